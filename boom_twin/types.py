@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from math import pi
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 if TYPE_CHECKING:  # commands that only look at a bag start without NumPy
     import numpy as np
@@ -435,8 +435,31 @@ class Health:
     noise: Mapping[str, float] = field(default_factory=dict)
 
 
+class _Rows(Protocol):
+    """What some fields of a report are made of when they are asked for."""
+
+    row: Array | None
+    streams: Sequence[int]
+
+    def prediction(self) -> Prediction | None: ...
+
+    def estimate(self) -> Estimate | None: ...
+
+    def residuals(self) -> tuple[Residuals, ...]: ...
+
+
+class _MadeWhenAsked:
+    """Beside the fields of a report, what those are made of that are not made yet."""
+
+    __slots__ = ("rows",)
+    rows: Any  # _Rows or None; what is encoded from rows knows more of them
+
+
+_MADE_OF_ROWS = frozenset({"prediction", "estimate", "residuals"})
+
+
 @dataclass(frozen=True, slots=True)
-class Report:
+class Report(_MadeWhenAsked):
     """What one sample caused.
 
     Attributes
@@ -477,6 +500,44 @@ class Report:
     health: Health | None = None
     estimate: Estimate | None = None
     earlier: tuple[Report, ...] = ()
+
+    @classmethod
+    def of_rows(cls, stamp: int, rows: _Rows, events: tuple[str, ...], passes: int, health: Health | None) -> Report:
+        """A report whose prediction, estimate and residuals are made of `rows` when they are asked for.
+
+        Few look at them where messages are encoded straight from the rows; it is the same in every other way.
+        """
+        report, put = object.__new__(cls), object.__setattr__
+        put(report, "stamp", stamp)
+        put(report, "accepted", True)
+        put(report, "events", events)
+        put(report, "status", "ok")
+        put(report, "change", None)
+        put(report, "passes", passes)
+        put(report, "health", health)
+        put(report, "earlier", ())
+        put(report, "rows", rows)
+        return report
+
+    def __getattr__(self, name: str) -> Any:
+        """A field that is not made yet; ``rows``, of a report that was made at once, is None."""
+        if name == "rows":
+            return None
+        if name not in _MADE_OF_ROWS or self.rows is None:
+            raise AttributeError(f"Report has no {name}")
+        value = getattr(self.rows, name)()
+        object.__setattr__(self, name, value)
+        return value
+
+    @property
+    def is_predicted(self) -> bool:
+        """Whether there is a prediction, which is not made by that."""
+        return self.prediction is not None if self.rows is None else self.rows.row is not None
+
+    @property
+    def has_residuals(self) -> bool:
+        """Whether there are residuals, likewise."""
+        return bool(self.residuals if self.rows is None else self.rows.streams)
 
     @property
     def all(self) -> tuple[Report, ...]:

@@ -45,7 +45,7 @@ class ModelWatch:
     def took(self, report: Report, duration: float) -> None:
         """The twin made `report` of a sample in so many seconds."""
         self._busy += duration
-        if report.prediction is not None:
+        if report.is_predicted:
             self._steps += 1
             self._passes += report.passes
             if duration > self._longest:
@@ -128,12 +128,14 @@ class LoadWatch:
         self._stamps: deque[int] = deque()
         self._loads: deque[Array] = deque()
 
+    def is_due(self, stamp: int) -> bool:
+        """Whether an estimate at `stamp` (ns) is to be taken: not if the last one was but `LOAD_INTERVAL` before."""
+        return not self._stamps or not 0 <= stamp - self._stamps[-1] < LOAD_INTERVAL
+
     def took(self, estimate: Estimate) -> None:
-        """Go on with an estimate, unless the last one was but `LOAD_INTERVAL` before."""
-        if self._stamps and not estimate.stamp - self._stamps[-1] >= LOAD_INTERVAL:
-            if estimate.stamp >= self._stamps[-1]:
-                return
-            self._stamps.clear()  # the clock was set back
+        """Go on with an estimate that `is_due`."""
+        if self._stamps and estimate.stamp < self._stamps[-1]:  # the clock was set back
+            self._stamps.clear()
             self._loads.clear()
         self._stamps.append(estimate.stamp)
         self._loads.append(estimate.load)

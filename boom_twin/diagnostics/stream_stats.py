@@ -138,7 +138,7 @@ class StreamWatch:
         """Listening begins; everything but the count is forgotten."""
         self.newest: int | None = None
         self._heard, self._told, self._least, self.lag = now, self.count, nan, nan
-        self._samples: list[Sample] = []
+        self._stamps, self._values = list[int](), list[Array]()  # of samples; these the collector of garbage does not search
         for channel in self._channels:
             channel.forget()
 
@@ -153,7 +153,8 @@ class StreamWatch:
 
     def took(self, sample: Sample) -> None:
         """A message held this; one that is refused never gets here."""
-        self._samples.append(sample)
+        self._stamps.append(sample.stamp)
+        self._values.append(sample.values)
 
     def age(self, now: float) -> float:
         """Time since the last message, or since listening began."""
@@ -167,10 +168,10 @@ class StreamWatch:
 
     def look(self, longest: float) -> list[ChannelStats]:
         """The figures of every channel since the last look; `longest` (s) is the step between stamps that is allowed."""
-        samples, self._samples = self._samples, []
-        refused = max(0, self.count - self._told - len(samples))
+        taken, values, self._stamps, self._values = self._stamps, self._values, [], []
+        refused = max(0, self.count - self._told - len(taken))
         self._told = self.count
         self.lag, self._least = self._least, nan
-        stamps = np.array([sample.stamp for sample in samples], dtype=np.int64)
-        table = np.concatenate([np.zeros(0), *(sample.values for sample in samples)]).reshape(-1, len(self._channels))
+        stamps = np.array(taken, dtype=np.int64)
+        table = np.concatenate([np.zeros(0), *values]).reshape(-1, len(self._channels))
         return [channel.look(stamps, table[:, i], refused, longest) for i, channel in enumerate(self._channels)]

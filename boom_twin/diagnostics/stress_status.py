@@ -28,17 +28,10 @@ class StressWatch:
 
     def __init__(self, model: BendingStressModel) -> None:
         self._model, self._judge = model, ComponentJudge("bending")
-        self._newest: tuple[Prediction, Estimate | None] | None = None
 
-    def took(self, prediction: Prediction, estimate: Estimate | None) -> None:
-        """Go on with a prediction and the estimate beside it."""
-        self._newest = prediction, estimate
-
-    def status(self, at: Evaluation) -> Status | None:
-        """Moment, stress and its deviation at every station; None before the first prediction."""
-        if self._newest is None:
-            return None
-        found, judge, places = self._model.at(*self._newest), self._judge, self._model.stations
+    def status(self, prediction: Prediction, estimate: Estimate | None, at: Evaluation) -> Status:
+        """Moment, stress and its deviation at every station, by a prediction and the estimate beside it."""
+        found, judge, places = self._model.at(prediction, estimate), self._judge, self._model.stations
         judge.begin(at)
         columns = found.moments, found.stresses, found.stress_sigmas
         for station, moment, stress, sigma in zip(places, *columns, strict=True):

@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 import numpy as np
 
 from ..config.settings import Thresholds
-from ..types import Health, Report, Residuals, Sample, Stream
+from ..types import Array, Health, Report, Sample, Stream
 from .levels import Evaluation, Level, Status
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualJudge, level_of
 from .sensor_status import SensorJudge, SensorSpec
@@ -69,7 +69,8 @@ class TwinWatch:
             stream.begin(now)
         self._model.begin(now)
         self._looked = now
-        self._residuals: list[Residuals] = []
+        self._residuals: dict[tuple[str, ...], tuple[list[Array], list[Array]]] = {}  # and their deviations, by channels
+        self._newest: Report | None = None  # that has a prediction
         self._judges: dict[str, ResidualJudge] = {}
         self._silent: set[Stream] = set()
         self.health: HealthWatch | None = None
@@ -86,13 +87,30 @@ class TwinWatch:
         self._streams[sample.stream].took(sample)
         for each in report.all:
             self._model.took(each, duration if each is report else 0.0)
-            if each.residuals:
-                self._residuals += each.residuals
-            if self._stress is not None and each.prediction is not None:
-                self._stress.took(each.prediction, each.estimate)
-            if each.estimate is not None:
+            if each.has_residuals:
+                self._keep_residuals(each)
+            if each.is_predicted:
+                self._newest = each
+            if self._load.is_due(each.stamp) and each.estimate is not None:
                 self._load.took(each.estimate)
             self.judged(each.health, 0.0)
+
+    def _keep_residuals(self, report: Report) -> None:
+        """Until the next look; arrays alone, which Python's collector of garbage does not search."""
+        rows = report.rows
+        if rows is not None and len(rows.streams) == 1:  # as nearly always
+            self._keep(rows.names(rows.streams[0]), rows.values, rows.sigmas)
+            return
+        for each in report.residuals:
+            self._keep(each.names, each.values[np.newaxis], each.sigmas[np.newaxis])
+
+    def _keep(self, names: tuple[str, ...], values: Array, sigmas: Array) -> None:
+        """Rows whose first columns are the channels."""
+        if names not in self._residuals:
+            self._residuals[names] = [], []
+        kept = self._residuals[names]
+        kept[0].append(values)
+        kept[1].append(sigmas)
 
     def judged(self, health: Health | None, duration: float) -> None:
         """The twin judged the rig's health in so many seconds; None if there was nothing to tell."""
@@ -187,8 +205,8 @@ class TwinWatch:
         if (load := self._load.status(at)) is not None:
             found.append(load)
         yield
-        if self._stress is not None and (stress := self._stress.status(at)) is not None:
-            found.append(stress)
+        if self._stress is not None and self._newest is not None and self._newest.prediction is not None:
+            found.append(self._stress.status(self._newest.prediction, self._newest.estimate, at))
         return found + sensors + (yield from self._look_at_residuals(now))
 
     def _is_silent(self, stream: StreamWatch, now: float) -> bool:
@@ -209,12 +227,12 @@ class TwinWatch:
 
     def _look_at_residuals(self, now: Callable[[], Evaluation]) -> Generator[None, None, list[Status]]:
         """Every channel that ever had a residual, one stream after the other."""
-        taken, self._residuals = self._residuals, []
-        for names in dict.fromkeys(each.names for each in taken):
+        taken, self._residuals = self._residuals, {}
+        for names, those in taken.items():
             yield
-            at, those = now(), [each for each in taken if each.names == names]
-            values, sigmas = (np.concatenate([getattr(each, part) for each in those]) for part in ("values", "sigmas"))
-            for name, column in zip(names, (values / sigmas).reshape(len(those), -1).T, strict=True):
+            at = now()
+            values, sigmas = (np.concatenate([each[:, : len(names)] for each in part]) for part in those)
+            for name, column in zip(names, (values / sigmas).T, strict=True):
                 self._judges.setdefault(name, ResidualJudge(name, self._looked)).take(column, at.now)
         at = now()
         self._looked = at.now

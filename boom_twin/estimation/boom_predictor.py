@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ..analysis.equilibrium import outline, set_undeformed, settle
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..kernels.elements.linkage import cylinder_length
+from ..kernels.jit import hold
 from ..kernels.result_row import PIN, places_in, prediction_width
 from ..kernels.tables import State, Tables, Tangents, Work
 from ..kernels.transfer.forward_kinematics import place
@@ -100,6 +102,8 @@ class BoomPredictor:
         The same for kernels; `boom_twin.twin.update` steps it.
     places : Places
         Where everything stands in a row of a prediction.
+    pins : int
+        Pins with clearance.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -108,7 +112,8 @@ class BoomPredictor:
         self._anchor, self._work = self.plan.state(), self.plan.work()
         self._undeflected = UndeflectedPredictor(scene, self.plan)
         self._track = new_track(self.plan, np.array([section.length for section in scene.sections]))
-        size = self.plan.joints, len(self.plan.pins)
+        self.pins = len(self.plan.pins)
+        size = self.plan.joints, self.pins
         self._row = np.zeros(prediction_width(*size))
         self.places = places_in(*size)
         self.compiled = CompiledBoom(
@@ -121,6 +126,11 @@ class BoomPredictor:
             moments_by_unknowns(self.plan),
             self._row,
         )
+
+    @cached_property
+    def held(self) -> tuple[Any, ...]:
+        """`compiled` as compiled code takes it with every call, see `boom_twin.kernels.jit.hold`."""
+        return tuple(map(hold, self.compiled))
 
     @property
     def variances(self) -> Array:
@@ -209,7 +219,11 @@ class BoomPredictor:
 
     def prediction(self, stamp: int, drawn: Outline | None = None, moments: Array | None = None) -> Prediction:
         """What the newest sample gave, with an outline and bending moments (N m) if they are given."""
-        row, at = self._row.copy(), self.places
+        return self.prediction_in(self._row.copy(), stamp, drawn, moments)
+
+    def prediction_in(self, row: Array, stamp: int, drawn: Outline | None = None, moments: Array | None = None) -> Prediction:
+        """The same of a row, of which its arrays are views; see `boom_twin.kernels.result_row`."""
+        at = self.places
         tip = row[at.tip].reshape(3, 3)
         angle, angular_velocity, angular_acceleration = tip[:, 2].tolist()
         position = tip[0, :2]

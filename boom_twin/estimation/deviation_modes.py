@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +15,7 @@ from ..analysis.modal import StrokeNoise
 from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..kernels.elements.linkage import levers
+from ..kernels.jit import hold
 from ..kernels.tables import State
 from ..scene.oil_spring import middle_stiffness
 from ..scene.schema import Scene
@@ -58,6 +61,11 @@ class DeviationModes:
         self._weight = explain(scene).mass * math.hypot(*scene.gravity)
         self._motions: list[Array] = []
         self._at = np.full(plan.joints, math.inf)
+
+    @cached_property
+    def held(self) -> Any:
+        """`filter` as compiled code takes it with every call, see `boom_twin.kernels.jit.hold`."""
+        return hold(self.filter)
 
     def begin(self) -> None:
         """A new run: nothing is known of the deviation."""

@@ -31,12 +31,14 @@ CONFIG_FILE = ".numba_config.yaml"
 """numba takes its settings from this file in the working directory, which may be a received session's."""
 
 
-_BY_REFERENCE: list[type] = []
+_BY_REFERENCE: set[type] = set()
+_UNREGISTERED: list[type] = []
 
 
 def by_reference(kind: type[Fields]) -> type[Fields]:
     """Let kernels take named tuples of this class by reference, see `boom_twin.kernels.references`."""
-    _BY_REFERENCE.append(kind)
+    _BY_REFERENCE.add(kind)
+    _UNREGISTERED.append(kind)
     return kind
 
 
@@ -78,8 +80,8 @@ def _register_references() -> None:
     """Make the classes known that are to be taken by reference."""
     from .references import register
 
-    while _BY_REFERENCE:
-        register(_BY_REFERENCE.pop())
+    while _UNREGISTERED:
+        register(_UNREGISTERED.pop())
 
 
 def _known(options: dict[str, Any]) -> dict[str, Any]:
@@ -95,7 +97,29 @@ def _kind(value: Any) -> Any:
     """What numba's type of an argument depends on; found fifty times as fast as that type."""
     if isinstance(value, np.ndarray):
         return type(value), value.dtype, value.ndim, value.flags.num & LAYOUT
+    if isinstance(value, HeldFields):
+        return _kind(value.fields)
     return (type(value), *map(_kind, value)) if isinstance(value, tuple) else type(value)
+
+
+class HeldFields(int):
+    """Address of the fields of a named tuple that kernels take by reference, see `hold`; with all that stands there.
+
+    Attributes
+    ----------
+    fields : tuple
+        The named tuple.
+    """
+
+    fields: Any
+    _room: Any
+
+    @classmethod
+    def of(cls, fields: Any, kept: Any, room: np.ndarray) -> HeldFields:
+        """The address of `room`; `kept` are the fields that were written there."""
+        held = cls(room.ctypes.data)
+        held.fields, held._room = fields, (kept, room)
+        return held
 
 
 class Kernel:
@@ -165,21 +189,25 @@ class Inner(Kernel):
         return self.py_func(*arguments)
 
 
-class _Referenced:
-    """See `referenced`."""
+class _OfReferences:
+    """A function of `boom_twin.kernels.references`, which is imported when a kernel that calls it is compiled."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
 
     def __call__(self, fields: Fields) -> Fields:
         return fields
 
     @property
     def _numba_type_(self) -> Any:
-        from .references import kind_of_referenced
+        from .references import kind_of
 
-        return kind_of_referenced()
+        return kind_of(self._name)
 
 
-referenced = _Referenced()
+referenced = _OfReferences("referenced")
 """A named tuple made in a kernel, as one that came `by_reference`; Python gets it back as it is."""
+_copy_fields: Any = _OfReferences("copy_fields")
 
 
 class StackArray:
@@ -209,3 +237,23 @@ def kernel(function: Callable[..., Any]) -> Kernel:
 def inner(function: Callable[..., Any]) -> Inner:
     """Compile as `kernel` does, inlined wherever a kernel calls it; Python runs it as it stands."""
     return Inner(function, forceinline=True, no_cpython_wrapper=True)
+
+
+@kernel
+def write_fields(fields, room):
+    """Copy a named tuple's fields to bytes, see `boom_twin.kernels.references.copy_fields`."""
+    return _copy_fields(fields, room)
+
+
+def hold(value: Any) -> Any:
+    """What stands for a named tuple in calls of compiled code, if that takes it by reference; anything else as it is.
+
+    Its fields are written once, here, and not with every call. It stands for this very tuple: what its arrays hold may change.
+    """
+    if type(value) not in _BY_REFERENCE or not hasattr(write_fields.dispatcher, "overloads"):
+        return value
+    kept, room = value._make(map(hold, value)), np.zeros(0, np.uint8)
+    write = write_fields.for_types_of(value, room)  # numba would look long for the type of what holds an address
+    while (size := write(kept, room)) > len(room):
+        room = np.zeros(size, np.uint8)
+    return HeldFields.of(value, kept, room)

@@ -6,6 +6,9 @@ when Python calls a kernel; kernels pass the address on and read a field where i
 
 A field is never written by a kernel (a named tuple cannot be changed, only what its arrays hold), so loads of fields are
 marked as invariant, and the compiler may move them out of loops.
+
+To write the fields is most of what a short call costs: two hundred arrays, each looked at in four places. Where the same tuple
+comes with every call they are written once, see `boom_twin.kernels.jit.hold`, and the call gets their address.
 """
 
 from __future__ import annotations
@@ -17,9 +20,13 @@ from llvmlite import ir
 from numba.core import cgutils
 from numba.core.imputils import lower_getattr_generic
 from numba.core.registry import cpu_target
-from numba.core.types import NamedTuple, Type  # type: ignore[attr-defined]
+from numba.core.types import NamedTuple, Type, int64  # type: ignore[attr-defined]
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import NativeValue, intrinsic, models, register_model, typeof_impl, unbox
+
+from .jit import HeldFields
+
+TUPLE_FLAG = 1 << 26  # Py_TPFLAGS_TUPLE_SUBCLASS
 
 
 class Reference(Type):
@@ -77,14 +84,31 @@ def _written(builder: Any, address: Any) -> Any:
 
 @unbox(Reference)
 def unbox_reference(of: Reference, value: Any, c: Any) -> NativeValue:
-    """Write the fields of a Python tuple where the call can read them."""
-    room = cgutils.alloca_once(c.builder, c.context.get_value_type(of.fields))
-    failed = cgutils.false_bit
-    for i, kind in enumerate(of.fields.types):
-        field = c.unbox(kind, c.pyapi.tuple_getitem(value, i))
-        c.builder.store(field.value, cgutils.gep_inbounds(c.builder, room, 0, i))
-        failed = c.builder.or_(failed, field.is_error)
-    return NativeValue(_written(c.builder, room), is_error=failed)
+    """Write the fields of a Python tuple where the call can read them, or take the address of what was written before."""
+    builder, kind = c.builder, c.context.get_value_type(of.fields)
+    room = cgutils.alloca_once(builder, kind)
+    address = cgutils.alloca_once_value(builder, room)
+    failed = cgutils.alloca_once_value(builder, cgutils.false_bit)
+    with builder.if_else(_is_tuple(c, value)) as (is_tuple, is_held):
+        with is_tuple:
+            for i, each in enumerate(of.fields.types):
+                field = c.unbox(each, c.pyapi.tuple_getitem(value, i))
+                builder.store(field.value, cgutils.gep_inbounds(builder, room, 0, i))
+                builder.store(builder.or_(builder.load(failed), field.is_error), failed)
+        with is_held:
+            builder.store(builder.bitcast(c.pyapi.long_as_voidptr(value), kind.as_pointer()), address)
+            builder.store(cgutils.is_not_null(builder, c.pyapi.err_occurred()), failed)
+    return NativeValue(_written(builder, builder.load(address)), is_error=builder.load(failed))
+
+
+def _is_tuple(c: Any, value: Any) -> Any:
+    """Whether a Python object is a tuple, by the flag that Python gives its class and those below it."""
+    word = c.pyapi.ulong
+    flags_of = cgutils.get_or_insert_function(c.builder.module, ir.FunctionType(word, [c.pyapi.pyobj]), "PyType_GetFlags")
+    kind = c.pyapi.object_type(value)
+    flags = c.builder.call(flags_of, [kind])
+    c.pyapi.decref(kind)
+    return c.builder.icmp_unsigned("!=", c.builder.and_(flags, word(TUPLE_FLAG)), word(0))
 
 
 @intrinsic
@@ -99,9 +123,23 @@ def referenced(_: Any, fields: Any) -> Any:
     return Reference(fields)(fields), write
 
 
-def kind_of_referenced() -> Any:
-    """numba's type of the function `referenced`."""
-    return cpu_target.typing_context.resolve_value_type(referenced)
+@intrinsic
+def copy_fields(_: Any, fields: Any, room: Any) -> Any:
+    """Copy the fields of a named tuple by reference to the array `room` of bytes, if it has room; gives how many these are."""
+
+    def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        address, given = arguments[0], context.make_array(signature.args[1])(context, builder, arguments[1])
+        size = ir.Constant(ir.IntType(64), context.get_abi_sizeof(address.type.pointee))
+        with builder.if_then(builder.icmp_signed(">=", given.nitems, size)):
+            cgutils.raw_memcpy(builder, builder.bitcast(given.data, address.type), address, size, 1)
+        return size
+
+    return int64(fields, room), write
+
+
+def kind_of(name: str) -> Any:
+    """numba's type of a function of this module."""
+    return cpu_target.typing_context.resolve_value_type(globals()[name])
 
 
 def register(kind: type) -> None:
@@ -110,3 +148,9 @@ def register(kind: type) -> None:
     @typeof_impl.register(kind)
     def type_of(value: Any, c: Any) -> Reference:
         return Reference(NamedTuple([typeof_impl(field, c) for field in value], kind))
+
+
+@typeof_impl.register(HeldFields)
+def type_of_held(value: HeldFields, c: Any) -> Any:
+    """As that of the named tuple itself."""
+    return typeof_impl(value.fields, c)

@@ -109,17 +109,24 @@ class Layout(NamedTuple):
     end: int
     at: int
     numbers: struct.Struct
+    stamped: struct.Struct
     later: tuple[tuple[int, bytes], ...]
     make: Callable[[tuple[float, ...]], Joints | Force]
 
     def is_of(self, data: bytes) -> bool:
         """Whether `data` is laid out like this."""
-        is_alike = len(data) == self.size and data[:2] == _LITTLE and data[_ORIGIN + _TIME : self.end] == self.head
-        return is_alike and all(data[at : at + 4] == length for at, length in self.later)
+        if len(data) != self.size or data[:2] != _LITTLE or data[_ORIGIN + _TIME : self.end] != self.head:
+            return False
+        return not self.later or all(data[at : at + len(part)] == part for at, part in self.later)
 
     def read(self, data: bytes) -> Joints | Force:
         """The message in `data`, which is laid out like this."""
         return self.make(self.numbers.unpack_from(data, self.at))
+
+    def read_stamped(self, data: bytes) -> tuple[int, Joints | Force]:
+        """Its stamp (ns) and the message."""
+        seconds, nanoseconds, *_ = found = self.stamped.unpack_from(data, _ORIGIN)
+        return seconds * SECOND + nanoseconds, self.make(found[2:])
 
     def are_of(self, block: MessageBlock, rows: Integers) -> NDArray[np.bool_]:
         """Whether each of some messages of a block is laid out like this, shape (rows,)."""
@@ -167,10 +174,9 @@ class CdrDecoder:
         """
         layout = self._layout
         if layout is not None and layout.is_of(data):
-            msg: Any = layout.read(data)
-        else:
-            msg = self._decode(data, self._type)
-            self._layout = layout_of(data, self._type, self._field)
+            return layout.read_stamped(data)
+        msg = self._decode(data, self._type)
+        self._layout = layout_of(data, self._type, self._field)
         stamp = stamp_in(data)
         if stamp is None:
             raise ValueError("the message is too short for a header")
@@ -188,10 +194,13 @@ def _joints_layout(data: bytes, field: str) -> Layout:
     """Of a JointState: header, names, and the number of positions come before these, then velocities and efforts alike."""
     names, place = names_in(data)
     place += -(place - _ORIGIN) % 4
-    end, lengths, found = place + 4, [], {}
+    end, lengths, found = place + 4, list[tuple[int, bytes]](), {}
     for each in (_POSITION, "velocity", "effort"):
         length = data[place : place + 4]
-        lengths.append((place, length))
+        if len(lengths) > 1 and lengths[-1][0] + len(lengths[-1][1]) == place:  # right behind the one before
+            lengths[-1] = lengths[-1][0], lengths[-1][1] + length
+        else:
+            lengths.append((place, length))
         count = int.from_bytes(length, "little")
         place += 4
         at = place + (-(place - _ORIGIN) % 8 if count else 0)
@@ -199,14 +208,20 @@ def _joints_layout(data: bytes, field: str) -> Layout:
         place = at + 8 * count
     at, numbers = found[field]
     head, make = data[_ORIGIN + _TIME : end], partial(Joints, names) if field == _POSITION else partial(Joints, names, ())
-    return Layout(len(data), head, end, at, numbers, tuple(lengths[1:]), make)
+    return Layout(len(data), head, end, at, numbers, _stamped(at, numbers), tuple(lengths[1:]), make)
 
 
 def _force_layout(data: bytes) -> Layout:
     """Of an Imu: after the header all has its place."""
     end = _ORIGIN + _TIME + 4 + int.from_bytes(data[_ORIGIN + _TIME : _ORIGIN + _TIME + 4], "little")
     at = end + -(end - _ORIGIN) % 8 + 8 * _BEFORE_FORCE
-    return Layout(len(data), data[_ORIGIN + _TIME : end], end, at, struct.Struct("<4d"), (), _force)
+    numbers = struct.Struct("<4d")
+    return Layout(len(data), data[_ORIGIN + _TIME : end], end, at, numbers, _stamped(at, numbers), (), _force)
+
+
+def _stamped(at: int, numbers: struct.Struct) -> struct.Struct:
+    """Stamp, and numbers from `at` on, of a message from after its encapsulation."""
+    return struct.Struct(f"<iI{at - _ORIGIN - _TIME}x{numbers.format.removeprefix('<')}")
 
 
 def _force(row: tuple[float, ...]) -> Force:

@@ -55,27 +55,40 @@ class Template:
         Its numbers are constants, or of `fields`; its stamps are `STAMP` s.
     fields : NumberFields
         Those of `msg`.
+
+    Attributes
+    ----------
+    size : int
+        Bytes of a message.
+    double_places, stamp_places : ndarray of int64
+        Of every field among the doubles, and of every stamp among the words of four bytes, that begin after the encapsulation.
     """
 
     def __init__(self, type_name: str, msg: Any, fields: NumberFields) -> None:
         self._data = bytearray(jazzy().serialize_cdr(msg, type_name))
-        size = len(self._data) - ORIGIN
+        self.size = len(self._data)
+        size = self.size - ORIGIN
         words = np.frombuffer(self._data, "<i4", size // 4, ORIGIN)
         self._singles, self._doubles = words.view("<f4"), np.frombuffer(self._data, "<f8", size // 8, ORIGIN)
-        self._stamps = [ORIGIN + 4 * int(place) for place in np.flatnonzero(words == STAMP)]
+        self.stamp_places = np.flatnonzero(words == STAMP)
+        self._stamps = [ORIGIN + 4 * place for place in self.stamp_places.tolist()]
         self._single_places = _places(words, _SINGLE, fields.singles)
-        self._double_places = _places(self._doubles.view("<i8"), _DOUBLE, fields.doubles)
+        self.double_places = _places(self._doubles.view("<i8"), _DOUBLE, fields.doubles)
 
     def byte_of(self, double: int) -> int:
         """Where in the message the field of that number begins; -1 is the last one."""
-        return ORIGIN + 8 * int(self._double_places[double])
+        return ORIGIN + 8 * int(self.double_places[double])
+
+    def put_into(self, data: Bytes) -> None:
+        """Copy the message, with its placeholders, to the beginning of an array of bytes."""
+        data[: self.size] = np.frombuffer(self._data, np.uint8)
 
     def fill(self, stamp: int, doubles: Array | Sequence[float], singles: Sequence[float] = ()) -> bytes:
         """The message with a stamp (ns) in all its headers, and with numbers in the order in which the fields were made."""
         time = divmod(stamp, SECOND)
         for place in self._stamps:
             _TIME.pack_into(self._data, place, *time)
-        self._doubles[self._double_places] = doubles
+        self._doubles[self.double_places] = doubles
         if singles:
             self._singles[self._single_places] = singles
         return bytes(self._data)
@@ -84,7 +97,7 @@ class Template:
         """Many messages, a row of bytes each, with stamps, shape (k,), and numbers, shape (d, k); see `fill`."""
         rows = np.empty((len(stamps), len(self._data)), np.uint8)
         rows[:] = np.frombuffer(self._data, np.uint8)
-        rows[:, ORIGIN : ORIGIN + self._doubles.nbytes].view("<f8")[:, self._double_places] = np.transpose(doubles)
+        rows[:, ORIGIN : ORIGIN + self._doubles.nbytes].view("<f8")[:, self.double_places] = np.transpose(doubles)
         times = np.column_stack(np.divmod(stamps, SECOND))
         for place in self._stamps:
             rows[:, place : place + _TIME.size].view("<i4")[:] = times

@@ -1,27 +1,28 @@
-"""Encode a `Report` of the twin as ROS messages: tip, residuals, joint states, changes, health.
-
-The model's plane (x forward, y up) is the x-z plane of ``base_link``, so a positive turn is one about its -y (REP-103).
-"""
+"""Encode a `Report` of the twin as ROS messages: tip, residuals, joint states, changes, health."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from math import nan
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..health.alarms import alarm_of, values_of
-from ..scene.kinematics import PassiveJoints, TipJoints
+from ..scene.kinematics import PassiveJoints
 from ..scene.schema import Scene
-from ..twin.blocks import STREAMS, EstimateBlock, Integers, PredictionBlock, ReportBlock, ResidualBlock
-from ..types import Alarm, Array, Change, Estimate, Health, Prediction, Report, Residuals, channels_of
+from ..twin.blocks import STREAMS, Integers, ReportBlock, ResidualBlock
+from ..twin.report_rows import ReportRows
+from ..types import Alarm, Array, Change, Health, Prediction, Report, Residuals, channels_of
 from .cdr_encoder import NumberFields, Template, stamped
 from .encoded_block import Bytes, EncodedBlock, EncodedBlockBuilder
 from .marker_encoder import ShapeMarkers
-from .message_fields import FRAME, fill_header, fill_xz
+from .message_fields import FRAME, fill_header
+from .numeric_outputs import ESTIMATED, PREDICTED, Selection, put_vector
+from .prediction_numbers import JOINTS, TIP_JOINTS, Chain, number_columns
+from .row_encoder import RowEncoder
 from .sample_decoder import stamp_of
 from .topic_table import TYPES, Output
 from .type_store import jazzy, new_message
@@ -91,97 +92,6 @@ def decode_changes(msg: Any) -> Change:
     return Change(stamp_of(msg), bool(from_rest), settings, zeros, from_rest == NEW)
 
 
-class PredictedOutput(NamedTuple):
-    """An output that every prediction gives one message of: what is put into an empty message, and with which numbers.
-
-    ``put`` gets the message and the fields, which it places where numbers stand; ``numbers`` gives these in the same order.
-    Of a block of predictions each of them is a column of it: transpose what has a row for every prediction.
-    """
-
-    output: Output
-    put: Callable[[Any, NumberFields], None]
-    numbers: Callable[[Prediction | PredictionBlock], Array | Sequence[Any]]
-
-
-def _put_vector(msg: Any, fields: NumberFields) -> None:
-    fill_xz(msg.vector, fields.row(2))
-
-
-def _put_point(msg: Any, fields: NumberFields) -> None:
-    fill_xz(msg.point, fields.row(2))
-
-
-def _put_acceleration(msg: Any, fields: NumberFields) -> None:
-    fill_xz(msg.accel.linear, fields.row(2))
-    msg.accel.angular.y = fields.double()
-
-
-PREDICTED = (
-    PredictedOutput(Output.TIP_DISPLACEMENT, _put_vector, lambda p: p.tip_displacement.T),
-    PredictedOutput(Output.TIP_POSITION, _put_point, lambda p: p.tip_position.T),
-    PredictedOutput(Output.TIP_ACCELERATION, _put_acceleration, lambda p: [*p.tip_acceleration.T, -p.tip_angular_acceleration]),
-)
-"""In the order in which a bag has them: m; m; m/s^2 and rad/s^2. ``joint_states`` follows."""
-
-
-def _put_pose(msg: Any, fields: NumberFields) -> None:
-    fill_xz(msg.pose.pose.position, fields.row(2))
-    msg.pose.pose.orientation.y, msg.pose.pose.orientation.w = fields.row(2)
-    _put_covariance(msg.pose, fields)
-
-
-def _put_acceleration_estimate(msg: Any, fields: NumberFields) -> None:
-    fill_xz(msg.accel.accel.linear, fields.row(2))
-    msg.accel.accel.angular.y = fields.double()
-    _put_covariance(msg.accel, fields)
-
-
-def _put_covariance(holder: Any, fields: NumberFields) -> None:
-    """Of x, z and the turn about y; the triangle that the numbers have comes first, then what mirrors it."""
-    table, (rows, columns) = np.zeros((6, 6)), np.triu_indices(3)
-    places = np.array([0, 2, 4])
-    table[places[rows], places[columns]] = fields.row(6)
-    off = rows != columns
-    table[places[columns[off]], places[rows[off]]] = fields.row(3)
-    holder.covariance = table.ravel()
-
-
-_MIRRORED = np.array([0, 1, 2, 3, 4, 5, 1, 2, 4])
-_SIGNS = np.array([1.0, 1.0, -1.0, 1.0, -1.0, 1.0])[_MIRRORED]
-
-
-def _covariance_numbers(triangle: Array) -> Array:
-    """Numbers of `_put_covariance` from an upper triangle (6,) or (6, k) of x, y and the angle: the turn counts about -y."""
-    return np.asarray((triangle[_MIRRORED].T * _SIGNS).T)
-
-
-def _pose_numbers(e: Estimate | EstimateBlock) -> Array:
-    x, y, angle = e.tip.T
-    place = np.array([x, y, -np.sin(0.5 * angle), np.cos(0.5 * angle)])
-    return np.concatenate([place, _covariance_numbers(e.tip_covariance.T)])
-
-
-def _acceleration_numbers(e: Estimate | EstimateBlock) -> Array:
-    x, y, angular = e.acceleration.T
-    return np.concatenate([np.array([x, y, -angular]), _covariance_numbers(e.acceleration_covariance.T)])
-
-
-class EstimatedOutput(NamedTuple):
-    """As `PredictedOutput`, of the estimate beside every prediction."""
-
-    output: Output
-    put: Callable[[Any, NumberFields], None]
-    numbers: Callable[[Estimate | EstimateBlock], Array]
-
-
-ESTIMATED = (
-    EstimatedOutput(Output.ESTIMATE_POSE, _put_pose, _pose_numbers),
-    EstimatedOutput(Output.ESTIMATE_ACCELERATION, _put_acceleration_estimate, _acceleration_numbers),
-    EstimatedOutput(Output.ESTIMATE_LOAD, lambda msg, fields: fill_xz(msg.wrench.force, fields.row(2)), lambda e: e.load.T),
-)
-"""In the order in which a bag has them, behind ``joint_states``."""
-
-
 Messages = list[tuple[Output, bytes]]
 
 
@@ -200,19 +110,29 @@ class ReportEncoder:
 
     def __init__(self, scene: Scene, settings: Settings, frame: str = FRAME) -> None:
         count, self._frame = len(scene.joints), frame
-        self._tip = TipJoints(scene)
         self._passive = PassiveJoints(scene)
+        self._chain = Chain(np.array(scene.base.pivot), np.array([section.length for section in scene.sections]))
+        own = [f"{kind}_{number}" for kind in ("joint", "stroke", "force") for number in range(1, count + 1)]
         names = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in range(1, count + 1)]
-        self._predicted = [(row.output, self._template(row.output, row.put), row.numbers) for row in PREDICTED]
-        self._estimated = [(row.output, self._template(row.output, row.put), row.numbers) for row in ESTIMATED]
-        self._uncertainty = self._template(Output.TIP_UNCERTAINTY, _put_vector)
-        self._joints = self._joint_states([*names, *TipJoints.NAMES], count)
-        self._all_joints = self._joint_states([*names, *TipJoints.NAMES, *self._passive.names], count)
+        joints = self._joint_states([*names, *TIP_JOINTS], count), Selection.named([*own, *TIP_JOINTS], count)
+        self._all_joints = self._joint_states([*names, *TIP_JOINTS, *self._passive.names], count)
+        predicted, self._estimated = (
+            [(row.output, self._template(row.output, row.put), Selection.named(row.numbers, count)) for row in table]
+            for table in (PREDICTED, ESTIMATED)
+        )
+        self._predicted = [*predicted, (Output.JOINT_STATES, *joints)]
+        self._uncertainty = self._template(Output.TIP_UNCERTAINTY, put_vector)
         self._channels = channels_of(count)
         self._residuals: dict[tuple[str, ...], Template] = {}
+        self._compiled: RowEncoder | None = None
         self._markers = ShapeMarkers(settings.exaggeration, settings.force_scale, frame)
         for output in Output:  # their encoders are compiled here, not when the first message waits
             jazzy().get_msgdef(TYPES[output])
+
+    def warm_up(self) -> None:
+        """Compile what encodes the reports of a twin sample by sample; else the first of them does."""
+        residuals = [(self._residual_template(names), 3 * len(names)) for names in self._channels.values()]
+        self._compiled = RowEncoder(self._chain, [*self._predicted, *self._estimated], residuals)
 
     def fill(self, report: Report, is_wanted: Callable[[Output], bool] = lambda output: True) -> Messages:
         """The messages of one report.
@@ -229,40 +149,71 @@ class ReportEncoder:
             Those of `PREDICTED`, ``joint_states``, those of `ESTIMATED`, and ``shape`` where it has one, if there is a
             prediction; ``residuals`` for each set of them; ``health`` and ``tip_uncertainty`` (m) where there is news of it.
         """
-        messages: Messages = []
-        if (p := report.prediction) is not None:
-            messages += [
-                (key, template.fill(p.stamp, numbers(p))) for key, template, numbers in self._predicted if is_wanted(key)
-            ]
-            if is_wanted(Output.JOINT_STATES):
-                messages.append((Output.JOINT_STATES, self._fill_joint_states(p)))
-        if (e := report.estimate) is not None:
-            messages += [
-                (key, template.fill(e.stamp, numbers(e))) for key, template, numbers in self._estimated if is_wanted(key)
-            ]
-        if report.residuals and is_wanted(Output.RESIDUALS):
-            messages += [(Output.RESIDUALS, self._fill_residuals(residuals)) for residuals in report.residuals]
+        rows: ReportRows | None = report.rows
+        if rows is None:
+            messages, has_shape = self._fill_numbers(report, is_wanted), _has_shape(report.prediction)
+        else:
+            messages, has_shape = self._fill_rows(rows, is_wanted), rows.outline is not None
         if report.change is not None and is_wanted(Output.CHANGES):
             messages.append((Output.CHANGES, encode_changes(report.change, self._frame)))
         if report.health is not None:
             messages += [each for each in self._fill_health(report.health) if is_wanted(each[0])]
-        if p is not None and p.shape is not None and is_wanted(Output.SHAPE):
-            messages.append((Output.SHAPE, self._markers.fill(p)))
+        if has_shape and is_wanted(Output.SHAPE):
+            assert report.prediction is not None
+            messages.append((Output.SHAPE, self._markers.fill(report.prediction)))
+        return messages
+
+    def _fill_rows(self, rows: ReportRows, is_wanted: Callable[[Output], bool]) -> Messages:
+        """Of prediction, estimate and residuals, straight from the rows that these would be made of."""
+        if self._compiled is None:
+            self.warm_up()
+        assert self._compiled is not None
+        messages = [] if rows.row is None else self._compiled.fill(rows, is_wanted)
+        if rows.outline is not None:
+            numbers = self._compiled.numbers[:, np.newaxis]
+            messages = [
+                (key, self._fill_joint_states(rows.stamp, numbers, True) if key is Output.JOINT_STATES else message)
+                for key, message in messages
+            ]
+        if rows.streams and is_wanted(Output.RESIDUALS):
+            messages += [(Output.RESIDUALS, each) for each in self._compiled.fill_residuals(rows)]
+        return messages
+
+    def _fill_numbers(self, report: Report, is_wanted: Callable[[Output], bool]) -> Messages:
+        """Of prediction, estimate and residuals."""
+        p, e, messages = report.prediction, report.estimate, Messages()
+        numbers = None if p is None and e is None else number_columns(self._chain, p, e, 1)
+        if p is not None and numbers is not None:
+            for key, template, chosen in self._predicted:
+                if key is Output.JOINT_STATES and is_wanted(key):
+                    messages.append((key, self._fill_joint_states(p.stamp, numbers, _has_shape(p))))
+                elif is_wanted(key):
+                    messages.append((key, template.fill(p.stamp, chosen.of(numbers)[:, 0])))
+        if e is not None and numbers is not None:
+            messages += [
+                (key, template.fill(e.stamp, chosen.of(numbers)[:, 0]))
+                for key, template, chosen in self._estimated
+                if is_wanted(key)
+            ]
+        if report.residuals and is_wanted(Output.RESIDUALS):
+            messages += [(Output.RESIDUALS, self._fill_residuals(residuals)) for residuals in report.residuals]
         return messages
 
     def fill_block(self, block: ReportBlock) -> EncodedBlock:
         """The messages of many reports: those that `fill` gives of one after the other."""
         p, residuals, found = block.predictions, block.residuals, EncodedBlockBuilder()
-        turn = len(self._predicted)  # of joint_states among the messages of one sample; estimates and residuals follow
-        first = turn + 1 + len(self._estimated)
+        turn = len(self._predicted)  # of estimates among the messages of one sample; residuals follow
+        first = turn + len(self._estimated)
         last = first + len(residuals.at)  # of health; shape follows
         if len(p.at):
-            for number, (output, template, numbers) in enumerate(self._predicted):
-                found.add(output, p.at, number, template.fill_rows(p.stamps, numbers(p)))
-            for rows, data in self._joint_states_rows(p):
-                found.add(Output.JOINT_STATES, p.at[rows], turn, data)
-            for number, (output, template, estimated) in enumerate(self._estimated, start=turn + 1):
-                found.add(output, p.at, number, template.fill_rows(p.stamps, estimated(block.estimates)))
+            numbers = number_columns(self._chain, p, block.estimates, len(p.at))
+            shaped = np.zeros(len(p.at), bool)
+            shaped[list(p.outlines)] = True
+            for number, (output, template, chosen) in enumerate([*self._predicted, *self._estimated]):
+                rows = np.flatnonzero(~shaped) if output is Output.JOINT_STATES else slice(None)
+                found.add(output, p.at[rows], number, template.fill_rows(p.stamps[rows], chosen.of(numbers[:, rows])))
+            rows, data = np.flatnonzero(shaped), self._shaped_joint_states(p.stamps[shaped], numbers[:, shaped])
+            found.add(Output.JOINT_STATES, p.at[rows], turn - 1, data)
         for rows, data in self._residual_rows(residuals):
             found.add(Output.RESIDUALS, residuals.at[rows], first + rows, data)
         for row, health in block.health.items():
@@ -289,26 +240,22 @@ class ReportEncoder:
 
         return self._template(Output.JOINT_STATES, put)
 
-    def _fill_joint_states(self, p: Prediction) -> bytes:
-        """With the passive joints where there is a shape."""
-        if p.shape is None:
-            return self._joints.fill(p.stamp, self._joint_numbers(p))
-        return self._all_joints.fill(p.stamp, [*self._joint_numbers(p), *self._passive.positions(p.joints)])
+    def _fill_joint_states(self, stamp: int, numbers: Array, is_shaped: bool) -> bytes:
+        """Of numbers, shape (all, 1); with the passive joints where there is a shape."""
+        _, template, chosen = self._predicted[-1]
+        own = chosen.of(numbers)[:, 0]
+        if not is_shaped:
+            return template.fill(stamp, own)
+        passive = self._passive.positions(numbers[JOINTS : JOINTS + len(self._chain.lengths), 0])
+        return self._all_joints.fill(stamp, [*own, *passive])
 
-    def _joint_numbers(self, p: Prediction | PredictionBlock) -> Array:
-        """What ``joint_states`` tells of joints, cylinders and the tip; of a block a column for every prediction."""
-        tip = self._tip.positions(p.joints, p.tip_position, p.tip_angle)
-        return np.concatenate([p.joints.T, p.strokes.T, p.cylinder_forces.T, tip])
-
-    def _joint_states_rows(self, p: PredictionBlock) -> Iterator[tuple[Integers, Bytes]]:
-        """Of all predictions, by rows of the block; those with a shape apart."""
-        numbers, has_shape = self._joint_numbers(p), np.zeros(len(p.at), bool)
-        has_shape[list(p.outlines)] = True
-        bare, shaped = np.flatnonzero(~has_shape), np.flatnonzero(has_shape)
-        yield bare, self._joints.fill_rows(p.stamps[bare], numbers[:, bare])
-        passive = np.array([self._passive.positions(joints) for joints in p.joints[shaped]])
-        columns = passive.reshape(len(shaped), len(self._passive.names)).T
-        yield shaped, self._all_joints.fill_rows(p.stamps[shaped], np.concatenate([numbers[:, shaped], columns]))
+    def _shaped_joint_states(self, stamps: Integers, numbers: Array) -> Bytes:
+        """With the passive joints, a row for each of the stamps (ns), of numbers, shape (all, k)."""
+        _, _, chosen = self._predicted[-1]
+        joints = numbers[JOINTS : JOINTS + len(self._chain.lengths)]
+        passive = np.array([self._passive.positions(column) for column in joints.T])
+        others = passive.reshape(len(stamps), len(self._passive.names)).T
+        return self._all_joints.fill_rows(stamps, np.concatenate([chosen.of(numbers), others]))
 
     def _fill_residuals(self, residuals: Residuals) -> bytes:
         """Named channels: ``position`` residual, ``velocity`` normalised residual, ``effort`` standard deviation."""
@@ -334,6 +281,10 @@ class ReportEncoder:
     def _fill_health(self, health: Health) -> Messages:
         uncertainty = self._uncertainty.fill(health.stamp, health.tip_sigmas)
         return [(Output.HEALTH, encode_health(health, self._frame)), (Output.TIP_UNCERTAINTY, uncertainty)]
+
+
+def _has_shape(prediction: Prediction | None) -> bool:
+    return prediction is not None and prediction.shape is not None
 
 
 def _residual_numbers(values: Array, sigmas: Array) -> Array:

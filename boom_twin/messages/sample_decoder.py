@@ -41,6 +41,12 @@ class _Channels:
         sensors = topics.sensors_of(stream, joints)
         self.names = [sensor.name for sensor in sensors.values()]
         self.scales = [(sensor.zero, factor(channel, sensor)) for channel, sensor in sensors.items()]
+        self.is_plain = all(scale == (0.0, 1.0) for scale in self.scales)  # readings are quantities
+        self.usual: tuple[Sequence[str], int, list[int]] = (
+            (),
+            -1,
+            [],
+        )  # names, readings and places of a message without oddities
         self._topics, self._stream = topics, stream
         self._seen: Sequence[str] = ()
         self._places = [-1] * len(self.names)
@@ -134,9 +140,10 @@ class SampleDecoder:
         raw = self._force(msg, stream) if stream in self._by_axis else self._by_name(msg, stream)
         if raw is None:
             return None
-        quantities = self._channels[stream].quantities(raw)
+        channels = self._channels[stream]
+        quantities = raw if channels.is_plain else channels.quantities(raw)
         values = [value if -LIMIT <= value <= LIMIT else self._reject(value) for value in quantities]
-        if all(map(isnan, values)):
+        if isnan(values[0]) and all(map(isnan, values)):
             self.oddities["no usable value"] += 1
             return None
         return Sample(stream, taken, np.array(values, dtype=np.float64))
@@ -179,10 +186,15 @@ class SampleDecoder:
 
     def _by_name(self, msg: Any, stream: Stream) -> list[float] | None:
         """Readings in the scene's order, `_ABSENT` where there is none; None if there is none at all."""
+        found, channels = getattr(msg, SENSORS[stream].field), self._channels[stream]
+        names, end, usual = channels.usual
+        if msg.name is names and len(found) == end:  # the decoder hands out the same names again
+            return [float(found[place]) for place in usual]
         places, odd = self.places(stream, msg)
         for name in odd:
             self.oddities[name] += 1
-        found = getattr(msg, SENSORS[stream].field)
+        if places is not None and not odd and isinstance(msg.name, tuple):
+            channels.usual = msg.name, len(found), places
         return None if places is None else [float(found[place]) if place >= 0 else _ABSENT for place in places]
 
     def _force(self, msg: Any, stream: Stream) -> list[float] | None:

@@ -8,9 +8,10 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from ..kernels.elements.linkage import LINK_L
-from ..scene.kinematics import CYLINDER, LEFT, RIGHT, TipJoints, linkage
+from ..scene.kinematics import CYLINDER, LEFT, RIGHT, linkage
 from ..scene.schema import Cylinder, Scene, section_depth
 from .message_fields import FRAME
+from .prediction_numbers import TIP_JOINTS
 
 NAME = "boom"
 TIP, TIP_RIGID, TIP_ALONG, TIP_ACROSS, IMU = "tip", "tip_rigid", "tip_along", "tip_across", "imu_link"
@@ -120,7 +121,7 @@ def _tip(robot: Element, scene: Scene) -> None:
         SubElement(robot, "link", name=name)
     _joint(robot, "tip_fixed", "fixed", f"section_{len(scene.sections)}", TIP_RIGID, (scene.sections[-1].length, 0.0))
     reach = sum(section.length for section in scene.sections)
-    along, across, pitch = TipJoints.NAMES
+    along, across, pitch = TIP_JOINTS
     _limit(_joint(robot, along, "prismatic", TIP_RIGID, TIP_ALONG, (0.0, 0.0), axis="1 0 0"), -reach, reach)
     _limit(_joint(robot, across, "prismatic", TIP_ALONG, TIP_ACROSS, (0.0, 0.0), axis="0 0 1"), -reach, reach)
     _joint(robot, pitch, "continuous", TIP_ACROSS, TIP, (0.0, 0.0))

@@ -162,35 +162,6 @@ class PassiveJoints:
         return positions
 
 
-class TipJoints:
-    """Positions of the joints that lead from the tip of rigid sections to that of the deflected boom, of one scene."""
-
-    NAMES = ("tip_dx", "tip_dz", "tip_pitch")
-
-    def __init__(self, scene: Scene) -> None:
-        self._pivot, self._lengths = scene.base.pivot, [section.length for section in scene.sections]
-
-    def positions(self, joints: Array, tip: Array, angle: Array | float) -> Array:
-        """What lies between, in the order of `NAMES`, shape (3, ..): along and across the last section, m; its turn, rad.
-
-        Parameters
-        ----------
-        joints : ndarray, shape (.., n)
-            Relative joint angles of the deflected boom, rad.
-        tip : ndarray, shape (.., 2)
-            Its tip, m.
-        angle : ndarray or float, shape (..)
-            Orientation of its last head, rad.
-        """
-        headings, x, y = np.cumsum(joints, axis=-1), 0.0, 0.0
-        for length, along, across in zip(self._lengths, np.cos(headings).T, np.sin(headings).T, strict=True):
-            x, y = x + length * along, y + length * across  # one after the other, for one row is what is asked for most
-        x, y = tip.T[0] - (self._pivot[0] + x), tip.T[1] - (self._pivot[1] + y)
-        found = np.array([along * x + across * y, along * y - across * x, angle - headings.T[-1]])
-        found[np.isnan(found)] = np.nan  # of two NaN, which one a sum has depends on how many are summed at once
-        return found
-
-
 def _plain(row: np.record) -> SimpleNamespace:
     """The fields of a record as Python numbers, which cost a tenth to read."""
     return SimpleNamespace(**{name: row[name].item() for name in LINKAGE.names or ()})

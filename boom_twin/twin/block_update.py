@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +22,15 @@ from ..estimation.step_choice import StepChoice
 from ..estimation.stroke_filter import filter_tuning
 from ..health.inference.block_problem import MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
+from ..kernels.jit import hold
 from ..kernels.result_row import PIN
 from ..scene.schema import Scene
-from ..types import NANO, SECOND, Health, Mount, Outline, Report, Residuals, Stream, channels_of
-from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
+from ..types import NANO, SECOND, Array, Health, Mount, Outline, Report, Stream, channels_of
+from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
 from .load_shedding import LoadShedding
+from .report_rows import ReportRows
 from .run import Run
-from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, STROKES, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
+from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .stroke_check import FAR
 from .update import AFTER_PAUSE, DONE, LOOK, ODD, REFRESH, measure, update
 
@@ -74,6 +77,11 @@ class _UpdateExtras:
 
 
 NO_EXTRAS = _UpdateExtras()
+
+_Code = tuple[Callable[..., tuple[int, int]], Callable[..., bool]]
+"""`update` and `measure`, compiled for a scene's types."""
+_Held = tuple[_Code, tuple[tuple[Any, ...], tuple[Any, ...], Any]]
+"""With fields of a boom; limits, state and filter of the estimate; output: see `boom_twin.kernels.jit.hold`."""
 
 
 class BlockUpdate:
@@ -126,8 +134,19 @@ class BlockUpdate:
         self._found.counts[:] = 0
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
         self._due: Run | None = None  # whose newest slot is still to be judged
-        self._update: Callable[..., tuple[int, int]] | None = None
-        self._measure: Callable[..., bool] | None = None
+        self._held: _Held | None  # what the compiled code takes with every call
+        is_same = before is not None and before._state is state
+        self._kept: tuple[Any, Any] | None = before._kept if before is not None and is_same else None  # state and output, held
+        self._code: _Code | None = before._code if before is not None and is_same else None
+
+    @property
+    def limits(self) -> Limits:
+        """What samples are judged by."""
+        return self._limits
+
+    @limits.setter
+    def limits(self, limits: Limits) -> None:
+        self._limits, self._held = limits, None
 
     def begin_health(self) -> None:
         """What was found up to now is of no concern to the health monitor any more."""
@@ -141,7 +160,7 @@ class BlockUpdate:
         Parameters
         ----------
         run : Run or None
-            The present one; only measured samples, one a block, are taken without.
+            The present one.
         block : SampleBlock
             At most `CAPACITY` samples; int64, int64 and float64 arrays without gaps.
         trusted : bool
@@ -152,22 +171,48 @@ class BlockUpdate:
         reason, count : int
             Why that ended, see `boom_twin.twin.update.DONE`, and how many samples were taken.
         """
-        found = self._found
         self.judge()
         self.make_room()
-        if len(block.stamps) == 1 and block.streams[0] != STROKES:
-            args = int(block.streams[0]), int(block.stamps[0]), block.values[0]
-            arguments = self.limits, self._state, self._modes.filter, *args, trusted, found
-            if self._measure is None:
-                self._measure = measure.for_types_of(*arguments)
-            is_taken = self._measure(*arguments)
-            reason, row = (DONE, 1) if is_taken else (ODD, 0)
-        else:
-            reason, row = self._advance_strokes(run, block, trusted)
+        reason, row = self._advance_strokes(run, block, trusted)
+        self._count_unmatched()
+        return reason, row
+
+    def measure(self, code: int, stamp: int, values: Array, trusted: bool) -> int:
+        """Take one measured sample, without the boom; `DONE`, or `ODD` and nothing done.
+
+        Parameters
+        ----------
+        code : int
+            Of its stream, see `boom_twin.twin.blocks.CODES`.
+        stamp : int
+            ns.
+        values : ndarray
+            float64 without gaps, all channels of the stream.
+        trusted : bool
+            Whether it was looked at before.
+        """
+        self.judge()
+        self.make_room()
+        (_, measure_one), (_, twin, found) = self._held or self._hold()
+        is_taken = measure_one(*twin, code, stamp, values, trusted, found)
+        self._count_unmatched()
+        return DONE if is_taken else ODD
+
+    def _count_unmatched(self) -> None:
         if unmatched := int(self._state.clock[UNMATCHED]):
             self._told_counts["unmatched"] += unmatched
             self._state.clock[UNMATCHED] = 0
-        return reason, row
+
+    def _hold(self) -> _Held:
+        """Look up the compiled code, and write once what it takes with every call; another load needs little of that anew."""
+        self._kept = state, found = self._kept or (hold(self._state), hold(self._found))
+        boom, twin = self._boom.held, (hold(self._limits), state, self._modes.held)
+        if self._code is None:
+            one, width = np.zeros(1, np.int64), int(self._widths.max())
+            advance = update.for_types_of(*boom, *twin, one, one, np.zeros((1, width)), 0, False, False, found)
+            self._code = advance, measure.for_types_of(*twin, 0, 0, np.zeros(width), False, found)
+        self._held = self._code, (boom, twin, found)
+        return self._held
 
     def make_room(self) -> None:
         """Before the next call of the compiled update, which adds its rows to those that the health monitor is told later."""
@@ -180,12 +225,9 @@ class BlockUpdate:
     def _advance_strokes(self, run: Run | None, block: SampleBlock, trusted: bool) -> tuple[int, int]:
         row, is_resumed, size = 0, False, len(block.stamps)
         assert run is not None
+        (advance, _), (arguments, twin, found) = self._held or self._hold()
         while True:
-            twin = *self._boom.compiled, self.limits, self._state, self._modes.filter
-            arguments = *twin, *block, row, is_resumed, trusted, self._found
-            if self._update is None:
-                self._update = update.for_types_of(*arguments)
-            reason, row = self._update(*arguments)
+            reason, row = advance(*arguments, *twin, *block, row, is_resumed, trusted, found)
             if is_resumed := reason == REFRESH:
                 interval, boom = run.interval or self._step, self._boom
                 prediction = boom.prediction(run.newest)
@@ -219,6 +261,11 @@ class BlockUpdate:
             self._told = tuple(self._found.counts.tolist())
         elif self._judge is not None:
             self._due = run
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the newest sample was the first of a slot, and the rig's health was not judged yet."""
+        return self._due is not None
 
     def judge(self) -> Health | None:
         """Judge the rig's health if the newest sample was the first of a slot and that was not done yet; gives the news.
@@ -324,19 +371,20 @@ class BlockUpdate:
         reports = enumerate(block.reports(self._joints))
         return [replace(each, events=self._news.events.get(row, ())) for row, each in reports]
 
-    def report(self, stamp: int, events: list[str], judged: bool = True) -> Report:
+    def report(self, stamp: int, events: Sequence[str], judged: bool = True) -> Report:
         """What the compiled update found of one sample, of which `events` are to be told too; unless `judged`, see `judge`."""
         found, news, (predicted, known) = self._found, self._news, self._found.counts.tolist()
-        residuals = []
-        for row in range(self._begin[1], known):
-            stream = STREAMS[found.residual_streams[row]]
-            names = self._channels[stream]
-            values, sigmas = found.values[row, : len(names)].copy(), found.sigmas[row, : len(names)].copy()
-            residuals.append(Residuals(stream, int(found.residual_stamps[row]), names, values, sigmas))
-        if predicted == self._begin[0]:
-            return Report(stamp, True, residuals=tuple(residuals), events=tuple(events))
-        prediction = self._boom.prediction(stamp, self._outlines().get(0), found.moments[predicted - 1].copy())
-        told = (*events, *news.events.get(0, ()))
-        estimate = estimate_of(stamp, found.estimates[predicted - 1].copy())
-        passes, health = int(found.passes[predicted - 1]), self.judge() if judged else None
-        return Report(stamp, True, prediction, tuple(residuals), told, passes=passes, health=health, estimate=estimate)
+        rows = ReportRows(self._boom, self._channels, stamp)
+        if known > self._begin[1]:
+            own = slice(self._begin[1], known)
+            rows.streams, rows.stamps = found.residual_streams[own].tolist(), found.residual_stamps[own].tolist()
+            rows.values, rows.sigmas = found.values[own].copy(), found.sigmas[own].copy()
+        passes, told, health = 0, tuple(events), None
+        if predicted > self._begin[0]:
+            at = predicted - 1
+            rows.row, rows.estimated = found.rows[at].copy(), found.estimates[at].copy()
+            rows.moments, passes = found.moments[at].copy(), int(found.passes[at])
+            if news is not NO_EXTRAS:
+                rows.outline, told = self._outlines().get(0), (*events, *news.events.get(0, ()))
+            health = self.judge() if judged else None
+        return Report.of_rows(stamp, rows, told, passes, health)

@@ -54,12 +54,14 @@ def drive(twin: Twin, items: Iterable[Sample | Change | None], judged: bool = Tr
         Of every sample; None for a message without a usable value.
     """
     for item in _repeating_changes(twin, items):
-        if item is None:
-            yield None
-        else:
-            began = perf_counter()
-            report = twin.update(item, judged)
-            yield Step(item, report, perf_counter() - began)
+        yield None if item is None else drive_one(twin, item, judged)
+
+
+def drive_one(twin: Twin, sample: Sample, judged: bool = True) -> Step:
+    """Update `twin` with one sample, of which no change comes before; see `drive`."""
+    began = perf_counter()
+    report = twin.update(sample, judged)
+    return Step(sample, report, perf_counter() - began)
 
 
 def drive_blocks(

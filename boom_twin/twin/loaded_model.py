@@ -56,6 +56,7 @@ def loaded_model(
     boom = BoomPredictor(scene)
     judge = None if baseline is None else HealthMonitor(scene, settings, tuple(mounts), baseline, on_block)
     modes = DeviationModes(scene, boom.plan, settings, mounts)
+    _ = boom.held, modes.held  # made here, where no sample waits for them
     return LoadedModel(scene, boom, judge, modes, choose_steps(scene, boom.plan, settings))
 
 

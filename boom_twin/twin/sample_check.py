@@ -34,7 +34,7 @@ class SampleCheck:
         self.is_sure = False
 
     def checked(self, sample: Sample) -> Sample:
-        """The sample, its stamp an int and its values float64, shape (channels,): a copy, the caller's may change.
+        """The sample, its stamp an int and its values float64 without gaps, shape (channels,); not copied if it is so already.
 
         Raises
         ------
@@ -49,14 +49,15 @@ class SampleCheck:
             and type(stream) is Stream
             and -LIMIT <= stamp < LIMIT
             and values.shape == self._shapes[stream]
+            and values.flags.carray
         ):
-            values = values.copy()
+            found = sample
         else:
             stream = _stream(stream)
-            stamp, values = _stamp(stamp), self._values(stream, values)
+            found = Sample(stream, _stamp(stamp), self._values(stream, values))
         if not self.is_sure and stream is Stream.STROKES:
-            self._look(stamp)
-        return Sample(stream, stamp, values)
+            self._look(found.stamp)
+        return found
 
     def look_at(self, stamps: NDArray[np.int64]) -> None:
         """Look at the stamps (ns) of strokes that are to come in a block: if these are enough to be sure, be so at once."""

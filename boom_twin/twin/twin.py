@@ -195,7 +195,7 @@ class Twin:
         parts = self._boom, limits, self._state, self._channels, self.settings.step, self._modes, self.judge
         self._former = before  # let go of when the next model is made, which may be in a thread of its own
         self._compiled = BlockUpdate(*parts, self.counts, self.shedding, before)
-        self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.full((1, max(self._widths)), np.nan))
+        self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, self.plan.joints)))  # of strokes
 
     def _take_over(self, stamp: int) -> list[str]:
         """Make what was asked for hold; gives the events. Another load, or other zeros of strokes, need a start from rest."""
@@ -269,11 +269,15 @@ class Twin:
         sample = self._edge.checked(sample)
         if self._run is None or (self.requests.due and sample.stream is Stream.STROKES):
             return self._look_at(sample)
-        self._fill_one(sample.stream, sample.stamp, sample.values)
-        reason, _ = self._compiled.advance(self._run, self._one)
+        reason = self._advance_one(sample)
         if reason == DONE:
-            return self._compiled.report(sample.stamp, [], judged)
+            return self._compiled.report(sample.stamp, (), judged)
         return self._fail(sample, []) if reason == FAILED else self._look_at(sample)
+
+    @property
+    def is_health_due(self) -> bool:
+        """Whether `update` left the judgement of health out for its last sample."""
+        return self._compiled.is_due
 
     def judge_health(self) -> Health | None:
         """Judge the rig's health, if `update` left that out for its last sample; see `Report.health`."""
@@ -323,13 +327,19 @@ class Twin:
         code = int(block.streams[row])
         return Sample(STREAMS[code], int(block.stamps[row]), block.values[row, : channels[code]].copy())
 
-    def _fill_one(self, stream: Stream, stamp: int, values: Array) -> None:
+    def _advance_one(self, sample: Sample, trusted: bool = False) -> int:
+        """Take a sample if it is ordinary, or `trusted`; see `BlockUpdate.advance`."""
+        if sample.stream is not Stream.STROKES:
+            return self._compiled.measure(CODES[sample.stream], sample.stamp, sample.values, trusted)
         one = self._one
-        one.streams[0], one.stamps[0], one.values[0, : len(values)] = CODES[stream], stamp, values
+        one.stamps[0], one.values[0] = sample.stamp, sample.values
+        reason, _ = self._compiled.advance(self._run, one, trusted)
+        return reason
 
     def _look_at(self, sample: Sample) -> Report:
-        """Take a sample that may be out of the ordinary."""
+        """Take a sample that may be out of the ordinary; of a copy, for it may be held, and the caller's may change."""
         self._compiled.make_room()
+        sample = replace(sample, values=sample.values.copy())
         complete = _are_readings(sample.values.tolist())
         if not complete:
             usable = np.abs(sample.values) <= LIMIT
@@ -502,9 +512,7 @@ class Twin:
         run.is_predicted = True
         events += oddities
         self._state.strokes[:], self._state.taken[:] = sample.values, taken
-        self._fill_one(sample.stream, sample.stamp, sample.values)
-        reason, _ = self._compiled.advance(self._run, self._one, trusted=True)
-        if reason == FAILED:
+        if self._advance_one(sample, trusted=True) == FAILED:
             return self._fail(sample, events)
         self.counts.update(events)
         return self._compiled.report(sample.stamp, events)
@@ -538,11 +546,9 @@ class Twin:
         if not complete:
             events = ("partial",)
             self.counts.update(events)
-        self._fill_one(sample.stream, sample.stamp, sample.values)
-        reason, _ = self._compiled.advance(self._run, self._one, trusted=True)
-        if reason != DONE:
+        if self._advance_one(sample, trusted=True) != DONE:
             return self._refuse(sample, "unmatched", *events)
-        return self._compiled.report(sample.stamp, list(events))
+        return self._compiled.report(sample.stamp, events)
 
     def _hold(self, sample: Sample, event: str) -> Report:
         """Taken as a witness of time alone, at first."""

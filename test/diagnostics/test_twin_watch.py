@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -177,16 +178,15 @@ def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() ->
     scene, strokes = load_scene(), strokes_of_posture(load_scene(), "horizontal")
     prediction = Twin(scene).update(Sample(Stream.STROKES, 10**18, strokes)).prediction
     watch, at = stress_watch(scene), Evaluation(Thresholds(), 0.0, 0.0)
-    assert watch is not None and prediction is not None and watch.status(at) is None
+    assert watch is not None and prediction is not None
     for load, told in (
         (np.zeros(2), "-94.4 MPa in section 1 at 0.60 m"),
         (np.array([0.0, -100.0]), "-98.1 ± 0.73 MPa in section 1"),
     ):
         variance = np.full(2, 400.0)
         estimate = Estimate(10**18, np.zeros(3), np.zeros(3), load, np.zeros(6), np.zeros(6), variance)
-        watch.took(prediction, estimate)
-        status = watch.status(at)
-        assert status is not None and status.level == Level.OK and status.message.startswith(told), status.message
+        status = watch.status(prediction, estimate, at)
+        assert status.level == Level.OK and status.message.startswith(told), status.message
     assert status.values["section_1_at_0.60_m_sigma_MPa"] == pytest.approx(0.73, rel=0.02)
     rigid = scene.model_copy(update={"modes": 0})
     assert stress_watch(rigid) is None
@@ -204,3 +204,26 @@ def test_the_load_at_the_tip_is_told_once_anything_was_measured() -> None:
     assert status.level == Level.OK and status.message.startswith("pulses of 12")
     assert status.values["frequency_Hz"] == pytest.approx(0.5, rel=0.02)
     assert status.values["pulses_N"] == pytest.approx(120.0, rel=0.05)
+
+
+def test_reports_of_rows_are_judged_as_those_that_were_made_at_once() -> None:
+    """Residuals of several streams, at once or when strokes come, the load, the bending stresses."""
+    scene, random = load_scene(), np.random.default_rng(3)
+    twin, rest = Twin(scene), strokes_of_posture(scene, "horizontal")
+    watches = []
+    for _ in range(2):
+        sensors = sensors_of(scene, Settings(), REQUIRED, [None] * 4)
+        watches.append(TwinWatch(sensors, NAMES, Thresholds(), lambda: 100.0, stress_watch(scene)))
+    for k in range(100):
+        stamp = 10**18 + k * 5_000_000
+        early = [Sample(stream, stamp + 1000, random.normal(size=4)) for stream in (Stream.ANGLES, Stream.FORCES)]
+        late = Sample(Stream.IMU, stamp, np.array([0.1, 9.8]))
+        for sample in (*early, Sample(Stream.STROKES, stamp, rest + random.normal(0.0, 2e-5, 4)), late):
+            report = twin.update(sample)
+            for watch, each in zip(watches, (report, replace(report)), strict=True):
+                watch.took(sample, each, 1e-4)
+    peers = {stream: Peers(f"/{stream.value}", ("/driver",)) for stream in Stream}
+    found = [all_pieces(watch.look({}, True, peers, [], 100.0)) for watch in watches]
+    assert repr(found[0]) == repr(found[1])
+    names = {status.name for status in found[0]}
+    assert names >= {"residual joint_1", "residual tip_imu_z", "residual cylinder_force_4", "tip load", "bending"}, names

@@ -12,7 +12,7 @@ import pytest
 
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.estimation.look_ahead import Track
-from boom_twin.kernels.jit import _kind, by_reference, kernel, referenced
+from boom_twin.kernels.jit import HeldFields, _kind, by_reference, hold, kernel, referenced
 from boom_twin.kernels.tables import Condensed, State, Tables, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.scene import load_scene
@@ -76,6 +76,37 @@ def test_tuples_made_in_a_loop_are_told_apart():
     tables, values, out = rng.normal(size=(50, 3, 2)), rng.normal(size=(50, 2)), np.zeros(50)
     totals(tables, values, Pair(0.5, 3), out)
     assert out == pytest.approx(np.einsum("ijk,ik->i", tables, values) + 1.5 * (np.arange(50) % 2), rel=1e-12)
+
+
+def test_fields_that_were_written_once_are_read_where_they_stand():
+    """Also those of the tuple inside; what its arrays hold changes with them, and nothing of it is let go of."""
+    given = fields()
+    held = hold(given)
+    assert isinstance(held, HeldFields) and held.fields is given
+    del given
+    others = [hold(fields(flag=False)) for _ in range(100)]
+    assert total(held) == total.for_types_of(held)(held) == total.for_types_of(fields())(held) == 96.0 + 1.5
+    assert {total(each) for each in others} == {96.0}
+    held.fields.inside.values[:] = 1.0
+    assert total(held) == total(fields()._replace(inside=Inside(np.ones(2)))) == 15.0 + 1.5
+
+
+def test_only_what_goes_by_reference_is_held():
+    for value in (Pair(0.5, 3), np.zeros(2), 1, (fields(),)):
+        assert hold(value) is value
+
+
+def test_what_is_held_is_of_the_type_of_its_fields():
+    import numba
+
+    held = hold(fields())
+    assert numba.typeof(held) == numba.typeof(fields()) and _kind(held) == _kind(fields())
+
+
+def test_neither_a_tuple_nor_held_is_refused():
+    """An address that somebody made up would be read."""
+    with pytest.raises(TypeError):
+        total.for_types_of(fields())("fields")
 
 
 def test_what_is_no_field_is_told():

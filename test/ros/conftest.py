@@ -26,8 +26,27 @@ PATIENCE = 240.0  # s; the first node compiles
 SECONDS, RATE = 4.0, 200.0
 
 
+def waited_ns(pid: int) -> dict[str, int]:
+    """How long each thread of a process, and of those that it started, waited for a core that others had, by its number."""
+    found = {}
+    for task in Path(f"/proc/{pid}/task").glob("*"):
+        with suppress(OSError):
+            found[task.name] = int((task / "schedstat").read_text().split()[1])
+            for child in (task / "children").read_text().split():
+                found |= waited_ns(int(child))
+    return found
+
+
 class Process:
-    """A child whose output is kept."""
+    """A child whose output is kept.
+
+    Attributes
+    ----------
+    ended_after : float
+        Of the last `end`: how long it took, s, less what it waited for cores that other processes had.
+    """
+
+    ended_after = 0.0
 
     def __init__(self, log: Path, *arguments: str, stdin: int | None = subprocess.DEVNULL) -> None:
         self._log = log
@@ -69,7 +88,17 @@ class Process:
         return self.end(10.0)
 
     def end(self, patience: float = PATIENCE) -> int:
-        return self._child.wait(patience)
+        """Exit code; an error if it goes on for `patience`, s, in which it could have had a core."""
+        began, before = time.monotonic(), waited_ns(self.pid)
+        waited = before.copy()
+        while self._child.poll() is None:
+            waited |= waited_ns(self.pid)
+            starved = sum(waited.values()) - sum(before.get(task, 0) for task in waited)
+            self.ended_after = time.monotonic() - began - 1e-9 * starved
+            if self.ended_after > patience:
+                raise subprocess.TimeoutExpired(self._child.args, patience)
+            time.sleep(0.01)
+        return self._child.returncode
 
     def close(self) -> None:
         with suppress(ProcessLookupError):  # its children too

@@ -96,7 +96,7 @@ def test_there_is_one_loop() -> None:
     """Node, replay, live page, held-out check and baseline all drive by it; none updates a twin itself."""
     root = Path(boom_twin.__file__).parent
     texts = {file.relative_to(root).as_posix(): file.read_text() for file in root.rglob("*.py")}
-    drives = re.compile(r"\bdrive(_blocks)?\(.*twin", re.I)
+    drives = re.compile(r"\bdrive(_blocks|_one)?\(.*twin", re.I)
     users = {name for name, text in texts.items() if drives.search(text) and "twin.driver import" in text}
     assert users == {
         "calibration/baseline.py", "calibration/validation.py", "monitor/data/bag_feed.py", "offline/replay.py",

@@ -12,6 +12,7 @@ from boom_twin import Report, Sample, Stream, Twin, load_scene
 from boom_twin.analysis.modal import ModeSeries
 from boom_twin.errors import UsageError
 from boom_twin.health.baseline import load_baseline
+from boom_twin.kernels.jit import _kind
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin import loaded_model
 from boom_twin.twin.loaded_model import ModelPreparation
@@ -133,3 +134,12 @@ def test_a_restart_and_another_load_find_their_natural_modes_made(monkeypatch: p
     twin.requests.rest()
     assert twin.update(rows[120]).change is not None
     assert found == ["MainThread", "model"]
+
+
+def test_code_that_is_compiled_for_a_boom_takes_it_under_any_load() -> None:
+    """Its tables have the same types, so that another load does not look them up while a sample waits."""
+    twin, kinds = Twin(load_scene()), set()
+    for live in ({}, {"payload": 40.0}, {"line_fill": 20.0}, {"payload": 40.0, "line_fill": 20.0}):
+        model = twin.model(twin.settings.tuned(live))
+        kinds.add((_kind(model.boom.compiled), _kind(model.modes.filter)))
+    assert len(kinds) == 1

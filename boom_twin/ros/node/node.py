@@ -11,6 +11,7 @@ from time import perf_counter
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
@@ -23,7 +24,7 @@ from ...messages.mapping import load_mapping
 from ...messages.report_encoder import ReportEncoder
 from ...messages.sample_decoder import SampleDecoder
 from ...messages.topic_table import NODE, Output
-from ...twin.driver import drive
+from ...twin.driver import drive_one
 from ...twin.loaded_model import ModelPreparation
 from ...twin.twin import Twin
 from ...types import SENSORS, Report, Stream
@@ -57,6 +58,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._twin: Twin | None = None
         self._page: MonitorProcess | None = None
         self._outputs: dict[Output, LifecyclePublisher] = {}
+        self._wanted: set[Output] = set()
         self._subscriptions_in: list[Subscription[Any]] = []
         self._refused = ""
         self._service_change_state.callback = partial(self._change_state, self._service_change_state.callback)
@@ -108,8 +110,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             raise
         for key, topic in self._topics.outputs.items():
             if key is not Output.DIAGNOSTICS:
-                kind = message_class(topic.type)
-                self._outputs[key] = self.create_lifecycle_publisher(kind, topic.name, qos_profile(topic.qos))
+                parts = message_class(topic.type), topic.name, qos_profile(topic.qos)
+                matched = PublisherEventCallbacks(matched=self._count_listeners)
+                self._outputs[key] = self.create_lifecycle_publisher(*parts, event_callbacks=matched)
+        self._count_listeners()
         if self.get_parameter("monitor").value:
             mapping, scene = (self.get_parameter(name).value for name in ("mapping", "scene"))
             self._page = MonitorProcess(self, self._topics, mapping, scene)
@@ -177,6 +181,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         import_module("scipy.special")  # of the first alarm and the first pause, whose samples would wait for it for 0.3 s
         self._twin, self._decoder, self._preparation = twin, SampleDecoder(joints, topics), ModelPreparation(twin)
         self._encoder = ReportEncoder(scene, settings, frame_of(self, topics))
+        self._encoder.warm_up()
         texts = {"scene": found.text} | baseline_text(self)
         acknowledge, is_active = self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in)
         self._twin_services = Services(self, twin, acknowledge, is_active, self.queue.catch_up, texts)
@@ -203,6 +208,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         for publisher in self._outputs.values():
             self.destroy_lifecycle_publisher(publisher)
         self._outputs.clear()
+        self._wanted.clear()
         if self._twin is not None:
             self._twin_services.close()
             self._preparation.close()
@@ -226,23 +232,34 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._preparation.take_in()
         self._twin.shedding.filled(self.queue.share)
         self._diagnostics.seen(stream, stamp - self._decoder.delays[stream])
-        for step in drive(self._twin, self._decoder.samples((stream,), stamp, msg), judged=False):
-            self._diagnostics.took(*step)
-            for each in step.report.all:
-                if each.change is not None:
-                    self._start_log.tell(each, each.change)
-                self._publish(each)
-            began = perf_counter()
-            health = self._twin.judge_health()  # a millisecond, for which no prediction waits
-            if health is not None:
-                self._publish(Report(step.sample.stamp, True, health=health))
-            self._diagnostics.judged(health, perf_counter() - began)
+        sample = self._decoder.put(stream, stamp, msg)
+        if sample is None:
+            return
+        step = drive_one(self._twin, sample, judged=False)
+        self._diagnostics.took(*step)
+        for each in step.report.all:
+            if each.change is not None:
+                self._start_log.tell(each, each.change)
+            self._publish(each)
+        if self._twin.is_health_due:
+            self._judge(self._twin, sample.stamp)
+
+    def _judge(self, twin: Twin, stamp: int) -> None:
+        """Judge health: a millisecond, for which no prediction waits."""
+        began = perf_counter()
+        health = twin.judge_health()
+        if health is not None:
+            self._publish(Report(stamp, True, health=health))
+        self._diagnostics.judged(health, perf_counter() - began)
+        self._count_listeners()
 
     def _publish(self, report: Report) -> None:
         """What somebody listens to, or may ask for later; the node is active, which the publishers need not look at again."""
-        for key, encoded in self._encoder.fill(report, self._is_wanted):
+        for key, encoded in self._encoder.fill(report, self._wanted.__contains__):
             self._outputs[key].handle.publish_raw(encoded)
 
-    def _is_wanted(self, key: Output) -> bool:
-        is_heard = self._outputs[key].handle.get_subscription_count() > 0
-        return is_heard or self._topics.outputs[key].qos.durability == "transient_local"
+    def _count_listeners(self, _: object = None) -> None:
+        """Look up which outputs are wanted: when a subscription is matched or goes, and now and then, should that be lost."""
+        handles = {key: publisher.handle for key, publisher in self._outputs.items()}
+        lasting = {key for key in handles if self._topics.outputs[key].qos.durability == "transient_local"}
+        self._wanted = lasting | {key for key, handle in handles.items() if handle.get_subscription_count() > 0}

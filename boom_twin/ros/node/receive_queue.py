@@ -29,9 +29,10 @@ class _Topic:
     """Waiting messages of one topic, with their arrival (ns), and what is counted."""
 
     def __init__(self, depth: int, read: Callable[[bytes], None]) -> None:
-        self.waiting: deque[tuple[int, int, bytes]] = deque()
+        self.waiting: deque[tuple[int, bytes]] = deque()
         self.depth, self.read = depth, read
         self.received = self.lost = self.dropped = 0
+        self.gone = 0  # turns of messages that gave way, see `ReceiveQueue._turns`
         self.wait = self.latency = nan
         self.number, self._missed, self._is_numbered = -1, 0, True
 
@@ -82,13 +83,14 @@ class ReceiveQueue:
     def __init__(self, clock: Callable[[], int] = time.time_ns) -> None:
         self._clock = clock
         self._topics: dict[str, _Topic] = {}
+        self._turns: deque[_Topic] = deque()  # of the topics, for each message that waits, and for those that gave way
         self.received, self.is_behind, self.share = 0, False, 0.0
         self.oddities: Counter[str] = Counter()
         self.on_put: Callable[[], None] | None = None
 
     def __bool__(self) -> bool:
         """Whether a message waits."""
-        return self._next() is not None
+        return bool(self._turns) and any(topic.waiting for topic in self._topics.values())
 
     def open(self, name: str, depth: int, read: Callable[[bytes], None]) -> Callable[..., None]:
         """The callback of a raw subscription.
@@ -113,10 +115,12 @@ class ReceiveQueue:
             if len(data) > LARGEST:
                 self.oddities["too large"] += 1
                 return
-            topic.waiting.append((self.received, arrival, data))
+            topic.waiting.append((arrival, data))
+            self._turns.append(topic)
             if len(topic.waiting) > topic.depth:
                 topic.waiting.popleft()
                 topic.dropped += 1
+                topic.gone += 1
             self.received += 1
             self.is_behind = (now - arrival) * NANO > FRESH
             if self.on_put is not None:
@@ -130,13 +134,18 @@ class ReceiveQueue:
     def close(self) -> None:
         """Forget all topics, and what waits."""
         self._topics.clear()
+        self._turns.clear()
         self.is_behind = False
 
     def work(self, budget: float) -> None:
         """Read messages until none waits or `budget`, s, has passed; the last one may take longer."""
         end = time.monotonic() + budget
-        while (topic := self._next()) is not None:
-            _, arrival, data = topic.waiting.popleft()
+        while self._turns:
+            topic = self._turns.popleft()
+            if topic.gone:  # the oldest of its messages gave way, so that this turn is not another's
+                topic.gone -= 1
+                continue
+            arrival, data = topic.waiting.popleft()
             self.share, wait = len(topic.waiting) / topic.depth, self._since(arrival)
             if not wait <= topic.wait:
                 topic.wait = wait
@@ -157,11 +166,3 @@ class ReceiveQueue:
     def look(self) -> Mapping[str, Reception]:
         """What is known of every topic, by name; begins a new span of time."""
         return {name: topic.look() for name, topic in self._topics.items()}
-
-    def _next(self) -> _Topic | None:
-        """The topic with the oldest message."""
-        found: _Topic | None = None
-        for topic in self._topics.values():
-            if topic.waiting and (found is None or topic.waiting[0][0] < found.waiting[0][0]):
-                found = topic
-        return found

@@ -1,0 +1,114 @@
+"""Outputs that tell numbers of a prediction and of the estimate beside it: which number stands where in which message.
+
+The model's plane (x forward, y up) is the x-z plane of ``base_link``, so a positive turn is one about its -y (REP-103).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..twin.blocks import Integers
+from ..types import Array
+from .cdr_encoder import NumberFields
+from .message_fields import fill_xz
+from .prediction_numbers import number_names
+from .topic_table import Output
+
+
+class NumericOutput(NamedTuple):
+    """An output that every prediction, or estimate, gives one message of: what is put into an empty message, and which numbers.
+
+    ``put`` gets the message and the fields, which it places where numbers stand; ``numbers`` names these in the same order, see
+    `boom_twin.messages.prediction_numbers.number_names`, with a minus where the message has the opposite.
+    """
+
+    output: Output
+    put: Callable[[Any, NumberFields], None]
+    numbers: tuple[str, ...]
+
+
+def put_vector(msg: Any, fields: NumberFields) -> None:
+    """x and z of a Vector3Stamped."""
+    fill_xz(msg.vector, fields.row(2))
+
+
+def _put_point(msg: Any, fields: NumberFields) -> None:
+    fill_xz(msg.point, fields.row(2))
+
+
+def _put_acceleration(msg: Any, fields: NumberFields) -> None:
+    fill_xz(msg.accel.linear, fields.row(2))
+    msg.accel.angular.y = fields.double()
+
+
+PREDICTED = (
+    NumericOutput(Output.TIP_DISPLACEMENT, put_vector, ("displacement_x", "displacement_y")),
+    NumericOutput(Output.TIP_POSITION, _put_point, ("tip_x", "tip_y")),
+    NumericOutput(Output.TIP_ACCELERATION, _put_acceleration, ("acceleration_x", "acceleration_y", "-angular_acceleration")),
+)
+"""In the order in which a bag has them: m; m; m/s^2 and rad/s^2. ``joint_states`` follows."""
+
+
+def _put_pose(msg: Any, fields: NumberFields) -> None:
+    fill_xz(msg.pose.pose.position, fields.row(2))
+    msg.pose.pose.orientation.y, msg.pose.pose.orientation.w = fields.row(2)
+    _put_covariance(msg.pose, fields)
+
+
+def _put_acceleration_estimate(msg: Any, fields: NumberFields) -> None:
+    fill_xz(msg.accel.accel.linear, fields.row(2))
+    msg.accel.accel.angular.y = fields.double()
+    _put_covariance(msg.accel, fields)
+
+
+def _put_covariance(holder: Any, fields: NumberFields) -> None:
+    """Of x, z and the turn about y; the triangle that the numbers have comes first, then what mirrors it."""
+    table, (rows, columns) = np.zeros((6, 6)), np.triu_indices(3)
+    places = np.array([0, 2, 4])
+    table[places[rows], places[columns]] = fields.row(6)
+    off = rows != columns
+    table[places[columns[off]], places[rows[off]]] = fields.row(3)
+    holder.covariance = table.ravel()
+
+
+def _covariance(kind: str) -> tuple[str, ...]:
+    """Numbers of `_put_covariance`: the turn counts about -y."""
+    xx, xy, xa, yy, ya, aa = (f"{kind}variance_xx", f"{kind}covariance_xy", f"-{kind}covariance_xa",
+                              f"{kind}variance_yy", f"-{kind}covariance_ya", f"{kind}variance_aa")  # fmt: skip
+    return xx, xy, xa, yy, ya, aa, xy, xa, ya
+
+
+_POSE = "estimate_x", "estimate_y", "-sine_of_half", "cosine_of_half", *_covariance("")
+_ACCELERATION = "estimate_acceleration_x", "estimate_acceleration_y", "-estimate_angular_acceleration"
+ESTIMATED = (
+    NumericOutput(Output.ESTIMATE_POSE, _put_pose, _POSE),
+    NumericOutput(Output.ESTIMATE_ACCELERATION, _put_acceleration_estimate, (*_ACCELERATION, *_covariance("acceleration_"))),
+    NumericOutput(Output.ESTIMATE_LOAD, lambda msg, fields: fill_xz(msg.wrench.force, fields.row(2)), ("load_x", "load_y")),
+)
+"""In the order in which a bag has them, behind ``joint_states``."""
+
+
+class Selection(NamedTuple):
+    """Some numbers of a row, each with its sign: places, and 1 or -1; both shape (selected,)."""
+
+    places: Integers
+    signs: Array
+
+    @classmethod
+    def named(cls, names: Sequence[str], joints: int) -> Selection:
+        """By `NumericOutput.numbers`, of a boom with so many joints."""
+        places = {name: place for place, name in enumerate(number_names(joints))}
+        chosen = np.array([places[name.removeprefix("-")] for name in names], np.int64)
+        return cls(chosen, np.array([-1.0 if name.startswith("-") else 1.0 for name in names]))
+
+    @classmethod
+    def of_all(cls, width: int) -> Selection:
+        """All of a row of so many, as they are."""
+        return cls(np.arange(width), np.ones(width))
+
+    def of(self, numbers: Array) -> Array:
+        """They, from columns of numbers, shape (all, k); shape (selected, k)."""
+        return np.asarray(numbers[self.places] * self.signs[:, np.newaxis])

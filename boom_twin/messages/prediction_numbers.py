@@ -1,0 +1,231 @@
+"""Numbers that messages tell of a prediction and of the estimate beside it: their names, and the kernels that write them.
+
+Every one of them stands once in a row of numbers, by the names of `number_names`, in the axes of the model. A message takes
+some of them, with a sign: see `boom_twin.messages.numeric_outputs`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..estimation.tip_estimate import FORCE_VARIANCE
+from ..kernels.jit import by_reference, inner, kernel
+from ..kernels.result_row import estimates_in, results_in
+from ..twin.blocks import EstimateBlock, PredictionBlock
+from ..types import SECOND, Array, Estimate, Prediction
+
+TIP_NUMBERS = (
+    "tip_x", "tip_y", "tip_angle",
+    "velocity_x", "velocity_y", "angular_velocity",
+    "acceleration_x", "acceleration_y", "angular_acceleration",
+    "displacement_x", "displacement_y",
+)  # fmt: skip
+TIP_JOINTS = ("tip_dx", "tip_dz", "tip_pitch")
+"""Of the joints that lead from the tip of rigid sections to that of the deflected boom: along and across the last section, m;
+its turn, rad."""
+ESTIMATED_NUMBERS = (
+    "estimate_x", "estimate_y", "estimate_angle",
+    "estimate_acceleration_x", "estimate_acceleration_y", "estimate_angular_acceleration",
+    "load_x", "load_y",
+    "variance_xx", "covariance_xy", "covariance_xa", "variance_yy", "covariance_ya", "variance_aa",
+    "acceleration_variance_xx", "acceleration_covariance_xy", "acceleration_covariance_xa",
+    "acceleration_variance_yy", "acceleration_covariance_ya", "acceleration_variance_aa",
+)  # fmt: skip
+"""As in a row of an estimate, see `boom_twin.estimation.tip_estimate.WIDTH`, up to its variances of the load."""
+TURN = ("sine_of_half", "cosine_of_half")
+"""Of half the angle of the estimate, for a quaternion."""
+
+DISPLACEMENT, JOINTS = (
+    9,
+    11,
+)  # where they begin; behind the joints' angles, strokes, cylinders' forces, the tip's joints, the estimate
+SECONDS, NANOSECONDS = range(2)  # of a stamp in a message
+
+
+def number_names(joints: int) -> tuple[str, ...]:
+    """Names of the numbers, of a boom with so many joints, in the order of a row. SI."""
+    own = [f"{kind}_{i}" for kind in ("joint", "stroke", "force") for i in range(1, joints + 1)]
+    return *TIP_NUMBERS, *own, *TIP_JOINTS, *ESTIMATED_NUMBERS, *TURN
+
+
+class Chain(NamedTuple):
+    """What of the boom the numbers need: pivot of its first joint (2,), m; lengths of its sections (n,), m."""
+
+    pivot: Array
+    lengths: Array
+
+
+@by_reference
+class Layout(NamedTuple):
+    """Messages that are written together, one behind the other, and which numbers stand where.
+
+    numbers : scratch, a row of them. turns : scratch, (n + 1, 3). chosen, signs : of every number that is written. doubles,
+    words : all the messages, as numbers of eight and of four bytes. places : of every number among the doubles. stamps : of
+    every stamp among the words.
+    """
+
+    numbers: Array
+    turns: Array
+    chosen: np.ndarray
+    signs: Array
+    places: np.ndarray
+    stamps: np.ndarray
+    doubles: Array
+    words: np.ndarray
+
+
+# What follows from other numbers is written by the two functions below: compiled for one row (all,), and run as they stand for
+# many, a column each (all, k), because the writer of a replay does without a compiler. Sine and cosine are those of the C
+# library in both, for the same bits; NumPy has its own on some processors.
+
+
+@inner
+def write_turns(numbers, turns):
+    """Angles whose sine and cosine are needed, shape (n + 1, 3, ..): of every section, then half the estimate's."""
+    n = turns.shape[0] - 1
+    turns[0, 0] = numbers[JOINTS]
+    for i in range(1, n):
+        turns[i, 0] = turns[i - 1, 0] + numbers[JOINTS + i]
+    turns[n, 0] = 0.5 * numbers[JOINTS + 3 * n + 5]
+
+
+@inner
+def derive(pivot, lengths, turns, numbers):
+    """Write the tip's joints, and half the estimate's turn; `turns` have their cosines and sines behind them."""
+    n = turns.shape[0] - 1
+    x, y = lengths[0] * turns[0, 1], lengths[0] * turns[0, 2]
+    for i in range(1, n):
+        x, y = x + lengths[i] * turns[i, 1], y + lengths[i] * turns[i, 2]
+    x, y = numbers[0] - (pivot[0] + x), numbers[1] - (pivot[1] + y)
+    along, across, at = turns[n - 1, 1], turns[n - 1, 2], JOINTS + 3 * n
+    numbers[at] = along * x + across * y
+    numbers[at + 1] = along * y - across * x
+    numbers[at + 2] = numbers[2] - turns[n - 1, 0]
+    numbers[at + 3 + FORCE_VARIANCE], numbers[at + 4 + FORCE_VARIANCE] = turns[n, 2], turns[n, 1]
+
+
+def number_columns(
+    chain: Chain, p: Prediction | PredictionBlock | None, e: Estimate | EstimateBlock | None, count: int
+) -> Array:
+    """Numbers of so many predictions and of the estimates beside them, a column for each, shape (all, count); NaN without."""
+    joints = len(chain.lengths)
+    numbers = np.full((len(number_names(joints)), count), math.nan)
+    if p is not None:
+        own = p.tip_position.T, p.tip_angle, p.tip_velocity.T, p.tip_angular_velocity
+        more = p.tip_acceleration.T, p.tip_angular_acceleration, p.tip_displacement.T
+        _stack(numbers, (*own, *more, p.joints.T, p.strokes.T, p.cylinder_forces.T))
+    if e is not None:
+        parts = e.tip.T, e.acceleration.T, e.load.T, e.tip_covariance.T, e.acceleration_covariance.T
+        _stack(numbers[JOINTS + 3 * joints + len(TIP_JOINTS) :], parts)
+    _derive_columns(chain, numbers)
+    return numbers
+
+
+def _stack(numbers: Array, parts: Sequence[Array | float]) -> None:
+    """Write parts, each of a number or more for every column, one below the other."""
+    at = 0
+    for part in parts:
+        rows = np.reshape(part, (-1, numbers.shape[1]))
+        numbers[at : at + len(rows)] = rows
+        at += len(rows)
+
+
+def _derive_columns(chain: Chain, numbers: Array) -> None:
+    """Write what follows from others of many rows of numbers, shape (all, k)."""
+    turns = np.zeros((len(chain.lengths) + 1, 3, numbers.shape[1]))
+    write_turns(numbers, turns)
+    angles = turns[:, 0].ravel().tolist()
+    for k, function in ((1, math.cos), (2, math.sin)):
+        turns[:, k] = np.array([function(each) if math.isfinite(each) else math.nan for each in angles]).reshape(
+            turns[:, 0].shape
+        )
+    derive(*chain, turns, numbers)
+    for row in _derived(len(chain.lengths)):
+        numbers[row, np.isnan(numbers[row])] = math.nan
+
+
+def _derived(joints: int) -> tuple[int, ...]:
+    first = JOINTS + 3 * joints
+    return first, first + 1, first + 2, first + 3 + FORCE_VARIANCE, first + 4 + FORCE_VARIANCE
+
+
+@inner
+def one_nan(numbers, place):
+    """Of all NaN take the one that every program has: which of two a sum has is up to the compiler."""
+    if math.isnan(numbers[place]):
+        numbers[place] = math.nan
+
+
+@kernel
+def write_messages(chain, row, pins, estimate, stamp, m):
+    """Write the messages of a layout.
+
+    Parameters
+    ----------
+    chain : Chain
+    row : ndarray
+        Of the prediction, see `boom_twin.kernels.result_row`.
+    pins : int
+        Pins with clearance.
+    estimate : ndarray, shape (WIDTH,)
+        Beside it.
+    stamp : int
+        ns, in all headers.
+    m : Layout
+    """
+    n = m.turns.shape[0] - 1
+    results, estimates = results_in(row, n, pins), estimates_in(row, n, pins)
+    for k in range(3):
+        for a in range(3):
+            m.numbers[3 * k + a] = results.tip[k, a]
+    for a in range(2):
+        m.numbers[DISPLACEMENT + a] = results.tip[0, a] - estimates.rigid_tip[a]
+    for i in range(n):
+        m.numbers[JOINTS + i] = results.joints[i]
+        m.numbers[JOINTS + n + i] = estimates.strokes[i]
+        m.numbers[JOINTS + 2 * n + i] = results.cylinder_forces[i]
+    first = JOINTS + 3 * n
+    for k in range(FORCE_VARIANCE):
+        m.numbers[first + 3 + k] = estimate[k]
+    write_turns(m.numbers, m.turns)
+    for i in range(n + 1):
+        m.turns[i, 1], m.turns[i, 2] = math.cos(m.turns[i, 0]), math.sin(m.turns[i, 0])
+    derive(chain.pivot, chain.lengths, m.turns, m.numbers)
+    for k in range(3):
+        one_nan(m.numbers, first + k)
+    for k in range(2):
+        one_nan(m.numbers, first + 3 + FORCE_VARIANCE + k)
+    put_numbers(m, stamp)
+
+
+@kernel
+def write_residuals(values, sigmas, row, stamp, m):
+    """Write a message of residuals, of which a layout has all channels three times.
+
+    Parameters
+    ----------
+    values, sigmas : ndarray, shape (k, w)
+        Residuals and their standard deviations; those of `row` are written.
+    stamp : int
+        ns.
+    m : Layout
+    """
+    n = m.chosen.shape[0] // 3
+    for i in range(n):
+        value, sigma = values[row, i], sigmas[row, i]
+        m.numbers[i], m.numbers[n + i], m.numbers[2 * n + i] = value, value / sigma, sigma
+    put_numbers(m, stamp)
+
+
+@inner
+def put_numbers(m, stamp):
+    """Put numbers and stamp where they stand in the messages."""
+    for k in range(m.chosen.shape[0]):
+        m.doubles[m.places[k]] = m.signs[k] * m.numbers[m.chosen[k]]
+    seconds = stamp // SECOND
+    for k in range(m.stamps.shape[0]):
+        m.words[m.stamps[k] + SECONDS], m.words[m.stamps[k] + NANOSECONDS] = seconds, stamp - seconds * SECOND
