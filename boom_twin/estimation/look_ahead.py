@@ -18,10 +18,10 @@ import numpy as np
 from ..compiler.plan import Plan
 from ..kernels.elements.linkage import angle_of_length
 from ..kernels.integrators import GENERALISED_ALPHA, REST, prepare
-from ..kernels.jit import by_reference, inner, kernel
+from ..kernels.jit import by_reference, inner, kernel, referenced
 from ..kernels.result_row import estimates_in
 from ..kernels.tables import OK
-from ..kernels.transfer.kept_tangent import forget_all, keep_corrections, work_of
+from ..kernels.transfer.kept_tangent import condensed_of, forget_all, keep_corrections, work_of
 from ..kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance, advance_again, observe
 from ..types import Array
 from .stroke_filter import FilterTuning, StrokeFilter, drive_between, lag_of, new_filter, start_filter, take_strokes
@@ -107,7 +107,7 @@ def follow(t, anchor, live, work, tangents, track, tuning, time, y, out):
             if track.moved[0] == 0:
                 hold(track, nodes[old])
                 for k in range(STEPS):
-                    forget_all(work_of(work, tangents, k))
+                    forget_all(work_of(work, tangents, k, work.condensed))
                 scheme = prepare(REST, tuning.rho, tuning.step, work.weights)
                 status, count, _ = advance(
                     t, anchor, work, scheme, track.drive, track.rate, TOLERANCE, REST_PASSES, REST_INCREMENT, None, ANEW
@@ -128,7 +128,8 @@ def follow(t, anchor, live, work, tangents, track, tuning, time, y, out):
             drive_to(track, start, nodes[new], span, (k + 1) / steps)
             own = work
             if ahead:
-                own = work_of(work, tangents, at)
+                condensed = referenced(condensed_of(tangents, at))
+                own = referenced(work_of(work, tangents, at, condensed))
                 keep_corrections(own, AHEAD_ORDER)
                 at = min(at + 1, STEPS - 1)
             status, count = advance_again(

@@ -28,7 +28,7 @@ the corrections of three steps. Without it an error of one sign was left in ever
 from __future__ import annotations
 
 from ..integrators import A
-from ..jit import inner, referenced
+from ..jit import inner
 from ..tables import CORRECTIONS, Condensed, Work
 
 LEAD = 4.0  # at first
@@ -67,23 +67,23 @@ def keep_corrections(work, most):
 
 
 @inner
-def work_of(work, tangents, k):
-    """`work` with what the `k`-th of several steps has kept."""
-    condensed = referenced(
-        Condensed(
-            gains=tangents.gains[k], free=tangents.free[k], factors=tangents.factors[k], order=tangents.order[k],
-            blocks=tangents.blocks[k], ends=tangents.ends[k], end_gains=tangents.end_gains[k], end_free=tangents.end_free[k],
-        )
+def condensed_of(tangents, k):
+    """What the `k`-th of several steps has condensed; a caller takes it by reference, whose room has to be the caller's."""
+    return Condensed(
+        gains=tangents.gains[k], free=tangents.free[k], factors=tangents.factors[k], order=tangents.order[k],
+        blocks=tangents.blocks[k], ends=tangents.ends[k], end_gains=tangents.end_gains[k], end_free=tangents.end_free[k],
     )  # fmt: skip
-    return referenced(
-        Work(
-            position=work.position, velocity=work.velocity, acceleration=work.acceleration, hat=work.hat,
-            offset=work.offset, weights=work.weights, finer=work.finer, s=work.s, p=work.p, g=work.g, h=work.h,
-            own_g=work.own_g, own_h=work.own_h, right=work.right, condensed=condensed, hold=work.hold, apart=work.apart,
-            rho=work.rho, drho=tangents.drho[k], turn=work.turn, local=work.local, drive=work.drive,
-            drive_rate=work.drive_rate, dz=work.dz, guess=work.guess, corrections=tangents.corrections[k],
-            kept_z=tangents.kept_z[k], kept=tangents.kept[k], cut=work.cut,
-        )
+
+
+@inner
+def work_of(work, tangents, k, condensed):
+    """`work` with what the `k`-th of several steps has kept, beside its `condensed`; by reference as that."""
+    return Work(
+        position=work.position, velocity=work.velocity, acceleration=work.acceleration, hat=work.hat, offset=work.offset,
+        weights=work.weights, finer=work.finer, s=work.s, p=work.p, g=work.g, h=work.h, own_g=work.own_g, own_h=work.own_h,
+        right=work.right, condensed=condensed, hold=work.hold, apart=work.apart, rho=work.rho, drho=tangents.drho[k],
+        turn=work.turn, local=work.local, drive=work.drive, drive_rate=work.drive_rate, dz=work.dz, guess=work.guess,
+        corrections=tangents.corrections[k], kept_z=tangents.kept_z[k], kept=tangents.kept[k], cut=work.cut,
     )  # fmt: skip
 
 
