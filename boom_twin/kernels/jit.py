@@ -121,6 +121,10 @@ class HeldFields(int):
         held.fields, held._room = fields, (kept, room)
         return held
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy is of fields of its own: the address is of these."""
+        return hold, (self.fields,)
+
 
 class Kernel:
     """A function that is compiled when Python first calls it, or when a kernel that calls it is compiled."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import os
+import pickle
 import subprocess
 import sys
 from typing import NamedTuple
@@ -89,6 +91,18 @@ def test_fields_that_were_written_once_are_read_where_they_stand():
     assert {total(each) for each in others} == {96.0}
     held.fields.inside.values[:] = 1.0
     assert total(held) == total(fields()._replace(inside=Inside(np.ones(2)))) == 15.0 + 1.5
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda held: pickle.loads(pickle.dumps(held))])
+def test_a_copy_of_what_is_held_has_fields_of_its_own(copied):
+    """Also beside the tuple that it stands for, as in a twin that is copied."""
+    given = fields()
+    both = copied([given, hold(given)])
+    assert both[1].fields is both[0] and both[0].table is not given.table
+    given.inside.values[:] = 1e9
+    assert total(both[1]) == 96.0 + 1.5
+    both[0].inside.values[:] = 1.0
+    assert total(both[1]) == 15.0 + 1.5
 
 
 def test_only_what_goes_by_reference_is_held():

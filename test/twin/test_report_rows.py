@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
 from dataclasses import fields, replace
 
@@ -115,3 +116,18 @@ def test_only_what_is_wanted_is_encoded_of_rows(given: list[Report]) -> None:
         for wanted in (Output.TIP_POSITION, Output.ESTIMATE_LOAD, Output.RESIDUALS):
             assert other.fill(report, wanted.__eq__) == [each for each in everything if each[0] is wanted]
         assert other.fill(report, lambda output: False) == []
+
+
+def test_a_copy_of_a_twin_goes_on_by_itself() -> None:
+    """It shares nothing with the one that it was made of, which goes on, or is gone."""
+    samples = plain()
+    twin = Twin(load_scene())
+    whole = [repr(twin.update(sample)) for sample in samples]
+    twin = Twin(load_scene())
+    for sample in samples[:60]:
+        twin.update(sample)
+    other = copy.deepcopy(twin)
+    for sample in reversed(samples):
+        twin.update(sample)
+    del twin
+    assert [repr(other.update(sample)) for sample in samples[60:]] == whole[60:]
