@@ -201,11 +201,11 @@ class CalibrationProblem:
             found.append(means[1:] - means[0] + own * rng.standard_normal(means[1:].shape))
         return found
 
-    def booms(self, deviations: Array, step: float) -> list[tuple[int | None, Scene]]:
-        """The boom itself, with None, and those with one of the boom's unknowns moved by `step`, with its number."""
+    def booms(self, deviations: Array, step: float) -> dict[int | None, Scene]:
+        """The boom itself, by None, and those with one of the boom's unknowns moved by `step`, by its number."""
         moved: list[int | None] = [i for i, unknown in enumerate(self.unknowns) if unknown.channel is None]
         every = np.arange(len(deviations))
-        return [(i, boom_of(self.scene, self.values(deviations + step * (every == i)))) for i in [None, *moved]]
+        return {i: boom_of(self.scene, self.values(deviations + step * (every == i))) for i in [None, *moved]}
 
     def trials(self, deviations: Array) -> list[dict[str, float]]:
         """The values themselves, and with every unknown moved that acts through the boom."""
@@ -221,8 +221,17 @@ class CalibrationProblem:
         readings = readings[..., self.used]
         acting = iter((readings[1:] - readings[0]) / DIFFERENCE)
         slopes = np.array([next(acting) if d is None else np.broadcast_to(d, readings[0].shape) for d in self._direct])
-        zeros = sum((d * at for d, at in zip(self._direct, deviations, strict=True) if d is not None), np.zeros(len(self.used)))
-        return readings[0] + zeros, slopes
+        return readings[0] + self._zeros(deviations), slopes
+
+    def left(self, deviations: Array, course: SessionCourse, blocks: ResidualBlocks) -> Array:
+        """Measured less predicted means (b, c) of one session."""
+        readings = blocks.averaged(ForwardModel(self.scene, [self.values(deviations)]).move(course))[0]
+        return np.asarray((blocks.measured - readings)[:, self.used] - self._zeros(deviations))
+
+    def _zeros(self, deviations: Array) -> Array:
+        """What zeros of the sensors that are compared add to each channel (c,)."""
+        pairs = zip(self._direct, deviations, strict=True)
+        return sum((effect * at for effect, at in pairs if effect is not None), np.zeros(len(self.used)))
 
     def _effect(self, unknown: Unknown) -> Array | None:
         """What a prior deviation adds to each channel (c,), for a zero of a sensor that is compared; else None."""

@@ -2,11 +2,10 @@
 
 Deviations from the prediction are u = Psi q, with the modes Psi of the present posture (unit modal mass) as shapes:
 
-    M q'' + D q' + K q = Phi^T f + N d
+    q'' + D q' + K q = Phi^T f + N d
 
 f (2), N: force at the tip; d (n), m: what the strokes are longer by; Phi, N: the shapes' motion of the tip and forces of the
-cylinders. For the boom that the shapes are of, M = 1 and K = diag(omega^2); for one with other parameters M, D, K and N follow
-from the energies of the same shapes, which is exact to the first order (Rayleigh and Ritz).
+cylinders.
 
 Modes are made at knots along the strokes' travel. Those of a knot are turned into the ones of the knot before by the rotation
 that is nearest in the sense of the masses, so that no coupling by the change of shapes is left, crossing modes do no harm, and
@@ -16,7 +15,6 @@ all matrices may be interpolated between knots.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -41,12 +39,12 @@ WIDTH = 1e-6  # relative accuracy of frequencies
 
 
 class ModesAlong(NamedTuple):
-    """Reduced models of b booms at k postures, m shapes, n joints.
+    """Reduced models of a boom at k postures, m shapes, n joints.
 
     Attributes
     ----------
-    mass, damping, stiffness : ndarray, shape (k, b, m, m)
-    forces : ndarray, shape (k, b, m, n)
+    damping, stiffness : ndarray, shape (k, m, m)
+    forces : ndarray, shape (k, m, n)
         Of the cylinders per unit of q.
     tip : ndarray, shape (k, m, 3)
         Motion of the tip: x, y, angle.
@@ -60,7 +58,6 @@ class ModesAlong(NamedTuple):
         Angle of the tip, rad.
     """
 
-    mass: Array
     damping: Array
     stiffness: Array
     forces: Array
@@ -71,12 +68,15 @@ class ModesAlong(NamedTuple):
     heading: Array
 
 
-def modes_along(scenes: Sequence[Scene], course: SessionCourse) -> tuple[ModesAlong, NDArray[np.int64]]:
-    """Models of the booms `scenes` in the modes of the first, and for every instant of `course` (m,) the posture's number."""
-    travelled = _travelled(scenes[0], course)
+def modes_along(scene: Scene, course: SessionCourse) -> tuple[ModesAlong, NDArray[np.int64]]:
+    """Models of a boom, and for every instant of `course` (m,) the posture's number."""
+    travelled = _travelled(scene, course)
+    moving = course.moving.max(axis=1) > 0.0
     knots = np.linspace(0.0, travelled[-1], 2 + int(travelled[-1] / TRAVEL))
+    held = travelled[~moving & np.append(moving[1:], True)]  # the last instants of holds: frequencies are to be exact there
+    knots = np.unique(np.concatenate([knots, held]))
     rows = np.minimum(np.searchsorted(travelled, knots), len(travelled) - 1)
-    found = _at_knots(scenes, course.strokes[rows])
+    found = _at_knots(scene, course.strokes[rows])
     every = np.linspace(0.0, len(knots) - 1.0, 1 + PIECES * (len(knots) - 1))
     left = np.minimum(every.astype(int), len(knots) - 2)
     share = every - left
@@ -106,28 +106,26 @@ class _Knot(NamedTuple):
     heading: float
 
 
-def _at_knots(scenes: Sequence[Scene], strokes: Array) -> ModesAlong:
+def _at_knots(scene: Scene, strokes: Array) -> ModesAlong:
     """The models at strokes (k, n), in as many modes as there are at all of them."""
-    plans = [compile_scene(scene) for scene in scenes]
-    knots = _knots(scenes[0], plans[0], strokes)
-    count, at = min(sum(mode.frequency < HIGHEST for mode in knot.modes) for knot in knots), plans[0].tables.tip
+    plan = compile_scene(scene)
+    knots = _knots(scene, plan, strokes)
+    count, at = min(sum(mode.frequency < HIGHEST for mode in knot.modes) for knot in knots), plan.tables.tip
     rows, before = [], None
     for knot in knots:
         modes = knot.modes[:count]
         motions, increments = (np.array([getattr(mode, name) for mode in modes]) for name in ("motion", "increments"))
         turn = np.eye(count)
         if before is not None:
-            left, _, right = np.linalg.svd((before * plans[0].masses) @ motions.T)
+            left, _, right = np.linalg.svd((before * plan.masses) @ motions.T)
             turn = left @ right
         before = turn @ motions
-        matrices = [_matrices(plan, plans[0], before, turn @ increments, modes[0].drives) for plan in plans]
-        mass, damping, stiffness, forces = map(np.array, zip(*matrices, strict=True))
-        square = turn * np.array([2.0 * math.pi * mode.frequency for mode in modes]) ** 2 @ turn.T
+        damping, forces = _damping_and_forces(plan, turn @ increments, modes[0].drives)
+        stiffness = turn * np.array([2.0 * math.pi * mode.frequency for mode in modes]) ** 2 @ turn.T
         tip = before[:, at : at + 3]
         quick = np.array([mode.motion[at : at + 2] / (2.0 * math.pi * mode.frequency) ** 2 for mode in knot.modes[count:]])
         follow = knot.joints[count:].T @ quick.reshape(-1, 2)
-        mass, stiffness = mass - mass[0] + np.eye(count), stiffness - stiffness[0] + square
-        rows.append((mass, damping, stiffness, forces, tip, turn @ knot.joints[:count], follow, knot.slopes, knot.heading))
+        rows.append((damping, stiffness, forces, tip, turn @ knot.joints[:count], follow, knot.slopes, knot.heading))
     return ModesAlong(*(np.array(each) for each in zip(*rows, strict=True)))
 
 
@@ -143,29 +141,17 @@ def _knots(scene: Scene, plan: Plan, strokes: Array) -> list[_Knot]:
     return found
 
 
-def _matrices(other: Plan, plan: Plan, shapes: Array, increments: Array, drives: Array) -> tuple[Array, Array, Array, Array]:
-    """Mass, damping and elastic stiffness (m, m), and forces (m, n), of the boom `other` in shapes of that of `plan`.
-
-    The cylinders' drives are as long as `drives`, m, shape (n,).
-    """
-    t, own = other.tables, plan.tables
-    size = len(shapes)
-    damping, stiffness = np.zeros((2, size, size))
-    forces = increments[:, own.cylinders.z].copy()
-    compliances, lags = other.compliances_and_lags(drives)
-    usuals, _ = plan.compliances_and_lags(drives)
-    for i, (compliance, lag, usual) in enumerate(zip(compliances, lags, usuals, strict=True)):
-        if usual > 0.0:
-            forces[:, i] *= usual / compliance
-        work = compliance * np.outer(forces[:, i], forces[:, i])
-        stiffness += work
-        damping += lag * work
-    for row, beam in enumerate(t.beams):
+def _damping_and_forces(plan: Plan, increments: Array, drives: Array) -> tuple[Array, Array]:
+    """Damping (m, m) and forces of the cylinders (m, n) in shapes with these increments; drives are as long as `drives`, m."""
+    damping = np.zeros((len(increments), len(increments)))
+    forces = increments[:, plan.tables.cylinders.z].copy()
+    for i, (compliance, lag) in enumerate(zip(*plan.compliances_and_lags(drives), strict=True)):
+        damping += lag * compliance * np.outer(forces[:, i], forces[:, i])
+    for row, beam in enumerate(plan.tables.beams):
         q = increments[:, beam.z : beam.z + beam.bending]
-        work = q @ t.stiffness[row, : beam.bending, : beam.bending] @ q.T
+        work = q @ plan.tables.stiffness[row, : beam.bending, : beam.bending] @ q.T
         if beam.axial:
             stretch = increments[:, beam.z + beam.bending]
             work = work + beam.axial_stiffness * np.outer(stretch, stretch)
-        stiffness += work
         damping += beam.beta * work
-    return (shapes * other.masses) @ shapes.T, damping, stiffness, forces
+    return damping, forces

@@ -183,7 +183,8 @@ def _fitted(
     quiet = fitted(problem, tell)
     if quiet.misfit <= LOADED:
         return problem, quiet
-    finer = CalibrationProblem(scene, unknowns, parts.in_blocks(parts.loaded_length, 0.5), parts.channels, settings)
+    blocks = [(course.held(settings.stroke_variance), each) for course, each in parts.in_blocks(parts.loaded_length, 0.5)]
+    finer = CalibrationProblem(scene, unknowns, blocks, parts.channels, settings)
     try:
         loaded = fitted_under_load(finer, quiet, tell)
     except SolverError:  # then the misfit stays, and is remarked on

@@ -6,9 +6,10 @@ lag: that of the quietest smoother of the twin's strokes (`boom_twin.estimation.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from heapq import merge
 from itertools import pairwise
 from pathlib import Path
@@ -26,6 +27,7 @@ from ..estimation.stroke_filter import corners
 from ..messages.topic_table import Topics
 from ..offline.reader_process import SampleReader
 from ..types import NANO, SENSORS, Array, Change, Sample, Stream, channels_of
+from .stroke_holds import held
 
 NEEDED = (Stream.STROKES, Stream.ANGLES)  # streams without which nothing can be estimated
 SHOWN = 12  # hex digits of a hash
@@ -150,6 +152,7 @@ LARGEST_GAP = 0.5  # s between strokes; a session is used from one such gap to t
 REST, SPEED = 1.0, 1e-3  # a course starts where no stroke has gone faster (m/s) than this for so long (s)
 SHORTEST = 15.0  # s
 HIGHEST = 0.4  # of the grid's frequency, bound of the corner
+BAND = 5.0 * math.pi / 9.0  # integral of the gain's square over frequencies of both signs, over the corner
 
 
 @dataclass(frozen=True)
@@ -168,6 +171,8 @@ class SessionCourse:
         Of the samples that it was made from.
     corner : float
         Of the smoothing, Hz.
+    moving : ndarray, shape (m, n)
+        How much of the noise of smoothed strokes is in `strokes`: 1, or less where they hold (`stroke_holds`).
     """
 
     start: int
@@ -175,6 +180,7 @@ class SessionCourse:
     strokes: Array
     stamps: NDArray[np.int64]
     corner: float
+    moving: Array
 
     @property
     def times(self) -> Array:
@@ -195,11 +201,20 @@ class SessionCourse:
         """The part up to `time` (s)."""
         count = 1 + int(time / self.step)
         end = self.start + round(time / NANO)
-        return SessionCourse(self.start, self.step, self.strokes[:count], self.stamps[self.stamps <= end], self.corner)
+        return SessionCourse(
+            self.start, self.step, self.strokes[:count], self.stamps[self.stamps <= end], self.corner, self.moving[:count]
+        )
 
     def smoothed(self, values: Array) -> Array:
         """What became of values at `stamps`, shape (k, ..), on the grid, shape (m, ..)."""
-        return _smoothed(np.asarray((self.stamps - self.start) * NANO), values, self.times, self.corner)
+        at: Array = np.asarray((self.stamps - self.start) * NANO)
+        return smoothed(_on_grid(at, values, self.times), self.step, self.corner)
+
+    def held(self, variance: float) -> SessionCourse:
+        """The course with strokes, measured with `variance` (m^2), at their means where they hold."""
+        deviation = math.sqrt(variance * self.interval * BAND * self.corner)
+        strokes, moving = held(self.strokes, deviation, self.step)
+        return replace(self, strokes=strokes, moving=moving)
 
 
 def course_of(session: MeasuredSession, settings: Settings) -> SessionCourse:
@@ -217,13 +232,15 @@ def course_of(session: MeasuredSession, settings: Settings) -> SessionCourse:
     refuse_short(session.name, float(grid[-1]), "without a gap in the strokes")
     quietest = corners(settings.stroke_variance, float(np.median(np.diff(times))), settings.stroke_agility)[0]
     corner = min(float(quietest) / (2.0 * np.pi), HIGHEST / step)
-    strokes = _smoothed(times, filled(times, series.values), grid, corner)
-    first = _rest(np.abs(np.gradient(strokes, step, axis=0)).max(axis=1), round(REST / step))
+    moved = smoothed(_on_grid(times, filled(times, series.values), grid), step, corner)
+    first = _rest(np.abs(np.gradient(moved, step, axis=0)).max(axis=1), round(REST / step))
     if first is None:
         raise BagError(f"{session.name}: the boom never rests for {REST:g} s, where a calibration starts. Record a hold first.")
     refuse_short(session.name, step * (len(grid) - 1 - first), "from the first rest on")
     start = int(series.stamps[0] + round(grid[first] / NANO))
-    return SessionCourse(start, step, strokes[first:], series.stamps[series.stamps >= start], corner)
+    return SessionCourse(
+        start, step, moved[first:], series.stamps[series.stamps >= start], corner, np.ones(moved[first:].shape)
+    )
 
 
 def refuse_short(name: str, duration: float, where: str) -> None:
@@ -234,14 +251,17 @@ def refuse_short(name: str, duration: float, where: str) -> None:
         )
 
 
-def _smoothed(times: Array, values: Array, grid: Array, corner: float) -> Array:
-    flat = values.reshape(len(values), -1)
-    on_grid = np.column_stack([np.interp(grid, times, column) for column in flat.T])
-    step = float(grid[1] - grid[0])
+def _on_grid(times: Array, values: Array, grid: Array) -> Array:
+    """Values (k, ..) at `times`, on the lines between them at the instants of `grid`, shape (m, ..)."""
+    columns = [np.interp(grid, times, column) for column in values.reshape(len(values), -1).T]
+    return np.asarray(np.column_stack(columns).reshape(len(grid), *values.shape[1:]))
+
+
+def smoothed(values: Array, step: float, corner: float) -> Array:
+    """Values (m, ..) on a grid of `step` (s), smoothed forth and back up to `corner` (Hz)."""
     sections = butter(3, corner, fs=1.0 / step, output="sos")
-    padding = min(len(grid) - 1, round(1.0 / (corner * step)))
-    found = sosfiltfilt(sections, on_grid, axis=0, padtype="even", padlen=padding)
-    return np.asarray(found.reshape(len(grid), *values.shape[1:]))
+    padding = min(len(values) - 1, round(1.0 / (corner * step)))
+    return np.asarray(sosfiltfilt(sections, values, axis=0, padtype="even", padlen=padding))
 
 
 def _longest(series: Series) -> Series:

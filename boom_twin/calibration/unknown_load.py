@@ -3,11 +3,12 @@
 The innovations v of the filter in `load_filter` depend on the parameters, by the prediction and by the modes alike. They are
 uncorrelated with what came before, so their derivatives by the parameters, which are functions of what came before, have no
 part in them where the parameters are right: sum v dv / s = 0 (Ljung, System Identification, 1999, ch. 7), solved by
-Gauss-Newton steps. Variances s are not fitted: the load is no Gaussian process.
+Gauss-Newton steps. That holds where the innovations are white, so a load that is taken to be livelier than it is, or noise that
+is not there, pulls the parameters: between its jumps the load has the rates of the greatest likelihood.
 
 A payload m and a load f push alike: m a and -f. What tells them apart is that the load is steady, so nothing may be taken to be
 known of the load while it changes: a pump's flanks keep step with the swings that the pump has made before. Where the load,
-first estimated by a filter that lets it move freely, jumps, it is set free (`LoadPrior.jumps`), and is taken for quiet between.
+first estimated by a filter that lets it move freely, jumps, its part that stays is set free (`LoadPrior.jumps`).
 
 Covariances are those of the sums over spans of `SPAN`, so that they hold for errors that are not white, too (White, 1982).
 """
@@ -15,33 +16,37 @@ Covariances are those of the sums over spans of `SPAN`, so that they hold for er
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import SolverError
 from ..estimation.load_spectrum import TipLoad, TipLoadFinder
-from ..scene.kinematics import gravity_in_base
 from ..scene.schema import Scene
 from ..scene.summary import explain
 from ..types import NANO, Array
-from .forward_model import CalibrationProblem, ForwardModel
+from .forward_model import CalibrationProblem, ForwardModel, boom_of
 from .least_squares import Fit, Tell, fitted_in_holds
-from .load_filter import Innovations, LoadPrior, filter_model, innovations, stroke_error
+from .load_filter import Innovations, LoadPrior, filter_model, gained_variance, innovations, stroke_error, tilted
 from .load_modes import modes_along
 from .noise_model import ResidualBlocks
 from .sessions import SessionCourse
 
 LENGTH, SAMPLES = 0.01, 1.5  # s, of the blocks at least, and samples in them on average
-FREE, QUIET = 0.031, 0.0008  # standard deviations of the load over the boom's weight: let free, and between its jumps
+FREE = 0.044  # a load that is let free: what it is likely to change by in a second, over the boom's weight
+QUIET = 0.001  # likewise between its jumps, at first
+STAYS = 0.06  # standard deviation of what stays of it, over the boom's weight
+FINER, FURTHER = (4.0, 2.0), 4  # factors by which the rates of the quiet load are looked at, and how often in a row
 FLANK = 0.1  # s, over which changes of the load are looked at
+FREER = 100.0  # times as free as it was let: where it jumps
 JUMP = 4.0  # of these changes' usual size: a jump
 TRIAL = 0.02  # of a prior deviation, for derivatives
 FURTHEST = 0.7  # prior deviations in one step
 FIRST, NEAR = 4, 1.0  # most steps with the load let free, and the step (in deviations of the estimate) that is the last one
-ROUNDS = 3  # of looking for the load's jumps, a step each
+ROUNDS, GUESSED = 5, 3  # of looking for the load's jumps, a step each; of these, with guessed rates
 LAST, SMALL = 5, 0.05  # likewise of the steps after these
 SPAN = 1.0  # s
 WIDER = 1.5  # by which intervals are wider than that: what swings longer is not seen in spans, see docs/calibrate.md
@@ -85,10 +90,12 @@ def fitted_under_load(problem: CalibrationProblem, quiet: Fit, tell: Tell) -> Fi
                 break
         return deviations, passes
 
-    free = [LoadPrior(FREE * weight, np.zeros(len(blocks.times))) for _, blocks in problem.parts]
-    deviations, passes = stepped(fitted_in_holds(problem), free, FIRST, NEAR)
-    for _ in range(ROUNDS):
-        priors = [LoadPrior(QUIET * weight, _jumps(each.loads, problem.length, FREE * weight)) for each in passes]
+    free = LoadPrior(np.full(2, (FREE * weight) ** 2), STAYS * weight)
+    deviations, passes = stepped(fitted_in_holds(problem), [free] * len(problem.parts), FIRST, NEAR)
+    rates = np.full(2, (QUIET * weight) ** 2)
+    for number in range(ROUNDS):
+        priors = _likely_priors(problem, deviations, free, rates, number >= GUESSED)
+        rates = priors[0].rates
         deviations, passes = stepped(deviations, priors, 1, 0.0)
     deviations, passes = stepped(deviations, priors, LAST, SMALL)
     measured = sum(int(np.count_nonzero(each.white)) for each in passes)
@@ -123,14 +130,14 @@ def _scatter(passes: Sequence[Pass], span: int) -> Array:
     return found
 
 
-def _jumps(loads: Array, length: float, free: float) -> Array:
-    """Variance that the load gains at every block, shape (b,), N^2: `free` squared within `FLANK` where it jumps, else 0."""
+def _jumps(loads: Array, length: float, free: LoadPrior) -> Array:
+    """Variance that the load gains at every block, shape (b, 2), N^2: far more than if let `free` where it jumps, else 0."""
     half = round(0.5 * FLANK / length)
     change = np.zeros(loads.shape)
     change[half:-half] = np.abs(loads[2 * half :] - loads[: -2 * half])
-    is_jump = (change > JUMP * 1.4826 * np.median(change, axis=0)).any(axis=1)
-    near = np.convolve(is_jump, np.ones(2 * half + 1), "same") > 0.5
-    return np.where(near, free**2 * length / FLANK, 0.0)
+    is_jump = change > JUMP * 1.4826 * np.median(change, axis=0)
+    near = np.array([np.convolve(column, np.ones(2 * half + 1), "same") > 0.5 for column in is_jump.T]).T
+    return near * FREER * free.rates * length
 
 
 def _load(problem: CalibrationProblem, passes: Sequence[Pass]) -> TipLoad | None:
@@ -141,12 +148,65 @@ def _load(problem: CalibrationProblem, passes: Sequence[Pass]) -> TipLoad | None
     return finder.load
 
 
+def _filter(
+    problem: CalibrationProblem, boom: Scene, course: SessionCourse, blocks: ResidualBlocks
+) -> Callable[[LoadPrior, Array], Innovations]:
+    """Innovations of columns of residuals (b, j, c) of one session of `boom`, given what is known of the load."""
+    modes, along = modes_along(boom, course)
+    rows = np.clip(np.rint(blocks.times / course.step).astype(int), 0, len(along) - 1)
+    noise = problem.deviations**2 / np.maximum(blocks.counts[:, problem.used], 1.0)
+    strokes = stroke_error(problem.stroke_variance, course)
+    tilts = tilted(blocks.measured, course.strokes.shape[1])[:, problem.used]
+
+    def run(prior: LoadPrior, columns: Array) -> Innovations:
+        model = filter_model(modes, problem.used, strokes.corner, prior, problem.length)
+        gained = gained_variance(model, prior, strokes, course.moving[rows], problem.length)
+        return innovations(model, along[rows], noise, gained, tilts, columns)
+
+    return run
+
+
+def _likely_priors(
+    problem: CalibrationProblem, deviations: Array, free: LoadPrior, rates: Array, seek: bool
+) -> list[LoadPrior]:
+    """What is known of the load in every session at a trial: its jumps, and rates of the greatest likelihood between them.
+
+    Jumps are those of the load that a filter finds which lets it move freely; rates are `rates`, or sought from there on.
+    """
+    boom, sessions = boom_of(problem.scene, problem.values(deviations)), []
+    for course, blocks in problem.parts:
+        run, left = _filter(problem, boom, course, blocks), problem.left(deviations, course, blocks)[:, None]
+        sessions.append((run, left, _jumps(run(free, left).loads, problem.length, free)))
+
+    def priors(rates: Array) -> list[LoadPrior]:
+        return [LoadPrior(rates, free.constant, jumps) for _, _, jumps in sessions]
+
+    if not seek:
+        return priors(rates)
+
+    def misfit(rates: Array) -> float:
+        total = 0.0
+        for (run, left, _), prior in zip(sessions, priors(rates), strict=True):
+            values, variances, _ = run(prior, left)
+            total += float(np.sum(np.log(variances) + values[:, 0] ** 2 / variances))
+        return total
+
+    found, least = rates, misfit(rates)
+    for factor in FINER:
+        for axis, way in product(range(2), (factor, 1.0 / factor)):
+            for _ in range(FURTHER):
+                trial = found.copy()
+                trial[axis] *= way
+                if (value := misfit(trial)) >= least:
+                    break
+                found, least = trial, value
+    return priors(found)
+
+
 def _passes(problem: CalibrationProblem, deviations: Array, priors: Sequence[LoadPrior]) -> list[Pass]:
     """Every session at a trial."""
-    forward = ForwardModel(problem.scene, problem.trials(deviations))
-    booms = dict(problem.booms(deviations, TRIAL))
-    parts = zip(problem.parts, priors, strict=True)
-    return [_pass(problem, forward, booms, deviations, *part, prior) for part, prior in parts]
+    forward, booms = ForwardModel(problem.scene, problem.trials(deviations)), problem.booms(deviations, TRIAL)
+    return [_pass(problem, forward, booms, deviations, *part, prior) for part, prior in zip(problem.parts, priors, strict=True)]
 
 
 def _pass(
@@ -167,19 +227,14 @@ def _pass(
     """
     predicted, slopes = problem.with_slopes(blocks.averaged(forward.move(course)), deviations)
     left = blocks.measured[:, problem.used] - predicted
-    modes, along = modes_along(list(booms.values()), course)
-    places = along[np.clip(np.rint(blocks.times / course.step).astype(int), 0, len(along) - 1)]
-    noise = problem.deviations**2 / np.maximum(blocks.counts[:, problem.used], 1.0)
-    strokes = stroke_error(problem.stroke_variance, course)
-    gravity, others = gravity_in_base(problem.scene), [i for i in range(len(slopes)) if i not in booms]
+    others = [i for i in range(len(slopes)) if i not in booms]
 
-    def run(number: int, moved: int | None) -> Innovations:
-        model = filter_model(modes, number, gravity, problem.used, strokes, prior.level, problem.length)
+    def run(moved: int | None) -> Innovations:
         columns = [left, *-slopes[others]] if moved is None else [left - TRIAL * slopes[moved]]
-        return innovations(model, places, noise, prior, np.stack(columns, axis=1))
+        return _filter(problem, booms[moved], course, blocks)(prior, np.stack(columns, axis=1))
 
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        found = dict(zip(booms, pool.map(run, range(len(booms)), booms), strict=True))
+        found = dict(zip(booms, pool.map(run, booms), strict=True))
     values, variances, loads = found[None]
     white = np.empty(slopes.shape)
     white[others] = values[:, 1:].swapaxes(0, 1)
