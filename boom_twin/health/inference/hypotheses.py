@@ -98,7 +98,7 @@ class Evidence:
         """Where there is a fault of these coefficients: of deviations from it of those that are kept, by their places."""
         by, at = self.matrix @ coefficients, np.asarray(kept)
         explained = (2.0 * self.vector - by) @ coefficients
-        matrix, vector = self.matrix[..., at[:, None], at], (self.vector - by)[..., at]
+        matrix, vector = self.matrix.take(at, axis=-2).take(at, axis=-1), (self.vector - by)[..., at]
         return Evidence(matrix, vector, self.squares - explained, self.rows, self.log + 0.5 * explained)
 
     def given(self, mean: Array, covariance: Array) -> Evidence:
@@ -220,6 +220,8 @@ class HypothesisTest:
         lasting = [known[i].form in (Form.DELAY, Form.SCALE) for i in self._places]  # lags and scales do not grow
         self._growing_priors = np.where(lasting, -np.inf, log(GROWING_PRIOR))
         self._none_sided = log_normal_below(-self._least / np.sqrt(self._faulty))
+        self._names = tuple(dict.fromkeys(known[i].cause for i in self._places))
+        self._group = 2 * [self._names.index(known[i].cause) for i in self._places]  # the cause of every place, in both shapes
         self._is_boundless = np.array([known[i].form in BOUNDLESS for i in self._places])
 
     def explain(self, evidence: Evidence, mean: Array, covariance: Array, span: float, carried: Mapping[str, float]) -> Verdict:
@@ -311,12 +313,13 @@ class HypothesisTest:
         return log_normal_below((values - self._least) / sigmas) - self._none_sided
 
     def _grouped(self, found: list[Explanation], shares: Array, alone: Array) -> tuple[Cause, ...]:
-        groups: dict[str, list[int]] = {}
+        groups: dict[int, list[int]] = {}
         for i in np.argsort(-shares, kind="stable").tolist():
-            groups.setdefault(self.known[found[i].place].cause, []).append(i)
+            groups.setdefault(self._group[i], []).append(i)
+        probable, by_themselves = (np.bincount(self._group, each).tolist() for each in (shares, alone))
         causes = [
-            Cause(name, float(shares[at].sum()), tuple(found[i] for i in at), float(alone[at].sum()))
-            for name, at in groups.items()
+            Cause(self._names[group], probable[group], tuple(found[i] for i in at), by_themselves[group])
+            for group, at in groups.items()
         ]
         return tuple(sorted(causes, key=lambda cause: -cause.probability))
 
