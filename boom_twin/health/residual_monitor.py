@@ -186,6 +186,8 @@ class ResidualMonitor:
             return []
         if self._on_block is not None:
             self._on_block(problem)
+        if self._known:
+            problem = problem._replace(strokes=problem.strokes + np.diag(self._known_in_motion2(problem)))
         news = [] if problem.hold is None else self._judge_hold(problem.hold)
         self._watch(problem)
         if self._limits and not self.is_shaken(block.start):
@@ -270,6 +272,18 @@ class ResidualMonitor:
         for each in self._known.values():
             errors2 = errors2 + (CRUDE * each.value * problem.table[:, 1 + each.place]) ** 2
         return errors2
+
+    def _known_in_motion2(self, problem: BlockProblem) -> Array:
+        """Variances (channels,) of what known faults do that change how forces bend the boom: signatures are those of rest.
+
+        While the tip is accelerated forces are others by that share of gravity.
+        """
+        bent2 = np.zeros(len(self._names))
+        for each in self._known.values():
+            if self._bank.known[each.place].form is Form.SCENE:
+                bent2 += (each.value * problem.table[:, 1 + each.place]) ** 2
+        gravity = np.asarray(self._scene.gravity)
+        return np.asarray(problem.shaking / (gravity @ gravity) * bent2)
 
     def _suspect(self, start: int) -> None:
         """Collect evidence from `start` (ns) on.

@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin import load_scene
+from boom_twin import Twin, load_scene
 from boom_twin.health.alarm_text import AlarmText
+from boom_twin.health.baseline import Baseline
 from boom_twin.health.inference.block_problem import BLOCK, BlockProblem
 from boom_twin.health.inference.fault_catalogue import Form, Parameter, parameters
 from boom_twin.health.inference.hypotheses import Cause, Explanation, HypothesisTest, Verdict
 from boom_twin.health.inference.innovation_filter import ModalStates
 from boom_twin.health.inference.sensitivities import Signatures
+from boom_twin.health.residual_monitor import _KnownFault
 from boom_twin.health.suspicion import Suspicion, refuted
 from boom_twin.types import Alarm
 
@@ -85,3 +87,16 @@ def test_a_name_takes_present_evidence_that_says_so_itself():
     assert cause_after(0.9, True) == (None, "cylinder_3.k most likely, not yet certain")
     cause, told = cause_after(0.99, False)
     assert cause is None and "as cylinder_3.k would, but not in all that was measured" in told
+
+
+def test_what_a_known_fault_does_in_motion_is_as_unsure_as_the_acceleration_is_large():
+    """A weight of 20 kg bends the boom by a tenth more or less at 1 m/s^2; an encoder's offset is the same in any motion."""
+    scene = load_scene()
+    places = {each.cause: place for place, each in enumerate(parameters(scene))}
+    table = np.full((6, 1 + len(parameters(scene))), 1e-4)
+    problem = BlockProblem(0, table, np.zeros(6), np.zeros((6, 6)), 1.0, 0.0, STIFF)
+    alarm = Alarm("joint_4", "changed", 0, None, "tip.payload", "")
+    for cause, share in (("tip.payload", 1.0 / 9.81), ("joint_2.sensor", 0.0)):
+        monitor = Twin(scene, baseline=Baseline()).judge.residuals
+        monitor._known = {cause: _KnownFault(alarm, places[cause], 20.0)}
+        assert np.sqrt(monitor._known_in_motion2(problem)) == pytest.approx(share * 20.0 * 1e-4)
