@@ -90,12 +90,15 @@ class AlarmText:
         move = self._advised_move(verdict, signature)
         return replace(alarm, kind="residual", cause=None, told=told + move, ranked=ranks)
 
-    def of_holds(self, alarm: Alarm, verdict: Verdict, tip: float) -> Alarm:
-        """The alarm with what holds say together; `tip` (m): by how much the most probable fault puts the tip off."""
+    def of_holds(self, alarm: Alarm, verdict: Verdict, tip: float, is_borne_out: bool) -> Alarm:
+        """The alarm with what holds say together; `tip` (m): by how much the most probable fault puts the tip off.
+
+        `is_borne_out`: no single frequency makes it the most probable one.
+        """
         likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
         ranks = tuple(self._ranked(cause, verdict.excess) for cause in likely)
         best, off = verdict.causes[0], f"; that puts the tip off by {1e3 * tip:.0f} mm"
-        if best.probability >= NAMED and verdict.excess <= FITS:
+        if best.probability >= NAMED and verdict.excess <= FITS and is_borne_out:
             told = self._sentence(ranks[0], verdict.best) + off
             return replace(alarm, kind=ranks[0].parts[0][0], cause=best.name, told=told, ranked=ranks)
         if alarm.cause is not None:

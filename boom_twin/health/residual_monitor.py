@@ -225,7 +225,8 @@ class ResidualMonitor:
             return self._end_hold_alarm(hold.end)
         alarm = self._hold_alarm or Alarm("tip", "residual", found.since, None, None, "")
         if self._is_held:
-            self._hold_alarm = alarm = self._tell.of_holds(alarm, found.verdict, found.tip)
+            is_borne_out = self._hold_test.is_borne_out(found, *about)
+            self._hold_alarm = alarm = self._tell.of_holds(alarm, found.verdict, found.tip, is_borne_out)
         else:
             self._hold_alarm = alarm = self._tell.of_far_tip(alarm, found.verdict, found.tip, self._hold_test.telling)
         if alarm.cause == found.verdict.causes[0].name and alarm.cause not in self._known:
