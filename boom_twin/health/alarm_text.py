@@ -19,7 +19,7 @@ from .inference.hypotheses import Cause, Explanation, Verdict
 from .inference.sensitivities import Signature, Signatures
 
 NAMED, GROWING = 0.95, 0.99  # probability of a cause beside the others that is taken for certain; of one that grows
-REFUTED = 1e-3  # probability of the cause that was named, below which another may be
+REFUTED = 1e-3  # probability of a cause below which evidence that fits rules it out; of that which was named, another may be
 GROWTH_AFTER, STEADY = 8.0, 0.9  # evidence (s) that gives a slope; share of the steepest that a lasting growth keeps
 FITS = 1.5  # squares over those of noise that a cause may leave, to be told by name
 NAMED_AFTER, GROWING_AFTER = 3.0, 20.0  # time (s) that it takes to be so probable without a break; evidence of one that grows
@@ -63,16 +63,17 @@ class AlarmText:
         self._steepest: dict[int, float] = {}
 
     def alarm(
-        self, alarm: Alarm, verdict: Verdict, span: float, stamp: int, is_calm: bool, signature: Signature | None
-    ) -> Alarm:
+        self, alarm: Alarm, verdict: Verdict, is_told_apart: bool, span: float, stamp: int, is_calm: bool,
+        signature: Signature | None,
+    ) -> Alarm:  # fmt: skip
         """The alarm with its explanation at `stamp` (ns), of evidence of `span` s; a name stays until it is refuted.
 
-        `is_calm`: no load shakes the boom.
+        `is_calm`: no load shakes the boom. `is_told_apart`: nothing else that was measured speaks against the likeliest cause.
         """
         likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
         ranks = tuple(self._ranked(cause, verdict.excess) for cause in likely)
         best = verdict.causes[0]
-        if self._is_certain(alarm, verdict, span, stamp, is_calm):
+        if self._is_certain(alarm, verdict, is_told_apart, span, stamp, is_calm):
             told = self._sentence(ranks[0], verdict.best)
             return replace(alarm, kind=ranks[0].parts[0][0], cause=best.name, told=told, ranked=ranks)
         if alarm.cause is not None:
@@ -80,18 +81,24 @@ class AlarmText:
         if verdict.excess > FITS and span >= NAMED_AFTER:
             told = f"{alarm.channel} deviates as no single fault that is known would make it; nearest is {best.name}"
             return replace(alarm, kind="unknown", cause=None, told=told, ranked=ranks)
+        if best.probability >= NAMED and not is_told_apart:
+            told = f"{alarm.channel} deviates as {best.name} would, but not in all that was measured: another fault, or two"
+            return replace(alarm, kind="residual", cause=None, told=told, ranked=ranks)
         if len(ranks) == 1:
             return replace(alarm, kind="residual", cause=None, told=f"{best.name} most likely, not yet certain", ranked=ranks)
         told = "cannot be told apart in this posture: " + " or ".join(rank.cause for rank in ranks)
         move = self._advised_move(verdict, signature)
         return replace(alarm, kind="residual", cause=None, told=told + move, ranked=ranks)
 
-    def of_holds(self, alarm: Alarm, verdict: Verdict, tip: float) -> Alarm:
-        """The alarm with what holds say together; `tip` (m): by how much the most probable fault puts the tip off."""
+    def of_holds(self, alarm: Alarm, verdict: Verdict, tip: float, is_borne_out: bool) -> Alarm:
+        """The alarm with what holds say together; `tip` (m): by how much the most probable fault puts the tip off.
+
+        `is_borne_out`: no single frequency makes it the most probable one.
+        """
         likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
         ranks = tuple(self._ranked(cause, verdict.excess) for cause in likely)
         best, off = verdict.causes[0], f"; that puts the tip off by {1e3 * tip:.0f} mm"
-        if best.probability >= NAMED and verdict.excess <= FITS:
+        if best.probability >= NAMED and verdict.excess <= FITS and is_borne_out:
             told = self._sentence(ranks[0], verdict.best) + off
             return replace(alarm, kind=ranks[0].parts[0][0], cause=best.name, told=told, ranked=ranks)
         if alarm.cause is not None:
@@ -133,13 +140,14 @@ class AlarmText:
                 found.append(f"{name} by {factor * own[place]:+.2g} {unit}")
         return ", ".join(found)
 
-    def _is_certain(self, alarm: Alarm, verdict: Verdict, span: float, stamp: int, is_calm: bool) -> bool:
+    def _is_certain(self, alarm: Alarm, verdict: Verdict, is_told_apart: bool, span: float, stamp: int, is_calm: bool) -> bool:
         """Whether the most probable cause is named: it fits, and has been probable enough for some time."""
         best = verdict.causes[0]
         is_growing = verdict.best.is_growing  # whatever else changes meanwhile may look like that
         is_drift = is_growing and self._known[verdict.best.place].form in DRIFTING  # a neighbour's offset may look like that
         is_steady = self._grows_still(alarm, verdict, span) or not is_drift
-        leads = best.probability >= (GROWING if is_growing else NAMED) and verdict.excess <= FITS and is_steady
+        sure = GROWING if is_growing else NAMED
+        leads = min(best.probability, best.alone) >= sure and verdict.excess <= FITS and is_steady and is_told_apart
         shares = {cause.name: cause.probability for cause in verdict.causes}
         is_held = alarm.cause not in (None, best.name) and shares[alarm.cause or ""] > REFUTED
         if not leads or is_held or (is_growing and (span < GROWING_AFTER or not is_calm)):

@@ -105,6 +105,19 @@ class HoldTest:
         was_far = before is not None and before.tip >= FAR and before.verdict.strength >= DOUBTED
         return replace(best, is_far=was_far and best.tip >= FAR and best.verdict.strength >= LIKELY)
 
+    def is_borne_out(self, found: HoldVerdict, mean: Array, covariance: Array) -> bool:
+        """Whether the most probable cause stays that, by e^`LIKELY`, whichever single frequency is left out.
+
+        A wind that was not noticed makes one as wrong as a fault does.
+        """
+        first, name = sum(hold.start < found.since for hold in self._holds), found.verdict.causes[0].name
+        for left_out in range(sum(len(hold.modes) for hold in self._holds)):
+            white, log, numbers = self._whitened(left_out)
+            verdict = self._explained(white, numbers >= first, log, mean, covariance)
+            if verdict.causes[0].name != name or verdict.strength < LIKELY:
+                return False
+        return True
+
     def change(self, place: int, by: float, mean: Array, covariance: Array) -> float:
         """ln of how much more probable it is that a parameter has changed by exactly `by`, from any hold on, than not."""
         white, log, numbers = self._whitened()
@@ -130,8 +143,11 @@ class HoldTest:
         matrix[:, :count, :count], vector[:, :count] = healthy.matrix[:, count:, count:], healthy.vector[:, count:]
         return Evidence(matrix, vector, healthy.squares, healthy.rows, healthy.log)
 
-    def _whitened(self) -> tuple[tuple[Array, Array, Array], float, Array]:
-        """Root of the covariance, whitened residuals and signatures, logarithm of their probability, hold of every row."""
+    def _whitened(self, left_out: int | None = None) -> tuple[tuple[Array, Array, Array], float, Array]:
+        """Root of the covariance, whitened residuals and signatures, logarithm of their probability, hold of every row.
+
+        `left_out`: number of a frequency among those of all holds.
+        """
         parts = [rows_of(hold, self._errors2, self._frequency_error) for hold in self._holds]
         table, own, error2 = (np.concatenate(column) for column in zip(*parts, strict=True))
         for place, left in self._known:
@@ -142,6 +158,8 @@ class HoldTest:
         strokes, times = np.array([hold.strokes for hold in self._holds]), np.array([hold.start for hold in self._holds]) * NANO
         travel = np.abs(strokes[:, None] - strokes[None]).max(axis=2) + REST * np.abs(times[:, None] - times[None])
         known = np.isfinite(table[:, 0])
+        if left_out is not None:
+            known[np.flatnonzero(what >= channels)[left_out]] = False
         table, own, error2, what, numbers = table[known], own[known], error2[known], what[known], numbers[known]
         alike = (what[:, None] == what[None]) * np.exp(-travel / REACH)[np.ix_(numbers, numbers)]
         covariance = np.diag(own) + alike * np.sqrt(np.outer(error2, error2))

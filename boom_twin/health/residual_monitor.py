@@ -26,7 +26,7 @@ from .inference.holds import HoldProblem
 from .inference.hypotheses import Explanation, HypothesisTest, Regression, Verdict
 from .inference.innovation_filter import KEEPS_STEP, InnovationFilter
 from .inference.sensitivities import Signature
-from .suspicion import CRUDE, DETUNING, MISFIT, RECENT, WHOLE_MISFIT, Suspicion, carried_on, load_levels
+from .suspicion import CRUDE, DETUNING, MISFIT, RECENT, WHOLE_MISFIT, Suspicion, carried_on, load_levels, refuted
 from .tip_load import TipLoadMonitor
 
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a suspicion begins, and is given up if it has not become an alarm
@@ -124,6 +124,7 @@ class ResidualMonitor:
         self._suspicion: Suspicion | None = None
         self._alarm: Alarm | None = None
         self._carried: dict[str, float] = {}
+        self._refuted: frozenset[str] = frozenset()  # causes that evidence which has fitted rules out for this alarm
         self._blocks = 0
         self._tip_load.begin()
         self._unexplained: int | None = None  # stamp (ns) from which on nothing explains the deviation
@@ -185,6 +186,8 @@ class ResidualMonitor:
             return []
         if self._on_block is not None:
             self._on_block(problem)
+        if self._known:
+            problem = problem._replace(strokes=problem.strokes + np.diag(self._known_in_motion2(problem)))
         news = [] if problem.hold is None else self._judge_hold(problem.hold)
         self._watch(problem)
         if self._limits and not self.is_shaken(block.start):
@@ -222,7 +225,8 @@ class ResidualMonitor:
             return self._end_hold_alarm(hold.end)
         alarm = self._hold_alarm or Alarm("tip", "residual", found.since, None, None, "")
         if self._is_held:
-            self._hold_alarm = alarm = self._tell.of_holds(alarm, found.verdict, found.tip)
+            is_borne_out = self._hold_test.is_borne_out(found, *about)
+            self._hold_alarm = alarm = self._tell.of_holds(alarm, found.verdict, found.tip, is_borne_out)
         else:
             self._hold_alarm = alarm = self._tell.of_far_tip(alarm, found.verdict, found.tip, self._hold_test.telling)
         if alarm.cause == found.verdict.causes[0].name and alarm.cause not in self._known:
@@ -269,6 +273,18 @@ class ResidualMonitor:
         for each in self._known.values():
             errors2 = errors2 + (CRUDE * each.value * problem.table[:, 1 + each.place]) ** 2
         return errors2
+
+    def _known_in_motion2(self, problem: BlockProblem) -> Array:
+        """Variances (channels,) of what known faults do that change how forces bend the boom: signatures are those of rest.
+
+        While the tip is accelerated forces are others by that share of gravity.
+        """
+        bent2 = np.zeros(len(self._names))
+        for each in self._known.values():
+            if self._bank.known[each.place].form is Form.SCENE:
+                bent2 += (each.value * problem.table[:, 1 + each.place]) ** 2
+        gravity = np.asarray(self._scene.gravity)
+        return np.asarray(problem.shaking / (gravity @ gravity) * bent2)
 
     def _suspect(self, start: int) -> None:
         """Collect evidence from `start` (ns) on.
@@ -333,11 +349,16 @@ class ResidualMonitor:
         news = self._judge_load(start, suspicion, verdict) + self._judge(start, suspicion, verdict)
         if self._suspicion is not suspicion:
             return news
-        if suspicion.is_outdated(verdict):
+        recent = suspicion.recent_fit(verdict)
+        is_resized = recent.is_resized and self._alarm is not None
+        if recent.is_outdated or is_resized:
             is_odd = verdict.none_excess > WHOLE_MISFIT or verdict.strength >= SURE  # no load explained it
             lately = max(suspicion.start, start - RECENT * BLOCK)  # before that it was explained
             self._unexplained = (self._unexplained or lately) if is_odd else None
-            self._carried = carried_on(verdict) if self._alarm is not None else {}
+            has_shape = not (is_resized or verdict.best.is_growing) and self._alarm is not None
+            self._carried = carried_on(verdict) if has_shape else {}
+            if has_shape and verdict.strength >= SURE:
+                self._refuted |= refuted(verdict)
             self._suspect(start + BLOCK)
         elif suspicion.is_settled:
             self._unexplained = None
@@ -359,9 +380,7 @@ class ResidualMonitor:
             return self._end_open(start) if suspicion.span > GONE_AFTER else []
         if (known := self._change_of_known(suspicion, verdict)) is not None:
             return self._end_known(known, start)
-        self._alarm = self._tell.alarm(
-            self._alarm, suspicion.explain_calmly(), suspicion.span, start, load == 0.0, self.signature
-        )
+        self._alarm = self._explained(self._alarm, suspicion, verdict, suspicion.span, start, load == 0.0)
         self._go_on_with(suspicion, verdict)
         return [*self.alarms]
 
@@ -392,10 +411,16 @@ class ResidualMonitor:
         channel = int(np.argmax(np.abs(suspicion.size) / np.sqrt(self._errors2)))
         since = start - (self._detector.blocks_since(int(np.argmax(self.levels))) - 1) * BLOCK
         alarm = Alarm(self._names[channel], "residual", since, None, None, "")
-        is_calm = self._load_lately(start) == 0.0
-        self._alarm = self._tell.alarm(alarm, suspicion.explain_calmly(), span, start, is_calm, self.signature)
+        self._refuted = frozenset()
+        self._alarm = self._explained(alarm, suspicion, verdict, span, start, self._load_lately(start) == 0.0)
         is_same = self._hold_alarm is not None and self._hold_alarm.cause is None  # one fault is one alarm
         return [*(self._end_hold_alarm(start) if is_same else []), self._alarm]
+
+    def _explained(self, alarm: Alarm, suspicion: Suspicion, verdict: Verdict, span: float, start: int, is_calm: bool) -> Alarm:
+        """The alarm in words, by what the calm blocks say; a name has to go with all of them, and with all that came before."""
+        calm = suspicion.explain_calmly()
+        is_told_apart = calm.causes[0].name == verdict.causes[0].name and calm.causes[0].name not in self._refuted
+        return self._tell.alarm(alarm, calm, is_told_apart, span, start, is_calm, self.signature)
 
     def _change_of_known(self, suspicion: Suspicion, verdict: Verdict) -> _KnownFault | None:
         """The known fault whose end goes with what is measured about as well as any other explanation does."""
@@ -426,7 +451,7 @@ class ResidualMonitor:
         assert self._alarm is not None
         best, cause = verdict.best, self._alarm.cause
         is_sure = cause == verdict.causes[0].name and best.sigma < KNOWN_WITHIN * abs(best.value)
-        if not is_sure or best.is_growing or suspicion.span < KNOWN_AFTER or suspicion.is_outdated(verdict):
+        if not is_sure or best.is_growing or suspicion.span < KNOWN_AFTER or any(suspicion.recent_fit(verdict)):
             return
         before = self._known.get(cause or "")
         if before is None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from ..scene.schema import Scene
 from ..scene.summary import explain
 from ..types import NANO, Array
+from .alarm_text import FITS, REFUTED
 from .hold_test import rows_of
 from .inference.block_problem import BLOCK, BlockProblem
 from .inference.holds import HoldProblem
@@ -27,12 +29,29 @@ RECENT = 20  # blocks that must go with what explains all of them
 MISFIT, WHOLE_MISFIT = 2.5, 1.6  # times the squares that noise leaves, in the recent blocks and in all of them
 EXCITED = 12.0  # ln of how much better another level of load goes with the recent blocks
 LONGEST = 900  # blocks of one suspicion
+CHANGED = 12.0  # ln of how much better another size of the same fault goes with the recent blocks
 CARRIED = 0.02  # least probability that a cause keeps from one suspicion to the next
 
 
 def load_levels(scene: Scene) -> Array:
     """Levels (N) that the unknown load at the tip of a boom is looked for at, from 0."""
     return LEVELS * explain(scene).mass * math.hypot(*scene.gravity)
+
+
+class RecentFit(NamedTuple):
+    """How an explanation of all evidence goes with its recent blocks.
+
+    Attributes
+    ----------
+    is_outdated : bool
+        Not any more: the fault or the load has changed.
+    is_resized : bool
+        With another size or rate of the same fault much better than with those that it has by all of the evidence: it has
+        grown, or grows no more. What such evidence says of causes depends on which makes up best for the wrong shape.
+    """
+
+    is_outdated: bool
+    is_resized: bool
 
 
 class Suspicion:
@@ -72,7 +91,7 @@ class Suspicion:
 
     @property
     def is_settled(self) -> bool:
-        """Whether it is old enough to be outdated, see `is_outdated`."""
+        """Whether it is old enough to be outdated, see `recent_fit`."""
         return self.blocks > RECENT
 
     def take(self, problem: BlockProblem) -> None:
@@ -127,16 +146,18 @@ class Suspicion:
         along = force / max(size, 1e-9)
         return size, math.sqrt(float(along @ covariance @ along))
 
-    def is_outdated(self, verdict: Verdict) -> bool:
-        """Whether what explains all of it does not go with the recent blocks: the fault or the load has changed."""
+    def recent_fit(self, verdict: Verdict) -> RecentFit:
+        """How what explains all of the evidence goes with the recent blocks."""
         if not self.is_settled:
-            return False
-        if self.blocks > LONGEST or verdict.excess > WHOLE_MISFIT:
-            return True
+            return RecentFit(False, False)
         recent = self._evidence + self._before[0].weighted(-1.0)
-        best = verdict.best if verdict.strength > 0.0 else None
-        logs, squares = self._bank.fit(recent, self._coefficients(best), self.mean, self.covariance)
-        return bool(squares[verdict.level] > MISFIT or logs.max() - logs[verdict.level] > EXCITED)
+        if verdict.strength > 0.0:
+            logs, squares, changed = self._bank.change(recent, verdict.best, self.span, self.mean, self.covariance)
+        else:
+            (logs, squares), changed = self._bank.fit(recent, self._coefficients(None), self.mean, self.covariance), 0.0
+        is_misfit = verdict.excess > WHOLE_MISFIT or squares[verdict.level] > MISFIT
+        is_other_load = logs.max() - logs[verdict.level] > EXCITED
+        return RecentFit(bool(self.blocks > LONGEST or is_misfit or is_other_load), changed > CHANGED)
 
     def _coefficients(self, each: Explanation | None) -> Array:
         return np.zeros(2 * len(self.mean)) if each is None else self._bank.coefficients(each, self.span)
@@ -149,11 +170,12 @@ class Suspicion:
 
 
 def carried_on(verdict: Verdict) -> dict[str, float]:
-    """What a suspicion that follows this verdict, when it is outdated, is to begin with; see `HypothesisTest.explain`.
-
-    Nothing where the best explanation grew: it grows no more, or otherwise, and which cause went best with that shape says
-    which one makes up best for what is wrong with it.
-    """
-    if verdict.best.is_growing:
-        return {}
+    """What a suspicion that follows this verdict, when it is outdated, is to begin with; see `HypothesisTest.explain`."""
     return {cause.name: math.log(max(cause.probability, CARRIED)) for cause in verdict.causes}
+
+
+def refuted(verdict: Verdict) -> frozenset[str]:
+    """Causes that cannot be that of a deviation which this verdict explains well, whatever comes later."""
+    if verdict.excess > FITS:
+        return frozenset()
+    return frozenset(cause.name for cause in verdict.causes if cause.alone < REFUTED)

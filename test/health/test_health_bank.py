@@ -157,6 +157,8 @@ def test_what_was_known_before_counts():
     first, later = problem.verdict(), BANK.explain(problem.evidence(), problem.mean, problem.covariance, SPAN, carried)
     odds = [share / (1.0 - share) for share in (probability(first, "joint_2.sensor"), probability(later, "joint_2.sensor"))]
     assert odds[1] / odds[0] == pytest.approx(np.exp(-3.0), rel=1e-6)
+    alone = {cause.name: cause.alone for cause in later.causes}
+    assert alone == pytest.approx({cause.name: cause.probability for cause in first.causes}), "but not for this evidence alone"
 
 
 def test_the_load_is_part_of_every_hypothesis():
@@ -211,6 +213,21 @@ def test_fit_of_a_known_fault():
     later = Problem(7, {})
     logs, squares = BANK.fit(later.evidence(), BANK.coefficients(best, SPAN), later.mean, later.covariance)
     assert logs[0] < later.log() and squares[0] > 2.0, "the fault has gone"
+
+
+@pytest.mark.parametrize("rate, bound", [(0.0, 0.0), (0.3, 12.0)])
+def test_another_size_of_a_known_fault_is_as_probable_as_densely(rate, bound):
+    """Of a size and a rate that differ from those of the explanation, each normal; only what grows on has changed."""
+    problem, each = Problem(6, {3: 2.0}, 40, rate), Explanation(3, 0, 0.0, 2.0, 0.1)
+    logs, squares, changed = BANK.change(problem.evidence(), each, SPAN, problem.mean, problem.covariance)
+    same, left = BANK.fit(problem.evidence(), BANK.coefficients(each, SPAN), problem.mean, problem.covariance)
+    assert logs == pytest.approx(same) and squares == pytest.approx(left)
+    columns = np.stack([np.ones(40), problem.times], axis=1) * problem.signature[:, [3]]
+    prior = KNOWN[3].faulty ** 2 * np.diag([1.0, 1.0 / GROWN**2])
+    at = problem.signature @ problem.mean + 2.0 * columns[:, 0]
+    other = log_density(problem.values, at, problem.spread + columns @ prior @ columns.T)
+    assert changed == pytest.approx(other - problem.log(3, 0.0, 2.0), abs=1e-7)
+    assert changed > bound if rate else changed < bound
 
 
 def test_levels_together_are_those_of_each_alone():

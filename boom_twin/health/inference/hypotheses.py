@@ -29,7 +29,7 @@ model that is not quite right is not quite sure.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import log
 
@@ -94,11 +94,11 @@ class Evidence:
             self.log + other.log,
         )  # fmt: skip
 
-    def about(self, coefficients: Array, count: int) -> Evidence:
-        """Where there is a fault of these coefficients: of deviations of the first `count` of them from it."""
-        by = self.matrix @ coefficients
+    def about(self, coefficients: Array, kept: Sequence[int]) -> Evidence:
+        """Where there is a fault of these coefficients: of deviations from it of those that are kept, by their places."""
+        by, at = self.matrix @ coefficients, np.asarray(kept)
         explained = (2.0 * self.vector - by) @ coefficients
-        matrix, vector = self.matrix[..., :count, :count], (self.vector - by)[..., :count]
+        matrix, vector = self.matrix.take(at, axis=-2).take(at, axis=-1), (self.vector - by)[..., at]
         return Evidence(matrix, vector, self.squares - explained, self.rows, self.log + 0.5 * explained)
 
     def given(self, mean: Array, covariance: Array) -> Evidence:
@@ -157,11 +157,18 @@ class Explanation:
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """Explanations that have one cause, the most probable first, and their probability together, if there is a fault."""
+    """Explanations that have one cause, the most probable first, and their probability together, if there is a fault.
+
+    Attributes
+    ----------
+    alone : float
+        Probability by this evidence alone, whatever was known before.
+    """
 
     name: str
     probability: float
     parts: tuple[Explanation, ...]
+    alone: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,6 +220,8 @@ class HypothesisTest:
         lasting = [known[i].form in (Form.DELAY, Form.SCALE) for i in self._places]  # lags and scales do not grow
         self._growing_priors = np.where(lasting, -np.inf, log(GROWING_PRIOR))
         self._none_sided = log_normal_below(-self._least / np.sqrt(self._faulty))
+        self._names = tuple(dict.fromkeys(known[i].cause for i in self._places))
+        self._group = 2 * [self._names.index(known[i].cause) for i in self._places]  # the cause of every place, in both shapes
         self._is_boundless = np.array([known[i].form in BOUNDLESS for i in self._places])
 
     def explain(self, evidence: Evidence, mean: Array, covariance: Array, span: float, carried: Mapping[str, float]) -> Verdict:
@@ -242,12 +251,13 @@ class HypothesisTest:
         squares = healthy.squares[:, None] - fits[:, 1]
         best = np.unravel_index(int(np.argmax(factors)), factors.shape)
         excess = max(1.0, float(squares[best]) / max(healthy.rows, 1.0))
-        priors = np.tile(self._priors + [carried.get(self.known[place].cause, 0.0) for place in self._places], 2)
+        priors = np.tile(self._priors, 2)
         seen = (healthy.matrix.diagonal(axis1=-2, axis2=-1)[:, self._places] > 0.0).any(axis=0)
         priors[~np.tile(seen, 2)] = -np.inf if seen.any() else 0.0  # what shows in no reading, say an IMU that is not there
         weights = factors / (excess * (1.0 + CRUDE * max(0.0, float(factors[best])))) + priors
-        shares = np.exp(weights - weights.max())
-        shares = shares.sum(axis=0) / shares.sum()
+        alone = np.exp(weights - weights.max()).sum(axis=0)
+        before = np.exp([carried.get(self.known[place].cause, 0.0) for place in self._places])
+        shares = alone * np.tile(before, 2)
         levels = np.argmax(factors, axis=0)
         found = [
             Explanation(int(place), level, float(factors[level, i]), *fits[level, 2:, i].tolist())
@@ -256,7 +266,8 @@ class HypothesisTest:
         is_faulty, none = float(factors[best]) > 0.0, int(np.argmax(logs))
         as_well = logs > logs[none] - AS_WELL
         none_excess = max(1.0, float(healthy.squares[as_well].min()) / max(healthy.rows, 1.0))
-        return Verdict(self._grouped(found, shares), excess, none_excess, int(best[0]) if is_faulty else none)
+        causes = self._grouped(found, shares / shares.sum(), alone / alone.sum())
+        return Verdict(causes, excess, none_excess, int(best[0]) if is_faulty else none)
 
     def least_told(self, information: Array, strength: float) -> Array:
         """Sizes (parameters,) of steady faults whose expected log factor is `strength`, by their information (parameters,).
@@ -301,11 +312,15 @@ class HypothesisTest:
         """What it adds to the log factor that faults have a least value."""
         return log_normal_below((values - self._least) / sigmas) - self._none_sided
 
-    def _grouped(self, found: list[Explanation], shares: Array) -> tuple[Cause, ...]:
-        groups: dict[str, list[int]] = {}
+    def _grouped(self, found: list[Explanation], shares: Array, alone: Array) -> tuple[Cause, ...]:
+        groups: dict[int, list[int]] = {}
         for i in np.argsort(-shares, kind="stable").tolist():
-            groups.setdefault(self.known[found[i].place].cause, []).append(i)
-        causes = [Cause(name, float(shares[at].sum()), tuple(found[i] for i in at)) for name, at in groups.items()]
+            groups.setdefault(self._group[i], []).append(i)
+        probable, by_themselves = (np.bincount(self._group, each).tolist() for each in (shares, alone))
+        causes = [
+            Cause(self._names[group], probable[group], tuple(found[i] for i in at), by_themselves[group])
+            for group, at in groups.items()
+        ]
         return tuple(sorted(causes, key=lambda cause: -cause.probability))
 
     def fit(self, evidence: Evidence, coefficients: Array, mean: Array, covariance: Array) -> tuple[Array, Array]:
@@ -316,8 +331,30 @@ class HypothesisTest:
         logs, squares : ndarray, shape (levels,)
             By level of the load: ln of how probable the measurements are, and squares left over those that noise leaves.
         """
-        healthy = evidence.about(coefficients, len(mean)).given(mean, covariance)
+        healthy = evidence.about(coefficients, range(len(mean))).given(mean, covariance)
         return healthy.log, healthy.squares / max(healthy.rows, 1.0)
+
+    def change(
+        self, evidence: Evidence, each: Explanation, span: float, mean: Array, covariance: Array
+    ) -> tuple[Array, Array, float]:
+        """How well a fault, `span` (s) after its evidence began, goes with further evidence of the same filter.
+
+        Returns
+        -------
+        logs, squares : ndarray, shape (levels,)
+            As `fit` gives them.
+        changed : float
+            ln of how much more probable it is, at the fault's level of the load, that its size or its rate is another one by
+            then than that both are what they were.
+        """
+        kept = [*range(len(mean)), each.place + len(self.known)]
+        healthy = evidence.about(self.coefficients(each, span), kept).given(mean, covariance)
+        pair, prior2 = np.array([each.place, len(mean)]), self.known[each.place].faulty ** 2 * np.array([1.0, GROWN**-2])
+        vector, matrix = healthy.vector[each.level, pair], healthy.matrix[each.level][pair[:, None], pair]
+        spread = np.eye(2) + prior2[:, None] * matrix
+        found = np.linalg.solve(spread, prior2 * vector)
+        changed = 0.5 * float(vector @ found) - 0.5 * float(np.linalg.slogdet(spread)[1])
+        return healthy.log, healthy.squares / max(healthy.rows, 1.0), changed
 
     def coefficients(self, each: Explanation, span: float) -> Array:
         """Of the fault alone, `span` (s) after its evidence began; shape (2 * parameters,)."""

@@ -1,0 +1,102 @@
+"""What a suspicion says of its own evidence, and what a name takes beside a probability."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from boom_twin import Twin, load_scene
+from boom_twin.health.alarm_text import AlarmText
+from boom_twin.health.baseline import Baseline
+from boom_twin.health.inference.block_problem import BLOCK, BlockProblem
+from boom_twin.health.inference.fault_catalogue import Form, Parameter, parameters
+from boom_twin.health.inference.hypotheses import Cause, Explanation, HypothesisTest, Verdict
+from boom_twin.health.inference.innovation_filter import ModalStates
+from boom_twin.health.inference.sensitivities import Signatures
+from boom_twin.health.residual_monitor import _KnownFault
+from boom_twin.health.suspicion import Suspicion, refuted
+from boom_twin.types import Alarm
+
+KNOWN = (
+    Parameter("joint_1.sensor", "bias", Form.ANGLE, 0, "rad", 1e-4, 5e-3),
+    Parameter("joint_2.sensor", "bias", Form.ANGLE, 1, "rad", 1e-4, 5e-3),
+)
+NOISE, ERROR = 4e-5, 5e-5  # rad, of a block's mean and of the model in one posture
+STIFF = ModalStates(*(np.zeros(shape) for shape in ((0,), (0, 0), (0, 0), (0, 0), (0, 0), (2, 0), (2,), (0, 2), (2, 2))))
+"""Of a boom without a mode below 8 Hz, that no load bends."""
+
+
+def suspicion_of(offsets: np.ndarray, seed: int = 1) -> Suspicion:
+    """Of blocks of two angles, the first of which is off by so much (rad) in each of them."""
+    rng, mean = np.random.default_rng(seed), np.zeros(2)
+    found = Suspicion(
+        HypothesisTest(KNOWN), 0, mean, np.diag([1e-8, 1e-8]), np.full(2, ERROR**2), np.ones(2), np.array([0.0]), {}
+    )
+    for k, offset in enumerate(offsets):
+        left = np.array([offset, 0.0]) + NOISE * rng.normal(size=2)
+        table = np.column_stack([left, np.eye(2)])
+        found.take(BlockProblem(k * BLOCK, table, np.full(2, NOISE**2), np.zeros((2, 2)), 0.0, 0.0, STIFF))
+    return found
+
+
+GROWING, STAYING = np.linspace(0.0, 6e-4, 60), np.full(60, 6e-4)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_size_that_has_changed_is_seen_within_a_few_seconds(seed):
+    """Growth that is over within 3 s of its end, though squares are those of noise; what grows on or stays is the same."""
+    over = suspicion_of(np.concatenate([GROWING, STAYING[:25]]), seed)
+    verdict = over.explain()
+    assert verdict.best.is_growing and verdict.excess < 1.5
+    assert over.recent_fit(verdict).is_resized and not over.recent_fit(verdict).is_outdated
+    for offsets in (GROWING, STAYING, np.concatenate([STAYING, STAYING])):
+        steady = suspicion_of(offsets, seed)
+        assert not any(steady.recent_fit(steady.explain()))
+
+
+def verdict_of(shares: dict[str, tuple[float, float]], excess: float = 1.0) -> Verdict:
+    """Of causes with their probability, and that by this evidence alone."""
+    known = parameters(load_scene())
+    places = {each.cause: place for place, each in enumerate(known)}
+    causes = [
+        Cause(name, share, (Explanation(places[name], 0, 40.0, 0.4, 0.02),), alone) for name, (share, alone) in shares.items()
+    ]
+    return Verdict(tuple(causes), excess, 1.0, 0)
+
+
+def test_what_fits_rules_out_other_causes():
+    shares = {"cylinder_3.k": (0.7, 0.7), "joint_3.sensor": (0.298, 0.298), "tip.payload": (0.002, 1e-9)}
+    assert refuted(verdict_of(shares)) == {"tip.payload"}
+    assert refuted(verdict_of(shares, excess=1.6)) == frozenset(), "what does not fit rules nothing out"
+
+
+def test_a_name_takes_present_evidence_that_says_so_itself():
+    """Odds that older evidence has left, or calm blocks that say otherwise than all of them, make no name."""
+    scene = load_scene()
+    known = parameters(scene)
+
+    def cause_after(alone: float, is_told_apart: bool) -> tuple[str | None, str]:
+        tell = AlarmText(scene, known, Signatures(scene, known, (None,) * 4), np.full(6, 1e-4))
+        alarm = Alarm("joint_3", "residual", 0, None, None, "")
+        verdict = verdict_of({"cylinder_3.k": (0.99, alone), "joint_3.sensor": (0.01, 1.0 - alone)})
+        for second in range(6):
+            alarm = tell.alarm(alarm, verdict, is_told_apart, 10.0 + second, second * 10**9, True, None)
+        return alarm.cause, alarm.told
+
+    assert cause_after(0.99, True)[0] == "cylinder_3.k"
+    assert cause_after(0.9, True) == (None, "cylinder_3.k most likely, not yet certain")
+    cause, told = cause_after(0.99, False)
+    assert cause is None and "as cylinder_3.k would, but not in all that was measured" in told
+
+
+def test_what_a_known_fault_does_in_motion_is_as_unsure_as_the_acceleration_is_large():
+    """A weight of 20 kg bends the boom by a tenth more or less at 1 m/s^2; an encoder's offset is the same in any motion."""
+    scene = load_scene()
+    places = {each.cause: place for place, each in enumerate(parameters(scene))}
+    table = np.full((6, 1 + len(parameters(scene))), 1e-4)
+    problem = BlockProblem(0, table, np.zeros(6), np.zeros((6, 6)), 1.0, 0.0, STIFF)
+    alarm = Alarm("joint_4", "changed", 0, None, "tip.payload", "")
+    for cause, share in (("tip.payload", 1.0 / 9.81), ("joint_2.sensor", 0.0)):
+        monitor = Twin(scene, baseline=Baseline()).judge.residuals
+        monitor._known = {cause: _KnownFault(alarm, places[cause], 20.0)}
+        assert np.sqrt(monitor._known_in_motion2(problem)) == pytest.approx(share * 20.0 * 1e-4)
