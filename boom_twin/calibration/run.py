@@ -19,7 +19,7 @@ from .forward_model import READINGS, CalibrationProblem
 from .least_squares import Fit, InseparableUnknowns, fitted, groups_of
 from .noise_model import ResidualBlocks, block_length, blocks_of, channel_names
 from .sessions import MeasuredSession, SessionCourse, course_of, read_sessions, refuse_short
-from .unknown_load import LENGTH, SAMPLES, fitted_under_load
+from .unknown_load import LENGTH, SAMPLES, fitted_under_load, is_plausible
 from .unknowns import Unknown, unknowns_of, usual_names
 from .validation import HeldOutResult, judged
 
@@ -189,7 +189,7 @@ def _fitted(
         loaded = fitted_under_load(finer, quiet, tell)
     except SolverError:  # then the misfit stays, and is remarked on
         return problem, quiet
-    return problem, loaded if loaded.misfit <= LOADED else quiet
+    return problem, loaded if loaded.misfit <= LOADED and is_plausible(loaded.load, scene) else quiet
 
 
 def _tell_pass(progress: Progress, number: int) -> None:

@@ -38,6 +38,7 @@ from .sessions import SessionCourse
 LENGTH, SAMPLES = 0.01, 1.5  # s, of the blocks at least, and samples in them on average
 FREE = 0.044  # a load that is let free: what it is likely to change by in a second, over the boom's weight
 QUIET = 0.001  # likewise between its jumps, at first
+GUSTS = 0.03  # root mean square of a load without pulses, over the boom's weight, up to which it may be wind
 STAYS = 0.06  # standard deviation of what stays of it, over the boom's weight
 FINER, FURTHER = (4.0, 2.0), 4  # factors by which the rates of the quiet load are looked at, and how often in a row
 FLANK = 0.1  # s, over which changes of the load are looked at
@@ -103,6 +104,13 @@ def fitted_under_load(problem: CalibrationProblem, quiet: Fit, tell: Tell) -> Fi
     scatter = WIDER**2 * _scatter(passes, round(SPAN / problem.length))
     passed, load = quiet.passes + count, _load(problem, passes)
     return Fit(deviations, _information(passes), scatter, misfit, passed, quiet.whitening, load)
+
+
+def is_plausible(load: TipLoad | None, scene: Scene) -> bool:
+    """Whether a load may be one: pulses, or no larger than wind. A drifting encoder looks like a large load that wanders."""
+    if load is None or load.pulses is not None:
+        return True
+    return load.rms <= GUSTS * explain(scene).mass * float(np.hypot(*scene.gravity))
 
 
 def _after_step(problem: CalibrationProblem, passes: Sequence[Pass], deviations: Array) -> tuple[Array, float]:

@@ -101,7 +101,8 @@ def public_functions() -> dict[str, object]:
     """The stable functions, and the twin's public methods that take something."""
     stable = {name: getattr(boom_twin, name) for name in boom_twin.__all__}
     functions = {name: value for name, value in stable.items() if inspect.isfunction(value)}
-    methods = {f"Twin.{name}": value for name, value in vars(stable["Twin"]).items() if name[0] != "_"}
+    public = {name: value for name, value in vars(stable["Twin"]).items() if name[0] != "_" and inspect.isfunction(value)}
+    methods = {f"Twin.{name}": value for name, value in public.items()}
     return functions | {name: value for name, value in methods.items() if len(inspect.signature(value).parameters) > 1}
 
 

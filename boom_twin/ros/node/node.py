@@ -11,7 +11,6 @@ from time import perf_counter
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.lifecycle import LifecycleNode, LifecyclePublisher, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
@@ -58,7 +57,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._twin: Twin | None = None
         self._page: MonitorProcess | None = None
         self._outputs: dict[Output, LifecyclePublisher] = {}
-        self._wanted: set[Output] = set()
         self._subscriptions_in: list[Subscription[Any]] = []
         self._refused = ""
         self._service_change_state.callback = partial(self._change_state, self._service_change_state.callback)
@@ -110,10 +108,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             raise
         for key, topic in self._topics.outputs.items():
             if key is not Output.DIAGNOSTICS:
-                parts = message_class(topic.type), topic.name, qos_profile(topic.qos)
-                matched = PublisherEventCallbacks(matched=self._count_listeners)
-                self._outputs[key] = self.create_lifecycle_publisher(*parts, event_callbacks=matched)
-        self._count_listeners()
+                kind = message_class(topic.type)
+                self._outputs[key] = self.create_lifecycle_publisher(kind, topic.name, qos_profile(topic.qos))
         if self.get_parameter("monitor").value:
             mapping, scene = (self.get_parameter(name).value for name in ("mapping", "scene"))
             self._page = MonitorProcess(self, self._topics, mapping, scene)
@@ -208,7 +204,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         for publisher in self._outputs.values():
             self.destroy_lifecycle_publisher(publisher)
         self._outputs.clear()
-        self._wanted.clear()
         if self._twin is not None:
             self._twin_services.close()
             self._preparation.close()
@@ -251,15 +246,12 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         if health is not None:
             self._publish(Report(stamp, True, health=health))
         self._diagnostics.judged(health, perf_counter() - began)
-        self._count_listeners()
 
     def _publish(self, report: Report) -> None:
         """What somebody listens to, or may ask for later; the node is active, which the publishers need not look at again."""
-        for key, encoded in self._encoder.fill(report, self._wanted.__contains__):
+        for key, encoded in self._encoder.fill(report, self._is_wanted):
             self._outputs[key].handle.publish_raw(encoded)
 
-    def _count_listeners(self, _: object = None) -> None:
-        """Look up which outputs are wanted: when a subscription is matched or goes, and now and then, should that be lost."""
-        handles = {key: publisher.handle for key, publisher in self._outputs.items()}
-        lasting = {key for key in handles if self._topics.outputs[key].qos.durability == "transient_local"}
-        self._wanted = lasting | {key for key, handle in handles.items() if handle.get_subscription_count() > 0}
+    def _is_wanted(self, key: Output) -> bool:
+        is_heard = self._outputs[key].handle.get_subscription_count() > 0
+        return is_heard or self._topics.outputs[key].qos.durability == "transient_local"
