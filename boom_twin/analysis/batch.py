@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compiler.plan import Plan, first_row, width_of
+from ..compiler.plan import Plan, first_row, stacked, width_of
 from ..errors import UsageError
 from ..kernels.integrators import GENERALISED_ALPHA
 from ..kernels.tables import OK, SENTENCES, Work
@@ -43,8 +43,8 @@ class Batch:
         _check_structure(plans)
         self.plans = tuple(plans)
         self.cores = cores or len(os.sched_getaffinity(0))
-        self._tables = _stacked([plan.tables for plan in plans])
-        self._states = _stacked([plan.state() for plan in plans])
+        self._tables = stacked([plan.tables for plan in plans])
+        self._states = stacked([plan.state() for plan in plans])
         self._works = [plans[0].work() for _ in range(min(len(plans), SHARES * self.cores))]
 
     def settle(self, strokes: Array, angles: Array) -> Array:
@@ -129,12 +129,6 @@ def _alike(a: Any, b: Any) -> bool:
         return False
     names = getattr(a, "dtype", np.dtype(float)).names or ()
     return all(np.array_equal(a[name], b[name]) for name in names if a.dtype[name].kind == "i")
-
-
-def _stacked(parts: Sequence[Any]) -> Any:
-    """Named tuples of arrays as one, a leading axis over them; what is not an array is common."""
-    columns = zip(*parts, strict=True)
-    return type(parts[0])(*(np.stack(column) if isinstance(column[0], np.ndarray) else column[0] for column in columns))
 
 
 def _part(stack: Any, i: int) -> Any:

@@ -26,7 +26,7 @@ import numpy as np
 from ..errors import SolverError
 from ..estimation.load_spectrum import TipLoad, TipLoadFinder
 from ..scene.schema import Scene
-from ..scene.summary import explain
+from ..scene.summary import weight_of
 from ..types import NANO, Array
 from .forward_model import CalibrationProblem, ForwardModel, boom_of
 from .least_squares import Fit, Tell, fitted_in_holds
@@ -78,7 +78,7 @@ def fitted_under_load(problem: CalibrationProblem, quiet: Fit, tell: Tell) -> Fi
     SolverError
         The filter has no usable numbers for this boom, as for a single stiff section.
     """
-    weight = explain(problem.scene).mass * float(np.hypot(*problem.scene.gravity))
+    weight = weight_of(problem.scene)
     count = 0
 
     def stepped(deviations: Array, priors: Sequence[LoadPrior], most: int, enough: float) -> tuple[Array, list[Pass]]:
@@ -110,7 +110,7 @@ def is_plausible(load: TipLoad | None, scene: Scene) -> bool:
     """Whether a load may be one: pulses, or no larger than wind. A drifting encoder looks like a large load that wanders."""
     if load is None or load.pulses is not None:
         return True
-    return load.rms <= GUSTS * explain(scene).mass * float(np.hypot(*scene.gravity))
+    return load.rms <= GUSTS * weight_of(scene)
 
 
 def _after_step(problem: CalibrationProblem, passes: Sequence[Pass], deviations: Array) -> tuple[Array, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -139,9 +140,14 @@ class Plan:
     def tangents(self, count: int) -> Tangents:
         """Room for what `count` steps that take turns keep."""
         works = [self.work() for _ in range(count)]
-        own = {name: [getattr(work.condensed, name) for work in works] for name in Condensed._fields}
-        own |= {name: [getattr(work, name) for work in works] for name in Tangents._fields if name not in own}
-        return Tangents(**{name: np.stack(arrays) for name, arrays in own.items()})
+        own = {name: np.stack([getattr(work, name) for work in works]) for name in Tangents._fields if name != "condensed"}
+        return Tangents(condensed=stacked([work.condensed for work in works]), **own)
+
+
+def stacked(parts: Sequence[Any]) -> Any:
+    """Named tuples of arrays as one, a leading axis over them; what is not an array is common."""
+    columns = zip(*parts, strict=True)
+    return type(parts[0])(*(np.stack(column) if isinstance(column[0], np.ndarray) else column[0] for column in columns))
 
 
 def width_of(plan: Plan) -> int:

@@ -116,15 +116,9 @@ class BoomPredictor:
         size = self.plan.joints, self.pins
         self._row = np.zeros(prediction_width(*size))
         self.places = places_in(*size)
+        tangents, bending = self.plan.tangents(int(STEPS)), moments_by_unknowns(self.plan)
         self.compiled = CompiledBoom(
-            self.plan.tables,
-            self._anchor,
-            self.live,
-            self._work,
-            self.plan.tangents(int(STEPS)),
-            self._track,
-            moments_by_unknowns(self.plan),
-            self._row,
+            self.plan.tables, self._anchor, self.live, self._work, tangents, self._track, bending, self._row
         )
 
     @cached_property

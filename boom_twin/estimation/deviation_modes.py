@@ -19,7 +19,7 @@ from ..kernels.jit import hold
 from ..kernels.tables import State
 from ..scene.oil_spring import middle_stiffness
 from ..scene.schema import Scene
-from ..scene.summary import explain
+from ..scene.summary import weight_of
 from ..types import SENSORS, Array, Mount, Stream
 from .deviation_filter import ANGLES_STAMP, COUNT, FED, FIRST_LOAD, FORCED, MODES, SHARES, STAMP, STARTED, DeviationFilter
 from .posture_modes import PostureMode, PostureModes
@@ -58,7 +58,7 @@ class DeviationModes:
         mounting = Mounting(plan, scene.base.inclination, mounts)
         self.filter = _new_filter(scene, plan, settings, mounting)
         self._angle_variance = settings.angle_variance
-        self._weight = explain(scene).mass * math.hypot(*scene.gravity)
+        self._weight = weight_of(scene)
         self._motions: list[Array] = []
         self._at = np.full(plan.joints, math.inf)
 
@@ -175,6 +175,6 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((8, size)),
         within=np.zeros((8, 8)), cross=np.zeros((8, n)), healed=np.zeros((8, n)), inverse=np.zeros((n, n)), drag=np.zeros(n),
         shifts=np.zeros((8, n + 1)), chances=np.zeros(n + 2),
-        spread=np.zeros((2, 2)), level=np.zeros(1), loads=LOADS * STIFFEST * explain(scene).mass * math.hypot(*scene.gravity),
+        spread=np.zeros((2, 2)), level=np.zeros(1), loads=LOADS * STIFFEST * weight_of(scene),
         last=np.zeros(len(noise)), now=np.zeros(6),
     )  # fmt: skip

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..scene.schema import Scene
-from ..scene.summary import explain
+from ..scene.summary import weight_of
 from ..types import NANO, Array
 from .alarm_text import FITS, REFUTED
 from .hold_test import rows_of
@@ -35,7 +35,7 @@ CARRIED = 0.02  # least probability that a cause keeps from one suspicion to the
 
 def load_levels(scene: Scene) -> Array:
     """Levels (N) that the unknown load at the tip of a boom is looked for at, from 0."""
-    return LEVELS * explain(scene).mass * math.hypot(*scene.gravity)
+    return LEVELS * weight_of(scene)
 
 
 class RecentFit(NamedTuple):

@@ -206,19 +206,12 @@ class Work(NamedTuple):
 
 @by_reference
 class Tangents(NamedTuple):
-    """What k steps that take turns keep, each its own: fields of `Condensed` and of `Work` with a leading axis over them.
+    """What k steps that take turns keep, each its own: fields of `Work`, their arrays with a leading axis over the steps.
 
     See `kernels.transfer.kept_tangent.work_of`.
     """
 
-    gains: Array
-    free: Array
-    factors: Array
-    order: np.ndarray
-    blocks: Array
-    ends: Array
-    end_gains: Array
-    end_free: Array
+    condensed: Condensed
     drho: Array
     corrections: Array
     kept_z: Array

@@ -39,10 +39,8 @@ ESTIMATED_NUMBERS = (
 TURN = ("sine_of_half", "cosine_of_half")
 """Of half the angle of the estimate, for a quaternion."""
 
-DISPLACEMENT, JOINTS = (
-    9,
-    11,
-)  # where they begin; behind the joints' angles, strokes, cylinders' forces, the tip's joints, the estimate
+DISPLACEMENT = TIP_NUMBERS.index("displacement_x")
+JOINTS = len(TIP_NUMBERS)  # behind the joints' angles: strokes, cylinders' forces, the tip's joints, the estimate
 SECONDS, NANOSECONDS = range(2)  # of a stamp in a message
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from .kinematics import stroke_range
@@ -173,6 +174,11 @@ class Account:
         """Unknowns of one step."""
         own = sum(s.unknowns for s in self.sections) + sum(j.unknowns for j in self.joints)
         return own + UNKNOWNS_PIN * len(self.pins)
+
+
+def weight_of(scene: Scene) -> float:
+    """Weight of a boom with its load, N."""
+    return explain(scene).mass * math.hypot(*scene.gravity)
 
 
 def explain(scene: Scene) -> Account:

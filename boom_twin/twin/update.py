@@ -60,25 +60,9 @@ was stepped to; the sample is complete and begins a slot, left the model's valid
 
 @kernel
 def update(
-    t,
-    anchor,
-    live,
-    work,
-    tangents,
-    track,
-    bending,
-    out,
-    limits,
-    state,
-    tip,
-    streams,
-    stamps,
-    values,
-    first,
-    resumed,
-    trusted,
+    t, anchor, live, work, tangents, track, bending, out, limits, state, tip, streams, stamps, values, first, resumed, trusted,
     found,
-):
+):  # fmt: skip
     """Take the samples of a block from row `first` on, as long as they are ordinary.
 
     Parameters

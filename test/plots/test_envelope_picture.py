@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -32,24 +31,16 @@ def envelope_of(scene: Any) -> Envelope:
     return Envelope(("",) * COUNT, angles, tips, deflections, forces, frequencies, stresses * 1e-3, stresses, {})
 
 
-def test_words_fit_beside_their_bars_and_the_legend_covers_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    figures: list[Any] = []
-    picture = drawing.picture
-
-    @contextmanager
-    def kept(*args: Any) -> Iterator[Any]:
-        with picture(*args) as figure:
-            yield figure
-            figures.append(figure)
-
-    monkeypatch.setattr(drawing, "picture", kept)
+def test_words_fit_beside_their_bars_and_the_legend_covers_nothing(
+    tmp_path: Path, figures_of: Callable[..., list[Any]]
+) -> None:
+    figures = figures_of(drawing)
     scene = load_scene()
     found = envelope_of(scene)
     ranges = [(f"cylinder {i + 1} force, kN", 1e-3 * found.forces[:, i]) for i in range(4)]
     ranges += [(f"section {i + 1} bending stress, MPa", 1e-6 * found.stresses[:, i]) for i in range(4)]
     drawing.envelope_picture(tmp_path / "envelope.png", scene, found, ranges)
     (figure,) = figures
-    figure.draw_without_rendering()
     tips, *bars = [axes for axes in figure.axes if axes.get_ylabel() == "y up, m" or axes.get_xlabel() in ("kN", "MPa")]
     assert len(bars) == 2 and tips.get_legend().get_window_extent().y0 >= tips.get_window_extent().y1
     forces, stresses = (axes.get_xticks() for axes in bars)

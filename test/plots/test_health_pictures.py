@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +13,8 @@ import boom_twin.plots.health as drawing
 
 
 @pytest.mark.parametrize("channels", [4, 6, 10])
-def test_title_and_legend_of_the_levels_are_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, channels: int) -> None:
-    figures: list[Any] = []
-    picture = drawing.picture
-
-    @contextmanager
-    def kept(*args: Any) -> Iterator[Any]:
-        with picture(*args) as figure:
-            yield figure
-            figure.draw_without_rendering()
-            figures.append(figure)
-
-    monkeypatch.setattr(drawing, "picture", kept)
+def test_title_and_legend_of_the_levels_are_apart(tmp_path: Path, figures_of: Callable[..., list[Any]], channels: int) -> None:
+    figures = figures_of(drawing)
     names = tuple(f"cylinder_force_{i + 1}" for i in range(channels))
     stamps, levels = np.arange(10.0), np.full((10, channels), 0.1)
     drawing.timeline_picture(tmp_path / "timeline.png", "session", 10.0, [], stamps, names, levels, "synthetic")

@@ -69,9 +69,10 @@ def keep_corrections(work, most):
 @inner
 def condensed_of(tangents, k):
     """What the `k`-th of several steps has condensed; a caller takes it by reference, whose room has to be the caller's."""
+    c = tangents.condensed
     return Condensed(
-        gains=tangents.gains[k], free=tangents.free[k], factors=tangents.factors[k], order=tangents.order[k],
-        blocks=tangents.blocks[k], ends=tangents.ends[k], end_gains=tangents.end_gains[k], end_free=tangents.end_free[k],
+        gains=c.gains[k], free=c.free[k], factors=c.factors[k], order=c.order[k],
+        blocks=c.blocks[k], ends=c.ends[k], end_gains=c.end_gains[k], end_free=c.end_free[k],
     )  # fmt: skip
 
 
