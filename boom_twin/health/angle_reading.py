@@ -19,7 +19,7 @@ from ..errors import BoomTwinError
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Alarm, Array, Mount, Ranked
-from .reading_means import ENOUGH, ReadingMeans
+from .stream_readings import ENOUGH, WINDOW, StreamReadings
 
 FAR = radians(1.0)  # by which readings have to be off, and two expected angles apart, for their exchange to be told
 FAR_SIGN = radians(10.0)  # likewise a reading for its sign: an offset looks like it where the angle is minus half of it
@@ -56,8 +56,8 @@ class AngleReading:
     def begin(self) -> None:
         """The boom starts from rest; alarms last until they are refuted."""
         count = len(self._scene.joints)
-        self._sums, self._strokes = ReadingMeans(count), np.zeros(count)
-        self._since = np.full(count, -1, dtype=np.int64)
+        self._strokes, self._since = np.zeros(count), np.full(count, -1, dtype=np.int64)
+        self._is_off = False
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -82,13 +82,13 @@ class AngleReading:
         joints = {joint for found in self._found if not found.is_of_strokes for joint in found.joints}
         return alarm.kind in {"range", "jump"} and alarm.channel in {f"joint_{i + 1}" for i in joints}
 
-    def take(self, raw: Array, left: Array, strokes: Array, span: float, start: int, end: int) -> list[Alarm]:
-        """Take the readings of a block; gives alarms that began or ended.
+    def take(self, readings: StreamReadings, strokes: Array, span: float, start: int, end: int) -> list[Alarm]:
+        """Take a block; gives alarms that began or ended.
 
         Parameters
         ----------
-        raw, left : ndarray, shape (k, n)
-            As measured, and less what the model has, rad; NaN where there is none.
+        readings : StreamReadings
+            Of the angle sensors, rad.
         strokes : ndarray, shape (n,)
             Mean of the measured strokes, m.
         span : float
@@ -96,22 +96,21 @@ class AngleReading:
         start, end : int
             Of the block, ns.
         """
-        share, off = self._sums.take(raw, left, span)
-        heard = share > 0.0
+        heard = readings.counts > 0.0
         if not heard.any():
             return []
-        self._strokes += share * (strokes - self._strokes)
-        is_off = np.abs(off) > FAR
+        self._strokes += np.where(heard, min(1.0, span / WINDOW), 0.0) * (strokes - self._strokes)
+        is_off = np.abs(readings.off) > FAR
+        if not (self._is_off or self._found or is_off.any()):
+            return []
         self._since = np.where(is_off, np.where(self._since < 0, start, self._since), np.where(heard, -1, self._since))
-        return self._ended(end) + self._begun()
+        self._is_off = bool((self._since >= 0).any())
+        weight = np.maximum(readings.slow.weight, 1e-9)
+        read, expected = readings.slow.read / weight, readings.slow.expected / weight
+        is_known = readings.slow.weight > ENOUGH
+        return self._ended(read, expected, end) + self._begun(is_known, read, expected, self._strokes / weight)
 
-    def _means(self) -> tuple[Array, Array, Array]:
-        """Angles that were read and expected, rad, and strokes, m, lately, shape (n,) each."""
-        weight = np.maximum(self._sums.weight, 1e-9)
-        return self._sums.read / weight, self._sums.expected / weight, self._strokes / weight
-
-    def _ended(self, end: int) -> list[Alarm]:
-        read, expected, _ = self._means()
+    def _ended(self, read: Array, expected: Array, end: int) -> list[Alarm]:
         over = [found for found in self._found if self._is_over(found, read, expected)]
         self._found = [found for found in self._found if found not in over]
         return [replace(found.alarm, until=end) for found in over]
@@ -124,10 +123,10 @@ class AngleReading:
         least = FAR_STROKES if found.is_of_strokes else apart
         return bool(apart > FAR and all(abs(read[i] - expected[i]) < RIGHT * least for i in found.joints))
 
-    def _begun(self) -> list[Alarm]:
+    def _begun(self, is_known: NDArray[np.bool_], read: Array, expected: Array, strokes: Array) -> list[Alarm]:
+        """Alarms that begin, of angles that were read and expected, rad, and strokes, m, lately; shape (n,) each."""
         taken = self.masked
-        read, expected, strokes = self._means()
-        off = (self._sums.weight > ENOUGH) & (np.abs(read - expected) > FAR) & ~taken & (self._since >= 0)
+        off = is_known & (np.abs(read - expected) > FAR) & ~taken & (self._since >= 0)
         if not off.any():
             return []
         news: list[Alarm] = []

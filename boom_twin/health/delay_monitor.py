@@ -15,8 +15,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..types import Alarm, Array, Ranked, Stream
+from .stream_readings import StreamReadings
 
 BLOCK, LEAST = 0.1, 10  # s of a block; blocks of half a triangle, at least
 SPAN = 40  # blocks of one estimate
@@ -64,23 +66,21 @@ class DelayMonitor:
     def take(
         self,
         number: int,
-        stamps: Array,
-        left: Array,
-        expected: Array,
+        readings: StreamReadings,
+        masked: NDArray[np.bool_],
         end: int,
         is_doubted: Callable[[], bool] = lambda: False,
         period: float = 1.0,
     ) -> list[Alarm]:
-        """Take the readings of a block; gives an alarm that began, changed or ended.
+        """Take a block; gives an alarm that began, changed or ended.
 
         Parameters
         ----------
         number : int
             Of the block; one that does not follow the last begins a new span.
-        stamps : ndarray, shape (k,)
-            s.
-        left, expected : ndarray, shape (k, channels)
-            Residuals, NaN of channels that are not to be used, and what was expected.
+        readings : StreamReadings
+        masked : ndarray of bool, shape (channels,)
+            Those that are not to be used.
         end : int
             Of the block, ns.
         is_doubted : callable, optional
@@ -88,12 +88,15 @@ class DelayMonitor:
         period : float
             Of the slowest vibration, s.
         """
-        if number != self._number + 1 or len(stamps) < 2 or stamps[-1] <= stamps[0]:
+        stamps = readings.rows.stamps
+        is_empty = len(stamps) < 2 or stamps[-1] <= stamps[0]
+        if number != self._number + 1 or is_empty:
             self._blocks.clear()
         self._number = number
-        if len(stamps) < 2 or stamps[-1] <= stamps[0]:
+        if is_empty:
             return []
-        self._blocks.append((left.mean(axis=0), (expected[-1] - expected[0]) / (stamps[-1] - stamps[0])))
+        is_unknown = (readings.counts < len(stamps)) | masked
+        self._blocks.append((np.where(is_unknown, np.nan, readings.off), readings.rates))
         half = max(LEAST, math.ceil(period / BLOCK))
         if len(self._blocks) < SPAN + 2 * (half - 1):
             return []

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..types import SENSORS, Alarm, Array, Ranked, Stream
-from .reading_means import ENOUGH, ReadingMeans
+from ..types import SENSORS, Alarm, Ranked, Stream
+from .stream_readings import ENOUGH, SlowMeans, StreamReadings
 
 LARGE = 0.2  # of the largest force, from which on a cylinder's is judged: a smaller one may be as large by a load
 CLOSE = 0.2  # of the factor by which a reason explains it: share by which the reading may be off it
@@ -45,7 +45,7 @@ class ForceReading:
 
     def begin(self) -> None:
         """The boom starts from rest; alarms last until they are refuted."""
-        self._means = ReadingMeans(len(self._names))
+        self._is_large = np.zeros(len(self._names), dtype=bool)
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -56,40 +56,28 @@ class ForceReading:
     def masked(self) -> NDArray[np.bool_]:
         """Channels that are not to be used, shape (channels,): if all large forces are wrong, the small ones as well."""
         found = np.isin(np.arange(len(self._names)), list(self._alarms))
-        return found | bool(self._alarms) & (found | ~self._is_large()).all()
+        return found | bool(self._alarms) & (found | ~self._is_large).all()
 
-    def take(self, raw: Array, left: Array, span: float, start: int, end: int) -> list[Alarm]:
-        """Take the readings of a block; gives alarms that began or ended.
-
-        Parameters
-        ----------
-        raw, left : ndarray, shape (k, channels)
-            As measured, and less what the model has, N; NaN where there is none.
-        span : float
-            Length of the block, s.
-        start, end : int
-            Of the block, ns.
-        """
-        if not len(left):
+    def take(self, readings: StreamReadings, start: int, end: int) -> list[Alarm]:
+        """Take a block from `start` to `end` (ns) of forces in N; gives alarms that began or ended."""
+        heard, slow = readings.counts > 0.0, readings.slow
+        if not heard.any():
             return []
-        share, _ = self._means.take(raw, left, span)
+        expected = np.abs(slow.expected)
+        self._is_large = (expected > LARGE * expected.max()) & (expected > 0.0)
         news: list[Alarm] = []
-        for i in np.flatnonzero((share > 0.0) & self._is_large()).tolist():
-            factor = self._means.read[i] / self._means.expected[i]
-            if i not in self._alarms and self._means.weight[i] > ENOUGH and (reason := _reason(factor)):
-                self._alarms[i] = self._begun(i, reason, start)
+        for i in np.flatnonzero(heard & self._is_large).tolist():
+            factor = slow.read[i] / slow.expected[i]
+            if i not in self._alarms and slow.weight[i] > ENOUGH and (reason := _reason(factor)):
+                self._alarms[i] = self._begun(i, reason, slow, start)
                 news.append(self._alarms[i])
             elif i in self._alarms and abs(factor - 1.0) < RIGHT:
                 news.append(replace(self._alarms.pop(i), until=end))
         return news
 
-    def _is_large(self) -> NDArray[np.bool_]:
-        expected = np.abs(self._means.expected)
-        return np.asarray((expected > LARGE * expected.max()) & (expected > 0.0))
-
-    def _begun(self, i: int, reason: str, start: int) -> Alarm:
+    def _begun(self, i: int, reason: str, slow: SlowMeans, start: int) -> Alarm:
         name, cause = self._names[i], f"{self._names[i]}.sensor"
-        read, expected = self._means.read[i] / self._means.weight[i], self._means.expected[i] / self._means.weight[i]
+        read, expected = slow.read[i] / slow.weight[i], slow.expected[i] / slow.weight[i]
         told = (
             f"{cause} reads {_three_digits(read)} N where the model has {_three_digits(expected)} N, as if {reason}: not used; "
             "give cylinder forces their unit and sign (positive in tension) in the mapping"

@@ -10,12 +10,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
-
-from ..types import SENSORS, Alarm, Array, Ranked, Stream
+from ..types import SENSORS, Alarm, Ranked, Stream
+from .stream_readings import SlowMeans, StreamReadings
 
 G = SENSORS[Stream.IMU].units["g"]
-WINDOW = 2.0  # s, time constant of the means
 FAR, GONE = 0.2 * G, 0.1 * G  # m/s^2, by which the means differ from which on it is told, and below which it has ended
 CLOSE, CLEAR = 0.1 * G, 0.05 * G  # m/s^2, how well a reason must explain the mean, and how much better than others
 CAUSE = "tip_imu.sensor"
@@ -46,49 +44,24 @@ class ImuMount:
     def __init__(self) -> None:
         self.alarm: Alarm | None = None
         self._reasons: tuple[str, ...] = ()
-        self.begin()
 
-    def begin(self) -> None:
-        """The boom starts from rest; an alarm lasts until it is refuted."""
-        self._read, self._expected, self._squares = np.zeros(2), np.zeros(2), 0.0
-        self._weight = 0.0
-
-    def take(self, raw: Array, left: Array, span: float, start: int, end: int) -> list[Alarm]:
-        """Take the readings of a block; gives an alarm that began or ended.
-
-        Parameters
-        ----------
-        raw, left : ndarray, shape (k, 2)
-            As measured, and less what the model has, m/s^2; NaN where there is none.
-        span : float
-            Length of the block, s.
-        start, end : int
-            Of the block, ns.
-        """
-        if not math.isfinite(left.sum()):
-            known = np.isfinite(left).all(axis=1)
-            raw, left = raw[known], left[known]
-        if not len(left):
+    def take(self, readings: StreamReadings, start: int, end: int) -> list[Alarm]:
+        """Take a block from `start` to `end` (ns) of readings in m/s^2; gives an alarm that began or ended."""
+        if readings.counts.min() == 0.0:
             return []
-        read, share = raw.mean(axis=0), min(1.0, span / WINDOW)
-        self._read += share * (read - self._read)
-        self._expected += share * (read - left.mean(axis=0) - self._expected)
-        self._squares += share * (float((left**2).sum(axis=1).mean()) - self._squares)
-        self._weight += share * (1.0 - self._weight)
-        return self._judge(start, end)
-
-    def _judge(self, start: int, end: int) -> list[Alarm]:
-        off = math.dist(self._read, self._expected)  # of sums that begin at 0: less than the means' at first
-        swing = math.sqrt(max(0.0, self._squares * self._weight - off**2))  # of vibration out of step: it stays in the means
-        if self.alarm is None and off > max(FAR, swing):
-            return [self._begun(start)]
-        if self.alarm is not None and off < GONE * self._weight and not self._is_reason_open():
+        slow = readings.slow
+        weight, read, expected = float(slow.weight.min()), slow.read.tolist(), slow.expected.tolist()
+        off = math.dist(read, expected)  # of sums that begin at 0: less than the means' at first
+        if self.alarm is None and off > FAR:
+            swing2 = float(slow.squares.sum()) * weight - off**2  # of vibration out of step: it stays in the means
+            return [self._begun(slow, start)] if off > math.sqrt(max(0.0, swing2)) else []
+        if self.alarm is not None and off < GONE * weight and not self._is_reason_open(slow):
             ended, self.alarm = replace(self.alarm, until=end), None
             return [ended]
         return []
 
-    def _begun(self, start: int) -> Alarm:
-        read, expected = self._read / self._weight, self._expected / self._weight
+    def _begun(self, slow: SlowMeans, start: int) -> Alarm:
+        read, expected = _means(slow)
         self._reasons = _likely(read, expected)
         likely = f", as if {' or '.join(self._reasons)}" if self._reasons else ""
         told = (
@@ -99,18 +72,23 @@ class ImuMount:
         self.alarm = Alarm("tip_imu", "range", start, None, CAUSE, told, (Ranked(CAUSE, 1.0, ()),))
         return self.alarm
 
-    def _is_reason_open(self) -> bool:
+    def _is_reason_open(self, slow: SlowMeans) -> bool:
         """Whether what was told explains the readings still: an axis the other way round shows only where gravity is in it."""
-        read, expected = self._read / self._weight, self._expected / self._weight
+        read, expected = _means(slow)
         return any(_miss(reason, read, expected) < FAR for reason in self._reasons)
 
 
-def _miss(reason: str, read: Array, expected: Array) -> float:
+def _means(slow: SlowMeans) -> tuple[list[float], list[float]]:
+    """What was read and what was expected, m/s^2 in x and z."""
+    return (slow.read / slow.weight).tolist(), (slow.expected / slow.weight).tolist()
+
+
+def _miss(reason: str, read: list[float], expected: list[float]) -> float:
     """How far the mean is off what is expected if it is read as `reason` says, m/s^2."""
     return math.hypot(*read) if reason == TAKEN_OUT else math.dist(REASONS[reason](*read), expected)
 
 
-def _likely(read: Array, expected: Array) -> tuple[str, ...]:
+def _likely(read: list[float], expected: list[float]) -> tuple[str, ...]:
     """What explains the mean, in words; nothing where nothing does."""
     if math.hypot(*read) < CLEAR:
         return (TAKEN_OUT,)

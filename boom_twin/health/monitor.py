@@ -19,23 +19,16 @@ from .baseline import JUDGED, Baseline, judged_channels
 from .delay_monitor import DelayMonitor, delay_cause
 from .force_reading import ForceReading
 from .imu_mount import ImuMount
-from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows, means
+from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows
 from .inference.hypotheses import Regression
 from .inference.innovation_filter import InnovationFilter, ModalStates
 from .residual_monitor import ResidualMonitor
 from .sensor_monitor import NOISE_OVER, SensorCheck, SensorMonitor, sensor_ranges
-from .sensor_survey import follow_noise, is_bent
+from .stream_readings import StreamReadings, StreamSurvey
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news
 UNCERTAIN = 2.0
 """Variances of a reading; strokes that are known worse are not followed, and then sensors are not judged by residuals."""
-SHAKEN = 3.0
-"""Variances of a reading in its second differences, by which other sensors bear witness that the boom is shaken and that what
-looks like noise in strokes may be motion."""
-WHITE = 0.75
-"""Share of that variance that third differences must have for noise."""
-LOUDEST, NOISE_SHARE = 100.0, 0.05
-"""Times the stated variance that noise is taken for at most; and weight of a block in the variance that is measured."""
 CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.alarms)
 """The streams whose single sensors are checked."""
 MEASURED_NOISE = (Stream.STROKES, Stream.ANGLES)
@@ -92,11 +85,14 @@ class HealthMonitor:
             for stream in CHECKED
         }
         self._ended += self.residuals.close(self._told)
-        self._noise2 = {stream: np.full(len(self._channels[stream]), settings.variance(SENSORS[stream])) for stream in JUDGED}
+        self._surveys: dict[Stream, StreamSurvey] = {
+            stream: StreamSurvey(self._stated[stream], len(names))
+            for stream, names in self._channels.items()
+            if stream is not Stream.STROKES
+        }
         self.residuals.begin()
         for monitor in self._delays.values():
             monitor.begin()
-        self._mount.begin()
         self._forces.begin()
         self._angles.begin()
 
@@ -171,18 +167,22 @@ class HealthMonitor:
 
     def _judge(self, block: Block) -> list[Alarm]:
         start, predictions, news = block.number * BLOCK, block.predictions(), []
-        readings = {stream: block.readings(stream, len(names)) for stream, names in self._channels.items()}
         is_followed = bool(predictions.variances.max() < UNCERTAIN * self._settings.stroke_variance)
-        is_shaken = any(self._is_shaken(stream, rows.raw) for stream, rows in readings.items() if stream is not Stream.STROKES)
-        for stream, (stamps, raw, left) in readings.items():
-            if stream in CHECKED and stream is not Stream.STROKES:
+        readings, span = dict[Stream, StreamReadings](), BLOCK * NANO if is_followed else 0.0
+        for stream, survey in self._surveys.items():
+            rows = block.readings(stream, len(self._channels[stream]))
+            readings[stream] = survey.take(rows, self._masked(stream), span)
+        is_shaken = any(each.is_bent for each in readings.values())
+        for stream, each in readings.items():
+            if stream in CHECKED:
+                stamps, raw, left = each.rows
                 expected = raw - left if is_followed else np.full_like(raw, np.nan)
                 news += self._check(stream, block, stamps, raw, expected)
         if is_followed:
-            news += self._judge_mount(block, readings[Stream.IMU])
-            news += self._judge_angles(block, predictions, readings[Stream.ANGLES])
-            forces = readings[Stream.FORCES]
-            news += self._forces.take(forces.raw, forces.left, BLOCK * NANO, block.number * BLOCK, block.end)
+            news += self._void(self._mount.take(readings[Stream.IMU], start, block.end), block.end)
+            strokes = predictions.measured.mean(axis=0)
+            news += self._void(self._angles.take(readings[Stream.ANGLES], strokes, BLOCK * NANO, start, block.end), block.end)
+            news += self._forces.take(readings[Stream.FORCES], start, block.end)
             news += self._judge_delays(block, readings)
         strokes = predictions.measured
         expected = np.full_like(strokes, np.nan if is_shaken else 0.0)
@@ -194,16 +194,6 @@ class HealthMonitor:
         averaged = self._means(block, predictions, readings)
         return news + self.residuals.take(averaged, self._noise)
 
-    def _judge_mount(self, block: Block, imu: MeasuredRows) -> list[Alarm]:
-        """Look whether the IMU reads gravity; gives the alarms that began or ended."""
-        news = self._mount.take(imu.raw, imu.left, BLOCK * NANO, block.number * BLOCK, block.end)
-        return self._void(news, block.end)
-
-    def _judge_angles(self, block: Block, predictions: PredictionRows, angles: MeasuredRows) -> list[Alarm]:
-        """Look whether encoders read their own joints; gives the alarms that began or ended."""
-        strokes, span = predictions.measured.mean(axis=0), BLOCK * NANO
-        return self._void(self._angles.take(angles.raw, angles.left, strokes, span, block.number * BLOCK, block.end), block.end)
-
     def _void(self, news: list[Alarm], end: int) -> list[Alarm]:
         """With news of readings that mean something else: what was suspected by them, or is being collected, is void."""
         if any(alarm.until is None for alarm in news):
@@ -211,16 +201,12 @@ class HealthMonitor:
             self.residuals.begin()
         return news
 
-    def _judge_delays(self, block: Block, readings: dict[Stream, MeasuredRows]) -> list[Alarm]:
+    def _judge_delays(self, block: Block, readings: dict[Stream, StreamReadings]) -> list[Alarm]:
         """Look for lags; gives the alarms that began, changed or ended."""
         news: list[Alarm] = []
         for stream, monitor in self._delays.items():
-            stamps, raw, left = readings[stream]
-            if (masked := self._masked(stream)).any():
-                left = np.where(masked, np.nan, left)
-            times = np.asarray((stamps - block.number * BLOCK) * NANO)
             is_doubted = partial(self._is_doubted, stream, block.end)
-            news += monitor.take(block.number, times, left, raw - left, block.end, is_doubted, self._slowest())
+            news += monitor.take(block.number, readings[stream], self._masked(stream), block.end, is_doubted, self._slowest())
         return news
 
     def _is_doubted(self, stream: Stream, stamp: int) -> bool:
@@ -234,13 +220,6 @@ class HealthMonitor:
         modes = () if self._noise is None else self._noise.modes
         return 1.0 / min((mode.frequency for mode in modes), default=math.inf)
 
-    def _is_shaken(self, stream: Stream, raw: Array) -> bool:
-        """Whether readings (k, channels) of sensors that are trusted tell of a motion that is quick against their rate.
-
-        Noise gives the same variance by second and by third differences, motion much less by third ones.
-        """
-        return bool(is_bent(np.ascontiguousarray(raw), self._masked(stream), self._stated[stream], SHAKEN, WHITE))
-
     def _check(self, stream: Stream, block: Block, stamps: NDArray[np.int64], raw: Array, expected: Array) -> list[Alarm]:
         """Check the sensors of a stream: stamps (k,) in ns, readings and what they should be (k, channels); gives the news."""
         monitor = self._sensors[stream]
@@ -253,18 +232,14 @@ class HealthMonitor:
             self.residuals.forget()
         return news
 
-    def _means(self, block: Block, predictions: PredictionRows, readings: dict[Stream, MeasuredRows]) -> BlockMeans:
-        """Means of the residuals (k, channels) of every stream that is judged."""
-        stamps, found = predictions.stamps, []
+    def _means(self, block: Block, predictions: PredictionRows, readings: dict[Stream, StreamReadings]) -> BlockMeans:
+        """Means of the residuals of every stream that is judged."""
+        stamps, found, imu = predictions.stamps, [], readings[Stream.IMU]
         for stream in JUDGED:
-            stated, left = self._stated[stream], np.ascontiguousarray(readings[stream].left)
-            mean, count = means(left, stated**0.5)
-            follow_noise(left, LOUDEST * stated, NOISE_SHARE, self._noise2[stream])
-            count = count * stated / np.maximum(self._noise2[stream], stated)
-            mean[self._masked(stream)] = np.nan
-            found.append((mean, count))
-        imu = readings[Stream.IMU]
-        rates = np.concatenate([_rates(stamps, predictions.joints), _rates(imu.stamps, imu.raw - imu.left)])
+            each, stated = readings[stream], self._stated[stream]
+            counts = each.near_counts * stated / np.maximum(self._surveys[stream].noise2, stated)
+            found.append((np.where(self._masked(stream), np.nan, each.near), counts))
+        rates = np.concatenate([_rates(stamps, predictions.joints), imu.rates])
         return BlockMeans(
             start=block.number * BLOCK,
             left=np.concatenate([mean for mean, _ in found]),
@@ -273,7 +248,7 @@ class HealthMonitor:
             variances=predictions.variances.mean(axis=0),
             rates=np.where(np.isfinite(rates), rates, 0.0),
             shaking=float((predictions.accelerations**2).sum(axis=1).mean()),
-            motion=readings[Stream.IMU if len(readings[Stream.IMU].stamps) else Stream.ANGLES],
+            motion=(imu if len(imu.rows.stamps) else readings[Stream.ANGLES]).rows,
         )
 
     def _tip_sigmas(self) -> Array:
@@ -296,9 +271,7 @@ def warm_up() -> None:
     """Compile the kernels that judge a rig, on made-up readings of two channels."""
     none, two = np.zeros((0, 0)), np.zeros((2, 2))
     SensorCheck(1.0, 0.0, two[0], two[0], 0.0).look(np.arange(2.0), two, two, 2.0)
-    is_bent(two, np.zeros(2, dtype=bool), 1.0, 1.0, 1.0)
-    follow_noise(two, 1.0, 1.0, np.zeros(2))
-    means(two, 1.0)
+    StreamSurvey(1.0, 2).take(MeasuredRows(np.arange(2), two, two), np.zeros(2, dtype=bool), 1.0)
     whitening = InnovationFilter(2, 2, BLOCK * NANO, 0.0)
     whitening.tune(ModalStates(np.zeros(0), none, none, none, none, np.zeros((2, 0)), two[0], np.zeros((0, 2)), two))
     found = whitening.step(np.ones((2, 2)), np.eye(2), two[0], 0.0, 0.0)

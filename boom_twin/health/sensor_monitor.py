@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.jit import hold
 from ..scene.schema import Scene
 from ..types import Alarm, Array, Mount, SensorKind, Stream, channels_of
-from .sensor_survey import survey
+from .sensor_survey import CheckWork, survey
 
 
 def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
@@ -63,6 +64,7 @@ REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to r
 FALSE_ALARM = 1e-12  # probability, for each reading, that a live sensor repeats for so long
 SILENT_FOR = 0.5  # s; readings that lie farther apart are no neighbours: neither jumps nor spikes show across such a gap
 MISSING = 0.1  # share of the readings
+ROOM = 32  # readings of a block for which there is room at first
 ENOUGH, MEDIAN2 = 6, 0.4549  # second differences whose median tells noise; that of the square of a standard normal value
 
 
@@ -130,14 +132,25 @@ class SensorCheck:
     def __init__(self, sigma: float, resolution: float, low: Array, high: Array, fastest: float) -> None:
         self._sigma = math.sqrt(sigma**2 + resolution**2 / 12.0)
         self._fastest = fastest
-        self._low, self._high = low - 5.0 * self._sigma, high + 5.0 * self._sigma
         self._patience = repeats(sigma, resolution)
-        count = len(low)
-        self._raw, self._left = np.full((3, count), np.nan), np.full((3, count), np.nan)
-        self._stamps = np.zeros(3)
-        self._run, self._since = np.zeros(count, dtype=np.int64), np.zeros(count)
-        self._heard = np.full(count, np.nan)
-        self._power, self._missing = np.full(count, np.nan), np.zeros(count)
+        count, rows = len(low), 3 + ROOM
+        margin, stated2 = 5.0 * self._sigma, self._sigma**2
+        self._known = CheckWork(
+            limits=np.array([SILENT_FOR, (4.0 * NOISY) ** 2 * stated2, stated2]),
+            times=np.zeros(rows),
+            raw=np.full((rows, count), np.nan),
+            left=np.full((rows, count), np.nan),
+            low=low - margin,
+            high=high + margin,
+            heard=np.full(count, np.nan),
+            power=np.full(count, np.nan),
+            run=np.zeros(count, dtype=np.int64),
+            since=np.zeros(count),
+            missing=np.zeros(count),
+            outside=np.zeros(count),
+        )
+        self._held = hold(self._known)
+        self._survey: Callable[..., Any] | None = None
         self._usual2 = self._lasting2 = self._sigma**2  # of the noise, as it is with most channels: now, and lately
         self._first = math.inf
         none, unknown = np.zeros(count, dtype=bool), np.full(count, np.nan)
@@ -166,53 +179,64 @@ class SensorCheck:
         now : float
             End of the block, s.
         """
-        count = raw.shape[1]
-        if not len(stamps):
+        count, rows = raw.shape[1], len(stamps)
+        if not rows:
             return self._calm if self._first == math.inf else self._nothing(count, now)
-        times = np.concatenate([self._stamps, stamps])
-        all_raw = np.concatenate([self._raw, raw])
-        left = np.concatenate([self._left, raw - expected])
-        whole, span = bool(np.isfinite(raw.sum())), max(float(stamps[-1] - stamps[0]), 1e-3)
-        self._heard = np.full(count, stamps[-1]) if whole else _newest(stamps, raw, self._heard)
-        share, cut, outside = min(1.0, span / NOISY_WINDOW), (4.0 * NOISY * self._sigma) ** 2, np.zeros(count)
-        variance, own = self._sigma**2, (self._power, self._run, self._since, self._missing, outside)
-        found = survey(times, all_raw, left, self._low, self._high, SILENT_FOR, share, cut, variance, *own)
+        self._make_room(3 + rows)
+        span, newest = max(float(stamps[-1] - stamps[0]), 1e-3), float(stamps[-1])
+        arguments = self._held, stamps, np.ascontiguousarray(raw), np.ascontiguousarray(expected), min(1.0, span / NOISY_WINDOW)
+        if self._survey is None:
+            self._survey = survey.for_types_of(*arguments)
+        *found, is_whole = self._survey(*arguments)
         self._usual2 = self._usual_power()
         self._lasting2 += min(1.0, span / USUAL_WINDOW) * (self._usual2 - self._lasting2)
-        loud, newest = NOISY**2 * min(self._usual2, NOISY**2 * variance), float(stamps[-1])
+        loud = NOISY**2 * min(self._usual2, NOISY**2 * self._sigma**2)
         self._first = min(self._first, float(stamps[0]))
-        if whole and now - newest <= SILENT_FOR and self._is_calm(found, loud, len(raw)):
-            self._stamps, self._raw, self._left = times[-3:], all_raw[-3:], left[-3:]
-            return self._calm
-        spikes, jumped = np.zeros(count, dtype=bool), np.zeros(count)
-        if found[0] > SPIKE * self._sigma:
-            steps = np.where((np.diff(times) > SILENT_FOR)[:, None], np.nan, np.diff(left, axis=0))
-            noise = np.sqrt(np.fmax(np.fmax(self._power, self._sigma**2), _usual_bend2(left)))
-            spikes, jumped = self._spikes(steps, noise), self._jumps(times, all_raw, left, steps, noise)
-        interval = (times[-1] - times[2]) / len(stamps)
-        is_motion = self._fastest > 0.0 and SWIFT * interval**2 > NOISY * self._sigma  # what bends readings so much
-        is_known = now - self._first > NOISY_WINDOW and not is_motion  # how noisy the sensors are
-        findings = SensorFindings(
-            stuck=self._stuck(newest),
-            noisy=is_known & (self._power > loud),
-            spikes=spikes & is_known,
-            jumped=jumped,
-            silent=(now - self._heard > SILENT_FOR) | (self._missing > MISSING),
-            outside=outside > 0.5 * len(raw),
-            level=left[-1],
-        )
-        self._stamps, self._raw, self._left = times[-3:], all_raw[-3:], left[-3:]
+        is_calm = is_whole and now - newest <= SILENT_FOR and self._is_calm(found, loud, rows)
+        findings = self._calm if is_calm else self._findings(found[0], loud, rows, now)
+        for column in (self._known.times, self._known.raw, self._known.left):
+            column[:3] = column[rows : rows + 3]
         return findings
 
-    def _is_calm(self, found: tuple[float, float, int, float, float], loud: float, rows: int) -> bool:
+    def _make_room(self, rows: int) -> None:
+        """Room for so many readings, the newest three before the block among them."""
+        known = self._known
+        if rows > len(known.times):
+            times, raw, left = (np.resize(each, (2 * rows, *each.shape[1:])) for each in (known.times, known.raw, known.left))
+            self._known = known._replace(times=times, raw=raw, left=left)
+            self._held = hold(self._known)
+
+    def _findings(self, largest: float, loud: float, rows: int, now: float) -> SensorFindings:
+        """What is found in so many readings, whose largest step is `largest`; variances up to `loud` are usual."""
+        known, count = self._known, len(self._known.power)
+        times, raw, left = (column[: 3 + rows] for column in (known.times, known.raw, known.left))
+        spikes, jumped = np.zeros(count, dtype=bool), np.zeros(count)
+        if largest > SPIKE * self._sigma:
+            steps = np.where((np.diff(times) > SILENT_FOR)[:, None], np.nan, np.diff(left, axis=0))
+            noise = np.sqrt(np.fmax(np.fmax(known.power, self._sigma**2), _usual_bend2(left)))
+            spikes, jumped = self._spikes(steps, noise), self._jumps(times, raw, left, steps, noise)
+        interval = (times[-1] - times[2]) / rows
+        is_motion = self._fastest > 0.0 and SWIFT * interval**2 > NOISY * self._sigma  # what bends readings so much
+        is_known = now - self._first > NOISY_WINDOW and not is_motion  # how noisy the sensors are
+        return SensorFindings(
+            stuck=self._stuck(float(times[-1])),
+            noisy=is_known & (known.power > loud),
+            spikes=spikes & is_known,
+            jumped=jumped,
+            silent=(now - known.heard > SILENT_FOR) | (known.missing > MISSING),
+            outside=known.outside > 0.5 * rows,
+            level=left[-1].copy(),
+        )
+
+    def _is_calm(self, found: Sequence[float], loud: float, rows: int) -> bool:
         """Whether no channel can have a finding, by what `survey` gave of so many rows; variances up to `loud` are usual."""
         largest, loudest, longest, lack, most = found
         is_live = lack <= MISSING and longest < self._patience and most <= 0.5 * rows
         return is_live and largest <= SPIKE * self._sigma and loudest <= loud
 
     def _nothing(self, count: int, now: float) -> SensorFindings:
-        none = np.zeros(count, dtype=bool)
-        return SensorFindings(none, none, none, np.zeros(count), now - self._heard > SILENT_FOR, none, np.full(count, np.nan))
+        none, silent = np.zeros(count, dtype=bool), now - self._known.heard > SILENT_FOR
+        return SensorFindings(none, none, none, np.zeros(count), silent, none, np.full(count, np.nan))
 
     def _spikes(self, steps: Array, noise: Array) -> Flags:
         """A reading that leaves both neighbours the same way, while these agree; `steps` from each to the next.
@@ -230,16 +254,16 @@ class SensorCheck:
 
         At least what is stated; of a single channel just that. A judgement takes at most `NOISY` times that for usual.
         """
-        known, stated = sorted(power for power in self._power.tolist() if math.isfinite(power)), self._sigma**2
+        known, stated = sorted(power for power in self._known.power.tolist() if math.isfinite(power)), self._sigma**2
         middle = known[(len(known) - 1) // 2] if len(known) > 1 else stated
         return max(middle, stated)
 
     def _stuck(self, newest: float) -> Flags:
         """One reading again and again until `newest` (s), while others of the stream are alive with noise."""
-        live = self._power > (QUIET * self._sigma) ** 2
+        live = self._known.power > (QUIET * self._sigma) ** 2
         if len(live) < 2 or not live.any():
             return np.zeros(len(live), dtype=bool)
-        return np.asarray((self._run >= self._patience) & (newest - self._since >= REPEATS_FOR))
+        return np.asarray((self._known.run >= self._patience) & (newest - self._known.since >= REPEATS_FOR))
 
     def _jumps(self, times: Array, raw: Array, left: Array, steps: Array, noise: Array) -> Array:
         """How far readings changed from one to the next, for good, while the model did not; 0 where they did not.
@@ -270,12 +294,6 @@ def _usual_bend2(left: Array) -> Array:
     known = np.isfinite(sorted2).sum(axis=0)
     middle = np.take_along_axis(sorted2, np.maximum((known - 1) // 2, 0)[None], axis=0)[0]
     return np.asarray(np.where(known >= ENOUGH, middle / MEDIAN2, 0.0))
-
-
-def _newest(stamps: Array, raw: Array, before: Array) -> Array:
-    """Times of the newest readings, shape (channels,)."""
-    seen = np.where(np.isfinite(raw), stamps[:, None], -np.inf).max(axis=0)
-    return np.asarray(np.where(np.isnan(before), np.where(np.isfinite(seen), seen, stamps[0]), np.maximum(before, seen)))
 
 
 def repeats(sigma: float, resolution: float) -> int:

@@ -3,8 +3,67 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from ..kernels.jit import inner, kernel
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.jit import by_reference, inner, kernel
+from ..types import NANO, Array
+
+Integers = NDArray[np.int64]
+COUNTS, READ, OFF, SQUARES, NEAR, NEAR_COUNTS, RATES = range(7)  # rows of `ReadingsWork.numbers`
+SLOW_READ, SLOW_EXPECTED, SLOW_SQUARES, WEIGHT = range(4)  # of `ReadingsWork.slow`
+VARIANCE, BENT, WHITE, FAR, LOUDEST, NOISE_SHARE = range(6)  # of `ReadingsWork.limits`
+GAP, CUT, USUAL = range(3)  # of `CheckWork.limits`
+
+
+@by_reference
+class ReadingsWork(NamedTuple):
+    """What `summarise` goes on with, of one stream.
+
+    limits : (6,) variance that noise is stated to have; times of it by which readings bend that move, and share of that power
+    which third differences have for noise; what lies that far from the median is an outlier; the largest variance that counts,
+    and the weight of a block in what is measured.
+    numbers : (7, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
+    slow : (4, channels) weighted sums of what was read and expected, of the squares of the difference, and their weight.
+    noise2 : (channels,) variance of the noise as measured.
+    column : scratch, as long as the largest block.
+    """
+
+    limits: Array
+    numbers: Array
+    slow: Array
+    noise2: Array
+    column: Array
+
+
+@by_reference
+class CheckWork(NamedTuple):
+    """What `survey` goes on with, of one stream.
+
+    limits : (3,) readings that lie farther apart (s) are no neighbours; what a single outlier counts at most, and what noise is
+    stated to have, as variances.
+    times, raw, left : (3 + k,), (3 + k, channels), (3 + k, channels) readings, the newest three before a block first: s, as
+    measured, less what the model has.
+    low, high : (channels,) the range of the sensors.
+    heard : (channels,) time of the newest reading, s; NaN before the first.
+    power, run, since, missing, outside : (channels,) variance of the noise, by second differences; times that the newest
+    reading was repeated, and since when (s); share of readings that are missing; readings of the newest block out of range.
+    """
+
+    limits: Array
+    times: Array
+    raw: Array
+    left: Array
+    low: Array
+    high: Array
+    heard: Array
+    power: Array
+    run: Integers
+    since: Array
+    missing: Array
+    outside: Array
 
 
 @inner
@@ -15,33 +74,36 @@ def bend2(values, t, i):
 
 
 @kernel
-def survey(times, raw, left, low, high, gap, share, cut, variance, power, run, since, missing, outside):
-    """Go on with what is known of every channel, and count readings out of range.
+def survey(sensors, stamps, raw, expected, share):
+    """Take a block of readings, and go on with what is known of every channel.
 
     Parameters
     ----------
-    times, raw, left : ndarray, shape (3 + k,), (3 + k, channels), (3 + k, channels)
-        Of the readings, the newest three before them first: s, as measured, less what the model has.
-    low, high : ndarray, shape (channels,)
-        Their range.
-    gap : float
-        Readings that lie farther apart are no neighbours, s.
-    share, cut, variance : float
-        Weight of these readings; what a single outlier counts at most, and what noise is stated to have, as variances.
-    power, run, since, missing, outside : ndarray, shape (channels,)
-        Variance of the noise, by second differences; times that the newest reading was repeated, and since when (s); share of
-        readings that are missing; readings out of range.
+    sensors : CheckWork
+        With the newest three readings before the block; those of the block follow them then.
+    stamps, raw, expected : ndarray, shape (k,), (k, channels), (k, channels)
+        s, as measured, as the model has it.
+    share : float
+        Weight of these readings.
 
     Returns
     -------
     largest, loudest, longest, lack, most : float, float, int, float, float
         The largest change of `left` from one reading to the next, but for those across a gap; the largest of `power`, `run`,
         `missing` and `outside`.
+    is_whole : bool
+        No reading is missing.
     """
-    largest, count = 0.0, times.shape[0]
-    loudest, longest, lack, most = 0.0, 0, 0.0, 0.0
+    times, all_raw, left, count = sensors.times, sensors.raw, sensors.left, 3 + stamps.shape[0]
+    gap, cut, variance = sensors.limits[GAP], sensors.limits[CUT], sensors.limits[USUAL]
+    power, run, missing, outside = sensors.power, sensors.run, sensors.missing, sensors.outside
+    for t in range(3, count):
+        times[t] = stamps[t - 3]
+    largest, loudest, longest, lack, most, is_whole = 0.0, 0.0, 0, 0.0, 0.0, True
     for i in range(power.shape[0]):
-        total, known, lacking = 0.0, 0, 0
+        total, known, lacking, newest, outside[i] = 0.0, 0, 0, -1, 0.0
+        for t in range(3, count):
+            all_raw[t, i], left[t, i] = raw[t - 3, i], raw[t - 3, i] - expected[t - 3, i]
         for t in range(1, count):
             step = abs(left[t, i] - left[t - 1, i])
             if times[t] - times[t - 1] <= gap and step > largest:
@@ -52,14 +114,23 @@ def survey(times, raw, left, low, high, gap, share, cut, variance, power, run, s
             if not math.isnan(bent):
                 total += min(bent, cut)
                 known += 1
-            if math.isnan(raw[t, i]):
+            if math.isnan(all_raw[t, i]):
                 lacking += 1
-            elif raw[t, i] < low[i] or raw[t, i] > high[i]:
+            elif all_raw[t, i] < sensors.low[i] or all_raw[t, i] > sensors.high[i]:
                 outside[i] += 1.0
-            if raw[t, i] == raw[t - 1, i]:
+            if all_raw[t, i] == all_raw[t - 1, i]:
                 run[i] += 1
-            elif math.isfinite(raw[t, i]):
-                run[i], since[i] = 0, times[t]
+            elif math.isfinite(all_raw[t, i]):
+                run[i], sensors.since[i] = 0, times[t]
+            if math.isfinite(all_raw[t, i]):
+                newest = t
+            else:
+                is_whole = False
+        if newest >= 0:
+            if not times[newest] <= sensors.heard[i]:
+                sensors.heard[i] = times[newest]
+        elif math.isnan(sensors.heard[i]):
+            sensors.heard[i] = times[3]
         missing[i] += share * (lacking / (count - 3) - missing[i])
         if known > 0:
             heard = total / known
@@ -70,26 +141,94 @@ def survey(times, raw, left, low, high, gap, share, cut, variance, power, run, s
         if power[i] > loudest:
             loudest = power[i]
         longest, lack, most = max(longest, run[i]), max(lack, missing[i]), max(most, outside[i])
-    return largest, loudest, longest, lack, most
+    return largest, loudest, longest, lack, most, is_whole
 
 
 @kernel
-def is_bent(raw, masked, variance, times, white):
-    """Whether readings of a channel that is not `masked` bend more than noise does, and smoothly.
+def summarise(work, stamps, raw, left, masked, share):
+    """Work out what a block of readings says, and go on with what it says of noise and slow means; gives whether it is bent.
+
+    Bent are readings of a channel that is not masked if they bend more than noise does, and smoothly: there is a motion that
+    is quick against their rate.
 
     Parameters
     ----------
-    raw : ndarray, shape (k, channels)
+    work : ReadingsWork
+        Its `numbers` are written.
+    stamps, raw, left : ndarray, shape (k,), (k, channels), (k, channels)
+        ns, as measured, less what the model has; NaN where it is missing; k > 0.
     masked : ndarray of bool, shape (channels,)
-    variance, times : float
-        Of the noise, and by how many times of it the second differences have to exceed it.
-    white : float
-        Share of the power of second differences that third ones must not reach: noise gives the same by both.
+        Channels that are not to be trusted.
+    share : float
+        Weight of the block in the slow means.
     """
-    count = raw.shape[0]
+    numbers, slow, last = work.numbers, work.slow, stamps.shape[0] - 1
+    span = (stamps[last] - stamps[0]) * NANO
     for i in range(raw.shape[1]):
-        if masked[i]:
-            continue
+        known, read, off, squares = 0, 0.0, 0.0, 0.0
+        for t in range(last + 1):
+            if math.isfinite(left[t, i]):
+                known += 1
+                read += raw[t, i]
+                off += left[t, i]
+                squares += left[t, i] * left[t, i]
+        numbers[COUNTS, i] = known
+        numbers[READ, i], numbers[OFF, i] = read / max(known, 1), off / max(known, 1)
+        numbers[SQUARES, i] = squares / max(known, 1)
+        if span > 0.0:
+            numbers[RATES, i] = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span
+        else:
+            numbers[RATES, i] = math.nan
+        if known > 0:
+            slow[SLOW_READ, i] += share * (numbers[READ, i] - slow[SLOW_READ, i])
+            slow[SLOW_EXPECTED, i] += share * (numbers[READ, i] - numbers[OFF, i] - slow[SLOW_EXPECTED, i])
+            slow[SLOW_SQUARES, i] += share * (numbers[SQUARES, i] - slow[SLOW_SQUARES, i])
+            slow[WEIGHT, i] += share * (1.0 - slow[WEIGHT, i])
+        mean_of_near(work, left, i)
+    follow_noise(work, left)
+    return is_bent(work, raw, masked)
+
+
+@inner
+def mean_of_near(work, left, i):
+    """Mean of those `left` of channel i that are not far from the median, and how many these are; NaN and 0 of none."""
+    column, size = work.column, 0
+    for t in range(left.shape[0]):
+        value = left[t, i]
+        if math.isfinite(value):
+            at = size
+            while at > 0 and column[at - 1] > value:
+                column[at] = column[at - 1]
+                at -= 1
+            column[at] = value
+            size += 1
+    total, near = 0.0, 0
+    for t in range(left.shape[0]):
+        if size > 0 and abs(left[t, i] - column[size // 2]) <= work.limits[FAR]:
+            total += left[t, i]
+            near += 1
+    work.numbers[NEAR, i], work.numbers[NEAR_COUNTS, i] = total / near if near > 0 else math.nan, near
+
+
+@inner
+def follow_noise(work, left):
+    """Go on with the variances of single readings by second differences, if there are some and all are known."""
+    count, noise2 = left.shape[0] - 2, work.noise2
+    is_known = count > 0
+    for i in range(noise2.shape[0]):
+        is_known = is_known and work.numbers[COUNTS, i] == left.shape[0]
+    for i in range(noise2.shape[0] if is_known else 0):
+        total = 0.0
+        for t in range(2, left.shape[0]):
+            total += bend2(left, t, i)
+        noise2[i] += work.limits[NOISE_SHARE] * (min(total / count, work.limits[LOUDEST]) - noise2[i])
+
+
+@inner
+def is_bent(work, raw, masked):
+    """Whether readings of a channel that is not masked bend more than noise does; it gives the same by third differences."""
+    count, found = raw.shape[0], False
+    for i in range(raw.shape[1]):
         power, rougher = 0.0, 0.0
         for t in range(2, count):
             power += bend2(raw, t, i)
@@ -97,50 +236,7 @@ def is_bent(raw, masked, variance, times, white):
             step = raw[t - 1, i] - raw[t - 2, i]
             third = (raw[t, i] - raw[t - 1, i] - step) - (step - (raw[t - 2, i] - raw[t - 3, i]))
             rougher += third * third
-        if power > times * variance * (count - 2) and rougher / 20.0 < white * power:
-            return True
-    return False
-
-
-@kernel
-def follow_noise(left, largest, share, variances):
-    """Go on with the variances (channels,) of single readings by second differences of `left` (k, channels), if all are known.
-
-    What a block has counts by `share`, and as `largest` at most.
-    """
-    count = left.shape[0] - 2
-    for i in range(left.shape[1]):
-        for t in range(left.shape[0]):
-            if not math.isfinite(left[t, i]):
-                return
-    for i in range(left.shape[1] if count > 0 else 0):
-        total = 0.0
-        for t in range(2, left.shape[0]):
-            total += bend2(left, t, i)
-        variances[i] += share * (min(total / count, largest) - variances[i])
-
-
-@kernel
-def mean_of_near(left, far, column, mean, count):
-    """Mean by channel of those `left` (k, channels) that are at most `far` from the median, and how many these are.
-
-    `column` (k,) is scratch. False, and nothing of use, if a reading is missing.
-    """
-    size = left.shape[0]
-    for i in range(left.shape[1]):
-        for t in range(size):
-            value = left[t, i]
-            if not math.isfinite(value):
-                return False
-            at = t
-            while at > 0 and column[at - 1] > value:
-                column[at] = column[at - 1]
-                at -= 1
-            column[at] = value
-        middle, total, near = column[size // 2], 0.0, 0
-        for t in range(size):
-            if abs(left[t, i] - middle) <= far:
-                total += left[t, i]
-                near += 1
-        mean[i], count[i] = total / near, near
-    return True
+        is_quick = power > work.limits[BENT] * work.limits[VARIANCE] * (count - 2)
+        if is_quick and rougher / 20.0 < work.limits[WHITE] * power and not masked[i]:
+            found = True
+    return found

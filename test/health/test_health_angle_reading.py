@@ -8,12 +8,13 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from health.recorded import run, session, spoilt
+from health.stream_blocks import block_of
 
 from boom_twin import Stream, load_scene, statics
 from boom_twin.health.angle_reading import AngleReading
-from boom_twin.types import Alarm
+from boom_twin.health.inference.block_problem import BLOCK
+from boom_twin.types import NANO, Alarm
 
-BLOCK = 0.1  # s
 SCENE = load_scene()
 ENCODERS = (None,) * 4
 STROKES = np.array([0.63, 0.165, 0.235, 0.187])
@@ -32,7 +33,7 @@ def told(
     rng, news = np.random.default_rng(first), []
     for k in range(first, first + 60):
         raw = read + rng.normal(0.0, 2e-4, (20, 4))
-        news += judge.take(raw, raw - expected, strokes, BLOCK, k * 100_000_000, (k + 1) * 100_000_000)
+        news += judge.take(block_of(judge, raw, expected, k), strokes, BLOCK * NANO, k * BLOCK, (k + 1) * BLOCK)
     return news
 
 
@@ -86,7 +87,7 @@ def test_offsets_and_softness_are_no_exchange(joints: list[int], off: float) -> 
     read[joints] -= off
     assert told(judge, read, expected) == [] and not judge.masked.any()
     nothing = np.full((20, 4), np.nan)
-    assert judge.take(nothing, nothing, STROKES, BLOCK, 0, 1) == []
+    assert judge.take(block_of(judge, nothing, nothing, 0), STROKES, BLOCK * NANO, 0, 1) == []
 
 
 def test_a_session_with_swapped_encoders_has_one_alarm() -> None:

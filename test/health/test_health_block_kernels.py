@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.health.inference.block_problem import means
+from boom_twin.health.inference.block_problem import BLOCK, MeasuredRows
 from boom_twin.health.sensor_monitor import SensorCheck, bends2
-from boom_twin.health.sensor_survey import follow_noise, is_bent
-from boom_twin.types import Array
+from boom_twin.health.stream_readings import StreamReadings, StreamSurvey
+from boom_twin.types import NANO, Array
 
 SIGMA = 2.0
 
@@ -17,34 +17,55 @@ def readings(seed: int, rows: int = 20, channels: int = 4) -> Array:
     return np.random.default_rng(seed).normal(3.0, SIGMA, (rows, channels))
 
 
-@pytest.mark.parametrize("rows", [1, 2, 3, 19, 20])
+def taken(raw: Array, left: Array, masked: Array | None = None) -> tuple[StreamSurvey, StreamReadings]:
+    """What a survey says of one block."""
+    survey = StreamSurvey(SIGMA**2, raw.shape[1])
+    none = np.zeros(raw.shape[1], dtype=bool)
+    stamps = 7 * BLOCK + 5_000_000 * np.arange(len(raw))
+    return survey, survey.take(MeasuredRows(stamps, raw, left), none if masked is None else masked, BLOCK * NANO)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 19, 20, 50])
 def test_means_leave_out_what_is_far_from_the_median(rows: int) -> None:
     left = readings(rows, rows)
     left[rows // 2, 1] += 100.0 * SIGMA
     near = np.abs(left - np.sort(left, axis=0)[rows // 2]) <= 6.0 * SIGMA
-    mean, count = means(left, SIGMA)
-    assert count.tolist() == near.sum(axis=0).tolist()
-    assert np.array_equal(mean, np.where(near, left, 0.0).sum(axis=0) / count)
+    _, found = taken(left, left)
+    assert found.near_counts.tolist() == near.sum(axis=0).tolist()
+    assert np.array_equal(found.near, np.where(near, left, 0.0).sum(axis=0) / found.near_counts)
+    assert found.off == pytest.approx(left.mean(axis=0)) and found.counts.tolist() == [rows] * 4
 
 
 def test_means_of_readings_some_of_which_are_missing() -> None:
     left = readings(1)
     left[3, 0], left[:, 2] = np.nan, np.nan
-    mean, count = means(left, SIGMA)
-    assert count.tolist() == [19.0, 20.0, 0.0, 20.0] and np.isnan(mean).tolist() == [False, False, True, False]
-    assert mean[0] == pytest.approx(np.nanmean(left[:, 0]))
+    survey, found = taken(left + 1.0, left)
+    assert found.near_counts.tolist() == [19.0, 20.0, 0.0, 20.0] == found.counts.tolist()
+    assert np.isnan(found.near).tolist() == [False, False, True, False]
+    assert found.near[0] == pytest.approx(np.nanmean(left[:, 0])) and found.off[2] == 0.0
+    assert found.slow.weight == pytest.approx([0.05, 0.05, 0.0, 0.05])
+    assert found.slow.expected[[0, 1, 3]] == pytest.approx([0.05] * 3) and found.slow.expected[2] == 0.0
+    assert found.slow.squares[1] == pytest.approx(0.05 * (left[:, 1] ** 2).mean())
+    assert np.array_equal(survey.noise2, np.full(4, SIGMA**2))
+
+
+def test_rates_are_those_of_what_is_expected() -> None:
+    """From the first reading to the last; unknown of one alone, or where the model has nothing."""
+    expected = 3.0 * 0.005 * np.arange(20.0)[:, None] * np.array([1.0, -2.0])
+    left = np.random.default_rng(3).normal(size=(20, 2))
+    _, found = taken(expected + left, left)
+    assert found.rates == pytest.approx([3.0, -6.0])
+    assert np.isnan(taken(expected[:1], left[:1])[1].rates).all() and np.isnan(taken(expected, left * np.nan)[1].rates).all()
 
 
 @pytest.mark.parametrize("order", ["C", "F"])
 def test_noise_is_followed_by_second_differences(order: str) -> None:
-    left, before = np.array(readings(2), order=order), np.array([1.0, 4.0, 9.0, 16.0])
-    found = before.copy()
-    follow_noise(np.ascontiguousarray(left), 5.0, 0.25, found)
-    assert found == pytest.approx(before + 0.25 * (np.minimum(bends2(left).mean(axis=0), 5.0) - before), rel=1e-14)
+    left = np.array(readings(2), order=order) * np.array([1.0, 2.0, 0.1, 30.0])
+    survey, _ = taken(left, left)
+    found = np.minimum(bends2(left).mean(axis=0), 100.0 * SIGMA**2)
+    assert survey.noise2 == pytest.approx(SIGMA**2 + 0.05 * (found - SIGMA**2), rel=1e-14)
     for unknown in (left[:2], np.where(left == left[4, 2], np.nan, left)):
-        again = before.copy()
-        follow_noise(np.ascontiguousarray(unknown), 5.0, 0.25, again)
-        assert np.array_equal(again, before)
+        assert np.array_equal(taken(unknown, unknown)[0].noise2, np.full(4, SIGMA**2))
 
 
 def test_motion_bends_readings_smoothly_and_noise_does_not() -> None:
@@ -57,11 +78,11 @@ def test_motion_bends_readings_smoothly_and_noise_does_not() -> None:
         trusted = raw[:, ~masked]
         power, rougher = bends2(trusted).sum(axis=0), (np.diff(trusted, n=3, axis=0) ** 2).sum(axis=0) / 20.0
         wanted = bool(((power > 3.0 * SIGMA**2 * 18) & (rougher < 0.75 * power)).any())
-        assert bool(is_bent(raw, masked, SIGMA**2, 3.0, 0.75)) is wanted
+        assert taken(raw, raw, masked)[1].is_bent is wanted
         told.append(wanted)
     assert 20 < sum(told) < 180
-    assert not is_bent(readings(1), np.zeros(4, dtype=bool), SIGMA**2, 3.0, 0.75)
-    assert not is_bent(np.zeros((0, 4)), np.zeros(4, dtype=bool), SIGMA**2, 3.0, 0.75)
+    assert not taken(readings(1), readings(1))[1].is_bent
+    assert not taken(np.zeros((0, 4)), np.zeros((0, 4)))[1].is_bent
 
 
 class Careful(SensorCheck):
@@ -76,8 +97,9 @@ def test_a_block_without_findings_is_told_as_the_long_way_tells_it() -> None:
     given = SIGMA, 0.0, np.full(2, -90.0), np.full(2, 90.0), 0.0
     rng, check, careful, calm = np.random.default_rng(5), SensorCheck(*given), Careful(*given), 0
     for block in range(400):
-        times = 0.1 * block + 0.005 * np.arange(20.0)
-        raw = rng.normal(0.0, SIGMA, (20, 2)) * rng.choice([1.0, 2.4, 2.6], 2)
+        rows = 50 if block % 17 == 0 else 20
+        times = 0.1 * block + 0.005 * np.arange(float(rows))
+        raw = rng.normal(0.0, SIGMA, (rows, 2)) * rng.choice([1.0, 2.4, 2.6], 2)
         if block % 7 == 0:
             raw[5:, rng.integers(2)] = raw[4, 0]
         if block % 11 == 0:

@@ -12,8 +12,10 @@ from boom_twin.health.delay_monitor import FEWEST, DelayMonitor
 from boom_twin.types import Alarm, Array
 
 from .recorded import run, session
+from .stream_blocks import block_of
 
 RATE, BLOCK = 20, 0.1  # readings of a block, its length in s
+NONE = np.zeros(2, dtype=bool)  # masked channels
 
 
 def force(times: Array) -> Array:
@@ -29,7 +31,7 @@ def judged(monitor: DelayMonitor, lag: float, seconds: float, first: int = 0, **
         expected = force(times)
         read = force(times - lag) * more.get("scale", 1.0) + more.get("bias", 0.0) + rng.normal(0.0, 100.0, expected.shape)
         read[:, 1] += more.get("lost", 0.0) * math.nan if "lost" in more else 0.0
-        news += monitor.take(number, times, read - expected, expected, round(times[-1] * 1e9))
+        news += monitor.take(number, block_of(monitor, read, expected, number), NONE, round(times[-1] * 1e9))
     return news
 
 
@@ -65,7 +67,8 @@ def test_slow_vibration_of_a_wrong_frequency_is_no_lag() -> None:
             moved = np.sin(0.4 * times)
             expected, read = (np.stack([moved + each, moved - 0.5 * each], axis=1) for each in (swing, real))
             left = read - expected + rng.normal(0.0, 0.05, expected.shape)
-            news += monitor.take(number, times, left, expected, number, period=period)
+            readings = block_of(monitor, expected + left, expected, number)
+            news += monitor.take(number, readings, NONE, number, period=period)
         return news
 
     assert told(1.0) and not told(1.0 / 0.44)
@@ -83,11 +86,11 @@ def test_little_evidence_tells_nothing() -> None:
     monitor = DelayMonitor(Stream.IMU)
     assert judged(monitor, 0.15, 4.0 * (FEWEST - 1.0) + 1.9) == []
     for number in range(0, 2000, 2):
-        assert monitor.take(number, np.arange(3.0), np.ones((3, 2)), np.ones((3, 2)), 0) == []
-        assert monitor.take(number, np.zeros(1), np.ones((1, 2)), np.ones((1, 2)), 0) == []
+        for count in (3, 1):
+            assert monitor.take(number, block_of(monitor, np.full((count, 2), 2.0), np.ones((count, 2)), number), NONE, 0) == []
     still = DelayMonitor(Stream.IMU)
     for number in range(600):
-        assert still.take(number, np.arange(2.0), np.zeros((2, 2)), np.ones((2, 2)), 0) == []
+        assert still.take(number, block_of(still, np.ones((2, 2)), np.ones((2, 2)), number), NONE, 0) == []
 
 
 def late(seconds: float, lag: float) -> tuple[Sample, ...]:

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from boom_twin.health.force_reading import ForceReading
+from boom_twin.health.inference.block_problem import BLOCK
 from boom_twin.types import Alarm
 
-BLOCK = 0.1  # s
+from .stream_blocks import block_of
+
 NAMES = tuple(f"cylinder_force_{i}" for i in range(1, 5))
 EXPECTED = np.array([-58e3, 93e3, 24e3, 1.5e3])  # N, of the default boom in posture arch
 LBF = 4.4482216152605
@@ -27,7 +29,7 @@ def told(forces: ForceReading, factor: np.ndarray | float, load: np.ndarray | fl
     rng, news = np.random.default_rng(first), []
     for k in range(first, first + 60):
         raw = (EXPECTED + load) * factor + rng.normal(0.0, 100.0, (20, 4)) * np.minimum(1.0, np.abs(factor))
-        news += forces.take(raw, raw - EXPECTED, BLOCK, k * 100_000_000, (k + 1) * 100_000_000)
+        news += forces.take(block_of(forces, raw, EXPECTED, k), k * BLOCK, (k + 1) * BLOCK)
     return news
 
 
@@ -59,5 +61,6 @@ def test_scales_and_loads_are_no_units(factor: float) -> None:
 
 def test_what_was_not_measured_tells_nothing() -> None:
     forces, nothing = ForceReading(NAMES), np.full((20, 4), np.nan)
-    assert forces.take(nothing, nothing, BLOCK, 0, 1) == [] == forces.take(np.zeros((0, 4)), np.zeros((0, 4)), BLOCK, 0, 1)
+    for readings in (nothing, np.zeros((0, 4))):
+        assert forces.take(block_of(forces, readings, readings, 0), 0, 1) == []
     assert not forces.masked.any()

@@ -9,11 +9,14 @@ import pytest
 
 from boom_twin import Sample, Stream
 from boom_twin.health.imu_mount import FAR, TAKEN_OUT, ImuMount
+from boom_twin.health.inference.block_problem import BLOCK
+from boom_twin.types import NANO
 
 from .recorded import Outcome, run, session
+from .stream_blocks import block_of
 
 G = 9.80665
-BLOCK = 0.1  # s
+PERIOD = BLOCK * NANO  # s
 EXPECTED = np.array([-3.1, 9.3])  # m/s^2: a tip that hangs by 18 deg
 TURNS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "in g": lambda f: f / G,
@@ -31,9 +34,9 @@ TURNS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 def told(mount: ImuMount, read: np.ndarray, expected: np.ndarray, seconds: float = 6.0, first: int = 0) -> list[object]:
     """Every alarm that begins or ends while the IMU reads `read` with noise."""
     rng, news = np.random.default_rng(first), []
-    for k in range(first, first + round(seconds / BLOCK)):
+    for k in range(first, first + round(seconds / PERIOD)):
         raw = read + rng.normal(0.0, 0.5, (20, 2))
-        news += mount.take(raw, raw - expected, BLOCK, k * 100_000_000, (k + 1) * 100_000_000)
+        news += mount.take(block_of(mount, raw, expected, k), k * BLOCK, (k + 1) * BLOCK)
     return news
 
 
@@ -56,11 +59,12 @@ def test_a_working_imu_tells_nothing() -> None:
     assert told(ImuMount(), EXPECTED + 0.9 * FAR / np.sqrt(2.0), EXPECTED) == []
     mount = ImuMount()
     for k in range(200):
-        times = BLOCK * (k + np.arange(20) / 20.0)
+        times = PERIOD * (k + np.arange(20) / 20.0)
         left = np.outer(np.minimum(1.0, 0.2 * times) * np.sin(2.0 * np.pi * 0.5 * times), [6.0, -8.0])
-        assert mount.take(EXPECTED + left, left, BLOCK, k, k + 1) == []
+        assert mount.take(block_of(mount, EXPECTED + left, EXPECTED, k), k, k + 1) == []
     nothing = np.full((20, 2), np.nan)
-    assert mount.take(nothing, nothing, BLOCK, 0, 1) == [] == mount.take(np.zeros((0, 2)), np.zeros((0, 2)), BLOCK, 0, 1)
+    for readings in (nothing, np.zeros((0, 2))):
+        assert mount.take(block_of(mount, readings, readings, 0), 0, 1) == []
 
 
 def test_an_axis_without_gravity_refutes_nothing_and_right_readings_do() -> None:

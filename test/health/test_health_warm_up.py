@@ -13,7 +13,7 @@ from pathlib import Path
 from boom_twin.bag.reader import scan
 from boom_twin.bag.session_model import baseline_of, mapping_of, scene_of
 from boom_twin.health.inference.kalman_update import correct, filter_block
-from boom_twin.health.sensor_survey import survey
+from boom_twin.health.sensor_survey import summarise, survey
 from boom_twin.offline.reader_process import items_of
 from boom_twin.twin.blocks import ReportBlock, SampleBlock
 from boom_twin.twin.twin import Twin
@@ -22,7 +22,7 @@ path = Path(sys.argv[1])
 scene, topics = scene_of(path, None).scene, mapping_of(path, None, 4, "").topics
 twin = Twin(scene, baseline=baseline_of(path, None).baseline)
 twin.warm_up()
-kernels = filter_block, correct, survey
+kernels = filter_block, correct, survey, summarise
 ready = [len(kernel.dispatcher.signatures) for kernel in kernels]
 session = scan(path)
 wanted = [name for name in topics.heard if (found := session.find(name)) is not None and found.count]

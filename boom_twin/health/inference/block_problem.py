@@ -16,7 +16,6 @@ from ...errors import BoomTwinError
 from ...scene.schema import Scene
 from ...types import NANO, Array, Mount, Stream, channels_of, sensor_kind
 from ..baseline import JUDGED, judged_channels
-from ..sensor_survey import mean_of_near
 from .fault_catalogue import Form, Parameter
 from .holds import HoldCollector, HoldProblem
 from .innovation_filter import CALM, ModalStates, modes_of
@@ -160,35 +159,6 @@ class BlockBuilder:
         while self._open[0].number > number:
             self._open.appendleft(Block(self._open[0].number - 1))
         return self._open[number - self._open[0].number]
-
-
-def means(left: Array, sigma: float) -> tuple[Array, Array]:
-    """Mean without outliers and number of values, by channel; NaN and 0 where there are none.
-
-    Parameters
-    ----------
-    left : ndarray, shape (k, channels)
-        Residuals; NaN where not measured.
-    sigma : float
-        Their noise: what is further than 6 of it from the median is an outlier.
-    """
-    channels = left.shape[1]
-    if not len(left):
-        return np.full(channels, np.nan), np.zeros(channels)
-    mean, count = np.empty(channels), np.empty(channels)
-    if not mean_of_near(np.ascontiguousarray(left), 6.0 * sigma, np.empty(len(left)), mean, count):
-        return _means_of_some(left, sigma)
-    return mean, count
-
-
-def _means_of_some(left: Array, sigma: float) -> tuple[Array, Array]:
-    mean, count = np.full(left.shape[1], np.nan), np.zeros(left.shape[1])
-    for i, column in enumerate(left.T):
-        known = column[np.isfinite(column)]
-        if len(known):
-            near = known[np.abs(known - np.sort(known)[len(known) // 2]) <= 6.0 * sigma]
-            mean[i], count[i] = near.mean(), len(near)
-    return mean, count
 
 
 STEP = 0.01  # m of stroke after which signatures are made anew

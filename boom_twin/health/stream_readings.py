@@ -1,0 +1,144 @@
+"""What a block of readings of one stream says, worked out once for all that judge it: means, rates, noise, motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.jit import hold
+from ..types import Array
+from .inference.block_problem import MeasuredRows
+from .sensor_survey import (
+    COUNTS,
+    NEAR,
+    NEAR_COUNTS,
+    OFF,
+    RATES,
+    SLOW_EXPECTED,
+    SLOW_READ,
+    SLOW_SQUARES,
+    WEIGHT,
+    ReadingsWork,
+    summarise,
+)
+
+SHAKEN = 3.0
+"""Variances of a reading in its second differences, by which other sensors bear witness that the boom is shaken and that what
+looks like noise in strokes may be motion."""
+WHITE = 0.75
+"""Share of that variance that third differences must have for noise."""
+OUTLIER = 6.0  # deviations of the noise from the median, from which on a reading counts in no mean
+LOUDEST, NOISE_SHARE = 100.0, 0.05
+"""Times the stated variance that noise is taken for at most; and weight of a block in the variance that is measured."""
+WINDOW = 2.0  # s, time constant of the slow means
+ENOUGH = 0.6  # of their weight: after 1.8 s
+ROOM = 32  # readings of a block for which there is room at first
+
+
+@dataclass(frozen=True, slots=True)
+class SlowMeans:
+    """Means over the last `WINDOW`; they go on with every block.
+
+    Attributes
+    ----------
+    read, expected, squares : ndarray, shape (channels,)
+        Weighted sums that begin at 0: divided by `weight` they are means of what was read, of what the model had, and of the
+        square of the difference; in the unit of the readings.
+    weight : ndarray, shape (channels,)
+        From 0 to 1.
+    """
+
+    read: Array
+    expected: Array
+    squares: Array
+    weight: Array
+
+
+@dataclass(frozen=True, slots=True)
+class StreamReadings:
+    """What a block of k readings says.
+
+    Attributes
+    ----------
+    rows : MeasuredRows
+    counts : ndarray, shape (channels,)
+        Of the readings that the model has something to compare with.
+    off : ndarray, shape (channels,)
+        Mean by which these are off, in their unit; 0 of none.
+    near, near_counts : ndarray, shape (channels,)
+        The same without outliers, NaN of none; and of how many readings.
+    rates : ndarray, shape (channels,)
+        Of what the model expects from the first reading to the last, per s; NaN of fewer than two.
+    slow : SlowMeans
+    is_bent : bool
+        Whether trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by second and
+        by third differences, motion much less by third ones.
+    """
+
+    rows: MeasuredRows
+    counts: Array
+    off: Array
+    near: Array
+    near_counts: Array
+    rates: Array
+    slow: SlowMeans
+    is_bent: bool
+
+
+class StreamSurvey:
+    """Goes through the readings of one stream, block by block.
+
+    Parameters
+    ----------
+    variance : float
+        Of the noise of a reading, as stated.
+    channels : int
+
+    Attributes
+    ----------
+    noise2 : ndarray, shape (channels,)
+        The same as measured, by second differences.
+    """
+
+    def __init__(self, variance: float, channels: int) -> None:
+        limits = np.array([variance, SHAKEN, WHITE, OUTLIER * variance**0.5, LOUDEST * variance, NOISE_SHARE])
+        self.noise2 = np.full(channels, variance)
+        self._numbers, slow = np.zeros((7, channels)), np.zeros((4, channels))
+        self._work = ReadingsWork(limits, self._numbers, slow, self.noise2, np.zeros(ROOM))
+        self._held = hold(self._work)
+        self._slow = SlowMeans(slow[SLOW_READ], slow[SLOW_EXPECTED], slow[SLOW_SQUARES], slow[WEIGHT])
+        none, unknown = np.zeros(channels), np.full(channels, np.nan)
+        no_rows = MeasuredRows(np.zeros(0, np.int64), np.zeros((0, channels)), np.zeros((0, channels)))
+        self._nothing = StreamReadings(no_rows, none, none, unknown, none, unknown, self._slow, False)
+        self._summarise: Callable[..., Any] | None = None
+
+    def take(self, rows: MeasuredRows, masked: NDArray[np.bool_], span: float) -> StreamReadings:
+        """Take a block.
+
+        Parameters
+        ----------
+        rows : MeasuredRows
+            None or more; NaN of what is missing, or what the model does not have.
+        masked : ndarray of bool, shape (channels,)
+            Sensors that are not to be trusted.
+        span : float
+            Length (s) of the block that the slow means take; 0 if they are to leave it out.
+        """
+        count = len(rows.stamps)
+        if not count:
+            return self._nothing
+        if count > len(self._work.column):
+            self._work = self._work._replace(column=np.zeros(2 * count))
+            self._held = hold(self._work)
+        stamps, raw, left = (np.ascontiguousarray(column) for column in rows)
+        arguments = self._held, stamps, raw, left, masked, min(1.0, span / WINDOW)
+        if self._summarise is None:
+            self._summarise = summarise.for_types_of(*arguments)
+        is_bent, numbers = self._summarise(*arguments), self._numbers.copy()
+        return StreamReadings(
+            rows, numbers[COUNTS], numbers[OFF], numbers[NEAR], numbers[NEAR_COUNTS], numbers[RATES], self._slow, bool(is_bent)
+        )
