@@ -37,4 +37,4 @@ print(ready, [len(kernel.dispatcher.signatures) for kernel in kernels], told)
 
 def test_nothing_is_compiled_while_a_session_runs():
     found = subprocess.run([sys.executable, "-c", CODE, str(SESSION)], capture_output=True, text=True, check=True)
-    assert found.stdout.strip() == "[1, 1, 1] [1, 1, 1] 3"
+    assert found.stdout.strip() == "[1, 1, 1, 1] [1, 1, 1, 1] 3"
