@@ -274,6 +274,12 @@ class StrokeNoise:
     collected : ndarray, shape (modes,)
         That of the modal coordinates in the long run, m^2 kg.
     modes : tuple of Mode
+    omegas : ndarray, shape (modes,)
+        Of these, rad/s.
+    loads : ndarray, shape (modes, n)
+        N_ij: increments of the cylinders' forces per unit of the modal coordinates.
+    motions : ndarray, shape (modes, 2)
+        Those of the tip, along x and y.
     """
 
     joints: Array
@@ -281,34 +287,36 @@ class StrokeNoise:
     response: Array
     collected: Array
     modes: tuple[Mode, ...]
+    omegas: Array
+    loads: Array
+    motions: Array
 
     def collected_of(self, spectrum: StrokeSpectrum) -> Array:
         """Variances (modes,) of the modal coordinates, m^2 kg, in the long run under other noise of the strokes."""
-        return np.asarray((self.response * spectrum.at(self._omegas())).sum(axis=1))
+        return np.asarray((self.response * spectrum.at(self.omegas)).sum(axis=1))
 
-    def pushes(self, plan: Plan, angle: float) -> Array:
+    def pushes(self, angle: float) -> Array:
         """What an error of the present strokes, too short for any mode to follow, makes of the tip's acceleration.
 
         In axes turned by `angle`, (m/s^2)^2 for a variance of 1 m^2; shape (n, 2).
         """
-        return np.asarray((self._loads(plan).T @ self._tip_motions(plan, angle)) ** 2)
+        return np.asarray((self.loads.T @ self._turned(angle)) ** 2)
 
-    def _tip_motions(self, plan: Plan, angle: float = 0.0) -> Array:
-        """Of the modes, per unit of their coordinates, in axes turned by `angle`; shape (modes, 2)."""
-        tip, (c, s) = plan.tables.tip, (np.cos(angle), np.sin(angle))
-        motions = np.array([mode.motion[tip : tip + 2] for mode in self.modes]).reshape(-1, 2)
-        return np.asarray(motions @ np.array([[c, -s], [s, c]]))
+    def _turned(self, angle: float) -> Array:
+        """The tip's motions in axes turned by `angle`, shape (modes, 2)."""
+        c, s = math.cos(angle), math.sin(angle)
+        return np.asarray(self.motions @ np.array([[c, -s], [s, c]]))
 
-    def of_start(self, plan: Plan, speeds: Array, sag: Array) -> Array:
+    def of_start(self, speeds: Array, sag: Array) -> Array:
         """Variances (modes,), m^2 kg, of vibration that a model lacks when it is started at rest.
 
         Strokes that went with `speeds` (n,) in m/s set off N_ij v_i / omega_j^3; and the first mode may have swung by
         `SWUNG` of the tip's deflection `sag` (2,) in m.
         """
-        found = self._loads(plan) ** 2 @ speeds**2 / self._omegas() ** 6
-        return found + self._of_tip(plan, SWUNG * float(np.hypot(*sag)))
+        found = self.loads**2 @ speeds**2 / self.omegas**6
+        return found + self._of_tip(SWUNG * float(np.hypot(*sag)))
 
-    def of_pause(self, plan: Plan, span: float, densities: Array) -> Array:
+    def of_pause(self, span: float, densities: Array) -> Array:
         """Variances (modes,), m^2 kg, of vibration by what strokes did in a pause of `span` s beside what its ends tell.
 
         A stroke is known but for its jerk, white with `densities` (n,) in m^2/s^5. What a mode keeps of it is its transform
@@ -317,41 +325,31 @@ class StrokeNoise:
         """
         from scipy.special import spherical_jn  # takes longer to import than all else that a twin starts with
 
-        omegas = self._omegas()
-        known = sum((2 * k + 1) * spherical_jn(k, 0.5 * omegas * span) ** 2 for k in range(3))
-        return np.asarray(self._loads(plan) ** 2 @ densities * span * np.maximum(1.0 - known, 0.0) / omegas**8)
+        known = sum((2 * k + 1) * spherical_jn(k, 0.5 * self.omegas * span) ** 2 for k in range(3))
+        return np.asarray(self.loads**2 @ densities * span * np.maximum(1.0 - known, 0.0) / self.omegas**8)
 
-    def of_phase(self, plan: Plan, velocity: Array, acceleration: Array) -> Array:
+    def of_phase(self, velocity: Array, acceleration: Array) -> Array:
         """Variances (modes,), m^2 kg, of a free vibration of unknown phase: how far two of them are apart, at the most.
 
         `velocity` and `acceleration` (2,) of the tip are taken to be those of the first mode.
         """
         if not self.modes:
             return np.zeros(0)
-        omega = float(self._omegas()[0])
+        omega = float(self.omegas[0])
         amplitude2 = float(velocity @ velocity) / omega**2 + float(acceleration @ acceleration) / omega**4
-        return self._of_tip(plan, float(np.sqrt(2.0 * amplitude2)))
+        return self._of_tip(float(np.sqrt(2.0 * amplitude2)))
 
-    def _of_tip(self, plan: Plan, amplitude: float) -> Array:
+    def _of_tip(self, amplitude: float) -> Array:
         """Variances (modes,) of a first mode that moves the tip by `amplitude` (m)."""
         found = np.zeros(len(self.modes))
         if self.modes:
-            motion = float(np.hypot(*self.modes[0].motion[plan.tables.tip : plan.tables.tip + 2]))
-            found[0] = (amplitude / max(motion, TINY)) ** 2
+            found[0] = (amplitude / max(float(np.hypot(*self.motions[0])), TINY)) ** 2
         return found
 
-    def _omegas(self) -> Array:
-        return np.array([2.0 * np.pi * mode.frequency for mode in self.modes])
-
-    def _loads(self, plan: Plan) -> Array:
-        """N_ij, shape (modes, n)."""
-        rows = [mode.increments[plan.tables.cylinders.z] for mode in self.modes]
-        return np.array(rows).reshape(len(rows), plan.joints)
-
-    def of(self, variances: Array, plan: Plan, angle: float) -> tuple[Array, Array, Array, Array]:
+    def of(self, variances: Array, angle: float) -> tuple[Array, Array, Array, Array]:
         """What modal variances make of joint angles (n,), tip acceleration (2,) in axes turned by `angle`, forces (n,), tip."""
-        swing = self._omegas()[:, None] ** 2 * self._tip_motions(plan, angle)
-        tip, forces = variances @ self._tip_motions(plan) ** 2, variances @ self._loads(plan) ** 2
+        swing = self.omegas[:, None] ** 2 * self._turned(angle)
+        tip, forces = variances @ self.motions**2, variances @ self.loads**2
         return variances @ self.joints, variances @ swing**2, forces, tip
 
 
@@ -364,16 +362,14 @@ def stroke_noise(plan: Plan, state: State, work: Work, spectrum: StrokeSpectrum)
 
 def stroke_noise_of(plan: Plan, found: Sequence[tuple[Mode, float, Array]], spectrum: StrokeSpectrum) -> StrokeNoise:
     """Propagate noise of the strokes to modes with their damping ratios, and what they turn the joints by (n,)."""
-    n, modes = plan.joints, tuple(mode for mode, _, _ in found)
-    joints, response, decay = [], [], []
-    for mode, zeta, turns in found:
-        omega = 2.0 * np.pi * mode.frequency
-        joints.append(turns**2)
-        response.append(mode.increments[plan.tables.cylinders.z] ** 2 / (4.0 * max(zeta, 1e-6) * omega**3))
-        decay.append(2.0 * zeta * omega)
-    noise = StrokeNoise(
-        np.array(joints).reshape(-1, n), np.array(decay), np.array(response).reshape(-1, n), np.zeros(len(modes)), modes
-    )
+    n, tip, cylinders = plan.joints, plan.tables.tip, plan.tables.cylinders.z
+    modes = tuple(mode for mode, _, _ in found)
+    omegas = np.array([2.0 * np.pi * mode.frequency for mode in modes])
+    loads = np.array([mode.increments[cylinders] for mode in modes]).reshape(-1, n)
+    motions = np.array([mode.motion[tip : tip + 2] for mode in modes]).reshape(-1, 2)
+    zetas, joints = np.array([zeta for _, zeta, _ in found]), np.array([turns**2 for _, _, turns in found]).reshape(-1, n)
+    response = loads**2 / (4.0 * np.maximum(zetas, 1e-6) * omegas**3)[:, None]
+    noise = StrokeNoise(joints, 2.0 * zetas * omegas, response, np.zeros(len(modes)), modes, omegas, loads, motions)
     return replace(noise, collected=noise.collected_of(spectrum))
 
 

@@ -84,12 +84,12 @@ class Deviations:
     def add_pause(self, stamp: int, span: float, densities: Array) -> None:
         """Strokes were not measured for `span` s up to `stamp` (ns); see `StrokeNoise.of_pause`."""
         if self.noise is not None:
-            self._add(stamp, self.noise.of_pause(self._plan, span, densities))
+            self._add(stamp, self.noise.of_pause(span, densities))
 
     def add_phase(self, stamp: int, prediction: Prediction) -> None:
         """How much time passed up to `stamp` (ns) is not known, while the boom vibrated as in `prediction`."""
         if self.noise is not None:
-            self._add(stamp, self.noise.of_phase(self._plan, prediction.tip_velocity, prediction.tip_acceleration))
+            self._add(stamp, self.noise.of_phase(prediction.tip_velocity, prediction.tip_acceleration))
 
     def _add(self, stamp: int, variances: Array) -> None:
         """Vibration with these variances (modes,), from `stamp` on, that the model cannot know of."""
@@ -103,7 +103,8 @@ class Deviations:
     def _of_modes(self, variances: Array) -> Array:
         """Variances of modes as many as there are at the present posture."""
         assert self.noise is not None
-        return np.pad(variances, (0, len(self.noise.modes)))[: len(self.noise.modes)]
+        count = len(self.noise.modes)
+        return variances if len(variances) == count else np.pad(variances, (0, count))[:count]
 
     def _decayed(self, span: int) -> Array:
         """What the modes' damping leaves of variances after `span` ns, shape (modes,)."""
@@ -139,14 +140,14 @@ class Deviations:
             levers(self._plan.tables.linkages, angles, slopes)
             self._state.slopes2[:] = 1.0 / np.square(slopes)
         if self._speeds is not None:
-            self._add(self._epoch, self.noise.of_start(self._plan, self._speeds, prediction.tip_displacement))
+            self._add(self._epoch, self.noise.of_start(self._speeds, prediction.tip_displacement))
             self._speeds, self._state.clock[SEEN] = None, prediction.stamp
         variances = self._shake(spectrum, prediction.stamp) + self._left(prediction.stamp)
-        joints, acceleration, forces, tip = self.noise.of(variances, self._plan, prediction.tip_angle)
+        joints, acceleration, forces, tip = self.noise.of(variances, prediction.tip_angle)
         self.tip = np.sqrt(tip)
         self._state.joints2[:] = self._settings.angle_variance + joints
         self._state.accelerations2[:] = self._settings.imu_sigma**2 + acceleration
-        self._state.pushes2[:] = self.noise.pushes(self._plan, prediction.tip_angle)
+        self._state.pushes2[:] = self.noise.pushes(prediction.tip_angle)
         self._state.forces2[:] = self._settings.variance(SENSORS[Stream.FORCES]) + forces
 
     def _spectrum(self, interval: float, shares: Array, excess: Array) -> StrokeSpectrum:

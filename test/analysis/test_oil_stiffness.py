@@ -109,7 +109,9 @@ def test_the_estimate_follows_the_stroke():
     strokes = strokes_of_posture(scene, "high")
     plan, angles = compile_scene(scene), joint_angles_of_strokes(scene, strokes)
     modes = DeviationModes(scene, plan, load_settings(), (None,) * 4)
-    modes.refresh(strokes, angles, plan.state(), StrokeNoise(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)), np.zeros(0), ()))
+    none = np.zeros((0, 4))
+    no_noise = StrokeNoise(none, np.zeros(0), none, np.zeros(0), (), np.zeros(0), none, np.zeros((0, 2)))
+    modes.refresh(strokes, angles, plan.state(), no_noise)
     expected = [formula(j["cylinder"]["oil"], j["cylinder"]["max_stroke"], s)
                 for j, s in zip(spec_with_oil()["joints"], strokes, strict=True)]  # fmt: skip
     assert 1.0 / modes.filter.softness == pytest.approx(expected, rel=1e-12)

@@ -72,7 +72,8 @@ def rows_of(boom: BoomPredictor) -> tuple[Results, Estimates]:
     return results_in(boom.compiled.row, *size), estimates_in(boom.compiled.row, *size)
 
 
-NO_NOISE = StrokeNoise(np.zeros((0, 4)), np.zeros((0, 2)), np.zeros(0), np.zeros(0), ())
+NONE = np.zeros((0, 4))
+NO_NOISE = StrokeNoise(NONE, np.zeros(0), NONE, np.zeros(0), (), np.zeros(0), NONE, np.zeros((0, 2)))
 
 
 @pytest.fixture

@@ -29,6 +29,7 @@ from boom_twin.health.inference.innovation_filter import (
     ModalStates,
     modes_of,
     oscillation,
+    read_modes,
 )
 from boom_twin.health.inference.sensitivities import Signatures
 from boom_twin.health.suspicion import load_levels
@@ -61,8 +62,14 @@ def boom():
     return noise, plan, state, work, reading, BLOCK
 
 
+def modes_in(boom, before=None):
+    """The modes of a boom at rest, of the signs of those `before`."""
+    noise, *there, block = boom
+    return modes_of(noise, read_modes(noise.modes, *there), block, before)
+
+
 def test_stroke_noise_keeps_its_own_covariance(boom):
-    modes = modes_of(*boom, None)
+    modes = modes_in(boom)
     assert len(modes.frequencies) >= 2 and modes.frequencies.max() < HIGHEST
     assert modes.turn @ modes.rest @ modes.turn.T + modes.least == pytest.approx(modes.rest, rel=1e-9, abs=1e-20)
     assert np.linalg.eigvalsh(modes.least).min() > 0.0
@@ -73,7 +80,7 @@ def test_stroke_noise_keeps_its_own_covariance(boom):
 def test_what_angles_read_of_modes(boom):
     """The mode's own increments of the joints, averaged over a block; velocities are not read."""
     noise, plan, state, work, *_ = boom
-    modes = modes_of(*boom, None)
+    modes = modes_in(boom)
     for k, frequency in enumerate(modes.frequencies):
         x = math.pi * frequency * BLOCK
         wanted = math.sin(x) / x * joint_increments(plan, state, work, noise.modes[k])
@@ -94,7 +101,7 @@ def test_a_load_at_rest_bends_the_boom_as_its_weight_does(posture):
     variance, quiet = Settings().stroke_variance, np.tile([1.0, 0.0, 0.0], (boom.plan.joints, 1))
     spectrum = StrokeSpectrum(variance, 0.005, corners(variance, 0.005, 1.0), quiet, np.zeros(boom.plan.joints))
     noise = stroke_noise(boom.plan, boom.state, boom.work, spectrum)
-    modes = modes_of(noise, boom.plan, boom.state, boom.work, boom.reading, BLOCK, None)
+    modes = modes_in((noise, boom.plan, boom.state, boom.work, boom.reading, BLOCK))
     still = np.linalg.solve(np.eye(len(modes.turn)) - modes.turn, modes.pushed)
     by_force = (modes.shown @ still + modes.lifted)[:, 1]
     by_weight = -signature.channels[:, 0] / G
@@ -106,7 +113,7 @@ def test_wrong_frequencies_shake_by_the_predicted_vibration(boom):
     """Density detuning^2 omega^4 A^2, A^2 of the coordinate whose acceleration gives the tip 1 (m/s^2)^2: in the limit, h S."""
     noise, plan, state, work, reading, _ = boom
     short, tip = 1e-6, plan.tables.tip
-    modes = modes_of(noise, plan, state, work, reading, short, None)
+    modes = modes_in((noise, plan, state, work, reading, short))
     for k in range(len(modes.frequencies)):
         swing2 = float((noise.modes[k].motion[tip : tip + 2] ** 2).sum())
         assert modes.driven[2 * k + 1, 2 * k + 1] == pytest.approx(KEEPS_STEP * short / swing2)
@@ -114,11 +121,11 @@ def test_wrong_frequencies_shake_by_the_predicted_vibration(boom):
 
 def test_modes_keep_their_signs(boom):
     """A mode's shape comes with any sign; that of the modes before is kept, so that coordinates go on."""
-    before, noise = modes_of(*boom, None), boom[0]
+    before, noise = modes_in(boom), boom[0]
     flipped = tuple(replace(m, increments=-m.increments, motion=-m.motion) for m in noise.modes)
-    other = (replace(noise, modes=flipped), *boom[1:])
-    assert modes_of(*other, None).shown == pytest.approx(-before.shown, rel=1e-6, abs=1e-12)
-    again = modes_of(*other, before)
+    other = (replace(noise, modes=flipped, motions=-noise.motions, loads=-noise.loads), *boom[1:])
+    assert modes_in(other).shown == pytest.approx(-before.shown, rel=1e-6, abs=1e-12)
+    again = modes_in(other, before)
     assert again.shown == pytest.approx(before.shown, rel=1e-6, abs=1e-12)
     tables = np.random.default_rng(1).normal(0.0, 1e-4, (20, 6, 1))
     one, two = (filtered(InnovationFilter(6, 1, BLOCK, 0.01), [before, each], tables) for each in (before, again))
@@ -127,7 +134,7 @@ def test_modes_keep_their_signs(boom):
 
 def test_levels_in_one_filter_are_those_of_each_alone(boom):
     """To the bit: the posture's modes change, and one channel is not measured all the time."""
-    modes = [modes_of(*boom, None), modes_of(*boom, None)]
+    modes = [modes_in(boom), modes_in(boom)]
     tables = np.random.default_rng(2).normal(0.0, 1e-4, (20, 6, 5))
     tables[7:9, 2, 0], tables[12, :, 0] = np.nan, np.nan
     levels = np.array([0.0, 15.0, 170.0])
@@ -149,7 +156,7 @@ def test_a_load_of_any_size_suits_a_level(boom, size):
 
     Between 0 and 15 N there was none: wind of 4 N was less probable by e^2.4 for each block, and passed for a fault.
     """
-    modes, kept, count = modes_of(*boom, None), math.exp(-BLOCK / LOAD_TIME), 300
+    modes, kept, count = modes_in(boom), math.exp(-BLOCK / LOAD_TIME), 300
     whitening = InnovationFilter(len(modes.shown), 1, BLOCK, DETUNING, np.append(load_levels(load_scene()), size))
     whitening.tune(modes)
     rng, sigma = np.random.default_rng(3), np.array([*(4e-5,) * (len(modes.shown) - 2), 5e-3, 5e-3])
@@ -176,7 +183,7 @@ def filtered(whitening: InnovationFilter, modes, tables):
 
 def test_vibration_that_nobody_predicted_is_found_and_forgotten(boom):
     """Free vibration of the first mode, 2 m/s^2 at the tip: its mean square is found; 8 s after it hardly any is left."""
-    modes = modes_of(*boom, None)
+    modes = modes_in(boom)
     whitening, omega = InnovationFilter(6, 1, BLOCK, 0.15, 50.0), 2.0 * math.pi * modes.frequencies[0]
     whitening.tune(modes)
     size = 2.0 / np.hypot(*modes.shown[-2:, 0])

@@ -18,7 +18,7 @@ from ...types import NANO, Array, Mount, Stream, channels_of, sensor_kind
 from ..baseline import JUDGED, judged_channels
 from .fault_catalogue import Form, Parameter
 from .holds import HoldCollector, HoldProblem
-from .innovation_filter import CALM, ModalStates, modes_of
+from .innovation_filter import CALM, ModalStates, modes_of, read_modes
 from .sensitivities import HoldInWork, Signature, Signatures
 
 BLOCK = 100_000_000  # ns
@@ -278,8 +278,10 @@ class LinearModel:
         if self.signature is None:
             return None
         if noise is not self._tuned:
-            boom, self._tuned = self.signatures.nominal, noise
-            self._modes = modes_of(noise, boom.plan, boom.state, boom.work, boom.reading, BLOCK * NANO, self._modes)
+            if self._tuned is None or noise.modes is not self._tuned.modes:
+                boom = self.signatures.nominal
+                self._read = read_modes(noise.modes, boom.plan, boom.state, boom.work, boom.reading)
+            self._modes, self._tuned = modes_of(noise, self._read, BLOCK * NANO, self._modes), noise
         travel = 0.0 if self._before is None else float(np.abs(block.strokes - self._before).max())
         shaking, self._before = self._shaking, block.strokes
         self._shaking = max(self._shaking * np.exp(-BLOCK * NANO / CALM), block.shaking)

@@ -87,16 +87,14 @@ class ModalStates(NamedTuple):
     lifted: Array
 
 
-def modes_of(
-    noise: StrokeNoise, plan: Plan, state: State, work: Work, reading: Reading, block: float, before: ModalStates | None
-) -> ModalStates:
-    """The modes of a posture, where the boom is at rest in `state`, for blocks of `block` s; of the signs of those `before`."""
-    size, n, tip, h = sum(mode.frequency < HIGHEST for mode in noise.modes), plan.joints, plan.tables.tip, block
+def modes_of(noise: StrokeNoise, read: ReadModes, block: float, before: ModalStates | None) -> ModalStates:
+    """The modes of a posture, as sensors read them, for blocks of `block` s; of the signs of those `before`."""
+    size, channels, h = sum(mode.frequency < HIGHEST for mode in noise.modes), read.still.shape[1], block
     turn, least, driven, rest = (np.zeros((2 * size, 2 * size)) for _ in range(4))
-    shown, shaken, pushed, lifted = np.zeros((n + 2, 2 * size)), np.zeros(n + 2), np.zeros((2 * size, 2)), np.zeros((n + 2, 2))
-    for k, mode in enumerate(noise.modes):
-        omega, motion = 2.0 * math.pi * mode.frequency, mode.motion[tip : tip + 2]
-        still, felt = _read(plan, state, work, mode, reading)
+    shown, shaken = np.zeros((channels, 2 * size)), np.zeros(channels)
+    pushed, lifted = np.zeros((2 * size, 2)), np.zeros((channels, 2))
+    for k, (mode, still, felt) in enumerate(zip(noise.modes, read.still, read.felt, strict=True)):
+        omega, motion = 2.0 * math.pi * mode.frequency, noise.motions[k]
         if k >= size:
             lifted += np.outer(still, motion) / omega**2
             continue
@@ -122,13 +120,27 @@ def oscillation(omega: float, decay: float, h: float) -> Array:
     return np.array(oscillate(omega, decay, h)).reshape(2, 2)
 
 
-def _read(plan: Plan, state: State, work: Work, mode: Mode, reading: Reading) -> tuple[Array, Array]:
-    """How the sensors read a mode's coordinate that rests at 1, and its acceleration of 1; shape (n + 2,) each."""
+class ReadModes(NamedTuple):
+    """How c channels read m modes of a posture.
+
+    Attributes
+    ----------
+    still, felt : ndarray, shape (m, c)
+        A mode's coordinate that rests at 1, and its acceleration of 1.
+    """
+
+    still: Array
+    felt: Array
+
+
+def read_modes(modes: tuple[Mode, ...], plan: Plan, state: State, work: Work, reading: Reading) -> ReadModes:
+    """How the sensors read modes, where the boom is at rest in `state`."""
     n, angle = plan.joints, float(state.frames[-1, FRAME_ANGLE])
-    still = along(plan, state, work, mode.increments, lambda: reading.of(state)[: n + 2])
-    felt = np.zeros(n + 2)
-    felt[n:] = specific_force(*mode.motion[plan.tables.tip : plan.tables.tip + 2], math.cos(angle), math.sin(angle))
-    return still, felt
+    still, felt = np.zeros((len(modes), n + 2)), np.zeros((len(modes), n + 2))
+    for k, mode in enumerate(modes):
+        still[k] = along(plan, state, work, mode.increments, lambda: reading.of(state)[: n + 2])
+        felt[k, n:] = specific_force(*mode.motion[plan.tables.tip : plan.tables.tip + 2], math.cos(angle), math.sin(angle))
+    return ReadModes(still, felt)
 
 
 class Innovations(NamedTuple):

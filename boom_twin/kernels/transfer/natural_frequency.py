@@ -150,8 +150,8 @@ def rotate(a, m, i, j):
     if a[i, j] == 0.0:
         return
     half = (a[j, j] - a[i, i]) / (2.0 * a[i, j])
-    tangent = math.copysign(1.0, half) / (abs(half) + math.hypot(1.0, half))
-    c = 1.0 / math.hypot(1.0, tangent)
+    tangent = math.copysign(1.0, half) / (abs(half) + math.sqrt(1.0 + half * half))
+    c = 1.0 / math.sqrt(1.0 + tangent * tangent)
     s = tangent * c
     for k in range(m):
         one, other = a[k, i], a[k, j]
