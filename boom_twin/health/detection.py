@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 
 from ..kernels.elements.pin_contact import bisect
 from ..types import Array
+from .deviation_sums import ALLOWANCE, WINDOW, follow_deviations
 
-ALLOWANCE = 1.0  # deviations by which the mean may be off
-CUT = 4.0  # a single innovation counts no more than this
-WINDOW = 20  # blocks of the window: 2 s
 EXCESS = 1.5  # times the variance that model error may have
 
 
@@ -40,53 +38,41 @@ class Detector:
         rate = false_alarms * block / (4.0 * channels)  # per test: two sides, and as many for the window as for the CUSUM
         self.threshold = cusum_threshold(1.0 / rate)
         self.limit = EXCESS * chi_square_exceeded(2.0 * rate)
-        self._up, self._down = np.zeros(channels), np.zeros(channels)
-        self._began = np.zeros((2, channels), dtype=np.int64)
-        self._squares = np.zeros((WINDOW, channels))  # the newest last
-        self._lasting = np.zeros(channels)
+        self._sums, self._began = np.zeros((2, channels)), np.zeros((2, channels), dtype=np.int64)
+        self._squares = np.zeros((WINDOW, channels))
+        self._lasting, self._window = 0.0, 0.0
         self._count = 0
 
     def take(self, normal: Array) -> None:
         """Innovations of one block, shape (channels,), NaN where nothing was measured."""
         self._count += 1
-        measured = np.isfinite(normal)
-        z = np.where(measured, np.minimum(np.maximum(normal, -CUT), CUT), 0.0)
-        allowed = np.where(measured, ALLOWANCE, 0.0)
-        for row, (sums, signed) in enumerate(((self._up, z), (self._down, -z))):
-            self._began[row, sums == 0.0] = self._count
-            np.maximum(0.0, sums + (signed - allowed), out=sums)
-        self._squares[:-1] = self._squares[1:]
-        self._squares[-1] = z**2
-        self._note_lasting()
+        self._lasting, self._window = follow_deviations(self._sums, self._began, self._squares, normal, self._count)
 
     @property
     def levels(self) -> Array:
         """Of each channel: 1 and above is an alarm; shape (channels,)."""
         window = self._squares.sum(axis=0) if self._count >= WINDOW else 0.0
-        return np.maximum(self._lasting, window / self.limit)
+        return np.asarray(np.maximum(self._sums.max(axis=0) / self.threshold, window / self.limit))
 
     @property
     def suspicion(self) -> float:
         """How near the nearest channel is to an alarm; 0 while nothing lasts and no spread is half of what is allowed."""
-        worst = float(self.levels.max())
-        return max(float(self._lasting.max()), worst if worst > 0.5 else 0.0)
-
-    def _note_lasting(self) -> None:
-        self._lasting = np.maximum(self._up, self._down) / self.threshold
+        lasting, window = self._lasting / self.threshold, self._window / self.limit if self._count >= WINDOW else 0.0
+        return max(lasting, window if window > 0.5 else 0.0)
 
     def blocks_since(self, channel: int) -> int:
         """Blocks since the deviation of a channel began, as far as it can be told."""
-        row = 0 if self._up[channel] >= self._down[channel] else 1
-        if max(self._up[channel], self._down[channel]) < self.threshold:
+        up, down = self._sums[:, channel].tolist()
+        row = 0 if up >= down else 1
+        if max(up, down) < self.threshold:
             return WINDOW
         return self._count - int(self._began[row, channel]) + 1
 
     def reset(self, channels: NDArray[np.bool_] | None = None) -> None:
         """Begin anew, at some channels or all."""
-        which = np.ones(len(self._up), dtype=bool) if channels is None else channels
-        self._up[which], self._down[which] = 0.0, 0.0
-        self._squares[:, which] = 0.0
-        self._note_lasting()
+        which = np.ones(self._sums.shape[1], dtype=bool) if channels is None else channels
+        self._sums[:, which], self._squares[:, which] = 0.0, 0.0
+        self._lasting, self._window = float(self._sums.max()), float(self._squares.sum(axis=0).max())
 
 
 def cusum_threshold(run: float) -> float:

@@ -17,6 +17,7 @@ from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels
 from .angle_reading import AngleReading
 from .baseline import JUDGED, Baseline, judged_channels
 from .delay_monitor import DelayMonitor, delay_cause
+from .detection import Detector
 from .force_reading import ForceReading
 from .imu_mount import ImuMount
 from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows
@@ -24,7 +25,7 @@ from .inference.hypotheses import Regression
 from .inference.innovation_filter import InnovationFilter, ModalStates
 from .residual_monitor import ResidualMonitor
 from .sensor_monitor import NOISE_OVER, SensorCheck, SensorMonitor, sensor_ranges
-from .stream_readings import StreamReadings, StreamSurvey
+from .stream_readings import PredictionMeans, StreamReadings, StreamSurvey
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news
 UNCERTAIN = 2.0
@@ -167,7 +168,8 @@ class HealthMonitor:
 
     def _judge(self, block: Block) -> list[Alarm]:
         start, predictions, news = block.number * BLOCK, block.predictions(), []
-        is_followed = bool(predictions.variances.max() < UNCERTAIN * self._settings.stroke_variance)
+        predicted = PredictionMeans.of(predictions)
+        is_followed = predicted.largest < UNCERTAIN * self._settings.stroke_variance
         readings, span = dict[Stream, StreamReadings](), BLOCK * NANO if is_followed else 0.0
         for stream, survey in self._surveys.items():
             rows = block.readings(stream, len(self._channels[stream]))
@@ -180,8 +182,8 @@ class HealthMonitor:
                 news += self._check(stream, block, stamps, raw, expected)
         if is_followed:
             news += self._void(self._mount.take(readings[Stream.IMU], start, block.end), block.end)
-            strokes = predictions.measured.mean(axis=0)
-            news += self._void(self._angles.take(readings[Stream.ANGLES], strokes, BLOCK * NANO, start, block.end), block.end)
+            angles = readings[Stream.ANGLES]
+            news += self._void(self._angles.take(angles, predicted.strokes, BLOCK * NANO, start, block.end), block.end)
             news += self._forces.take(readings[Stream.FORCES], start, block.end)
             news += self._judge_delays(block, readings)
         strokes = predictions.measured
@@ -191,7 +193,7 @@ class HealthMonitor:
             news += self.residuals.close(start)
             self.residuals.begin()
             return news
-        averaged = self._means(block, predictions, readings)
+        averaged = self._means(start, predictions, predicted, readings)
         return news + self.residuals.take(averaged, self._noise)
 
     def _void(self, news: list[Alarm], end: int) -> list[Alarm]:
@@ -225,28 +227,28 @@ class HealthMonitor:
         monitor = self._sensors[stream]
         before = monitor.masked
         findings = self._checks[stream].look(np.asarray(stamps * NANO, float), raw, expected, block.end * NANO)
-        is_predicted = stream is not Stream.STROKES
-        blamed = self.residuals.blamed if is_predicted and findings.jumped.any() else frozenset()
-        news = monitor.take(findings, block.number * BLOCK, block.end, blamed)
-        if stream in JUDGED and (monitor.masked & ~before).any():
+        may_come_back = stream is not Stream.STROKES and not findings.is_calm and findings.jumped.any()
+        news = monitor.take(findings, block.number * BLOCK, block.end, self.residuals.blamed if may_come_back else frozenset())
+        if stream in JUDGED and monitor.masked is not before and (monitor.masked & ~before).any():
             self.residuals.forget()
         return news
 
-    def _means(self, block: Block, predictions: PredictionRows, readings: dict[Stream, StreamReadings]) -> BlockMeans:
-        """Means of the residuals of every stream that is judged."""
-        stamps, found, imu = predictions.stamps, [], readings[Stream.IMU]
+    def _means(
+        self, start: int, predictions: PredictionRows, predicted: PredictionMeans, readings: dict[Stream, StreamReadings]
+    ) -> BlockMeans:
+        """Means of the residuals of every stream that is judged, of the block that begins at `start` (ns)."""
+        means, counts, imu = [], [], readings[Stream.IMU]
         for stream in JUDGED:
             each, stated = readings[stream], self._stated[stream]
-            counts = each.near_counts * stated / np.maximum(self._surveys[stream].noise2, stated)
-            found.append((np.where(self._masked(stream), np.nan, each.near), counts))
-        rates = np.concatenate([_rates(stamps, predictions.joints), imu.rates])
+            counts.append(each.near_counts * stated / np.maximum(self._surveys[stream].noise2, stated))
+            means.append(np.where(self._masked(stream), np.nan, each.near))
         return BlockMeans(
-            start=block.number * BLOCK,
-            left=np.concatenate([mean for mean, _ in found]),
-            counts=np.concatenate([count for _, count in found]),
-            strokes=predictions.strokes[len(stamps) // 2],
-            variances=predictions.variances.mean(axis=0),
-            rates=np.where(np.isfinite(rates), rates, 0.0),
+            start=start,
+            left=np.concatenate(means),
+            counts=np.concatenate(counts),
+            strokes=predictions.strokes[len(predictions.stamps) // 2],
+            variances=predicted.variances,
+            rates=np.concatenate([predicted.rates, np.where(np.isfinite(imu.rates), imu.rates, 0.0)]),
             shaking=float((predictions.accelerations**2).sum(axis=1).mean()),
             motion=(imu if len(imu.rows.stamps) else readings[Stream.ANGLES]).rows,
         )
@@ -260,19 +262,14 @@ class HealthMonitor:
         return np.asarray(np.sqrt(by_parameters + signature.tip_by_stroke**2 @ self._variances))
 
 
-def _rates(stamps: NDArray[np.int64], values: Array) -> Array:
-    """Mean rate (channels,) of `values` (k, channels) at `stamps` (ns), per s."""
-    if len(stamps) < 2 or stamps[-1] <= stamps[0]:
-        return np.zeros(values.shape[1])
-    return np.asarray((values[-1] - values[0]) / (int(stamps[-1] - stamps[0]) * NANO))
-
-
 def warm_up() -> None:
     """Compile the kernels that judge a rig, on made-up readings of two channels."""
     none, two = np.zeros((0, 0)), np.zeros((2, 2))
     SensorCheck(1.0, 0.0, two[0], two[0], 0.0).look(np.arange(2.0), two, two, 2.0)
+    PredictionMeans.of(PredictionRows(np.arange(2), two, two, two, two, two))
     StreamSurvey(1.0, 2).take(MeasuredRows(np.arange(2), two, two), np.zeros(2, dtype=bool), 1.0)
     whitening = InnovationFilter(2, 2, BLOCK * NANO, 0.0)
     whitening.tune(ModalStates(np.zeros(0), none, none, none, none, np.zeros((2, 0)), two[0], np.zeros((0, 2)), two))
     found = whitening.step(np.ones((2, 2)), np.eye(2), two[0], 0.0, 0.0)
     Regression(np.zeros(1), np.eye(1)).take(found.white, True)
+    Detector(2, BLOCK * NANO, 1e-6).take(np.zeros(2))

@@ -13,6 +13,7 @@ from ..types import NANO, Array
 
 Integers = NDArray[np.int64]
 COUNTS, READ, OFF, SQUARES, NEAR, NEAR_COUNTS, RATES = range(7)  # rows of `ReadingsWork.numbers`
+MEASURED, SPREAD, TURNING = range(3)  # rows of what `summarise_predictions` writes
 SLOW_READ, SLOW_EXPECTED, SLOW_SQUARES, WEIGHT = range(4)  # of `ReadingsWork.slow`
 VARIANCE, BENT, WHITE, FAR, LOUDEST, NOISE_SHARE = range(6)  # of `ReadingsWork.limits`
 GAP, CUT, USUAL = range(3)  # of `CheckWork.limits`
@@ -240,3 +241,33 @@ def is_bent(work, raw, masked):
         if is_quick and rougher / 20.0 < work.limits[WHITE] * power and not masked[i]:
             found = True
     return found
+
+
+@kernel
+def summarise_predictions(stamps, measured, variances, joints, found):
+    """Write means of a block of predictions: measured strokes, variances of the estimates, rates of the joints.
+
+    Parameters
+    ----------
+    stamps, measured, variances, joints : ndarray, shape (k,), (k, n), (k, n), (k, n)
+        ns, m, m^2, rad; k > 0.
+    found : ndarray, shape (3, n)
+        m, m^2, rad/s; rates of 0 from the first to the last where no time lies between them.
+
+    Returns
+    -------
+    largest : float
+        Of the variances; NaN if one is.
+    """
+    count, largest = stamps.shape[0], 0.0
+    span = (stamps[count - 1] - stamps[0]) * NANO
+    for i in range(measured.shape[1]):
+        strokes, spread = 0.0, 0.0
+        for t in range(count):
+            strokes += measured[t, i]
+            spread += variances[t, i]
+            if not variances[t, i] <= largest:
+                largest = variances[t, i]
+        found[MEASURED, i], found[SPREAD, i] = strokes / count, spread / count
+        found[TURNING, i] = (joints[count - 1, i] - joints[0, i]) / span if span > 0.0 else 0.0
+    return largest

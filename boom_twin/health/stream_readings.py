@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from ..kernels.jit import hold
 from ..types import Array
-from .inference.block_problem import MeasuredRows
+from .inference.block_problem import MeasuredRows, PredictionRows
 from .sensor_survey import (
     COUNTS,
+    MEASURED,
     NEAR,
     NEAR_COUNTS,
     OFF,
@@ -21,9 +22,12 @@ from .sensor_survey import (
     SLOW_EXPECTED,
     SLOW_READ,
     SLOW_SQUARES,
+    SPREAD,
+    TURNING,
     WEIGHT,
     ReadingsWork,
     summarise,
+    summarise_predictions,
 )
 
 SHAKEN = 3.0
@@ -142,3 +146,31 @@ class StreamSurvey:
         return StreamReadings(
             rows, numbers[COUNTS], numbers[OFF], numbers[NEAR], numbers[NEAR_COUNTS], numbers[RATES], self._slow, bool(is_bent)
         )
+
+
+@dataclass(frozen=True, slots=True)
+class PredictionMeans:
+    """What a block of predictions of n joints says.
+
+    Attributes
+    ----------
+    strokes, variances : ndarray, shape (n,)
+        Means of the strokes as measured, m, and of the variances of their estimates, m^2.
+    rates : ndarray, shape (n,)
+        Of the joints from the first prediction to the last, rad/s.
+    largest : float
+        Of the variances, m^2.
+    """
+
+    strokes: Array
+    variances: Array
+    rates: Array
+    largest: float
+
+    @classmethod
+    def of(cls, rows: PredictionRows) -> PredictionMeans:
+        """Of one prediction or more."""
+        found = np.empty((3, rows.measured.shape[1]))
+        columns = (np.ascontiguousarray(column) for column in (rows.stamps, rows.measured, rows.variances, rows.joints))
+        largest = summarise_predictions(*columns, found)
+        return cls(found[MEASURED], found[SPREAD], found[TURNING], largest)

@@ -27,7 +27,7 @@ ROOT = Path(__file__).resolve().parents[1]
 KERNEL_SOURCES = (
     "kernels", "estimation", "twin/update.py", "twin/state.py", "twin/expected_readings.py", "twin/stamp_check.py",
     "twin/sample_check.py", "twin/blocks.py", "calibration/load_filter.py", "health/inference/kalman_update.py",
-    "health/sensor_survey.py", "messages/prediction_numbers.py", "types.py",
+    "health/deviation_sums.py", "health/sensor_survey.py", "messages/prediction_numbers.py", "types.py",
 )  # fmt: skip
 """Folders and modules of the package that kernels, or the constants in them, come from."""
 SUFFIX = ".kernel"

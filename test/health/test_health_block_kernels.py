@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.health.inference.block_problem import BLOCK, MeasuredRows
+from boom_twin.health.inference.block_problem import BLOCK, MeasuredRows, PredictionRows
 from boom_twin.health.sensor_monitor import SensorCheck, bends2
-from boom_twin.health.stream_readings import StreamReadings, StreamSurvey
+from boom_twin.health.stream_readings import PredictionMeans, StreamReadings, StreamSurvey
 from boom_twin.types import NANO, Array
 
 SIGMA = 2.0
@@ -113,3 +113,16 @@ def test_a_block_without_findings_is_told_as_the_long_way_tells_it() -> None:
         assert found.jumped.tolist() == wanted.jumped.tolist() and not wanted.is_calm
         calm += found.is_calm
     assert 50 < calm < 380 and check.noise == careful.noise
+
+
+def test_predictions_of_a_block_are_averaged() -> None:
+    rng, stamps = np.random.default_rng(8), 5_000_000 * np.arange(20)
+    measured, strokes, variances, joints = rng.normal(size=(4, 20, 3))
+    rows = PredictionRows(stamps, measured, strokes, variances**2, joints, np.zeros((20, 2)))
+    found = PredictionMeans.of(rows)
+    assert found.strokes == pytest.approx(measured.mean(axis=0))
+    assert found.variances == pytest.approx((variances**2).mean(axis=0))
+    assert found.rates == pytest.approx((joints[-1] - joints[0]) / 0.095) and found.largest == (variances**2).max()
+    one = PredictionMeans.of(PredictionRows(*(column[:1] for column in rows)))
+    assert not one.rates.any() and one.strokes.tolist() == measured[0].tolist()
+    assert np.isnan(PredictionMeans.of(rows._replace(variances=np.full((20, 3), np.nan))).largest)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.health.detection import ALLOWANCE, CUT, WINDOW, Detector, cusum_threshold
+from boom_twin.health.detection import Detector, cusum_threshold
+from boom_twin.health.deviation_sums import ALLOWANCE, CUT, WINDOW
 
 BLOCK = 0.1
 
