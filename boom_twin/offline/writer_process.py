@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from itertools import groupby
 from pathlib import Path
 
-from ..bag.writer import SessionWriter
+from ..bag.writer import RESULT_CHUNK_SIZE, SessionWriter
 from ..config.settings import Settings
 from ..errors import BoomTwinError
 from ..messages.report_encoder import ReportEncoder
@@ -112,7 +112,7 @@ def main(directory: Path) -> int:
         notes, topics, scene, settings = next(items)
         outputs: dict[str, Topic] = {key: topic for key, topic in topics.outputs.items() if key is not Output.DIAGNOSTICS}
         encoder = ReportEncoder(scene, settings, topics.frame)
-        with SessionWriter(directory, outputs, notes) as writer:
+        with SessionWriter(directory, outputs, notes, chunk_size=RESULT_CHUNK_SIZE) as writer:
             say_ready()
             for batch in items:
                 for item in batch:
