@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf, isnan
 
 from ..config.settings import Settings, Thresholds
-from ..health.sensor_monitor import readings_of_frozen, sensor_ranges
+from ..health.sensor_check import readings_of_frozen, sensor_ranges
 from ..scene.schema import Scene
 from ..types import SENSORS, Mount, Stream
 from .levels import Bounds, ComponentJudge, Evaluation, Status
@@ -91,7 +91,7 @@ def sensors_of(
     Parameters
     ----------
     scene : Scene
-        Gives the ranges, see `boom_twin.health.sensor_monitor.sensor_ranges`.
+        Gives the ranges, see `boom_twin.health.sensor_check.sensor_ranges`.
     settings : Settings
         Noise and resolution.
     required : dict of Stream to bool

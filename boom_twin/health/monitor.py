@@ -24,7 +24,8 @@ from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, Blo
 from .inference.hypotheses import Regression
 from .inference.innovation_filter import InnovationFilter, ModalStates
 from .residual_monitor import ResidualMonitor
-from .sensor_monitor import NOISE_OVER, SensorCheck, SensorMonitor, sensor_ranges
+from .sensor_check import NOISE_OVER, SensorCheck, sensor_ranges
+from .sensor_monitor import SensorMonitor
 from .stream_readings import PredictionMeans, StreamReadings, StreamSurvey
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from boom_twin.config.settings import Settings, Thresholds
-from boom_twin.health.sensor_monitor import readings_of_frozen
+from boom_twin.health.sensor_check import readings_of_frozen
 
 
 @pytest.mark.parametrize(("sigma", "resolution"), [(1.0, 0.25), (1.0, 0.5), (0.5, 1.0), (0.3, 1.0)])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from boom_twin.health.inference.block_problem import BLOCK, MeasuredRows, PredictionRows
-from boom_twin.health.sensor_monitor import SensorCheck, bends2
+from boom_twin.health.sensor_check import SensorCheck, bends2
 from boom_twin.health.stream_readings import PredictionMeans, StreamReadings, StreamSurvey
 from boom_twin.types import NANO, Array
 

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from boom_twin.health.sensor_monitor import SETTLED, TOLD, SensorCheck, SensorFindings, SensorMonitor
+from boom_twin.health.sensor_check import SensorCheck, SensorFindings
+from boom_twin.health.sensor_monitor import SETTLED, TOLD, SensorMonitor
 from boom_twin.types import SENSORS, Stream
 
 BLOCK, NAMES = 100_000_000, ("joint_1", "joint_2")
