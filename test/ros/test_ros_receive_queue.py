@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from boom_twin.ros.node.receive_queue import LARGEST, ReceiveQueue
-from boom_twin.ros.runtime import _read_at_once
+from boom_twin.ros.runtime import _EventTurns
 
 MS = 1_000_000
 
@@ -87,7 +87,7 @@ def test_messages_are_read_as_they_come_until_one_had_to_wait(bus: Bus) -> None:
             bus.send("b", b"3")
             assert bus.read == [b"1"] and turn.done()
 
-    _read_at_once(Executor(), bus.queue)
+    _EventTurns(bus.queue, lambda: False).serve(Executor(), bus.queue)
     bus.queue.work(1.0)
     bus.send("b", b"4")
     assert bus.read == [b"1", b"2", b"3"] and bus.queue

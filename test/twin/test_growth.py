@@ -1,0 +1,80 @@
+"""Nothing that is kept grows: as many objects live after twice as many samples."""
+
+from __future__ import annotations
+
+import gc
+import sys
+from collections import Counter
+
+import numpy as np
+
+from boom_twin import Sample, Stream, Twin, load_scene, statics
+from boom_twin.config.settings import Thresholds
+from boom_twin.diagnostics.sensor_status import sensors_of
+from boom_twin.diagnostics.topic_status import Peers
+from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
+from boom_twin.health.baseline import load_baseline
+from boom_twin.messages.report_encoder import ReportEncoder
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.types import Array
+
+RATE, SPAN = 32, 240  # Hz, of which times are sums without rounding; s: all windows are full after three minutes
+GRAVITY = 9.81
+
+
+class Live:
+    """What the node does with a sample, without ROS; the boom stands still, its sensors have their noise."""
+
+    def __init__(self) -> None:
+        scene, self.now, self.random = load_scene(), 0.0, np.random.default_rng(5)
+        self.twin = Twin(scene, baseline=load_baseline())
+        self.encoder = ReportEncoder(scene, self.twin.settings, "base_link")
+        sensors = sensors_of(scene, self.twin.settings, dict.fromkeys(Stream, False), self.twin.mounts)
+        self.watch = TwinWatch(sensors, {stream: stream.value for stream in Stream}, Thresholds(), lambda: self.now)
+        strokes = strokes_of_posture(scene, "arch")
+        prediction = Twin(scene).update(Sample(Stream.STROKES, 0, strokes)).prediction
+        assert prediction is not None
+        up = GRAVITY * np.array([np.sin(prediction.tip_angle), np.cos(prediction.tip_angle)])
+        self.rest: dict[Stream, tuple[Array, float]] = {
+            Stream.STROKES: (strokes, 2e-5),
+            Stream.ANGLES: (statics(scene, "arch").joints, 1.7e-4),
+            Stream.IMU: (up, 0.05),
+        }
+
+    def second(self) -> None:
+        """Of samples of all streams, and the look at everything after it."""
+        for _ in range(RATE):
+            self.now += 1.0 / RATE
+            for stream, (values, sigma) in self.rest.items():
+                self._take(Sample(stream, round(self.now * 1e9), values + self.random.normal(0.0, sigma, len(values))))
+        peers = dict.fromkeys(Stream, Peers())
+        all_pieces(self.watch.look({}, True, peers, peers.values(), self.now))
+
+    def _take(self, sample: Sample) -> None:
+        self.watch.seen(sample.stream, sample.stamp)
+        report = self.twin.update(sample, judged=False)
+        self.watch.took(sample, report, 0.0)
+        for each in report.all:
+            self.encoder.fill(each, lambda _: True)
+        if self.twin.is_health_due:
+            self.watch.judged(self.twin.judge_health(), 0.0)
+
+
+def alive() -> tuple[Counter[str], int]:
+    """Objects of the package by class, and blocks of memory of all objects."""
+    gc.collect()
+    kinds = (type(each) for each in gc.get_objects())
+    return Counter(kind.__name__ for kind in kinds if str(kind.__module__).startswith("boom_twin")), sys.getallocatedblocks()
+
+
+def test_as_many_objects_live_after_twice_as_many_samples() -> None:
+    live = Live()
+    alive()
+    for _ in range(SPAN):
+        live.second()
+    before, blocks = alive()
+    for _ in range(SPAN):
+        live.second()
+    after, later = alive()
+    assert after == before
+    assert later - blocks < SPAN / 2, "an object every other second"
