@@ -19,6 +19,7 @@ from .inference.hypotheses import Cause, Explanation, Verdict
 from .inference.sensitivities import Signature, Signatures
 
 NAMED, GROWING = 0.95, 0.99  # probability of a cause beside the others that is taken for certain; of one that grows
+BORNE_OUT = 0.7  # likewise, by blocks in which the boom does not vibrate
 REFUTED = 1e-3  # probability of a cause below which evidence that fits rules it out; of that which was named, another may be
 GROWTH_AFTER, STEADY = 8.0, 0.9  # evidence (s) that gives a slope; share of the steepest that a lasting growth keeps
 FITS = 1.5  # squares over those of noise that a cause may leave, to be told by name
@@ -63,22 +64,23 @@ class AlarmText:
         self._steepest: dict[int, float] = {}
 
     def alarm(
-        self, alarm: Alarm, verdict: Verdict, is_told_apart: bool, span: float, stamp: int, is_calm: bool,
+        self, alarm: Alarm, whole: Verdict, calm: Verdict, is_told_apart: bool, span: float, stamp: int, is_calm: bool,
         signature: Signature | None,
     ) -> Alarm:  # fmt: skip
         """The alarm with its explanation at `stamp` (ns), of evidence of `span` s; a name stays until it is refuted.
 
-        `is_calm`: no load shakes the boom. `is_told_apart`: nothing else that was measured speaks against the likeliest cause.
+        A name is given by the whole of the evidence; what the blocks in which the boom does not vibrate say has to bear it out,
+        and is what is told until then. `is_calm`: no load shakes the boom. `is_told_apart`: nothing else that was measured
+        speaks against the likeliest cause.
         """
-        likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
-        ranks = tuple(self._ranked(cause, verdict.excess) for cause in likely)
-        best = verdict.causes[0]
-        if self._is_certain(alarm, verdict, is_told_apart, span, stamp, is_calm):
-            told = self._sentence(ranks[0], verdict.best)
-            return replace(alarm, kind=ranks[0].parts[0][0], cause=best.name, told=told, ranked=ranks)
+        if self._is_certain(alarm, whole, calm, is_told_apart, span, stamp, is_calm):
+            ranks = self._likely(whole)
+            told = self._sentence(ranks[0], whole.best)
+            return replace(alarm, kind=ranks[0].parts[0][0], cause=whole.causes[0].name, told=told, ranked=ranks)
         if alarm.cause is not None:
             return alarm
-        if verdict.excess > FITS and span >= NAMED_AFTER:
+        ranks, best = self._likely(calm), calm.causes[0]
+        if calm.excess > FITS and span >= NAMED_AFTER:
             told = f"{alarm.channel} deviates as no single fault that is known would make it; nearest is {best.name}"
             return replace(alarm, kind="unknown", cause=None, told=told, ranked=ranks)
         if best.probability >= NAMED and not is_told_apart:
@@ -87,7 +89,7 @@ class AlarmText:
         if len(ranks) == 1:
             return replace(alarm, kind="residual", cause=None, told=f"{best.name} most likely, not yet certain", ranked=ranks)
         told = "cannot be told apart in this posture: " + " or ".join(rank.cause for rank in ranks)
-        move = self._advised_move(verdict, signature)
+        move = self._advised_move(calm, signature)
         return replace(alarm, kind="residual", cause=None, told=told + move, ranked=ranks)
 
     def of_holds(self, alarm: Alarm, verdict: Verdict, tip: float, is_borne_out: bool) -> Alarm:
@@ -95,8 +97,7 @@ class AlarmText:
 
         `is_borne_out`: no single frequency makes it the most probable one.
         """
-        likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
-        ranks = tuple(self._ranked(cause, verdict.excess) for cause in likely)
+        ranks = self._likely(verdict)
         best, off = verdict.causes[0], f"; that puts the tip off by {1e3 * tip:.0f} mm"
         if best.probability >= NAMED and verdict.excess <= FITS and is_borne_out:
             told = self._sentence(ranks[0], verdict.best) + off
@@ -115,8 +116,7 @@ class AlarmText:
 
         `hold`: the newest that tells of frequencies; the words say by how much these, angles and IMU are off.
         """
-        likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
-        ranks = tuple(self._ranked(cause, verdict.excess) for cause in likely)
+        ranks = self._likely(verdict)
         odds = math.exp(min(verdict.strength, SAYABLE))
         names = " or ".join(rank.cause for rank in ranks)
         told = (
@@ -140,17 +140,31 @@ class AlarmText:
                 found.append(f"{name} by {factor * own[place]:+.2g} {unit}")
         return ", ".join(found)
 
-    def _is_certain(self, alarm: Alarm, verdict: Verdict, is_told_apart: bool, span: float, stamp: int, is_calm: bool) -> bool:
-        """Whether the most probable cause is named: it fits, and has been probable enough for some time."""
-        best = verdict.causes[0]
-        is_growing = verdict.best.is_growing  # whatever else changes meanwhile may look like that
-        is_drift = is_growing and self._known[verdict.best.place].form in DRIFTING  # a neighbour's offset may look like that
-        is_steady = self._grows_still(alarm, verdict, span) or not is_drift
-        sure = GROWING if is_growing else NAMED
-        leads = min(best.probability, best.alone) >= sure and verdict.excess <= FITS and is_steady and is_told_apart
-        shares = {cause.name: cause.probability for cause in verdict.causes}
+    def _likely(self, verdict: Verdict) -> tuple[Ranked, ...]:
+        """Causes that are told."""
+        likely = [cause for cause in verdict.causes if cause.probability >= LISTED][:MOST]
+        return tuple(self._ranked(cause, verdict.excess) for cause in likely)
+
+    def _is_certain(
+        self, alarm: Alarm, whole: Verdict, calm: Verdict, is_told_apart: bool, span: float, stamp: int, is_calm: bool
+    ) -> bool:
+        """Whether the most probable cause is named: it fits, and has been probable enough for some time.
+
+        Whatever else changes meanwhile may look like growth, and a neighbour's offset like a drift. So a fault that grows is
+        named on a calm boom, a drift as long as it is as fast as it was; or where the cause is the same if nothing grows: then
+        the name does not depend on the shape.
+        """
+        best, borne_out = whole.causes[0], calm.causes[0]
+        is_growing = whole.best.is_growing or calm.best.is_growing
+        is_drift = calm.best.is_growing and self._known[calm.best.place].form in DRIFTING
+        is_lasting = (self._grows_still(alarm, calm, span) or not is_drift) and is_calm
+        is_shapeless = best.steady >= NAMED and borne_out.steady >= BORNE_OUT
+        has_shape = not is_growing or (span >= GROWING_AFTER and (is_lasting or is_shapeless))
+        leads = min(best.probability, best.alone) >= (GROWING if is_growing else NAMED)
+        leads = leads and min(borne_out.probability, borne_out.alone) >= BORNE_OUT and is_told_apart
+        shares = {cause.name: cause.probability for cause in whole.causes}
         is_held = alarm.cause not in (None, best.name) and shares[alarm.cause or ""] > REFUTED
-        if not leads or is_held or (is_growing and (span < GROWING_AFTER or not is_calm)):
+        if not (leads and has_shape and max(whole.excess, calm.excess) <= FITS) or is_held:
             self._leading = "", stamp
             return False
         if not alarm.told or self._leading[0] != best.name:

@@ -26,7 +26,7 @@ from .inference.holds import HoldProblem
 from .inference.hypotheses import Explanation, HypothesisTest, Regression, Verdict
 from .inference.innovation_filter import KEEPS_STEP, InnovationFilter
 from .inference.sensitivities import Signature
-from .suspicion import CRUDE, DETUNING, MISFIT, RECENT, WHOLE_MISFIT, Suspicion, carried_on, load_levels, refuted
+from .suspicion import CRUDE, DETUNING, MISFIT, RECENT, SURE, WHOLE_MISFIT, Suspicion, carried_on, load_levels, refuted
 from .tip_load import TipLoadMonitor
 
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a suspicion begins, and is given up if it has not become an alarm
@@ -37,7 +37,7 @@ EXCITED_FOR = 20.0  # s for which a load counts after it last showed
 LOAD_MEANS = 3.0  # times the load's level: less weight than that may be its mean, and is no fault
 LIMITS_PERIOD = 60  # blocks of a suspicion between two looks at what could be told, a multiple of the next
 PERIOD = 3  # blocks between two looks at a suspicion
-SURE, OBVIOUS = 15.0, 60.0  # ln of how much more probable a fault must be than none; and not to wait for a load to show
+OBVIOUS = 60.0  # ln of how much more probable than none a fault must be not to wait for a load to show
 GONE, GONE_AFTER = 3.0, 3.0  # likewise, of a suspicion that has taken so long (s), below which the fault is there no more
 KNOWN_AFTER, KNOWN_WITHIN = 5.0, 0.1  # s that a suspicion takes, and deviation over size, before the twin goes on with a fault
 HELD, LET_GO = 12.0, 4.0  # ln of how much more probable by holds a fault must be than none for an alarm, and to keep it
@@ -417,10 +417,10 @@ class ResidualMonitor:
         return [*(self._end_hold_alarm(start) if is_same else []), self._alarm]
 
     def _explained(self, alarm: Alarm, suspicion: Suspicion, verdict: Verdict, span: float, start: int, is_calm: bool) -> Alarm:
-        """The alarm in words, by what the calm blocks say; a name has to go with all of them, and with all that came before."""
+        """The alarm in words; a name has to go with the calm blocks as well, and with all that came before."""
         calm = suspicion.explain_calmly()
         is_told_apart = calm.causes[0].name == verdict.causes[0].name and calm.causes[0].name not in self._refuted
-        return self._tell.alarm(alarm, calm, is_told_apart, span, start, is_calm, self.signature)
+        return self._tell.alarm(alarm, verdict, calm, is_told_apart, span, start, is_calm, self.signature)
 
     def _change_of_known(self, suspicion: Suspicion, verdict: Verdict) -> _KnownFault | None:
         """The known fault whose end goes with what is measured about as well as any other explanation does."""

@@ -27,6 +27,7 @@ CRUDE = 0.01  # share of a deviation by which its signature, a derivative, may b
 LEVEL = 2.0  # s, over which the size of a deviation is taken for that
 RECENT = 20  # blocks that must go with what explains all of them
 MISFIT, WHOLE_MISFIT = 2.5, 1.6  # times the squares that noise leaves, in the recent blocks and in all of them
+SURE = 15.0  # ln of how much more probable a fault must be than none for an alarm
 EXCITED = 12.0  # ln of how much better another level of load goes with the recent blocks
 LONGEST = 900  # blocks of one suspicion
 CHANGED = 12.0  # ln of how much better another size of the same fault goes with the recent blocks
@@ -44,7 +45,8 @@ class RecentFit(NamedTuple):
     Attributes
     ----------
     is_outdated : bool
-        Not any more: the fault or the load has changed.
+        Not any more: the fault or the load has changed. A load that is less than it was refutes no fault: what explained
+        the evidence under the larger one still does.
     is_resized : bool
         With another size or rate of the same fault much better than with those that it has by all of the evidence: it has
         grown, or grows no more. What such evidence says of causes depends on which makes up best for the wrong shape.
@@ -156,7 +158,8 @@ class Suspicion:
         else:
             (logs, squares), changed = self._bank.fit(recent, self._coefficients(None), self.mean, self.covariance), 0.0
         is_misfit = verdict.excess > WHOLE_MISFIT or squares[verdict.level] > MISFIT
-        is_other_load = logs.max() - logs[verdict.level] > EXCITED
+        others = logs[verdict.level :] if verdict.strength >= SURE else logs
+        is_other_load = others.max() - logs[verdict.level] > EXCITED
         return RecentFit(bool(self.blocks > LONGEST or is_misfit or is_other_load), changed > CHANGED)
 
     def _coefficients(self, each: Explanation | None) -> Array:

@@ -141,13 +141,15 @@ def test_probabilities(seed):
     assert sum(cause.probability for cause in verdict.causes) == pytest.approx(1.0)
     assert [cause.probability for cause in verdict.causes] == sorted((c.probability for c in verdict.causes), reverse=True)
     scale = verdict.excess * (1.0 + CRUDE * verdict.strength * verdict.excess)
-    weights = dict.fromkeys(range(4), 0.0)
+    weights, steady = (dict.fromkeys(range(4), 0.0) for _ in range(2))
     for growing in (False, True):
         for place, each in explained(verdict, growing).items():
             weights[place] += np.exp(each.log_factor / scale) * KNOWN[place].prior
+            steady[place] += 0.0 if growing else np.exp(each.log_factor / scale) * KNOWN[place].prior
     sensor = next(cause for cause in verdict.causes if cause.name == "joint_1.sensor")
     assert {part.place for part in sensor.parts} == {1, 2}
     assert sensor.probability == pytest.approx((weights[1] + weights[2]) / sum(weights.values()))
+    assert sensor.steady == pytest.approx((steady[1] + steady[2]) / sum(steady.values())), "of faults that do not grow"
     assert verdict.causes[0].name == "joint_2.sensor" and verdict.best.place == 3
 
 
@@ -228,6 +230,19 @@ def test_another_size_of_a_known_fault_is_as_probable_as_densely(rate, bound):
     other = log_density(problem.values, at, problem.spread + columns @ prior @ columns.T)
     assert changed == pytest.approx(other - problem.log(3, 0.0, 2.0), abs=1e-7)
     assert changed > bound if rate else changed < bound
+
+
+def test_what_another_load_explains_is_no_other_size():
+    """The change is weighed with the load that suits it beside none with the load that suits that."""
+    each, rises, stays = Explanation(3, 0, 0.0, 2.0, 0.1), Problem(6, {3: 2.0}, 40, 0.3), Problem(7, {3: 2.0}, 40)
+    mean, covariance = rises.mean, rises.covariance
+    own, other = rises.evidence(), stays.evidence()
+    alone = BANK.change(own, each, SPAN, mean, covariance)[2]
+    assert alone > 12.0
+    for ahead, least, most in ((-1e4, alone, alone), (1e4, -10.0, 2.0)):  # of the load under which nothing has changed
+        pairs = [(getattr(own, name), getattr(other, name)) for name in ("matrix", "vector", "squares")]
+        both = Evidence(*(np.concatenate(pair) for pair in pairs), own.rows, np.concatenate([own.log, own.log + ahead]))
+        assert least - 1e-6 <= BANK.change(both, each, SPAN, mean, covariance)[2] <= most + 1e-6
 
 
 def test_levels_together_are_those_of_each_alone():

@@ -278,7 +278,7 @@ def test_a_weight_that_may_be_the_mean_of_a_load_is_no_alarm_of_holds() -> None:
     place = next(i for i, each in enumerate(known) if each.cause == "tip.payload")
     for weight, level, alarms in ((-4.3, 0, 1), (-4.3, 2, 0), (20.0, 2, 1)):
         monitor = Twin(load_scene(), baseline=Baseline()).judge.residuals
-        best = Cause("tip.payload", 1.0, (Explanation(place, 0, 30.0, weight, 0.5),), 1.0)
+        best = Cause("tip.payload", 1.0, (Explanation(place, 0, 30.0, weight, 0.5),), 1.0, 1.0)
         found = HoldVerdict(hold.start, Verdict((best,), 1.0, 1.0, 0), 0.007)
         monitor._hold_test.take = lambda *_, found=found: found
         monitor._shaken[level] = hold.end
@@ -293,7 +293,7 @@ def test_a_far_tip_by_a_weight_takes_a_hold_that_no_load_shakes() -> None:
     places = {each.cause: i for i, each in enumerate(known)}
     for cause, at, alarms in (("tip.payload", shaken, 0), ("tip.payload", hold, 1), ("section_1.EI", shaken, 1)):
         monitor = Twin(load_scene(), baseline=Baseline()).judge.residuals
-        best = Cause(cause, 1.0, (Explanation(places[cause], 0, 6.0, 12.0, 0.5),), 1.0)
+        best = Cause(cause, 1.0, (Explanation(places[cause], 0, 6.0, 12.0, 0.5),), 1.0, 1.0)
         found = HoldVerdict(hold.start, Verdict((best,), 1.0, 1.0, 0), 0.02, is_far=True)
         monitor._hold_test.take = lambda *_, found=found: found
         monitor._hold_test._holds = [at]
@@ -305,7 +305,7 @@ def verdict_of(**shares: float) -> Verdict:
     known = parameters(load_scene())
     places = {"first": 4, "second": 5}
     causes = [
-        Cause(known[places[name]].cause, share, (Explanation(places[name], 0, 20.0, 0.4, 0.05),), share)
+        Cause(known[places[name]].cause, share, (Explanation(places[name], 0, 20.0, 0.4, 0.05),), share, share)
         for name, share in shares.items()
     ]
     return Verdict(tuple(causes), 1.0, 1.0, 0)

@@ -14,7 +14,7 @@ from boom_twin.health.inference.hypotheses import Cause, Explanation, Hypothesis
 from boom_twin.health.inference.innovation_filter import ModalStates
 from boom_twin.health.inference.sensitivities import Signatures
 from boom_twin.health.residual_monitor import _KnownFault
-from boom_twin.health.suspicion import Suspicion, refuted
+from boom_twin.health.suspicion import SURE, Suspicion, refuted
 from boom_twin.types import Alarm
 
 KNOWN = (
@@ -26,16 +26,23 @@ STIFF = ModalStates(*(np.zeros(shape) for shape in ((0,), (0, 0), (0, 0), (0, 0)
 """Of a boom without a mode below 8 Hz, that no load bends."""
 
 
-def suspicion_of(offsets: np.ndarray, seed: int = 1) -> Suspicion:
-    """Of blocks of two angles, the first of which is off by so much (rad) in each of them."""
+LIMP = STIFF._replace(lifted=np.array([[0.0, 0.0], [1e-5, 0.0]]))
+"""Likewise, but a force of 1 N at the tip turns the second joint by 1e-5 rad."""
+
+
+def suspicion_of(
+    offsets: np.ndarray, seed: int = 1, forces: np.ndarray | None = None, levels: tuple[float, ...] = (0.0,)
+) -> Suspicion:
+    """Of blocks of two angles, the first of which is off by so much (rad) in each; forces (N) at the tip turn the second."""
     rng, mean = np.random.default_rng(seed), np.zeros(2)
     found = Suspicion(
-        HypothesisTest(KNOWN), 0, mean, np.diag([1e-8, 1e-8]), np.full(2, ERROR**2), np.ones(2), np.array([0.0]), {}
+        HypothesisTest(KNOWN), 0, mean, np.diag([1e-8, 1e-8]), np.full(2, ERROR**2), np.ones(2), np.array(levels), {}
     )
-    for k, offset in enumerate(offsets):
-        left = np.array([offset, 0.0]) + NOISE * rng.normal(size=2)
+    modes, bent = (STIFF, np.zeros(len(offsets))) if forces is None else (LIMP, 1e-5 * forces)
+    for k, (offset, other) in enumerate(zip(offsets, bent, strict=True)):
+        left = np.array([offset, other]) + NOISE * rng.normal(size=2)
         table = np.column_stack([left, np.eye(2)])
-        found.take(BlockProblem(k * BLOCK, table, np.full(2, NOISE**2), np.zeros((2, 2)), 0.0, 0.0, STIFF))
+        found.take(BlockProblem(k * BLOCK, table, np.full(2, NOISE**2), np.zeros((2, 2)), 0.0, 0.0, modes))
     return found
 
 
@@ -54,12 +61,26 @@ def test_a_size_that_has_changed_is_seen_within_a_few_seconds(seed):
         assert not any(steady.recent_fit(steady.explain()))
 
 
-def verdict_of(shares: dict[str, tuple[float, float]], excess: float = 1.0) -> Verdict:
-    """Of causes with their probability, and that by this evidence alone."""
+@pytest.mark.parametrize("seed", range(3))
+def test_a_load_that_becomes_less_refutes_no_fault(seed):
+    """The wind drops: two seconds without it suit the lowest level far better, but refute nothing."""
+    gusts = 50.0 * np.sin(np.arange(60) / 3.0)
+    found = suspicion_of(np.full(85, 2e-3), seed, np.concatenate([gusts, np.zeros(25)]), (0.0, 50.0))
+    verdict = found.explain()
+    assert verdict.level == 1 and verdict.causes[0].name == "joint_1.sensor" and verdict.strength > SURE
+    assert not any(found.recent_fit(verdict))
+    healthy = suspicion_of(np.zeros(85), seed, np.concatenate([gusts, np.zeros(25)]), (0.0, 50.0))
+    assert healthy.recent_fit(healthy.explain()).is_outdated, "where there is no fault it shows sooner without a load"
+
+
+def verdict_of(shares: dict[str, tuple[float, float]], excess: float = 1.0, rate: float = 0.0, steady: float = 1.0) -> Verdict:
+    """Of causes with their probability, and that by this evidence alone; of the first, if nothing grows; perhaps all grow."""
     known = parameters(load_scene())
     places = {each.cause: place for place, each in enumerate(known)}
+    others = (1.0 - steady) / max(len(shares) - 1, 1)
     causes = [
-        Cause(name, share, (Explanation(places[name], 0, 40.0, 0.4, 0.02),), alone) for name, (share, alone) in shares.items()
+        Cause(name, share, (Explanation(places[name], 0, 40.0, 0.4, 0.02, rate, 0.01 * rate),), alone, others if i else steady)
+        for i, (name, (share, alone)) in enumerate(shares.items())
     ]
     return Verdict(tuple(causes), excess, 1.0, 0)
 
@@ -75,18 +96,36 @@ def test_a_name_takes_present_evidence_that_says_so_itself():
     scene = load_scene()
     known = parameters(scene)
 
-    def cause_after(alone: float, is_told_apart: bool) -> tuple[str | None, str]:
+    def cause_after(alone: float, is_told_apart: bool, calmly: float = 0.99) -> tuple[str | None, str]:
         tell = AlarmText(scene, known, Signatures(scene, known, (None,) * 4), np.full(6, 1e-4))
         alarm = Alarm("joint_3", "residual", 0, None, None, "")
-        verdict = verdict_of({"cylinder_3.k": (0.99, alone), "joint_3.sensor": (0.01, 1.0 - alone)})
+        whole = verdict_of({"cylinder_3.k": (0.99, alone), "joint_3.sensor": (0.01, 1.0 - alone)})
+        calm = verdict_of({"cylinder_3.k": (calmly, calmly), "joint_3.sensor": (1.0 - calmly, 1.0 - calmly)})
         for second in range(6):
-            alarm = tell.alarm(alarm, verdict, is_told_apart, 10.0 + second, second * 10**9, True, None)
+            alarm = tell.alarm(alarm, whole, calm, is_told_apart, 10.0 + second, second * 10**9, True, None)
         return alarm.cause, alarm.told
 
     assert cause_after(0.99, True)[0] == "cylinder_3.k"
     assert cause_after(0.9, True) == (None, "cylinder_3.k most likely, not yet certain")
     cause, told = cause_after(0.99, False)
     assert cause is None and "as cylinder_3.k would, but not in all that was measured" in told
+    cause, told = cause_after(0.99, True, calmly=0.8)
+    assert cause == "cylinder_3.k" and "(probability 0.990)" in told, "few calm blocks bear it out as far as they go"
+    cause, told = cause_after(0.99, True, calmly=0.6)
+    assert cause is None and "cylinder_3.k or joint_3.sensor" in told
+
+
+@pytest.mark.parametrize("steady, is_calm, cause", [(0.6, True, "line_fill"), (0.6, False, None), (0.97, False, "line_fill")])
+def test_what_grows_under_a_load_is_named_where_that_does_not_depend_on_the_growth(steady, is_calm, cause):
+    scene = load_scene()
+    known = parameters(scene)
+    tell = AlarmText(scene, known, Signatures(scene, known, (None,) * 4), np.full(6, 1e-4))
+    alarm = Alarm("joint_2", "residual", 0, None, None, "")
+    verdict = verdict_of({"line_fill": (0.999, 0.999), "joint_2.sensor": (0.001, 0.001)}, rate=0.1, steady=steady)
+    for second in range(25):
+        alarm = tell.alarm(alarm, verdict, verdict, True, float(second), second * 10**9, is_calm, None)
+        assert alarm.cause is None or second >= 20, "growth takes time to be told"
+    assert alarm.cause == cause
 
 
 def test_what_a_known_fault_does_in_motion_is_as_unsure_as_the_acceleration_is_large():

@@ -163,12 +163,15 @@ class Cause:
     ----------
     alone : float
         Probability by this evidence alone, whatever was known before.
+    steady : float
+        Likewise, if faults do not grow: by that shape alone.
     """
 
     name: str
     probability: float
     parts: tuple[Explanation, ...]
     alone: float
+    steady: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,7 +269,10 @@ class HypothesisTest:
         is_faulty, none = float(factors[best]) > 0.0, int(np.argmax(logs))
         as_well = logs > logs[none] - AS_WELL
         none_excess = max(1.0, float(healthy.squares[as_well].min()) / max(healthy.rows, 1.0))
-        causes = self._grouped(found, shares / shares.sum(), alone / alone.sum())
+        constant = weights[:, : len(self._places)]
+        steady = np.exp(constant - constant.max()).sum(axis=0)
+        steady = np.concatenate([steady, np.zeros_like(steady)])
+        causes = self._grouped(found, *(each / each.sum() for each in (shares, alone, steady)))
         return Verdict(causes, excess, none_excess, int(best[0]) if is_faulty else none)
 
     def least_told(self, information: Array, strength: float) -> Array:
@@ -312,13 +318,13 @@ class HypothesisTest:
         """What it adds to the log factor that faults have a least value."""
         return log_normal_below((values - self._least) / sigmas) - self._none_sided
 
-    def _grouped(self, found: list[Explanation], shares: Array, alone: Array) -> tuple[Cause, ...]:
+    def _grouped(self, found: list[Explanation], shares: Array, alone: Array, steady: Array) -> tuple[Cause, ...]:
         groups: dict[int, list[int]] = {}
         for i in np.argsort(-shares, kind="stable").tolist():
             groups.setdefault(self._group[i], []).append(i)
-        probable, by_themselves = (np.bincount(self._group, each).tolist() for each in (shares, alone))
+        sums = [np.bincount(self._group, each).tolist() for each in (shares, alone, steady)]
         causes = [
-            Cause(self._names[group], probable[group], tuple(found[i] for i in at), by_themselves[group])
+            Cause(self._names[group], sums[0][group], tuple(found[i] for i in at), sums[1][group], sums[2][group])
             for group, at in groups.items()
         ]
         return tuple(sorted(causes, key=lambda cause: -cause.probability))
@@ -344,16 +350,17 @@ class HypothesisTest:
         logs, squares : ndarray, shape (levels,)
             As `fit` gives them.
         changed : float
-            ln of how much more probable it is, at the fault's level of the load, that its size or its rate is another one by
-            then than that both are what they were.
+            ln of how much more probable it is that its size or its rate is another one by then than that both are what they
+            were, each with the load that goes best with it: the flank of a pump's pulse is no other size.
         """
         kept = [*range(len(mean)), each.place + len(self.known)]
         healthy = evidence.about(self.coefficients(each, span), kept).given(mean, covariance)
         pair, prior2 = np.array([each.place, len(mean)]), self.known[each.place].faulty ** 2 * np.array([1.0, GROWN**-2])
-        vector, matrix = healthy.vector[each.level, pair], healthy.matrix[each.level][pair[:, None], pair]
+        vector, matrix = healthy.vector[:, pair], healthy.matrix[:, pair[:, None], pair]
         spread = np.eye(2) + prior2[:, None] * matrix
-        found = np.linalg.solve(spread, prior2 * vector)
-        changed = 0.5 * float(vector @ found) - 0.5 * float(np.linalg.slogdet(spread)[1])
+        found = np.linalg.solve(spread, (prior2 * vector)[..., None])[..., 0]
+        gains = 0.5 * (vector * found).sum(axis=-1) - 0.5 * np.linalg.slogdet(spread)[1]
+        changed = float((healthy.log + gains).max() - healthy.log.max())
         return healthy.log, healthy.squares / max(healthy.rows, 1.0), changed
 
     def coefficients(self, each: Explanation, span: float) -> Array:
