@@ -17,7 +17,7 @@ from .hold_test import rows_of
 from .inference.block_problem import BLOCK, BlockProblem
 from .inference.holds import HoldProblem
 from .inference.hypotheses import Evidence, Explanation, HypothesisTest, Verdict
-from .inference.innovation_filter import InnovationFilter
+from .inference.innovation_filter import REACH, InnovationFilter
 
 LEVELS = np.array([0.0, 0.0007, 0.0023, 0.0077, 0.026])
 """Of the unknown load at the tip, as shares of the boom's weight: 0, 4.5, 15, 50 and 170 N of the 6.5 kN of the default one."""
@@ -82,7 +82,7 @@ class Suspicion:
         self._errors2, self._noise2, self._carried = errors2, noise2, carried
         channels, coefficients = len(errors2), 2 * len(mean)
         self._filter = InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, DETUNING, levels)
-        self.size, self.blocks = np.zeros(channels), 0
+        self.size, self.blocks, self._travel = np.zeros(channels), 0, 0.0
         self._evidence = self._calm = Evidence.none(coefficients, levels.shape)
         self._before = deque([self._evidence], maxlen=RECENT + 1)  # after each of the recent blocks, and before them
 
@@ -111,6 +111,7 @@ class Suspicion:
         self._calm += found.weighted(weight)
         self._before.append(self._evidence)
         self.blocks += 1
+        self._travel += problem.travel
 
     def take_hold(self, hold: HoldProblem, frequency_error: float) -> None:
         """Take the natural frequencies of a hold that began since; no load changes them, and no sensor."""
@@ -126,11 +127,15 @@ class Suspicion:
 
     def explain(self) -> Verdict:
         """Weigh all hypotheses."""
-        return self._bank.explain(self._evidence, self.mean, self.covariance, self.span, self._carried)
+        return self._explain(self._evidence)
 
     def explain_calmly(self) -> Verdict:
         """Likewise, but blocks in which the boom vibrates count less: what a cause is named by."""
-        return self._bank.explain(self._calm, self.mean, self.covariance, self.span, self._carried)
+        return self._explain(self._calm)
+
+    def _explain(self, evidence: Evidence) -> Verdict:
+        postures = 1.0 + self._travel / REACH
+        return self._bank.explain(evidence, self.mean, self.covariance, self.span, self._carried, postures)
 
     def least_told(self, level: int, strength: float) -> Array:
         """Least sizes of steady faults, shape (parameters,), that this evidence would tell under a load of that level.

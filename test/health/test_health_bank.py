@@ -153,6 +153,23 @@ def test_probabilities(seed):
     assert verdict.causes[0].name == "joint_2.sensor" and verdict.best.place == 3
 
 
+def test_odds_that_many_postures_bear_out_count_for_more():
+    """What signatures are wrong by makes large odds less sure: by half as much where it is another error all the time."""
+    problem = Problem(5, {3: 3.0}, 40)
+    one, many = (
+        BANK.explain(problem.evidence(), problem.mean, problem.covariance, SPAN, {}, postures) for postures in (1.0, 1e6)
+    )
+    names = "joint_2.sensor", "joint_1.sensor"
+    for verdict, crude in ((one, CRUDE), (many, 0.5 * CRUDE)):
+        found = explained(verdict)
+        scale = verdict.excess * (1.0 + crude * verdict.strength * verdict.excess)
+        both = sum(np.exp(found[place].log_factor / scale) * KNOWN[place].prior for place in (1, 2))
+        assert found[3].log_factor / scale - np.log(both) == pytest.approx(
+            np.log([each.steady for name in names for each in verdict.causes if each.name == name]) @ [1.0, -1.0]
+        )
+    assert one.strength == many.strength > 100.0
+
+
 def test_what_was_known_before_counts():
     problem = Problem(1, {3: 2.0})
     carried = {"joint_2.sensor": -3.0}

@@ -24,7 +24,8 @@ is shaken is not taken for a faulty one, nor a faulty one for one that is shaken
 
 (Gaussian model comparison; MacKay, Information Theory, Inference, and Learning Algorithms, 2003, ch. 28.) What even the best
 explanation leaves is compared with what noise leaves; where it is more, all logarithms are divided by the ratio, so that a
-model that is not quite right is not quite sure.
+model that is not quite right is not quite sure. Signatures are not quite right either: logarithms are divided by 1 + `CRUDE` of
+the largest. Half of what signatures are wrong by is another error in every posture, and averages out over them.
 """
 
 from __future__ import annotations
@@ -227,7 +228,15 @@ class HypothesisTest:
         self._group = 2 * [self._names.index(known[i].cause) for i in self._places]  # the cause of every place, in both shapes
         self._is_boundless = np.array([known[i].form in BOUNDLESS for i in self._places])
 
-    def explain(self, evidence: Evidence, mean: Array, covariance: Array, span: float, carried: Mapping[str, float]) -> Verdict:
+    def explain(
+        self,
+        evidence: Evidence,
+        mean: Array,
+        covariance: Array,
+        span: float,
+        carried: Mapping[str, float],
+        postures: float = 1.0,
+    ) -> Verdict:
         """Weigh all faults.
 
         Parameters
@@ -240,6 +249,8 @@ class HypothesisTest:
             Time (s) that the evidence has taken.
         carried : mapping of str to float
             ln of how probable causes were before this evidence; 0 for others.
+        postures : float
+            In how many the evidence was collected.
 
         Returns
         -------
@@ -257,7 +268,8 @@ class HypothesisTest:
         priors = np.tile(self._priors, 2)
         seen = (healthy.matrix.diagonal(axis1=-2, axis2=-1)[:, self._places] > 0.0).any(axis=0)
         priors[~np.tile(seen, 2)] = -np.inf if seen.any() else 0.0  # what shows in no reading, say an IMU that is not there
-        weights = factors / (excess * (1.0 + CRUDE * max(0.0, float(factors[best])))) + priors
+        crude = 0.5 * CRUDE * (1.0 + 1.0 / postures)
+        weights = factors / (excess * (1.0 + crude * max(0.0, float(factors[best])))) + priors
         alone = np.exp(weights - weights.max()).sum(axis=0)
         before = np.exp([carried.get(self.known[place].cause, 0.0) for place in self._places])
         shares = alone * np.tile(before, 2)

@@ -61,9 +61,9 @@ def told_after(row: Row, number: int = 0) -> float | None:
     return min(times) - fault.onset - 0.5 * fault.ramp if times else None
 
 
-def ended(row: Row) -> bool:
-    """Whether, 8 s after the fault's end, no alarm lasts."""
-    over = faults_of(row)[0].end + min(faults_of(row)[0].ramp, 5.0) + 8.0
+def ended(row: Row, within: float) -> bool:
+    """Whether no alarm lasts `within` s of the fault's end."""
+    over = faults_of(row)[0].end + min(faults_of(row)[0].ramp, 5.0) + within
     last: dict[tuple[str, float], Row] = {}
     for told in row["told"]:
         if told["at"] <= over:
@@ -121,7 +121,10 @@ def summary(rows: list[Row]) -> list[str]:
     return [
         f"- of causes named with 0.9 and more, right: {share(sum(sure.values()), len(sure))}",
         f"- two faults, both named: {share(sum(named(row, 0) and named(row, 1) for row in two), len(two))}",
-        f"- recovery, no alarm 8 s after it: {share(sum(ended(row) for row in recovery), len(recovery))}",
+        *(
+            f"- recovery, no alarm {within:g} s after it: {share(sum(ended(row, within) for row in recovery), len(recovery))}"
+            for within in (5.0, 8.0)
+        ),
     ]
 
 
