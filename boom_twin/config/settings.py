@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -143,6 +144,7 @@ class Settings(BaseModel):
     force_scale: Positive = Field(default=1.0e5, description="cylinder force that has the full colour in ~/shape, N")
 
     @classmethod
+    @cache
     def live_names(cls) -> tuple[str, ...]:
         """What can change while the twin runs."""
         return tuple(name for name, field in cls.model_fields.items() if LIVE in field.metadata)

@@ -134,6 +134,7 @@ class BlockUpdate:
         self._found.counts[:] = 0
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
         self._due: Run | None = None  # whose newest slot is still to be judged
+        self._begins_health = False  # before it is told anything
         self._held: _Held | None  # what the compiled code takes with every call
         is_same = before is not None and before._state is state
         self._kept: tuple[Any, Any] | None = before._kept if before is not None and is_same else None  # state and output, held
@@ -149,10 +150,8 @@ class BlockUpdate:
         self._limits, self._held = limits, None
 
     def begin_health(self) -> None:
-        """What was found up to now is of no concern to the health monitor any more."""
-        self._told, self._due = tuple(self._found.counts.tolist()), None
-        if self._judge is not None:
-            self._judge.begin()
+        """What was found up to now is of no concern to the health monitor any more, which begins anew when it is told more."""
+        self._told, self._due, self._begins_health = tuple(self._found.counts.tolist()), None, True
 
     def advance(self, run: Run | None, block: SampleBlock, trusted: bool = False) -> tuple[int, int]:
         """Take samples of a block as long as they are ordinary; `reports` or `report` tell what they caused.
@@ -295,6 +294,9 @@ class BlockUpdate:
         found, at = self._found, self._boom.places
         if self._judge is None:
             return
+        if self._begins_health:
+            self._judge.begin()
+            self._begins_health = False
         counts = found.counts.tolist()
         for which, stamps in enumerate((found.stamps, found.residual_stamps)):
             while counts[which] > self._told[which] and stamps[counts[which] - 1] >= end:

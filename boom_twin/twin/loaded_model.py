@@ -25,6 +25,8 @@ from ..health.monitor import HealthMonitor
 from ..scene.edit import loaded
 from ..scene.schema import Scene
 from ..types import Mount
+from .block_update import limits_of
+from .state import Limits
 
 if TYPE_CHECKING:
     from .twin import Twin
@@ -38,6 +40,7 @@ class LoadedModel:
     """All that depends on the load; `scene` has it."""
 
     scene: Scene
+    limits: Limits
     boom: BoomPredictor
     judge: HealthMonitor | None
     modes: DeviationModes
@@ -57,7 +60,8 @@ def loaded_model(
     judge = None if baseline is None else HealthMonitor(scene, settings, tuple(mounts), baseline, on_block)
     modes = DeviationModes(scene, boom.plan, settings, mounts)
     _ = boom.held, modes.held  # made here, where no sample waits for them
-    return LoadedModel(scene, boom, judge, modes, choose_steps(scene, boom.plan, settings))
+    steps = choose_steps(scene, boom.plan, settings)
+    return LoadedModel(scene, limits_of(scene, boom.plan, settings, steps, mounts), boom, judge, modes, steps)
 
 
 class ModelPreparation:

@@ -96,6 +96,7 @@ class Twin:
         self._widths = [len(names) for names in self._channels.values()]
         self._edge = SampleCheck(self._channels)
         self.requests = Requests(self.settings)
+        self._judged = True  # health, with the present sample
         self._begin()
 
     def _begin(self) -> None:
@@ -191,8 +192,7 @@ class Twin:
         """Go on with this model, which is of the present load, after that of `before`."""
         self._boom, self.judge, self._modes, self.steps = model.boom, model.judge, model.modes, model.steps
         self.plan = self._boom.plan
-        limits = limits_of(model.scene, self.plan, self.settings, self.steps, self.mounts)
-        parts = self._boom, limits, self._state, self._channels, self.settings.step, self._modes, self.judge
+        parts = self._boom, model.limits, self._state, self._channels, self.settings.step, self._modes, self.judge
         self._former = before  # let go of when the next model is made, which may be in a thread of its own
         self._compiled = BlockUpdate(*parts, self.counts, self.shedding, before)
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, self.plan.joints)))  # of strokes
@@ -266,7 +266,7 @@ class Twin:
             A sample that no rig can give: a stream by another name, stamps that are not nanoseconds, values not one for each
             channel. Nothing has changed then.
         """
-        sample = self._edge.checked(sample)
+        sample, self._judged = self._edge.checked(sample), judged
         if self._run is None or (self.requests.due and sample.stream is Stream.STROKES):
             return self._look_at(sample)
         reason = self._advance_one(sample)
@@ -305,7 +305,7 @@ class Twin:
         block = SampleBlock(*map(np.ascontiguousarray, block, (np.int64, np.int64, float)))
         if not self._edge.is_sure:
             self._edge.look_at(block.stamps[block.streams == CODES[Stream.STROKES]])
-        row, size, channels = 0, len(block.stamps), self._widths
+        row, size, channels, self._judged = 0, len(block.stamps), self._widths, True
         while row < size:
             if self._run is not None and self._edge.is_sure and not self.requests.due:
                 end = row + CAPACITY
@@ -421,9 +421,9 @@ class Twin:
             self._speeds = speeds
         elif events:
             self._doubt_pause(run, held[0], why)
-        reports = []
+        reports, asked = [], self._judged
         for sample in held:
-            complete = bool(np.isfinite(sample.values.sum()))
+            complete, self._judged = bool(np.isfinite(sample.values.sum())), asked or sample is not held[-1]
             reports.append(self._follow(sample, self._zeroed(sample), complete, events))
             events = []
         return replace(reports[-1], earlier=tuple(reports[:-1]))
@@ -515,7 +515,7 @@ class Twin:
         if self._advance_one(sample, trusted=True) == FAILED:
             return self._fail(sample, events)
         self.counts.update(events)
-        return self._compiled.report(sample.stamp, events)
+        return self._compiled.report(sample.stamp, events, self._judged)
 
     def _fail(self, sample: Sample, events: list[str]) -> Report:
         """The model failed at a stroke sample."""

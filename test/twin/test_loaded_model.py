@@ -12,6 +12,7 @@ from boom_twin import Report, Sample, Stream, Twin, load_scene
 from boom_twin.analysis.modal import ModeSeries
 from boom_twin.errors import UsageError
 from boom_twin.health.baseline import load_baseline
+from boom_twin.health.monitor import HealthMonitor
 from boom_twin.kernels.jit import _kind
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin import loaded_model
@@ -112,6 +113,37 @@ def test_limits_need_no_model_and_what_cannot_be_is_refused_at_once(makers: list
     preparation.close()
     preparation.take_in()
     assert twin.requests.settings.payload == -1.0
+
+
+def test_a_restart_and_another_load_leave_health_and_limits_to_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The sample's own path has neither: health begins when it is told more, limits are made beside with the model."""
+    found: list[str] = []
+    begin, limits = HealthMonitor.begin, loaded_model.limits_of
+
+    def begun(monitor: HealthMonitor) -> None:
+        found.append("health")
+        begin(monitor)
+
+    def made(*arguments: Any) -> Any:
+        found.append(f"limits in {current_thread().name}")
+        return limits(*arguments)
+
+    rows, twin = samples(60), Twin(load_scene(), baseline=load_baseline())
+    preparation = ModelPreparation(twin)
+    for sample in rows[:30]:
+        twin.update(sample)
+    monkeypatch.setattr(HealthMonitor, "begin", begun)
+    monkeypatch.setattr(loaded_model, "limits_of", made)
+    twin.requests.rest()
+    assert twin.update(rows[30], judged=False).change is not None and not found
+    twin.judge_health()
+    assert found == ["health"]
+    found.clear()
+    preparation.tune({"payload": 40.0})
+    preparation.finish()
+    assert found == ["health", "limits in model"] or found == ["limits in model", "health"]
+    found.clear()
+    assert twin.update(rows[31], judged=False).change is not None and not found
 
 
 def test_a_restart_and_another_load_find_their_natural_modes_made(monkeypatch: pytest.MonkeyPatch) -> None:
