@@ -110,5 +110,5 @@ def run_covariance(f, live, row, size, moments, gravity, counts, span, steps, ze
             take_imu(f, zeros, size[0], k * span)
         for _ in range(counts[3]):
             take_forces(f, zeros, size[0] + 2, k * span)
-        f.level[0] = f.loads[USUAL_LOAD]  # readings without noise would let it fall
+        f.level[:] = f.loads[USUAL_LOAD]  # readings without noise would let it fall
     write_estimate(f, results, out)

@@ -27,7 +27,7 @@ LOAD, LOAD_CHANGE, ERROR, BIAS, STAYING, SHARES = 0, 2, 4, 6, 8, 10
 """First places in the state: the load's x and y, their rates, e's x and y, biases of the IMU's x and z, the part of the load
 that stays (x and y), the shares a (n,) and b (n,); then q_j and q_j' of every mode, and o (n,) if forces are measured."""
 
-COUNT, STARTED, FED, STAMP, ANGLES_STAMP, FORCED = range(6)  # of `status`
+COUNT, STARTED, FED, STAMP, ANGLES_STAMP, FORCED, IMU_STAMP = range(7)  # of `status`
 ANGLE, FELT_X, FELT_Y, STEP, SHAKEN = range(5)
 """Places in `now`: angle of the tip, rad; its predicted acceleration less gravity, m/s^2; time since the strokes before, s;
 mean squares of its predicted acceleration along x and y lately, (m/s^2)^2."""
@@ -37,15 +37,15 @@ mean squares of its predicted acceleration along x and y lately, (m/s^2)^2."""
 class DeviationFilter(NamedTuple):
     """The filter as kernels take it; n joints, m modes at most, s states, c measured channels, f frames, k stations.
 
-    status : (6,) number of modes; whether it has begun; whether anything was measured; stamps of the newest strokes and of the
-    newest angles, ns; whether cylinder forces were measured.
+    status : (7,) number of modes; whether it has begun; whether anything was measured; stamps of the newest strokes and of the
+    newest angles, ns; whether cylinder forces were measured; stamp of the newest of the IMU, ns.
     omega, decay, density : (m,) rad/s; 2 zeta omega, 1/s; of w, m^2 kg/s^3.
     relative : (f, m, 3) motion of every frame relative to the one before, in its axes: m, m, rad per unit of q.
     forces : (m, n) N per unit. bending : (m, k) M_j w / EI. sections : (k,) of the stations, 0-based.
     sections_off : (n,) standard deviation of b. softness, slopes : (n,) 1/k, m/N, 0 of a rigid cylinder; stroke over angle, m.
     roots : (n,) frames of the pivots. sensed, absolute : (n,) frames of the inclinometers, and which angle sensors are such.
     noise : (c,) variances of the sensors. masked : (c,) channels that are not to be used.
-    noisier : (1,) times the variance that is stated, of the strokes.
+    noisier : (1,) times the variance that is stated, of the strokes. reading : (1,) the stated variance of one, m^2.
     pulls : (n,) predicted forces of the cylinders, slow, N.
     tip : (m, 3), turns : (m, n), lever : (n, 3) at the newest posture: motion of the tip, of the angles, and of the
     tip by strokes.
@@ -57,7 +57,8 @@ class DeviationFilter(NamedTuple):
     shifts : (8, n + 1) scratch, by how much the causes change what the rows read; that all are off changes nothing.
     inverse, healed, drag : (n, n), (8, n), (n,) scratch, B of `weigh_causes`, and B times `cross` and times the mean of a.
     chances : (n + 2,) of the causes: no cylinder is off, one of them is, all are.
-    last : (c,) innovations. level : (1,) N.
+    likely : (5,) scratch, see `boom_twin.estimation.load_level`. before : (2, 2) what angles and IMU said last of the two
+    components of the load. level : (2,) of these, N.
     loads : (4,) least and largest level, the usual one, and that which it begins with, N.
     spread : (2, 2) mean square of the tip's x and y less the predicted ones lately, and the newest, with what is not known of
     it, m^2.
@@ -81,6 +82,7 @@ class DeviationFilter(NamedTuple):
     noise: Array
     masked: NDArray[np.bool_]
     noisier: Array
+    reading: Array
     pulls: Array
     tip: Array
     turns: Array
@@ -105,7 +107,8 @@ class DeviationFilter(NamedTuple):
     spread: Array
     level: Array
     loads: Array
-    last: Array
+    likely: Array
+    before: Array
     now: Array
 
 

@@ -21,7 +21,7 @@ from ..scene.oil_spring import middle_stiffness
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
 from ..types import SENSORS, Array, Mount, Stream
-from .deviation_filter import ANGLES_STAMP, COUNT, FED, FIRST_LOAD, FORCED, MODES, SHARES, STAMP, STARTED, DeviationFilter
+from .deviation_filter import ANGLES_STAMP, COUNT, FED, FIRST_LOAD, IMU_STAMP, MODES, SHARES, STAMP, STARTED, DeviationFilter
 from .posture_modes import PostureMode, PostureModes
 from .sensor_model import Mounting
 
@@ -70,9 +70,9 @@ class DeviationModes:
     def begin(self) -> None:
         """A new run: nothing is known of the deviation."""
         f = self.filter
-        f.status[STARTED] = f.status[FED] = f.status[STAMP] = f.status[ANGLES_STAMP] = f.status[FORCED] = 0
-        f.level[0], self._at[:] = f.loads[FIRST_LOAD], math.inf
-        f.last[:], f.spread[:] = 0.0, 0.0
+        f.status[STARTED:] = 0
+        f.level[:], self._at[:] = f.loads[FIRST_LOAD], math.inf
+        f.before[:], f.spread[:] = 0.0, 0.0
         self.expect_noise(1.0, 1.0)
 
     def mask(self, masked: NDArray[np.bool_]) -> None:
@@ -94,6 +94,7 @@ class DeviationModes:
         """All stamps are later by `shift` (ns) from now on."""
         self.filter.status[STAMP] += shift
         self.filter.status[ANGLES_STAMP] += shift
+        self.filter.status[IMU_STAMP] += shift
 
     def refresh(self, strokes: Array, angles: Array, live: State, noise: StrokeNoise) -> None:
         """Take other modes, about an equilibrium near `strokes` (m), shape (n,), if these have moved far enough.
@@ -163,18 +164,19 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
     ]
     size = SHARES + 3 * n + 2 * MODES
     return DeviationFilter(
-        status=np.zeros(6, np.int64), omega=np.ones(MODES), decay=np.zeros(MODES), density=np.zeros(MODES),
+        status=np.zeros(7, np.int64), omega=np.ones(MODES), decay=np.zeros(MODES), density=np.zeros(MODES),
         relative=np.zeros((frames, MODES, 3)), forces=np.zeros((MODES, n)), bending=np.zeros((MODES, len(places))),
         sections=np.array([each.section for each in places], np.int64),
         sections_off=np.array([settings.section_deviation * scene.is_flexible(i) for i in range(n)]),
         softness=np.array([1.0 / middle_stiffness(joint.cylinder) for joint in scene.joints]),
         slopes=np.ones(n), roots=mounting.roots, sensed=mounting.frames, absolute=mounting.absolute,
-        noise=np.array(noise), masked=np.zeros(len(noise), bool), noisier=np.ones(1), pulls=np.zeros(n),
+        noise=np.array(noise), masked=np.zeros(len(noise), bool),
+        noisier=np.ones(1), reading=np.full(1, settings.stroke_variance), pulls=np.zeros(n),
         tip=np.zeros((MODES, 3)), turns=np.zeros((MODES, n)), lever=np.zeros((n, 3)),
         coupling=np.zeros((MODES, 4 + 2 * n)), drawn=np.zeros(n), ahead=np.zeros(n), variances=np.zeros(n), pushes=np.zeros(2),
         x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((8, size)),
         within=np.zeros((8, 8)), cross=np.zeros((8, n)), healed=np.zeros((8, n)), inverse=np.zeros((n, n)), drag=np.zeros(n),
         shifts=np.zeros((8, n + 1)), chances=np.zeros(n + 2),
-        spread=np.zeros((2, 2)), level=np.zeros(1), loads=LOADS * STIFFEST * weight_of(scene),
-        last=np.zeros(len(noise)), now=np.zeros(6),
+        spread=np.zeros((2, 2)), level=np.zeros(2), loads=LOADS * STIFFEST * weight_of(scene),
+        likely=np.zeros(5), before=np.zeros((2, 2)), now=np.zeros(6),
     )  # fmt: skip

@@ -19,8 +19,8 @@ from .deviation_filter import (
     FELT_X,
     FELT_Y,
     FORCED,
-    LEAST_LOAD,
-    MOST_LOAD,
+    IMU_STAMP,
+    LOAD,
     SHARES,
     SOFT,
     STAMP,
@@ -34,11 +34,10 @@ from .deviation_filter import (
     oscillate,
     states_of,
 )
-from .deviation_step import LOAD_RATE, LONGEST_STEP, add_offsets, add_unknown
+from .deviation_step import LONGEST_STEP, add_offsets, add_unknown, load_after
+from .load_level import BY_ANGLES, BY_IMU, add_innovation, begin_sample, follow_levels
 
-AGILITY, RETREAT = 2.0, 0.015  # 1/s, by which the load's level follows the innovations; likeness of them at which it stays
 UNLIKELY = 4.0  # innovations beyond so many deviations count less the larger they are: a spike moves little
-ALIKE = 4.0  # most that one product of successive innovations counts
 
 OLDEST = 0.25  # s, age of a sample that still counts
 
@@ -136,16 +135,19 @@ def take_angles(f, residuals, first, stamp):
     age = age_of(f, stamp)
     if age > OLDEST:
         return
-    alike, count = 0.0, 0
+    begin_sample(f)
+    count = 0
     for i in range(f.softness.shape[0]):
         if usable(f, first + i, residuals[i]):
             variance = f.noise[first + i] + read_angle(f, i, f.row)
-            alike += correct(f, first + i, residuals[i], variance, age)
+            innovation, by_x, by_y = correct(f, residuals[i], variance, age), 0.0, 0.0
+            for j in range(f.status[COUNT]):
+                still = f.turns[j, i] / (f.omega[j] * f.omega[j] * math.sqrt(variance))
+                by_x, by_y = by_x + still * f.tip[j, 0], by_y + still * f.tip[j, 1]
+            add_innovation(f, by_x, by_y, innovation)
             count += 1
     if count > 0 and stamp > f.status[ANGLES_STAMP]:
-        h = min((stamp - f.status[ANGLES_STAMP]) * NANO, LONGEST_STEP)
-        level = f.level[0] * math.exp(AGILITY * h * (alike / math.sqrt(count) - RETREAT))
-        f.level[0] = min(max(level, f.loads[LEAST_LOAD]), f.loads[MOST_LOAD])
+        follow_levels(f, BY_ANGLES, min((stamp - f.status[ANGLES_STAMP]) * NANO, LONGEST_STEP))
         f.status[ANGLES_STAMP] = stamp
 
 
@@ -155,15 +157,20 @@ def take_imu(f, residuals, first, stamp):
     age = age_of(f, stamp)
     if age > OLDEST:
         return
-    c, s = math.cos(f.now[ANGLE]), math.sin(f.now[ANGLE])
-    if usable(f, first, residuals[0]):
-        read_acceleration(f, c, s, 0.0, c * f.now[FELT_Y] - s * f.now[FELT_X], f.row)
-        f.row[BIAS] = 1.0
-        correct(f, first, residuals[0], f.noise[first], age)
-    if usable(f, first + 1, residuals[1]):
-        read_acceleration(f, -s, c, 0.0, -c * f.now[FELT_X] - s * f.now[FELT_Y], f.row)
-        f.row[BIAS + 1] = 1.0
-        correct(f, first + 1, residuals[1], f.noise[first + 1], age)
+    begin_sample(f)
+    c, s, count = math.cos(f.now[ANGLE]), math.sin(f.now[ANGLE]), 0
+    for axis in range(2):
+        if usable(f, first + axis, residuals[axis]):
+            x, y = (c, s) if axis == 0 else (-s, c)
+            read_acceleration(f, x, y, 0.0, x * f.now[FELT_Y] - y * f.now[FELT_X], f.row)
+            f.row[BIAS + axis] = 1.0
+            deviation = math.sqrt(f.noise[first + axis])
+            by_x, by_y = f.row[LOAD] / deviation, f.row[LOAD + 1] / deviation
+            add_innovation(f, by_x, by_y, correct(f, residuals[axis], f.noise[first + axis], age))
+            count += 1
+    if count > 0 and stamp > f.status[IMU_STAMP]:
+        follow_levels(f, BY_IMU, min((stamp - f.status[IMU_STAMP]) * NANO, LONGEST_STEP))
+        f.status[IMU_STAMP] = stamp
 
 
 @inner
@@ -178,7 +185,7 @@ def take_forces(f, residuals, first, stamp):
     for i in range(f.softness.shape[0]):
         if usable(f, first + i, residuals[i]):
             variance = f.noise[first + i] + read_force(f, i, f.row)
-            correct(f, first + i, residuals[i], variance, age)
+            correct(f, residuals[i], variance, age)
 
 
 @inner
@@ -192,7 +199,7 @@ def turn_back(f, age):
     """Make `f.row` read what it read `age` s ago, of the state now; gives the variance of what the load did since.
 
     Modes are turned back about where their inputs, taken to be what they are now, hold them at rest. The load's Gauss-Markov
-    process changes within t by the variance 2 level^2 (1 - (1 + r t) exp(-r t)), r its rate.
+    process changes within t by the variance 2 level^2 (1 - a), a its correlation over t.
     """
     n, row, by_x, by_y = f.softness.shape[0], f.row, 0.0, 0.0
     for j in range(f.status[COUNT]):
@@ -204,14 +211,14 @@ def turn_back(f, age):
         for b in range(c.shape[0]):
             if not is_sag(b, n):
                 row[input_place(f, b)] += still * c[b]
-        by_x, by_y = by_x + still * c[0], by_y + still * c[1]
-    gone = LOAD_RATE * age
-    return 2.0 * f.level[0] * f.level[0] * (1.0 - (1.0 + gone) * math.exp(-gone)) * (by_x * by_x + by_y * by_y)
+        by_x, by_y = by_x + still * c[0] * f.level[0], by_y + still * c[1] * f.level[1]
+    kept, _, _, _ = load_after(age)
+    return 2.0 * (1.0 - kept) * (by_x * by_x + by_y * by_y)
 
 
 @inner
-def correct(f, channel, residual, variance, age):
-    """Correct the state by one reading that is read by `f.row`; gives the product of its innovation with the one before."""
+def correct(f, residual, variance, age):
+    """Correct the state by one reading that is read by `f.row`; gives its innovation, in deviations."""
     size = states_of(f)
     x, p, row, gain = f.x, f.p, f.row, f.gain
     if age > 0.0:
@@ -222,8 +229,6 @@ def correct(f, channel, residual, variance, age):
         spread += row[k] * gain[k]
         off -= row[k] * x[k]
     innovation = off / math.sqrt(spread)
-    alike = min(max(innovation * f.last[channel], -ALIKE), ALIKE)
-    f.last[channel] = innovation
     if abs(innovation) > UNLIKELY:
         spread *= (innovation / UNLIKELY) ** 2
     deviation = math.sqrt(spread)
@@ -232,4 +237,4 @@ def correct(f, channel, residual, variance, age):
     add_row(x, off / deviation, gain, size)
     for k in range(size):
         add_row(p[k], -gain[k], gain, size)
-    return alike
+    return innovation

@@ -48,13 +48,14 @@ from .deviation_filter import (
     states_of,
 )
 
-LOAD_RATE, JERK_TIME = 6.0, 0.02  # 1/s, s
+SLOWEST, QUICKEST = 2.0, 15.0  # 1/s, rates of the load
+JERK_TIME = 0.02  # s
 SLOW = 0.5  # s, over which the forces and moments are taken that a and b are learnt from
 BIAS_OFF, BIAS_DRIFT = 0.1, 0.001  # m/s^2, standard deviation of the IMU's bias, and of its change in a second
 LEAST_ERROR = 0.02  # m/s^2, of the standard deviation of e
 INEXACT_MOTION = 0.01  # share of the predicted acceleration, over `SLOW` seconds, that it is off by in haste
 
-LONGEST_STEP = 0.05  # s, of the covariance's differential equation
+SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.05  # s, between strokes; the longest of the covariance's differential equation too
 
 
 @inner
@@ -106,11 +107,11 @@ def start_state(f):
         f.x[k] = 0.0
         for b in range(f.x.shape[0]):
             f.p[k, b] = 0.0
-    f.level[0] = f.loads[FIRST_LOAD]
     for b in range(2):
-        add_unknown(f, b, f.level[0])
+        f.level[b] = f.loads[FIRST_LOAD]
+        add_unknown(f, b, f.level[b])
         add_unknown(f, 2 + 2 * n + b, STAYS * f.loads[USUAL_LOAD])
-        f.p[LOAD_CHANGE + b, LOAD_CHANGE + b] = (LOAD_RATE * f.level[0]) ** 2
+        f.p[LOAD_CHANGE + b, LOAD_CHANGE + b] = SLOWEST * QUICKEST * f.level[b] * f.level[b]
         f.p[ERROR + b, ERROR + b] = f.pushes[b]
         f.p[BIAS + b, BIAS + b] = BIAS_OFF * BIAS_OFF
     for i in range(n):
@@ -212,14 +213,23 @@ def follow_prediction(f, results, estimates, moments, gravity):
 
 @inner
 def follow_errors(f):
-    """Variances of the acceleration that errors of the strokes push the tip with, and by which fast motions are not exact."""
+    """Variances of the acceleration that errors of the strokes push the tip with, and by which fast motions are not exact.
+
+    A mode has followed most of an error that is slow to it: of one that changes at the rate r the share r^2 / (r^2 + omega_j^2)
+    is left, which is the mode's transfer function from stroke to acceleration at the growth r. The newest estimate of a
+    stroke is that of a Kalman filter of white jerk, the error of which has the variance 2 r_s T c, with r_s the variance of a
+    reading, T the time between readings and c the filter's corner; half the power of it is above 1.5 c, and on the mean
+    over it a mode is left what it is at r = 2 c: 1.8 c if omega_j is 1.4 c, 2.5 c if it is 2.9 c.
+    """
     for a in range(2):
         f.pushes[a] = LEAST_ERROR * LEAST_ERROR + INEXACT_MOTION * INEXACT_MOTION * f.now[SHAKEN + a]
+    power = f.noisier[0] * f.reading[0] * min(max(f.now[STEP], SHORTEST_STEP), LONGEST_STEP)
     for i in range(f.softness.shape[0]):
-        x, y = 0.0, 0.0
+        rate, x, y = f.variances[i] / power, 0.0, 0.0
         for j in range(f.status[COUNT]):
-            x += f.forces[j, i] * f.tip[j, 0]
-            y += f.forces[j, i] * f.tip[j, 1]
+            left = f.forces[j, i] * rate * rate / (rate * rate + f.omega[j] * f.omega[j])
+            x += left * f.tip[j, 0]
+            y += left * f.tip[j, 1]
         f.pushes[0] += x * x * f.variances[i]
         f.pushes[1] += y * y * f.variances[i]
 
@@ -271,9 +281,11 @@ def step_state(f, h):
 @inner
 def step_inputs(f, h, size):
     """Load and shares h (s) later."""
+    kept = math.exp(-h / STAY_TIME)
     for b in range(2):
-        step_load(f, LOAD + b, LOAD_CHANGE + b, h, size)
-        fade(f, STAYING + b, math.exp(-h / STAY_TIME), (STAYS * f.loads[USUAL_LOAD]) ** 2, size)
+        step_load(f, b, h, size)
+        fade(f, STAYING + b, kept, 0.0, size)
+        drift(f, b, (STAYS * f.loads[USUAL_LOAD]) ** 2 * (1.0 - kept * kept))
     for i in range(f.softness.shape[0]):
         if f.drawn[i] != 0.0:
             lag = f.x[SHARES + i] * f.ahead[i]
@@ -281,13 +293,36 @@ def step_inputs(f, h, size):
 
 
 @inner
-def step_load(f, place, change, h, size):
-    """A component of the load and its rate h (s) later, at these places: exact."""
-    x, p, e, level2 = f.x, f.p, math.exp(-LOAD_RATE * h), f.level[0] * f.level[0]
-    a11, a12, a21, a22 = e * (1.0 + LOAD_RATE * h), e * h, -e * LOAD_RATE * LOAD_RATE * h, e * (1.0 - LOAD_RATE * h)
+def drift(f, b, variance):
+    """A component of the load that stays is other by this variance, and the modes as at rest: slow, so it shakes nothing."""
+    p, place = f.p, STAYING + b
+    p[place, place] += variance
+    for j in range(f.status[COUNT]):
+        at, still = mode_place(f, j), f.tip[j, b] / (f.omega[j] * f.omega[j])
+        p[place, at] += variance * still
+        p[at, place] = p[place, at]
+        for k in range(j + 1):
+            other = mode_place(f, k)
+            p[at, other] += variance * still * (f.tip[k, b] / (f.omega[k] * f.omega[k]))
+            p[other, at] = p[at, other]
+
+
+@inner
+def load_after(h):
+    """What a component of the load and its rate become within h (s): a 2 by 2 matrix by rows, exact."""
+    slow, quick = math.exp(-SLOWEST * h), math.exp(-QUICKEST * h)
+    by_rate = (slow - quick) / (QUICKEST - SLOWEST)
+    return slow + SLOWEST * by_rate, by_rate, -SLOWEST * QUICKEST * by_rate, quick - SLOWEST * by_rate
+
+
+@inner
+def step_load(f, b, h, size):
+    """Component b of the load and its rate h (s) later: exact."""
+    x, p, place, change, level2 = f.x, f.p, LOAD + b, LOAD_CHANGE + b, f.level[b] * f.level[b]
+    a11, a12, a21, a22 = load_after(h)
     x[place], x[change] = a11 * x[place] + a12 * x[change], a21 * x[place] + a22 * x[change]
     mix_rows(p[place], p[change], a11, a12, a21, a22, f.gain, size)
-    rate2 = LOAD_RATE * LOAD_RATE * level2  # at rest in itself, load and rate have these variances and no covariance
+    rate2 = SLOWEST * QUICKEST * level2  # at rest in itself, load and rate have these variances and no covariance
     load = a11 * p[place, place] + a12 * p[place, change] + level2 - a11 * a11 * level2 - a12 * a12 * rate2
     both = a21 * p[place, place] + a22 * p[place, change] - a11 * a21 * level2 - a12 * a22 * rate2
     rate = a21 * p[change, place] + a22 * p[change, change] + rate2 - a21 * a21 * level2 - a22 * a22 * rate2

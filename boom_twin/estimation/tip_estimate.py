@@ -5,13 +5,14 @@ about it, in the natural modes j of the present posture (coordinates q_j, unit m
 
     q_j'' + 2 zeta_j omega_j q_j' + omega_j^2 q_j = Phi_j^T f + sum_i N_ij (F_i / k_i) a_i + w_j
 
-- f (2), N: force at the tip that the model does not know, a Gauss-Markov process of second order, twice damped at `LOAD_RATE`,
-  so that its rate is a state too: what shakes a boom has no corners, and a process of first order states twice the error of
-  the acceleration that there is. Phi_j is the mode's motion of the tip, 1/sqrt(kg). Its level follows the sensors: while
-  successive innovations of the angles are alike, the filter is too slow and the level rises, while they alternate it is too
-  quick and it falls (Mehra 1970). A pump's pulses need no periodic part of their own: the process is as wide as they are.
+- f (2), N: force at the tip that the model does not know, a Gauss-Markov process of second order with the rates `SLOWEST`, as
+  pulses of 0.2 to 0.6 Hz lose their likeness, and `QUICKEST`, as their flanks of 0.1 s rise; its rate is a state too: what
+  shakes a boom has no corners, and a process of first order states twice the error of the acceleration that there is. Phi_j is
+  the mode's motion of the tip, 1/sqrt(kg). The level of each component follows the innovations of angles and IMU, see
+  `boom_twin.estimation.load_level` (Mehra 1970).
 - f also has a part that stays, Gauss-Markov of `STAY_TIME`, `STAYS` times as large as is usual: a load that is there from the
-  first sample on, and the mean of a pump's pulses.
+  first sample on, and the mean of a pump's pulses. As it drifts the modes go with it as they would at rest: as an input that
+  jumps at every sample it would shake them, by 0.1 m/s^2 at the tip of the default boom at rest.
 - a_i: by how much cylinder i is softer than the scene says, as a share of 1/k_i. A spring that is softer lengthens by
   F_i a_i / k_i more under the predicted force F_i, as if the stroke were longer; N_ij is the mode's force in it. F_i is
   its slow part, over `SLOW` seconds: the fast part holds the strokes' noise, which the IMU's residual holds as well, and a_i
@@ -23,7 +24,8 @@ about it, in the natural modes j of the present posture (coordinates q_j, unit m
   and angles, which show no sag, would be taken to contradict it.
 - w: white, of the density that strokes' noise drives the mode with (`boom_twin.analysis.modal.StrokeNoise`).
 - e (2), m/s^2: error of the predicted acceleration by errors of the strokes that are too short for any mode to follow,
-  Gauss-Markov of time `JERK_TIME`: of cylinder i sum_j N_ij Phi_j times the deviation of its stroke; and by `INEXACT_MOTION`
+  Gauss-Markov of time `JERK_TIME`: of cylinder i sum_j N_ij Phi_j, of each mode the share that it does not follow, times the
+  deviation of its stroke (`boom_twin.estimation.deviation_step.follow_errors`); and by `INEXACT_MOTION`
   of the predicted acceleration itself, which smoothers, steps and the modes left out are off by in haste.
 
 Measured less predicted:

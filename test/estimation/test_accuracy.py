@@ -42,7 +42,7 @@ def test_it_is_what_a_twin_comes_to(monkeypatch: pytest.MonkeyPatch) -> None:
         report = twin.update(Sample(Stream.STROKES, 5_000_000 * k, ARCH + 2e-5 * rng.normal(size=4)))
         assert report.prediction is not None and report.estimate is not None
         angles = report.prediction.joints if angles is None else angles
-        twin._modes.filter.level[0] = twin._modes.filter.loads[deviation_filter.USUAL_LOAD]
+        twin._modes.filter.level[:] = twin._modes.filter.loads[deviation_filter.USUAL_LOAD]
         twin.update(Sample(Stream.ANGLES, 5_000_000 * k, _noisy(angles, rng)))
         estimates.append(np.sqrt(report.estimate.tip_covariance[[0, 3, 5]]))
     assert estimates[-1] == pytest.approx(stated.tip, rel=0.1)

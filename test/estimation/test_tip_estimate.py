@@ -16,6 +16,7 @@ from boom_twin.estimation import cause_mixture as mix
 from boom_twin.estimation import deviation_filter as layout
 from boom_twin.estimation import deviation_readings as reading
 from boom_twin.estimation import deviation_step as stepping
+from boom_twin.estimation import load_level as level
 from boom_twin.estimation.boom_predictor import BoomPredictor
 from boom_twin.estimation.deviation_filter import DeviationFilter
 from boom_twin.estimation.deviation_modes import DeviationModes
@@ -85,19 +86,21 @@ def dense(f: DeviationFilter) -> tuple[Array, Array]:
     """Continuous system x' = A x + white noise of density Q, from the equations in the module's text."""
     n, count, size = len(f.softness), int(f.status[layout.COUNT]), int(layout.states_of(f))
     a, q = np.zeros((size, size)), np.zeros((size, size))
+    slowest, quickest = stepping.SLOWEST, stepping.QUICKEST
     for k in (0, 1):
         load, change, error = layout.LOAD + k, layout.LOAD_CHANGE + k, layout.ERROR + k
         a[load, change], a[change, load], a[change, change] = (
             1.0,
-            -(stepping.LOAD_RATE**2),
-            -2.0 * stepping.LOAD_RATE,
+            -slowest * quickest,
+            -(slowest + quickest),
         )
-        q[change, change] = 4.0 * stepping.LOAD_RATE**3 * f.level[0] ** 2
+        q[change, change] = 2.0 * slowest * quickest * (slowest + quickest) * f.level[k] ** 2
         a[error, error], q[error, error] = -1.0 / stepping.JERK_TIME, 2.0 * f.pushes[k] / stepping.JERK_TIME
         q[layout.BIAS + k, layout.BIAS + k] = stepping.BIAS_DRIFT**2
         stays = layout.STAYING + k
         a[stays, stays] = -1.0 / layout.STAY_TIME
-        q[stays, stays] = 2.0 * (layout.STAYS * f.loads[layout.USUAL_LOAD]) ** 2 / layout.STAY_TIME
+        at_rest = as_at_rest(f, stays, 2 + 2 * n + k)
+        q += 2.0 * (layout.STAYS * f.loads[layout.USUAL_LOAD]) ** 2 / layout.STAY_TIME * np.outer(at_rest, at_rest)
     for i in range(n):
         q[layout.SHARES + i, layout.SHARES + i] = layout.SOFTENING**2
     places = [
@@ -113,12 +116,21 @@ def dense(f: DeviationFilter) -> tuple[Array, Array]:
         a[at + 1, at], a[at + 1, at + 1] = -(f.omega[j] ** 2), -f.decay[j]
         a[at + 1, places] = f.coupling[j]
         a[at + 1, layout.SHARES + n : layout.SHARES + 2 * n] = 0.0  # what sections sag is no part of q
-        q[at + 1, at + 1] = f.density[j]
+        q[at + 1, at + 1] += f.density[j]
     if f.status[layout.FORCED]:
         unit = np.abs(f.pulls) + layout.LEAST_FORCE * np.abs(f.pulls).max()
         places = [layout.offset_place(f, i) for i in range(n)]
         q[places, places] = (layout.FORCE_DRIFT * unit) ** 2
     return a, q
+
+
+def as_at_rest(f: DeviationFilter, place: int, b: int) -> Array:
+    """The state under one unit of input b of the modes, which is at `place`, at rest."""
+    found = np.zeros(int(layout.states_of(f)))
+    found[place] = 1.0
+    for j in range(int(f.status[layout.COUNT])):
+        found[layout.mode_place(f, j)] = f.coupling[j, b] / f.omega[j] ** 2
+    return found
 
 
 def measure_forces(f: DeviationFilter) -> None:
@@ -173,7 +185,7 @@ def test_corrections_are_those_of_the_dense_filter(posed: Posed) -> None:
     for i, (read, scale, variance) in ((0, angles), (3, angles), (1, forces), (3, forces)):
         read(f, i, f.row)
         row, value = f.row[:size].copy(), scale * rng.normal()
-        reading.correct(f, i, value, variance, 0.0)
+        reading.correct(f, value, variance, 0.0)
         gain = p @ row / (row @ p @ row + variance)
         x, p = x + gain * (value - row @ x), p - np.outer(gain, row @ p)
     scale = np.sqrt(np.diag(p) + 1e-15)
@@ -192,7 +204,7 @@ def test_a_late_reading_is_read_by_the_state_as_it_was(posed: Posed) -> None:
     stepping.step_state(f, 0.03)
     reading.read_angle(f, 2, f.row)
     f.p[:] = 0.0
-    reading.correct(f, 2, 0.0, 1.0, 0.03)
+    reading.correct(f, 0.0, 1.0, 0.03)
     assert float(f.row[first:size] @ f.x[first:size]) == pytest.approx(then, rel=1e-9)
 
 
@@ -205,21 +217,22 @@ def test_a_late_reading_under_a_load_that_stays_is_what_it_is_now(posed: Posed) 
     before = f.x.copy()
     for i in range(4):
         reading.read_angle(f, i, f.row)
-        reading.correct(f, i, float(f.row @ f.x), 1e-12, 0.2)
+        reading.correct(f, float(f.row @ f.x), 1e-12, 0.2)
         assert f.x == pytest.approx(before, rel=1e-9, abs=1e-9)
 
 
 def test_a_late_reading_holds_less_while_the_load_may_have_changed(posed: Posed) -> None:
     """Its noise has the variance that the load's process gains in that time, against its exact covariance (Van Loan)."""
-    f, rate, age = posed.modes.filter, stepping.LOAD_RATE, 0.1
+    f, slowest, quickest, age = posed.modes.filter, stepping.SLOWEST, stepping.QUICKEST, 0.1
+    f.level[:] = 20.0, 70.0
     reading.read_angle(f, 2, f.row)
     f.x[:] = 0.0
     still = -f.row[layout.LOAD : layout.LOAD + 2].copy()
     found = reading.turn_back(f, age)
     still = still + f.row[layout.LOAD : layout.LOAD + 2]
-    a, level2 = np.array([[0.0, 1.0], [-(rate**2), -2.0 * rate]]), float(f.level[0]) ** 2
+    a = np.array([[0.0, 1.0], [-slowest * quickest, -slowest - quickest]])
     kept = expm(a * age)[0, 0]
-    assert found == pytest.approx(2.0 * level2 * (1.0 - kept) * float(still @ still), rel=1e-9)
+    assert found == pytest.approx(2.0 * (1.0 - kept) * float(np.sum((f.level * still) ** 2)), rel=1e-9)
 
 
 @pytest.mark.parametrize("posture", ["arch", "high"])
@@ -282,6 +295,63 @@ def test_fast_motion_is_predicted_to_a_share(posed: Posed) -> None:
         results.tip[2, :2] = 12.0 * math.sin(2.0 * math.pi * 4.0 * k * H), 0.0
         stepping.follow_prediction(f, results, estimates, moments, gravity)
     assert f.pushes - before == pytest.approx([0.01**2 * 72.0, 0.0], rel=0.1, abs=1e-9)
+
+
+def test_modes_follow_most_of_a_slow_error_of_the_strokes(posed: Posed) -> None:
+    """The acceleration that errors of the newest strokes push the tip with, against an integral over their spectrum.
+
+    That of a steady Kalman filter of white jerk with corner c: (1 + 4 u^4) / (1 + u^6) for u = omega / c, its noise's part.
+    """
+    f, settings, corner = posed.modes.filter, Settings(), 24.0
+    count = int(f.status[layout.COUNT])
+    f.variances[:] = 2.0 * settings.stroke_variance * H * corner
+    f.now[layout.STEP], f.now[layout.SHAKEN : layout.SHAKEN + 2] = H, 0.0
+    stepping.follow_errors(f)
+    u = np.linspace(1e-3, math.pi / H / corner, 20000)
+    power = (1.0 + 4.0 * u**4) / (1.0 + u**6)
+    left = u**2 / (u**2 + (f.omega[:count, None] / corner) ** 2)
+    for axis in (0, 1):
+        pushed = (f.forces[:count].T * f.tip[:count, axis]) @ left
+        mean = (pushed**2 @ power) / power.sum()
+        found = math.sqrt(f.pushes[axis] - stepping.LEAST_ERROR**2)
+        assert found == pytest.approx(math.sqrt(float(mean @ f.variances)), rel=0.25)
+        whole = (f.forces[:count].T @ f.tip[:count, axis]) ** 2 @ f.variances
+        assert found < 0.8 * math.sqrt(float(whole))
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_the_level_of_one_component_follows_what_only_it_explains(posed: Posed, count: int) -> None:
+    """Numbers that innovations tell of the load, against least squares; a load along y leaves the level along x."""
+    f, rng = posed.modes.filter, np.random.default_rng(11)
+    by = rng.normal(size=(count, 2))
+    f.level[:] = 20.0
+    for k in range(400):
+        innovations = rng.normal(size=count) + 0.5 * by[:, 1] / float(np.linalg.norm(by[:, 1]))
+        level.begin_sample(f)
+        for (x, y), innovation in zip(by, innovations, strict=True):
+            level.add_innovation(f, x, y, innovation)
+        level.follow_levels(f, level.BY_ANGLES, H)
+        if count > 1 and k == 0:
+            covariance = np.linalg.inv(by.T @ by)
+            found = covariance @ by.T @ innovations / np.sqrt(np.diag(covariance))
+            assert f.before[level.BY_ANGLES] == pytest.approx(found, rel=1e-9)
+    assert f.level[1] > 22.0
+    assert (abs(f.level[0] - 20.0) < 6.0) == (count > 1)
+
+
+def test_the_stated_deviation_of_the_acceleration_at_rest_is_true(scene: Scene) -> None:
+    """The boom is as the scene says, with an IMU: error over stated deviation, over some sessions."""
+    errors = []
+    for seed in range(2):
+        samples, _ = pseudo_session(scene, scene, 8.0, 20 + seed)
+        twin, told = Twin(scene), []
+        for sample in with_imu(scene, scene, samples, seed):
+            report = twin.update(sample)
+            told += [report.estimate] if report.estimate is not None else []
+        late = told[len(told) // 3 :]
+        variances = np.array([each.acceleration_covariance[[0, 3]] for each in late])
+        errors.append(np.mean(np.array([each.acceleration[:2] for each in late]) ** 2 / variances))
+    assert 0.7 < math.sqrt(float(np.mean(errors))) < 1.2
 
 
 @pytest.mark.parametrize("example", ["", "five_section_z_fold"])
@@ -429,9 +499,9 @@ def test_causes_are_weighed_as_gaussians_are(posed: Posed) -> None:
     assert mix.covariance_of(f, 3, 5) == pytest.approx(covariance[3, 5], rel=1e-6)
 
 
-def with_imu(scene: Scene, true: Scene, samples: list[Sample]) -> list[Sample]:
+def with_imu(scene: Scene, true: Scene, samples: list[Sample], seed: int = 7) -> list[Sample]:
     """The same, and behind every sample of the angles what the IMU of the boom `true` reads, at rest."""
-    posed, rng = Posed(true, strokes_of_posture(scene, "arch")), np.random.default_rng(7)
+    posed, rng = Posed(true, strokes_of_posture(scene, "arch")), np.random.default_rng(seed)
     heading = float(rows_of(posed.boom)[0].tip[0, 2])
     c, s = math.cos(heading), math.sin(heading)
     felt, found = -np.array([[c, s], [-s, c]]) @ np.array(scene.gravity), []
