@@ -284,27 +284,11 @@ def step_inputs(f, h, size):
     kept = math.exp(-h / STAY_TIME)
     for b in range(2):
         step_load(f, b, h, size)
-        fade(f, STAYING + b, kept, 0.0, size)
-        drift(f, b, (STAYS * f.loads[USUAL_LOAD]) ** 2 * (1.0 - kept * kept))
+        fade(f, STAYING + b, kept, (STAYS * f.loads[USUAL_LOAD]) ** 2, size)
     for i in range(f.softness.shape[0]):
         if f.drawn[i] != 0.0:
             lag = f.x[SHARES + i] * f.ahead[i]
             f.p[SHARES + i, SHARES + i] += (SOFTENING * SOFTENING + lag * lag / SLOW) * h
-
-
-@inner
-def drift(f, b, variance):
-    """A component of the load that stays is other by this variance, and the modes as at rest: slow, so it shakes nothing."""
-    p, place = f.p, STAYING + b
-    p[place, place] += variance
-    for j in range(f.status[COUNT]):
-        at, still = mode_place(f, j), f.tip[j, b] / (f.omega[j] * f.omega[j])
-        p[place, at] += variance * still
-        p[at, place] = p[place, at]
-        for k in range(j + 1):
-            other = mode_place(f, k)
-            p[at, other] += variance * still * (f.tip[k, b] / (f.omega[k] * f.omega[k]))
-            p[other, at] = p[at, other]
 
 
 @inner

@@ -11,8 +11,7 @@ about it, in the natural modes j of the present posture (coordinates q_j, unit m
   the mode's motion of the tip, 1/sqrt(kg). The level of each component follows the innovations of angles and IMU, see
   `boom_twin.estimation.load_level` (Mehra 1970).
 - f also has a part that stays, Gauss-Markov of `STAY_TIME`, `STAYS` times as large as is usual: a load that is there from the
-  first sample on, and the mean of a pump's pulses. As it drifts the modes go with it as they would at rest: as an input that
-  jumps at every sample it would shake them, by 0.1 m/s^2 at the tip of the default boom at rest.
+  first sample on, and the mean of a pump's pulses.
 - a_i: by how much cylinder i is softer than the scene says, as a share of 1/k_i. A spring that is softer lengthens by
   F_i a_i / k_i more under the predicted force F_i, as if the stroke were longer; N_ij is the mode's force in it. F_i is
   its slow part, over `SLOW` seconds: the fast part holds the strokes' noise, which the IMU's residual holds as well, and a_i

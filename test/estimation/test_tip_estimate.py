@@ -99,8 +99,7 @@ def dense(f: DeviationFilter) -> tuple[Array, Array]:
         q[layout.BIAS + k, layout.BIAS + k] = stepping.BIAS_DRIFT**2
         stays = layout.STAYING + k
         a[stays, stays] = -1.0 / layout.STAY_TIME
-        at_rest = as_at_rest(f, stays, 2 + 2 * n + k)
-        q += 2.0 * (layout.STAYS * f.loads[layout.USUAL_LOAD]) ** 2 / layout.STAY_TIME * np.outer(at_rest, at_rest)
+        q[stays, stays] = 2.0 * (layout.STAYS * f.loads[layout.USUAL_LOAD]) ** 2 / layout.STAY_TIME
     for i in range(n):
         q[layout.SHARES + i, layout.SHARES + i] = layout.SOFTENING**2
     places = [
@@ -116,21 +115,12 @@ def dense(f: DeviationFilter) -> tuple[Array, Array]:
         a[at + 1, at], a[at + 1, at + 1] = -(f.omega[j] ** 2), -f.decay[j]
         a[at + 1, places] = f.coupling[j]
         a[at + 1, layout.SHARES + n : layout.SHARES + 2 * n] = 0.0  # what sections sag is no part of q
-        q[at + 1, at + 1] += f.density[j]
+        q[at + 1, at + 1] = f.density[j]
     if f.status[layout.FORCED]:
         unit = np.abs(f.pulls) + layout.LEAST_FORCE * np.abs(f.pulls).max()
         places = [layout.offset_place(f, i) for i in range(n)]
         q[places, places] = (layout.FORCE_DRIFT * unit) ** 2
     return a, q
-
-
-def as_at_rest(f: DeviationFilter, place: int, b: int) -> Array:
-    """The state under one unit of input b of the modes, which is at `place`, at rest."""
-    found = np.zeros(int(layout.states_of(f)))
-    found[place] = 1.0
-    for j in range(int(f.status[layout.COUNT])):
-        found[layout.mode_place(f, j)] = f.coupling[j, b] / f.omega[j] ** 2
-    return found
 
 
 def measure_forces(f: DeviationFilter) -> None:
