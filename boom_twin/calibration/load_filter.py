@@ -59,12 +59,14 @@ def stroke_error(variance: float, course: SessionCourse) -> StrokeError:
 class FilterModel(NamedTuple):
     """Matrices of k postures, s states, c channels.
 
-    `turn`, `drive` (k, s, s) of a step; `read` (k, c, s); `tilt` (k, s), angle of the tip, rad; `start` (s, s).
+    `turn`, `drive` (k, s, s) of a step; `read` (k, c, s), and what it gains, beyond each, where a posture is passed in a
+    second, `passing` (k, c, s), s; `tilt` (k, s), angle of the tip, rad; `start` (s, s).
     """
 
     turn: Array
     drive: Array
     read: Array
+    passing: Array
     tilt: Array
     start: Array
 
@@ -98,7 +100,8 @@ def filter_model(modes: ModesAlong, channels: NDArray[np.int64], corner: float, 
     tilt = np.zeros(rates.shape[:2])
     first = STROKES + 2 * ORDER * modes.slopes.shape[1]
     tilt[:, first : first + modes.tip.shape[1]] = modes.tip[..., 2]
-    return FilterModel(turn, drive, _readings(modes, rates)[:, channels].copy(), tilt, 0.5 * (start + start.T))
+    read, passing = _readings(modes, rates)[:, channels].copy(), _passing(modes, rates.shape[1])[:, channels].copy()
+    return FilterModel(turn, drive, read, passing, tilt, 0.5 * (start + start.T))
 
 
 def _carried(turn: Array, density: Array) -> Array:
@@ -149,6 +152,17 @@ def _readings(modes: ModesAlong, rates: Array) -> Array:
     return read
 
 
+def _passing(modes: ModesAlong, size: int) -> Array:
+    """What the IMU reads of rates while shapes change: the tip's acceleration is Psi q'' + 2 Psi' q' + ..; (k, n + 2, s), s."""
+    k, m, n = modes.forces.shape
+    rate = _places(n, m)[2]
+    found, middle = np.zeros((k, n + 2, size)), 0.5 * (modes.heading[1:] + modes.heading[:-1])
+    change = 2.0 * np.diff(modes.tip[..., :2], axis=0)
+    force = specific_force(change[..., 0], change[..., 1], np.cos(middle)[:, None], np.sin(middle)[:, None])
+    found[:-1, n:, rate[0] : rate[-1] + 1] = np.stack(force, axis=1)
+    return found
+
+
 def tilted(measured: Array, joints: int) -> Array:
     """What joint angles and the IMU (b, n + 2) read per radian that the tip is turned, from what was measured (b, n + 2).
 
@@ -161,14 +175,14 @@ def tilted(measured: Array, joints: int) -> Array:
 
 
 def innovations(
-    model: FilterModel, places: NDArray[np.int64], noise: Array, gained: Array, tilts: Array, residuals: Array
+    model: FilterModel, places: Array, paces: Array, noise: Array, gained: Array, tilts: Array, residuals: Array
 ) -> Innovations:
     """Run the filter over residuals of b blocks, shape (b, j, c).
 
     Parameters
     ----------
-    places : ndarray of int, shape (b,)
-        Number of the posture of each block.
+    places, paces : ndarray, shape (b,)
+        Where among the postures each block is, from 0 to k - 1, and how many it passes in a second.
     noise : ndarray, shape (b, c)
         Variances of the means over blocks.
     gained : ndarray, shape (b, s)
@@ -179,8 +193,8 @@ def innovations(
     count, columns, channels = residuals.shape
     size = len(model.start)
     found = Innovations(np.zeros(residuals.shape), np.ones((count, channels)), np.zeros((count, 2)))
-    x, p, scratch = np.zeros((size, columns)), model.start.copy(), np.zeros((size + 2, size))
-    run_filter(places, model.turn, model.drive, model.read, model.tilt, noise, gained, tilts, x, p, residuals, *found, scratch)
+    x, p, scratch = np.zeros((size, columns)), model.start.copy(), np.zeros((2 * size + 2, size))
+    run_filter(places, paces, *model[:-1], noise, gained, tilts, x, p, residuals, *found, scratch)
     return found
 
 
@@ -198,15 +212,20 @@ def gained_variance(model: FilterModel, prior: LoadPrior, strokes: StrokeError, 
 
 @kernel
 def run_filter(
-    places: NDArray[np.int64], turn: Array, drive: Array, read: Array, tilt: Array, noise: Array, gained: Array,
-    tilts: Array, x: Array, p: Array,
+    places: Array, paces: Array, turn: Array, drive: Array, read: Array, passing: Array, tilt: Array,
+    noise: Array, gained: Array, tilts: Array, x: Array, p: Array,
     residuals: Array, values: Array, variances: Array, loads: Array, scratch: Array,
 ) -> None:  # fmt: skip
-    """See `innovations`; x (s, j), p (s, s) state and covariance, scratch (s + 2, s). NaN in column 0: not measured."""
+    """See `innovations`; x (s, j), p (s, s) state and covariance, scratch (2 s + 2, s). NaN in column 0: not measured."""
     size, columns = x.shape
-    g, h, w = scratch[size], scratch[size + 1], scratch
+    g, h, a, w = scratch[2 * size], scratch[2 * size + 1], scratch[size : 2 * size], scratch
     for t in range(residuals.shape[0]):
-        a, q = turn[places[t]], drive[places[t]]
+        left = max(0, min(int(places[t]), turn.shape[0] - 2))
+        right, far = left + 1, places[t] - left
+        near = 1.0 - far
+        for i in range(size):
+            for k in range(size):
+                a[i, k] = near * turn[left, i, k] + far * turn[right, i, k]
         for b in range(size):
             p[b, b] += gained[t, b]
         for k in range(columns):
@@ -225,7 +244,7 @@ def run_filter(
                         w[i, k] += a[i, b] * p[b, k]
         for i in range(size):
             for k in range(i + 1):
-                p[i, k] = q[i, k]
+                p[i, k] = near * drive[left, i, k] + far * drive[right, i, k]
         for k in range(size):
             for b in range(size):
                 if a[k, b] != 0.0:
@@ -237,7 +256,8 @@ def run_filter(
             if not math.isfinite(residuals[t, 0, c]):
                 continue
             for i in range(size):
-                h[i] = read[places[t], c, i] + tilts[t, c] * tilt[places[t], i]
+                turned = near * tilt[left, i] + far * tilt[right, i]
+                h[i] = near * read[left, c, i] + far * read[right, c, i] + paces[t] * passing[left, c, i] + tilts[t, c] * turned
             spread = noise[t, c]
             for i in range(size):
                 g[i] = 0.0

@@ -9,21 +9,24 @@ cylinders.
 
 Modes are made at knots along the strokes' travel. Those of a knot are turned into the ones of the knot before by the rotation
 that is nearest in the sense of the masses, so that no coupling by the change of shapes is left, crossing modes do no harm, and
-all matrices may be interpolated between knots.
+all matrices may be interpolated between knots. They have to be, at every instant: in steps they would shake the boom, several
+times a second, as often as it swings by itself.
 """
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..analysis.bending_moments import increments_by_tip_force
 from ..analysis.equilibrium import settle
-from ..analysis.modal import Mode, joint_increments, natural_modes
+from ..analysis.modal import Mode, along, natural_modes
 from ..compiler.compile import compile_scene
-from ..compiler.plan import Plan
+from ..compiler.plan import Plan, first_row, taken_apart
+from ..errors import SolverError
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.tables import FRAME_ANGLE
 from ..scene.kinematics import joint_angles_of_strokes
@@ -31,10 +34,11 @@ from ..scene.schema import Scene
 from ..types import Array
 from .sessions import SessionCourse
 
-TRAVEL, PIECES = 0.05, 4  # rad that a section turns from one knot to the next, and interpolated postures for each knot
+TRAVEL = 0.05  # rad at most that a section turns from one knot to the next
+APART = 0.005  # rad, at least between two holds that have knots of their own
 EVERY = 20  # instants, at which the turns are looked at
 HIGHEST = 25.0  # Hz; faster modes follow a force without vibration of their own
-MODES = 9  # most that are looked for, of both kinds
+MODES = 9  # most that are looked for
 WIDTH = 1e-6  # relative accuracy of frequencies
 
 
@@ -51,7 +55,7 @@ class ModesAlong(NamedTuple):
     joints : ndarray, shape (k, m, n)
         Joint angles.
     follow : ndarray, shape (k, n, 2)
-        Joint angles by modes that follow a force at once, rad/N.
+        Joint angles by all faster modes, which follow a force at once, rad/N.
     slopes : ndarray, shape (k, n)
         Change of stroke with joint angle, m.
     heading : ndarray, shape (k,)
@@ -68,25 +72,32 @@ class ModesAlong(NamedTuple):
     heading: Array
 
 
-def modes_along(scene: Scene, course: SessionCourse) -> tuple[ModesAlong, NDArray[np.int64]]:
-    """Models of a boom, and for every instant of `course` (m,) the posture's number."""
+class PosturePath(NamedTuple):
+    """Knots along a course: `strokes` and joint `angles` of the undeformed boom (k, n) there, m and rad.
+
+    `places` (m,): where every instant of the course is among them, from 0 to k - 1.
+    """
+
+    strokes: Array
+    angles: Array
+    places: Array
+
+
+def posture_path(scene: Scene, course: SessionCourse) -> PosturePath:
+    """Knots of a course, `TRAVEL` apart at most; two at least."""
     travelled = _travelled(scene, course)
     moving = course.moving.max(axis=1) > 0.0
-    knots = np.linspace(0.0, travelled[-1], 2 + int(travelled[-1] / TRAVEL))
     held = travelled[~moving & np.append(moving[1:], True)]  # the last instants of holds: frequencies are to be exact there
-    knots = np.unique(np.concatenate([knots, held]))
-    rows = np.minimum(np.searchsorted(travelled, knots), len(travelled) - 1)
-    found = _at_knots(scene, course.strokes[rows])
-    every = np.linspace(0.0, len(knots) - 1.0, 1 + PIECES * (len(knots) - 1))
-    left = np.minimum(every.astype(int), len(knots) - 2)
-    share = every - left
-
-    def between(values: Array) -> Array:
-        weight = share.reshape(-1, *(1,) * (values.ndim - 1))
-        return np.asarray((1.0 - weight) * values[left] + weight * values[left + 1])
-
-    places = np.rint(PIECES * np.interp(travelled, knots, np.arange(len(knots)))).astype(np.int64)
-    return ModesAlong(*map(between, found)), places
+    ends = [0.0]
+    for at in (*held.tolist(), travelled[-1]):
+        if at > ends[-1] + APART:
+            ends.append(at)
+    ends = ends if len(ends) > 1 else [0.0, APART]
+    pieces = [np.linspace(a, b, 1 + math.ceil((b - a) / TRAVEL))[1:] for a, b in pairwise(ends)]
+    knots = np.concatenate([[0.0], *pieces])
+    strokes = course.strokes[np.minimum(np.searchsorted(travelled, knots), len(travelled) - 1)]
+    angles = np.array([joint_angles_of_strokes(scene, at) for at in strokes])
+    return PosturePath(strokes, angles, np.interp(travelled, knots, np.arange(float(len(knots)))))
 
 
 def _travelled(scene: Scene, course: SessionCourse) -> Array:
@@ -98,46 +109,61 @@ def _travelled(scene: Scene, course: SessionCourse) -> Array:
 
 
 class _Knot(NamedTuple):
-    """A posture: m modes with their turns of the joints (m, n), slopes (n,) of strokes by angles, angle of the tip."""
+    """A posture: m modes with their turns of the joints (m, n), those by a force at the tip (n, 2), the drives' lengths (n,),
+    slopes (n,) of strokes by angles, angle of the tip.
+    """
 
     modes: tuple[Mode, ...]
     joints: Array
+    still: Array
+    drives: Array
     slopes: Array
     heading: float
 
 
-def _at_knots(scene: Scene, strokes: Array) -> ModesAlong:
-    """The models at strokes (k, n), in as many modes as there are at all of them."""
+def modes_along(scene: Scene, path: PosturePath) -> ModesAlong:
+    """Models of a boom at the knots of a path, in as many modes as there are at all of them.
+
+    Raises
+    ------
+    SolverError
+        There are none.
+    """
     plan = compile_scene(scene)
-    knots = _knots(scene, plan, strokes)
-    count, at = min(sum(mode.frequency < HIGHEST for mode in knot.modes) for knot in knots), plan.tables.tip
+    knots = _knots(scene, plan, path)
+    count, at = min(len(knot.modes) for knot in knots), plan.tables.tip
+    if not count:
+        raise SolverError(f"the boom has no natural frequency below {HIGHEST:g} Hz.")
     rows, before = [], None
     for knot in knots:
-        modes = knot.modes[:count]
+        modes, joints = knot.modes[:count], knot.joints[:count]
         motions, increments = (np.array([getattr(mode, name) for mode in modes]) for name in ("motion", "increments"))
         turn = np.eye(count)
         if before is not None:
             left, _, right = np.linalg.svd((before * plan.masses) @ motions.T)
             turn = left @ right
         before = turn @ motions
-        damping, forces = _damping_and_forces(plan, turn @ increments, modes[0].drives)
-        stiffness = turn * np.array([2.0 * math.pi * mode.frequency for mode in modes]) ** 2 @ turn.T
+        damping, forces = _damping_and_forces(plan, turn @ increments, knot.drives)
+        squares = np.array([2.0 * math.pi * mode.frequency for mode in modes]) ** 2
+        follow = knot.still - joints.T @ (motions[:, at : at + 2] / squares[:, None])
         tip = before[:, at : at + 3]
-        quick = np.array([mode.motion[at : at + 2] / (2.0 * math.pi * mode.frequency) ** 2 for mode in knot.modes[count:]])
-        follow = knot.joints[count:].T @ quick.reshape(-1, 2)
-        rows.append((damping, stiffness, forces, tip, turn @ knot.joints[:count], follow, knot.slopes, knot.heading))
+        rows.append((damping, turn * squares @ turn.T, forces, tip, turn @ joints, follow, knot.slopes, knot.heading))
     return ModesAlong(*(np.array(each) for each in zip(*rows, strict=True)))
 
 
-def _knots(scene: Scene, plan: Plan, strokes: Array) -> list[_Knot]:
+def _knots(scene: Scene, plan: Plan, path: PosturePath) -> list[_Knot]:
     state, work, found = plan.state(), plan.work(), []
-    for at in strokes:
-        angles = joint_angles_of_strokes(scene, at)
-        settle(plan, state, work, at, angles)
-        modes = natural_modes(plan, state, work, MODES, WIDTH)
-        joints = np.array([joint_increments(plan, state, work, mode) for mode in modes])
+
+    def turns(increments: Array) -> Array:
+        return along(plan, state, work, increments, lambda: taken_apart(plan, first_row(plan, state)).joints)
+
+    for strokes, angles in zip(path.strokes, path.angles, strict=True):
+        settle(plan, state, work, strokes, angles)
+        modes = natural_modes(plan, state, work, MODES, WIDTH, 2.0 * math.pi * HIGHEST)
+        joints = np.array([turns(mode.increments) for mode in modes])
+        still = np.column_stack([turns(column) for column in increments_by_tip_force(plan, state, work).T])
         slopes = np.array([cylinder_length(plan.tables.linkages[i], angle)[1] for i, angle in enumerate(angles)])
-        found.append(_Knot(modes, joints, slopes, float(state.frames[-1, FRAME_ANGLE])))
+        found.append(_Knot(modes, joints, still, state.drives[0].copy(), slopes, float(state.frames[-1, FRAME_ANGLE])))
     return found
 
 

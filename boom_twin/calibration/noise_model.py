@@ -22,6 +22,7 @@ from .sessions import MeasuredSession, Series, SessionCourse, filled
 
 SHORTEST = 0.05  # s
 END = 0.25  # s before the end of a course that are not used, for smoothing ends there
+USUAL = 1.5  # times the median: longer times between samples are gaps
 LEAST = 0.5  # of the values of a block that must be there
 
 
@@ -56,8 +57,8 @@ def block_length(
     sessions: Sequence[MeasuredSession], streams: Sequence[Stream], shortest: float = SHORTEST, least: float = 2.0
 ) -> float:
     """Time (s) that holds `least` samples, on average, of every one of the streams of every session; `shortest` or more."""
-    intervals = [np.median(np.diff(session.series[stream].stamps)) * NANO for session in sessions for stream in streams]
-    return max(shortest, least * float(max(intervals)))
+    gaps = [np.diff(session.series[stream].stamps) * NANO for session in sessions for stream in streams]
+    return max(shortest, least * max(float(each[each < USUAL * np.median(each)].mean()) for each in gaps))
 
 
 def channel_names(joints: int, streams: Sequence[Stream]) -> tuple[str, ...]:

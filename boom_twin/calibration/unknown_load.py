@@ -31,11 +31,11 @@ from ..types import NANO, Array
 from .forward_model import CalibrationProblem, ForwardModel, boom_of
 from .least_squares import Fit, Tell, fitted_in_holds
 from .load_filter import Innovations, LoadPrior, filter_model, gained_variance, innovations, stroke_error, tilted
-from .load_modes import modes_along
+from .load_modes import PosturePath, modes_along, posture_path
 from .noise_model import ResidualBlocks
 from .sessions import SessionCourse
 
-LENGTH, SAMPLES = 0.01, 1.5  # s, of the blocks at least, and samples in them on average
+LENGTH, SAMPLES = 0.005, 1.0  # s, of the blocks at least, and samples in them: means over more of them flatten fast swings
 FREE = 0.044  # a load that is let free: what it is likely to change by in a second, over the boom's weight
 QUIET = 0.001  # likewise between its jumps, at first
 GUSTS = 0.03  # root mean square of a load without pulses, over the boom's weight, up to which it may be wind
@@ -50,7 +50,19 @@ FIRST, NEAR = 4, 1.0  # most steps with the load let free, and the step (in devi
 ROUNDS, GUESSED = 5, 3  # of looking for the load's jumps, a step each; of these, with guessed rates
 LAST, SMALL = 5, 0.05  # likewise of the steps after these
 SPAN = 1.0  # s
-WIDER = 1.5  # by which intervals are wider than that: what swings longer is not seen in spans, see docs/calibrate.md
+WIDER = 2.0  # by which intervals are wider than that: the load's spectrum is not quite the one taken, see docs/calibrate.md
+
+
+class _Part(NamedTuple):
+    """What is used of one session."""
+
+    course: SessionCourse
+    blocks: ResidualBlocks
+    path: PosturePath
+
+
+Run = Callable[[LoadPrior, Array], Innovations]
+"""The filter of one session: of what is known of the load, and columns of residuals (b, j, c)."""
 
 
 class Pass(NamedTuple):
@@ -78,27 +90,31 @@ def fitted_under_load(problem: CalibrationProblem, quiet: Fit, tell: Tell) -> Fi
     SolverError
         The filter has no usable numbers for this boom, as for a single stiff section.
     """
-    weight = weight_of(problem.scene)
-    count = 0
+    weight, count = weight_of(problem.scene), 0
+    parts = [_Part(*part, posture_path(problem.scene, part[0])) for part in problem.parts]
+    passes: list[Pass] = []
 
-    def stepped(deviations: Array, priors: Sequence[LoadPrior], most: int, enough: float) -> tuple[Array, list[Pass]]:
-        nonlocal count
-        for _ in range(most):
-            tell()
-            passes, count = _passes(problem, deviations, priors), count + 1
-            deviations, size = _after_step(problem, passes, deviations)
-            if size < enough:
-                break
-        return deviations, passes
+    def stepped(deviations: Array, runs: Sequence[Run], priors: Sequence[LoadPrior], anew: bool) -> tuple[Array, float]:
+        nonlocal count, passes
+        tell()
+        passes, count = _passes(problem, parts, deviations, runs, priors, None if anew else passes), count + 1
+        return _after_step(problem, passes, deviations)
 
     free = LoadPrior(np.full(2, (FREE * weight) ** 2), STAYS * weight)
-    deviations, passes = stepped(fitted_in_holds(problem), [free] * len(problem.parts), FIRST, NEAR)
-    rates = np.full(2, (QUIET * weight) ** 2)
+    rates, deviations = np.full(2, (QUIET * weight) ** 2), fitted_in_holds(problem)
+    for _ in range(FIRST):
+        deviations, size = stepped(deviations, _runs(problem, parts, deviations), [free] * len(parts), True)
+        if size < NEAR:
+            break
     for number in range(ROUNDS):
-        priors = _likely_priors(problem, deviations, free, rates, number >= GUESSED)
+        runs = _runs(problem, parts, deviations)
+        priors = _likely_priors(problem, parts, deviations, runs, free, rates, number >= GUESSED)
         rates = priors[0].rates
-        deviations, passes = stepped(deviations, priors, 1, 0.0)
-    deviations, passes = stepped(deviations, priors, LAST, SMALL)
+        deviations, _ = stepped(deviations, runs, priors, number in (0, GUESSED))
+    for number in range(LAST):
+        deviations, size = stepped(deviations, _runs(problem, parts, deviations), priors, number == 0)
+        if size < SMALL:
+            break
     measured = sum(int(np.count_nonzero(each.white)) for each in passes)
     misfit = float(np.sqrt(sum(np.sum(each.white**2) for each in passes) / max(measured - len(deviations), 1)))
     scatter = WIDER**2 * _scatter(passes, round(SPAN / problem.length))
@@ -156,12 +172,12 @@ def _load(problem: CalibrationProblem, passes: Sequence[Pass]) -> TipLoad | None
     return finder.load
 
 
-def _filter(
-    problem: CalibrationProblem, boom: Scene, course: SessionCourse, blocks: ResidualBlocks
-) -> Callable[[LoadPrior, Array], Innovations]:
-    """Innovations of columns of residuals (b, j, c) of one session of `boom`, given what is known of the load."""
-    modes, along = modes_along(boom, course)
-    rows = np.clip(np.rint(blocks.times / course.step).astype(int), 0, len(along) - 1)
+def _run(problem: CalibrationProblem, boom: Scene, part: _Part) -> Run:
+    """The filter of one session of `boom`."""
+    course, blocks, path = part
+    modes = modes_along(boom, path)
+    rows = np.clip(np.rint(blocks.times / course.step).astype(int), 0, len(path.places) - 1)
+    places, paces = path.places[rows], np.gradient(path.places, course.step)[rows]
     noise = problem.deviations**2 / np.maximum(blocks.counts[:, problem.used], 1.0)
     strokes = stroke_error(problem.stroke_variance, course)
     tilts = tilted(blocks.measured, course.strokes.shape[1])[:, problem.used]
@@ -169,21 +185,27 @@ def _filter(
     def run(prior: LoadPrior, columns: Array) -> Innovations:
         model = filter_model(modes, problem.used, strokes.corner, prior, problem.length)
         gained = gained_variance(model, prior, strokes, course.moving[rows], problem.length)
-        return innovations(model, along[rows], noise, gained, tilts, columns)
+        return innovations(model, places, paces, noise, gained, tilts, columns)
 
     return run
 
 
+def _runs(problem: CalibrationProblem, parts: Sequence[_Part], deviations: Array) -> list[Run]:
+    boom = boom_of(problem.scene, problem.values(deviations))
+    return [_run(problem, boom, part) for part in parts]
+
+
 def _likely_priors(
-    problem: CalibrationProblem, deviations: Array, free: LoadPrior, rates: Array, seek: bool
-) -> list[LoadPrior]:
+    problem: CalibrationProblem, parts: Sequence[_Part], deviations: Array, runs: Sequence[Run],
+    free: LoadPrior, rates: Array, seek: bool,
+) -> list[LoadPrior]:  # fmt: skip
     """What is known of the load in every session at a trial: its jumps, and rates of the greatest likelihood between them.
 
     Jumps are those of the load that a filter finds which lets it move freely; rates are `rates`, or sought from there on.
     """
-    boom, sessions = boom_of(problem.scene, problem.values(deviations)), []
-    for course, blocks in problem.parts:
-        run, left = _filter(problem, boom, course, blocks), problem.left(deviations, course, blocks)[:, None]
+    sessions = []
+    for part, run in zip(parts, runs, strict=True):
+        left = problem.left(deviations, part.course, part.blocks)[:, None]
         sessions.append((run, left, _jumps(run(free, left).loads, problem.length, free)))
 
     def priors(rates: Array) -> list[LoadPrior]:
@@ -211,45 +233,66 @@ def _likely_priors(
     return priors(found)
 
 
-def _passes(problem: CalibrationProblem, deviations: Array, priors: Sequence[LoadPrior]) -> list[Pass]:
-    """Every session at a trial."""
+def _passes(
+    problem: CalibrationProblem, parts: Sequence[_Part], deviations: Array, runs: Sequence[Run],
+    priors: Sequence[LoadPrior], kept: Sequence[Pass] | None,
+) -> list[Pass]:  # fmt: skip
+    """Every session at a trial, with derivatives made anew, or with those of `kept`: any that hold the past alone will do."""
+    if kept is not None:
+        return [
+            before._replace(white=_white(found)[:, 0], loads=found.loads)
+            for part, run, prior, before in zip(parts, runs, priors, kept, strict=True)
+            for found in [run(prior, problem.left(deviations, part.course, part.blocks)[:, None])]
+        ]
     forward, booms = ForwardModel(problem.scene, problem.trials(deviations)), problem.booms(deviations, TRIAL)
-    return [_pass(problem, forward, booms, deviations, *part, prior) for part, prior in zip(problem.parts, priors, strict=True)]
+    return [
+        _pass(
+            problem, part, run, prior, problem.with_slopes(part.blocks.averaged(forward.move(part.course)), deviations), booms
+        )
+        for part, run, prior in zip(parts, runs, priors, strict=True)
+    ]
+
+
+def _white(found: Innovations) -> Array:
+    """Innovations in their deviations, (b, j, c); SolverError if they are no numbers."""
+    if not (np.isfinite(found.values).all() and (found.variances > 0.0).all()):
+        raise SolverError("the filter of the unknown load lost its digits on this boom.")
+    return np.asarray(found.values / np.sqrt(found.variances)[:, None])
 
 
 def _pass(
     problem: CalibrationProblem,
-    forward: ForwardModel,
-    booms: Mapping[int | None, Scene],
-    deviations: Array,
-    course: SessionCourse,
-    blocks: ResidualBlocks,
+    part: _Part,
+    run: Run,
     prior: LoadPrior,
+    predicted: tuple[Array, Array],
+    booms: Mapping[int | None, Scene],
 ) -> Pass:
     """One session at a trial.
 
     Parameters
     ----------
+    run : callable
+        Of the boom itself.
+    predicted : ndarray, shape (b, c) and (p, b, c)
+        With its derivatives.
     booms : mapping of int or None to Scene
         See `CalibrationProblem.booms`.
     """
-    predicted, slopes = problem.with_slopes(blocks.averaged(forward.move(course)), deviations)
-    left = blocks.measured[:, problem.used] - predicted
+    expected, slopes = predicted
+    left = part.blocks.measured[:, problem.used] - expected
     others = [i for i in range(len(slopes)) if i not in booms]
+    found = run(prior, np.stack([left, *-slopes[others]], axis=1))
+    values, all_white = found.values[:, 0], _white(found)
+    white, root = np.empty(slopes.shape), np.sqrt(found.variances)
+    white[others] = all_white[:, 1:].swapaxes(0, 1)
 
-    def run(moved: int | None) -> Innovations:
-        columns = [left, *-slopes[others]] if moved is None else [left - TRIAL * slopes[moved]]
-        return _filter(problem, booms[moved], course, blocks)(prior, np.stack(columns, axis=1))
+    def moved(i: int) -> Array:
+        other = _run(problem, booms[i], part)(prior, (left - TRIAL * slopes[i])[:, None])
+        return (_white(other)[:, 0] * np.sqrt(other.variances) - values) / (TRIAL * root)
 
+    acting = [i for i in booms if i is not None]
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        found = dict(zip(booms, pool.map(run, booms), strict=True))
-    values, variances, loads = found[None]
-    white = np.empty(slopes.shape)
-    white[others] = values[:, 1:].swapaxes(0, 1)
-    for i, other in found.items():
-        if i is not None:
-            white[i] = (other.values[:, 0] - values[:, 0]) / TRIAL
-    if not (np.isfinite(values).all() and (variances > 0.0).all()):
-        raise SolverError("the filter of the unknown load lost its digits on this boom.")
-    root = np.sqrt(variances)
-    return Pass(values[:, 0] / root, white / root, loads)
+        for i, slope in zip(acting, pool.map(moved, acting), strict=True):
+            white[i] = slope
+    return Pass(all_white[:, 0], white, found.loads)

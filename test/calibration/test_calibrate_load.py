@@ -11,7 +11,7 @@ from boom_twin import load_scene
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.modal import natural_modes
 from boom_twin.bag.session_files import write_session
-from boom_twin.calibration import Choice, calibrate
+from boom_twin.calibration import Choice, calibrate, load_modes
 from boom_twin.calibration.forward_model import ForwardModel
 from boom_twin.calibration.load_filter import (
     ORDER,
@@ -20,9 +20,10 @@ from boom_twin.calibration.load_filter import (
     StrokeError,
     filter_model,
     gained_variance,
+    innovations,
     tilted,
 )
-from boom_twin.calibration.load_modes import modes_along
+from boom_twin.calibration.load_modes import modes_along, posture_path
 from boom_twin.calibration.sessions import SessionCourse, smoothed
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.estimation.sensor_model import specific_force
@@ -47,9 +48,6 @@ def shaken(path, truth, posture, duration, seed, zeros=0.0):
 
 def values_of(found):
     return {each.unknown.name: each.value for each in found.estimates}
-
-
-SOFT = pytest.mark.xfail(reason="cylinder 1 comes out 2.3 % too soft, 2 % are wanted: see docs/calibrate.md")
 
 
 @pytest.mark.slow
@@ -82,7 +80,9 @@ def test_a_force_that_stays_bends_the_boom_as_weight_does():
     course = resting_then_moving(scene)
     booms = [with_parameters(scene, {"tip.payload": 1.0}), with_parameters(scene, {"tip.payload": 1.0, "cylinder_4.k": 5.9e6})]
     for boom in booms:
-        model = filter_model(modes_along(boom, course)[0], np.arange(6), 20.0, LoadPrior(np.ones(2), 1.0), 0.01)
+        model = filter_model(
+            modes_along(boom, posture_path(boom, course)), np.arange(6), 20.0, LoadPrior(np.ones(2), 1.0), 0.01
+        )
         free = slice(STROKES + 2 * ORDER * 4, None)
         turn = model.turn[0]
         still = np.linalg.solve(np.eye(len(turn[free])) - turn[free, free], turn[free, 3])  # under 1 N along y
@@ -95,14 +95,51 @@ def test_frequencies_are_those_of_the_very_postures_that_are_held():
     """A load that shakes the boom near resonance tells a thousandth of a frequency from none."""
     scene = load_scene()
     course = resting_then_moving(scene)
-    modes, along = modes_along(scene, course)
+    path = posture_path(scene, course)
+    modes = modes_along(scene, path)
     for row in (100, 900):
         plan = compile_scene(scene)
         state, work = plan.state(), plan.work()
         settle(plan, state, work, course.strokes[row], joint_angles_of_strokes(scene, course.strokes[row]))
         right = [mode.frequency for mode in natural_modes(plan, state, work, 4, 1e-6)]
-        found = np.sqrt(np.linalg.eigvalsh(modes.stiffness[along[row]])) / (2.0 * np.pi)
+        assert path.places[row] == pytest.approx(round(path.places[row]), abs=1e-3)
+        found = np.sqrt(np.linalg.eigvalsh(modes.stiffness[round(path.places[row])])) / (2.0 * np.pi)
         np.testing.assert_allclose(found, right, rtol=1e-5)
+
+
+def response(scene, course, loads):
+    """Of joint angles and IMU to loads (m, 2) at the instants of a course, by the matrices of knots as near as one likes."""
+    path = posture_path(scene, course)
+    model = filter_model(modes_along(scene, path), np.arange(6), 20.0, LoadPrior(np.ones(2), 1.0), course.step)
+    paces, x, found = np.gradient(path.places, course.step), np.zeros(len(model.start)), []
+    for place, pace, load in zip(path.places, paces, loads, strict=True):
+        left = min(int(place), len(path.strokes) - 2)
+        turn, read = ((1.0 - place + left) * m[left] + (place - left) * m[left + 1] for m in (model.turn, model.read))
+        x[:STROKES] = 0.0
+        x[2:STROKES] = load
+        x = turn @ x
+        found.append((read + pace * model.passing[left]) @ x)
+    return np.array(found)
+
+
+def test_a_load_shakes_a_boom_that_moves_without_steps(monkeypatch):
+    """Knots a quarter as far apart leave the same motion: nothing is left for the filter but what a load as free may make."""
+    scene = load_scene()
+    course = resting_then_moving(scene)
+    loads = 100.0 * np.column_stack([np.zeros(1000), np.arange(1000) // 120 % 2])
+    path = posture_path(scene, course)
+    modes = modes_along(scene, path)
+    monkeypatch.setattr(load_modes, "TRAVEL", load_modes.TRAVEL / 4.0)
+    readings = response(scene, course, loads)
+    jumps = 1e6 * (np.abs(np.diff(loads, axis=0, prepend=loads[:1])) > 0.0)
+    prior = LoadPrior(np.full(2, 0.1), 100.0, jumps)
+    model = filter_model(modes, np.arange(6), 20.0, prior, course.step)
+    gained = gained_variance(model, prior, StrokeError(0.0, 20.0), course.moving, course.step)
+    noise = np.tile(np.array([1e-5] * 4 + [0.005] * 2) ** 2, (1000, 1))
+    paces = np.gradient(path.places, course.step)
+    found = innovations(model, path.places, paces, noise, gained, np.zeros((1000, 6)), readings[:, None])
+    assert np.sqrt(np.mean(found.values[:, 0] ** 2 / found.variances)) < 0.3
+    np.testing.assert_allclose(found.loads[100::120], loads[100::120], atol=2.0)
 
 
 def test_noise_that_a_smoother_leaves_in_moving_strokes_is_that_of_the_filter():
@@ -110,7 +147,7 @@ def test_noise_that_a_smoother_leaves_in_moving_strokes_is_that_of_the_filter():
     rng, step, corner, variance = np.random.default_rng(2), 0.005, 3.85, 4e-10
     noise = smoothed(np.sqrt(variance) * rng.standard_normal((400_000, 1)), step, corner)[:, 0]
     scene = load_scene()
-    modes, _ = modes_along(scene, resting_then_moving(scene))
+    modes = modes_along(scene, posture_path(scene, resting_then_moving(scene)))
     strokes, length = StrokeError(variance * step, 2.0 * np.pi * corner), 0.01
     prior = LoadPrior(np.ones(2), 1.0)
     model = filter_model(modes, np.arange(6), strokes.corner, prior, length)
@@ -136,7 +173,7 @@ def test_an_imu_on_a_turned_tip_reads_along_other_axes_whatever_acts_there():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("posture", "seed"), [("arch", 40), pytest.param("high", 41, marks=SOFT)])
+@pytest.mark.parametrize(("posture", "seed"), [("arch", 40), ("high", 41)])
 def test_pump_and_wind_shake_the_default_boom(posture, seed, tmp_path):
     """One session of 60 s of the independent model."""
     truth = off(load_scene(), 1.1, 0.9, 1.08, 0.92, **{"tip.payload": 15.0})
