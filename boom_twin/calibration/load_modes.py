@@ -109,8 +109,10 @@ def _travelled(scene: Scene, course: SessionCourse) -> Array:
 
 
 class _Knot(NamedTuple):
-    """A posture: m modes with their turns of the joints (m, n), those by a force at the tip (n, 2), the drives' lengths (n,),
-    slopes (n,) of strokes by angles, angle of the tip.
+    """What is known of a posture.
+
+    m modes with their turns of the joints (m, n), those by a force at the tip (n, 2), the drives' lengths (n,), slopes (n,) of
+    strokes by angles, angle of the tip.
     """
 
     modes: tuple[Mode, ...]
