@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import fcntl
 import gc
+import os
 import pickle
 import subprocess
 import sys
@@ -59,8 +60,7 @@ class Pipe:
         """One object down the pipe."""
         assert self._stdin is not None
         try:
-            pickle.dump(item, self._stdin, protocol=pickle.HIGHEST_PROTOCOL)
-            self._stdin.flush()
+            _write(self._stdin.fileno(), item)
         except BrokenPipeError:
             self.finish()
             raise
@@ -123,5 +123,11 @@ def say_ready() -> None:
 def post(items: list[Any]) -> None:
     """Send objects up the pipe; called by the process."""
     for item in items:
-        pickle.dump(item, sys.stdout.buffer, protocol=pickle.HIGHEST_PROTOCOL)
-    sys.stdout.buffer.flush()
+        _write(sys.stdout.fileno(), item)
+
+
+def _write(descriptor: int, item: Any) -> None:
+    """Write all of an object: Python's buffered writer loses what a process that is suspended (Ctrl-Z) had begun to write."""
+    left = memoryview(pickle.dumps(item, protocol=pickle.HIGHEST_PROTOCOL))
+    while left:
+        left = left[os.write(descriptor, left) :]
