@@ -204,9 +204,9 @@ def _mode(plan: Plan, state: State, work: Work, boom: _AtRest, omega: float, low
     return Mode(omega / (2.0 * math.pi), increments, motion, state.drives[0].copy())
 
 
-def joint_increments(plan: Plan, state: State, work: Work, mode: Mode) -> Array:
-    """Change of the joint angles, shape (n,), rad per unit of the modal coordinate."""
-    return along(plan, state, work, mode.increments, lambda: taken_apart(plan, first_row(plan, state)).joints)
+def joint_increments(plan: Plan, state: State, work: Work, increments: Array) -> Array:
+    """Change of the joint angles, shape (n,), rad, with `increments` of the unknowns."""
+    return along(plan, state, work, increments, lambda: taken_apart(plan, first_row(plan, state)).joints)
 
 
 def along(plan: Plan, state: State, work: Work, increments: Array, read: Callable[[], Array]) -> Array:
@@ -356,7 +356,7 @@ class StrokeNoise:
 def stroke_noise(plan: Plan, state: State, work: Work, spectrum: StrokeSpectrum) -> StrokeNoise:
     """Propagate noise of the strokes to the natural modes within the band of the quickest smoother."""
     modes = natural_modes(plan, state, work, len(plan.names), width=WIDTH, highest=float(spectrum.corners[-1]))
-    found = [(mode, damping_ratio(plan, mode), joint_increments(plan, state, work, mode)) for mode in modes]
+    found = [(mode, damping_ratio(plan, mode), joint_increments(plan, state, work, mode.increments)) for mode in modes]
     return stroke_noise_of(plan, found, spectrum)
 
 

@@ -16,6 +16,7 @@ times a second, as often as it swings by itself.
 from __future__ import annotations
 
 import math
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -23,9 +24,9 @@ import numpy as np
 
 from ..analysis.bending_moments import increments_by_tip_force
 from ..analysis.equilibrium import settle
-from ..analysis.modal import Mode, along, natural_modes
+from ..analysis.modal import Mode, joint_increments, natural_modes
 from ..compiler.compile import compile_scene
-from ..compiler.plan import Plan, first_row, taken_apart
+from ..compiler.plan import Plan
 from ..errors import SolverError
 from ..kernels.elements.linkage import cylinder_length
 from ..kernels.tables import FRAME_ANGLE
@@ -155,10 +156,7 @@ def modes_along(scene: Scene, path: PosturePath) -> ModesAlong:
 
 def _knots(scene: Scene, plan: Plan, path: PosturePath) -> list[_Knot]:
     state, work, found = plan.state(), plan.work(), []
-
-    def turns(increments: Array) -> Array:
-        return along(plan, state, work, increments, lambda: taken_apart(plan, first_row(plan, state)).joints)
-
+    turns = partial(joint_increments, plan, state, work)
     for strokes, angles in zip(path.strokes, path.angles, strict=True):
         settle(plan, state, work, strokes, angles)
         modes = natural_modes(plan, state, work, MODES, WIDTH, 2.0 * math.pi * HIGHEST)

@@ -253,11 +253,16 @@ def _passes(
     ]
 
 
-def _white(found: Innovations) -> Array:
-    """Innovations in their deviations, (b, j, c); SolverError if they are no numbers."""
+def _checked(found: Innovations) -> Innovations:
+    """The same; SolverError if they are no numbers."""
     if not (np.isfinite(found.values).all() and (found.variances > 0.0).all()):
         raise SolverError("the filter of the unknown load lost its digits on this boom.")
-    return np.asarray(found.values / np.sqrt(found.variances)[:, None])
+    return found
+
+
+def _white(found: Innovations) -> Array:
+    """Innovations in their deviations, (b, j, c)."""
+    return np.asarray(_checked(found).values / np.sqrt(found.variances)[:, None])
 
 
 def _pass(
@@ -288,8 +293,8 @@ def _pass(
     white[others] = all_white[:, 1:].swapaxes(0, 1)
 
     def moved(i: int) -> Array:
-        other = _run(problem, booms[i], part)(prior, (left - TRIAL * slopes[i])[:, None])
-        return (_white(other)[:, 0] * np.sqrt(other.variances) - values) / (TRIAL * root)
+        other = _checked(_run(problem, booms[i], part)(prior, (left - TRIAL * slopes[i])[:, None]))
+        return (other.values[:, 0] - values) / (TRIAL * root)
 
     acting = [i for i in booms if i is not None]
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:

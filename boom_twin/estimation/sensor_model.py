@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ..compiler.plan import Plan, width_of
 from ..errors import UsageError
-from ..kernels.jit import inner
+from ..kernels.jit import SameTypes, inner
 from ..kernels.result_row import places_in
 from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, JOINT_A, JOINT_B, State
 from ..kernels.transfer.time_step import observe
@@ -96,7 +96,7 @@ class Reading:
         self._plan, self._mounting = plan, mounting
         self._row, self._at = np.zeros(width_of(plan)), places_in(plan.joints, len(plan.pins))
         self._gravity: tuple[float, float] = tuple(plan.tables.gravity.tolist())
-        self._observe: Callable[..., object] | None = None
+        self._observe = SameTypes(observe)
 
     def of(self, state: State) -> Array:
         """Of an equilibrium."""
@@ -115,7 +115,4 @@ class Reading:
 
     def _look(self, state: State) -> None:
         """Bring the row of results up to date."""
-        arguments = self._plan.tables, state, self._row
-        if self._observe is None:
-            self._observe = observe.for_types_of(*arguments)
-        self._observe(*arguments)
+        self._observe(self._plan.tables, state, self._row)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.jit import hold
+from ..kernels.jit import SameTypes, hold
 from ..scene.schema import Scene
 from ..types import Array, Mount, Stream, channels_of
-from .sensor_survey import CheckWork, survey
+from .sensor_survey import ROOM, CheckWork, survey
 
 
 def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
@@ -64,7 +63,6 @@ REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to r
 FALSE_ALARM = 1e-12  # probability, for each reading, that a live sensor repeats for so long
 SILENT_FOR = 0.5  # s; readings that lie farther apart are no neighbours: neither jumps nor spikes show across such a gap
 MISSING = 0.1  # share of the readings
-ROOM = 32  # readings of a block for which there is room at first
 ENOUGH, MEDIAN2 = 6, 0.4549  # second differences whose median tells noise; that of the square of a standard normal value
 
 
@@ -150,7 +148,7 @@ class SensorCheck:
             outside=np.zeros(count),
         )
         self._held = hold(self._known)
-        self._survey: Callable[..., Any] | None = None
+        self._survey = SameTypes(survey)
         self._usual2 = self._lasting2 = self._sigma**2  # of the noise, as it is with most channels: now, and lately
         self._first = math.inf
         none, unknown = np.zeros(count, dtype=bool), np.full(count, np.nan)
@@ -184,10 +182,8 @@ class SensorCheck:
             return self._calm if self._first == math.inf else self._nothing(count, now)
         self._make_room(3 + rows)
         span, newest = max(float(stamps[-1] - stamps[0]), 1e-3), float(stamps[-1])
-        arguments = self._held, stamps, np.ascontiguousarray(raw), np.ascontiguousarray(expected), min(1.0, span / NOISY_WINDOW)
-        if self._survey is None:
-            self._survey = survey.for_types_of(*arguments)
-        *found, is_whole = self._survey(*arguments)
+        raw, expected = np.ascontiguousarray(raw), np.ascontiguousarray(expected)
+        *found, is_whole = self._survey(self._held, stamps, raw, expected, min(1.0, span / NOISY_WINDOW))
         self._usual2 = self._usual_power()
         self._lasting2 += min(1.0, span / USUAL_WINDOW) * (self._usual2 - self._lasting2)
         loud = NOISY**2 * min(self._usual2, NOISY**2 * self._sigma**2)

@@ -12,7 +12,9 @@ from ..kernels.jit import by_reference, inner, kernel
 from ..types import NANO, Array
 
 Integers = NDArray[np.int64]
-COUNTS, READ, OFF, SQUARES, NEAR, NEAR_COUNTS, RATES = range(7)  # rows of `ReadingsWork.numbers`
+
+ROOM = 32  # readings of a block for which callers make room at first
+COUNTS, OFF, NEAR, NEAR_COUNTS, RATES = range(5)  # rows of `ReadingsWork.numbers`
 MEASURED, SPREAD, TURNING = range(3)  # rows of what `summarise_predictions` writes
 SLOW_READ, SLOW_EXPECTED, SLOW_SQUARES, WEIGHT = range(4)  # of `ReadingsWork.slow`
 VARIANCE, BENT, WHITE, FAR, LOUDEST, NOISE_SHARE = range(6)  # of `ReadingsWork.limits`
@@ -26,7 +28,7 @@ class ReadingsWork(NamedTuple):
     limits : (6,) variance that noise is stated to have; times of it by which readings bend that move, and share of that power
     which third differences have for noise; what lies that far from the median is an outlier; the largest variance that counts,
     and the weight of a block in what is measured.
-    numbers : (7, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
+    numbers : (5, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
     slow : (4, channels) weighted sums of what was read and expected, of the squares of the difference, and their weight.
     noise2 : (channels,) variance of the noise as measured.
     column : scratch, as long as the largest block.
@@ -173,17 +175,15 @@ def summarise(work, stamps, raw, left, masked, share):
                 read += raw[t, i]
                 off += left[t, i]
                 squares += left[t, i] * left[t, i]
-        numbers[COUNTS, i] = known
-        numbers[READ, i], numbers[OFF, i] = read / max(known, 1), off / max(known, 1)
-        numbers[SQUARES, i] = squares / max(known, 1)
+        numbers[COUNTS, i], numbers[OFF, i] = known, off / max(known, 1)
         if span > 0.0:
             numbers[RATES, i] = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span
         else:
             numbers[RATES, i] = math.nan
         if known > 0:
-            slow[SLOW_READ, i] += share * (numbers[READ, i] - slow[SLOW_READ, i])
-            slow[SLOW_EXPECTED, i] += share * (numbers[READ, i] - numbers[OFF, i] - slow[SLOW_EXPECTED, i])
-            slow[SLOW_SQUARES, i] += share * (numbers[SQUARES, i] - slow[SLOW_SQUARES, i])
+            slow[SLOW_READ, i] += share * (read / known - slow[SLOW_READ, i])
+            slow[SLOW_EXPECTED, i] += share * (read / known - numbers[OFF, i] - slow[SLOW_EXPECTED, i])
+            slow[SLOW_SQUARES, i] += share * (squares / known - slow[SLOW_SQUARES, i])
             slow[WEIGHT, i] += share * (1.0 - slow[WEIGHT, i])
         mean_of_near(work, left, i)
     follow_noise(work, left)

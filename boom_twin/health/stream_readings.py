@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.jit import hold
+from ..kernels.jit import SameTypes, hold
 from ..types import Array
 from .inference.block_problem import MeasuredRows, PredictionRows
 from .sensor_survey import (
@@ -19,6 +17,7 @@ from .sensor_survey import (
     NEAR_COUNTS,
     OFF,
     RATES,
+    ROOM,
     SLOW_EXPECTED,
     SLOW_READ,
     SLOW_SQUARES,
@@ -40,7 +39,6 @@ LOUDEST, NOISE_SHARE = 100.0, 0.05
 """Times the stated variance that noise is taken for at most; and weight of a block in the variance that is measured."""
 WINDOW = 2.0  # s, time constant of the slow means
 ENOUGH = 0.6  # of their weight: after 1.8 s
-ROOM = 32  # readings of a block for which there is room at first
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,14 +109,14 @@ class StreamSurvey:
     def __init__(self, variance: float, channels: int) -> None:
         limits = np.array([variance, SHAKEN, WHITE, OUTLIER * variance**0.5, LOUDEST * variance, NOISE_SHARE])
         self.noise2 = np.full(channels, variance)
-        self._numbers, slow = np.zeros((7, channels)), np.zeros((4, channels))
+        self._numbers, slow = np.zeros((5, channels)), np.zeros((4, channels))
         self._work = ReadingsWork(limits, self._numbers, slow, self.noise2, np.zeros(ROOM))
         self._held = hold(self._work)
         self._slow = SlowMeans(slow[SLOW_READ], slow[SLOW_EXPECTED], slow[SLOW_SQUARES], slow[WEIGHT])
         none, unknown = np.zeros(channels), np.full(channels, np.nan)
         no_rows = MeasuredRows(np.zeros(0, np.int64), np.zeros((0, channels)), np.zeros((0, channels)))
         self._nothing = StreamReadings(no_rows, none, none, unknown, none, unknown, self._slow, False)
-        self._summarise: Callable[..., Any] | None = None
+        self._summarise = SameTypes(summarise)
 
     def take(self, rows: MeasuredRows, masked: NDArray[np.bool_], span: float) -> StreamReadings:
         """Take a block.
@@ -139,10 +137,8 @@ class StreamSurvey:
             self._work = self._work._replace(column=np.zeros(2 * count))
             self._held = hold(self._work)
         stamps, raw, left = (np.ascontiguousarray(column) for column in rows)
-        arguments = self._held, stamps, raw, left, masked, min(1.0, span / WINDOW)
-        if self._summarise is None:
-            self._summarise = summarise.for_types_of(*arguments)
-        is_bent, numbers = self._summarise(*arguments), self._numbers.copy()
+        is_bent = self._summarise(self._held, stamps, raw, left, masked, min(1.0, span / WINDOW))
+        numbers = self._numbers.copy()
         return StreamReadings(
             rows, numbers[COUNTS], numbers[OFF], numbers[NEAR], numbers[NEAR_COUNTS], numbers[RATES], self._slow, bool(is_bent)
         )

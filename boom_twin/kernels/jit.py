@@ -179,6 +179,19 @@ class Kernel:
         return self._compiled[kinds]
 
 
+class SameTypes:
+    """A kernel for a caller whose arguments always are of the types that it first calls with, see `Kernel.for_types_of`."""
+
+    def __init__(self, kernel: Kernel) -> None:
+        self._kernel = kernel
+        self._call: Callable[..., Any] | None = None
+
+    def __call__(self, *arguments: Any) -> Any:
+        if self._call is None:
+            self._call = self._kernel.for_types_of(*arguments)
+        return self._call(*arguments)
+
+
 class Inner(Kernel):
     """A kernel that exists compiled only inside others; called from Python it runs as Python."""
 

@@ -83,7 +83,7 @@ def test_what_angles_read_of_modes(boom):
     modes = modes_in(boom)
     for k, frequency in enumerate(modes.frequencies):
         x = math.pi * frequency * BLOCK
-        wanted = math.sin(x) / x * joint_increments(plan, state, work, noise.modes[k])
+        wanted = math.sin(x) / x * joint_increments(plan, state, work, noise.modes[k].increments)
         assert modes.shown[:4, 2 * k] == pytest.approx(wanted, rel=1e-4, abs=1e-9)
     assert not modes.shown[:, 1::2].any()
 

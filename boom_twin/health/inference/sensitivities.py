@@ -15,6 +15,7 @@ from ...compiler.plan import Plan
 from ...errors import BoomTwinError, SolverError
 from ...estimation.sensor_model import Mounting, Reading
 from ...kernels.integrators import REST, X, prepare
+from ...kernels.jit import SameTypes
 from ...kernels.tables import OK, State, Work
 from ...kernels.transfer.time_step import ANEW, advance
 from ...scene.edit import with_parameters
@@ -101,7 +102,7 @@ class _Boom:
         self.state: State = self.plan.state()
         self.work: Work = self.plan.work()
         self._still = np.zeros(self.plan.joints)
-        self._advance: Callable[..., tuple[int, int, float]] | None = None
+        self._advance = SameTypes(advance)
         self._scheme = prepare(REST, 0.0, 0.0, self.work.weights)
         self.reading = Reading(self.plan, Mounting(self.plan, scene.base.inclination, mounts))
 
@@ -113,10 +114,7 @@ class _Boom:
         """What sensors read at rest there, next to where the boom is; None without an equilibrium."""
         drive = self.plan.closed_lengths + strokes
         boom = self.plan.tables, self.state, self.work, self._scheme
-        arguments = *boom, drive, self._still, TOLERANCE, PASSES, LONGEST, None, ANEW
-        if self._advance is None:
-            self._advance = advance.for_types_of(*arguments)
-        status, _, _ = self._advance(*arguments)
+        status, _, _ = self._advance(*boom, drive, self._still, TOLERANCE, PASSES, LONGEST, None, ANEW)
         return self.reading.of(self.state) if status == OK else None
 
     def follow(self, other: Stand) -> None:
