@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, nan
@@ -107,6 +108,27 @@ class Channel:
         return steps[(steps > 0.0) & (steps <= LONGEST)]
 
 
+class Rows:
+    """Rows of numbers that come one by one, kept as plain memory: nothing for Python's collector of garbage to search.
+
+    Parameters
+    ----------
+    width : int
+        Numbers in a row.
+    """
+
+    def __init__(self, width: int) -> None:
+        self._width, self._numbers = width, array("d")
+
+    def append(self, row: Array) -> None:
+        """One more row, shape (width,)."""
+        self._numbers.frombytes(row.tobytes())
+
+    def table(self) -> Array:
+        """All of them, shape (k, width); no row can be added as long as this is there."""
+        return np.frombuffer(self._numbers).reshape(-1, self._width)
+
+
 class StreamWatch:
     """Counts messages as they come, and works out figures when asked; times in s, stamps in ns.
 
@@ -138,7 +160,7 @@ class StreamWatch:
         """Listening begins; everything but the count is forgotten."""
         self.newest: int | None = None
         self._heard, self._told, self._least, self.lag = now, self.count, nan, nan
-        self._stamps, self._values = list[int](), list[Array]()  # of samples; these the collector of garbage does not search
+        self._stamps, self._values = array("q"), Rows(len(self._channels))  # of samples
         for channel in self._channels:
             channel.forget()
 
@@ -168,10 +190,10 @@ class StreamWatch:
 
     def look(self, longest: float) -> list[ChannelStats]:
         """The figures of every channel since the last look; `longest` (s) is the step between stamps that is allowed."""
-        taken, values, self._stamps, self._values = self._stamps, self._values, [], []
+        taken, values = self._stamps, self._values
+        self._stamps, self._values = array("q"), Rows(len(self._channels))
         refused = max(0, self.count - self._told - len(taken))
         self._told = self.count
         self.lag, self._least = self._least, nan
-        stamps = np.array(taken, dtype=np.int64)
-        table = np.concatenate([np.zeros(0), *values]).reshape(-1, len(self._channels))
+        stamps, table = np.frombuffer(taken, np.int64), values.table()
         return [channel.look(stamps, table[:, i], refused, longest) for i, channel in enumerate(self._channels)]

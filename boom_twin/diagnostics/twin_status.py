@@ -13,7 +13,7 @@ from .levels import Evaluation, Level, Status
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualJudge, level_of
 from .sensor_status import SensorJudge, SensorSpec
 from .source_status import PublishersJudge, Reception, ReceptionJudge
-from .stream_stats import StreamWatch
+from .stream_stats import Rows, StreamWatch
 from .stress_status import StressWatch
 from .topic_status import OutputsJudge, Peers, TopicJudge, seconds
 
@@ -69,7 +69,7 @@ class TwinWatch:
             stream.begin(now)
         self._model.begin(now)
         self._looked = now
-        self._residuals: dict[tuple[str, ...], tuple[list[Array], list[Array]]] = {}  # and their deviations, by channels
+        self._residuals: dict[tuple[str, ...], tuple[Rows, Rows]] = {}  # and their deviations, by channels
         self._newest: Report | None = None  # that has a prediction
         self._judges: dict[str, ResidualJudge] = {}
         self._silent: set[Stream] = set()
@@ -96,19 +96,20 @@ class TwinWatch:
             self.judged(each.health, 0.0)
 
     def _keep_residuals(self, report: Report) -> None:
-        """Until the next look; arrays alone, which Python's collector of garbage does not search."""
+        """Until the next look."""
         rows = report.rows
         if rows is not None and len(rows.streams) == 1:  # as nearly always
-            self._keep(rows.names(rows.streams[0]), rows.values, rows.sigmas)
+            names = rows.names(rows.streams[0])
+            self._keep(names, rows.values[0, : len(names)], rows.sigmas[0, : len(names)])
             return
         for each in report.residuals:
-            self._keep(each.names, each.values[np.newaxis], each.sigmas[np.newaxis])
+            self._keep(each.names, each.values, each.sigmas)
 
     def _keep(self, names: tuple[str, ...], values: Array, sigmas: Array) -> None:
-        """Rows whose first columns are the channels."""
-        if names not in self._residuals:
-            self._residuals[names] = [], []
-        kept = self._residuals[names]
+        """A row of these channels."""
+        kept = self._residuals.get(names)
+        if kept is None:
+            kept = self._residuals[names] = Rows(len(names)), Rows(len(names))
         kept[0].append(values)
         kept[1].append(sigmas)
 
@@ -231,7 +232,7 @@ class TwinWatch:
         for names, those in taken.items():
             yield
             at = now()
-            values, sigmas = (np.concatenate([each[:, : len(names)] for each in part]) for part in those)
+            values, sigmas = (each.table() for each in those)
             for name, column in zip(names, (values / sigmas).T, strict=True):
                 self._judges.setdefault(name, ResidualJudge(name, self._looked)).take(column, at.now)
         at = now()

@@ -92,7 +92,7 @@ def find_pulses(load: Array, interval: float) -> Pulses | None:
         return None
     power = np.square(np.abs(lines @ _direction(lines[peak])))
     peak = peak - 1 + int(np.argmax(power[peak - 1 : peak + 2]))
-    ratio = _prominence(frequencies, power, peak, span)
+    ratio = float(_prominences(frequencies, power, np.array([peak]), span)[0])
     if ratio < STANDS_OUT:
         return None
     offset, top = _vertex(np.log(power[peak - 1 : peak + 2]))
@@ -107,19 +107,20 @@ def _highest(frequencies: Array, power: Array, span: float) -> int | None:
     is_peak = (power[inner] > power[inner - 1]) & (power[inner] >= power[inner + 1]) & (power[inner] > 0.0)
     is_inside = (frequencies[inner] >= LOWEST / span) & (frequencies[inner] <= HIGHEST)
     found = inner[is_peak & is_inside]
-    for place in found[np.argsort(-power[found])].tolist():
-        if _prominence(frequencies, power, place, span) >= STANDS_OUT:
-            return int(place)
-    return None
+    found = found[_prominences(frequencies, power, found, span) >= STANDS_OUT]
+    return int(found[np.argmax(power[found])]) if len(found) else None
 
 
-def _prominence(frequencies: Array, power: Array, place: int, span: float) -> float:
-    """Power of a peak over the mean of its neighbourhood, half its frequency to twice; of the two sides the larger mean."""
-    at, lobe = frequencies[place], LOBE / span
-    below = (frequencies > 0.5 * at) & (frequencies < at - lobe)
-    above = (frequencies > at + lobe) & (frequencies < max(2.0 * at - lobe, at + 3.0 * lobe))
-    level = max(float(power[side].mean()) for side in (below, above) if side.any())
-    return float(power[place]) / level if level > 0.0 else np.inf
+def _prominences(frequencies: Array, power: Array, places: NDArray[np.int64], span: float) -> Array:
+    """Power of peaks (k,) over the mean of half the frequency to twice, of the larger of the two sides."""
+    at, lobe, sums = frequencies[places], LOBE / span, np.concatenate([[0.0], np.cumsum(power)])
+    sides = (0.5 * at, at - lobe), (at + lobe, np.maximum(2.0 * at - lobe, at + 3.0 * lobe))
+    level = np.zeros(len(places))
+    for above, below in sides:
+        first, end = np.searchsorted(frequencies, above, "right"), np.searchsorted(frequencies, below, "left")
+        count = np.maximum(end - first, 0)
+        level = np.maximum(level, (sums[first + count] - sums[first]) / np.maximum(count, 1))
+    return np.divide(power[places], level, out=np.full(len(places), np.inf), where=level > 0.0)
 
 
 def _direction(lines: NDArray[np.complex128]) -> Array:

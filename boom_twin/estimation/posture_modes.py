@@ -77,6 +77,10 @@ class Posture:
         self._found += [self._derived(mode) for mode in modes[len(self._found) :]]
         return self._found[: len(modes)]
 
+    def find_next(self, count: int, highest: float) -> None:
+        """Find one more of those that `lowest` gives, if there is one."""
+        self.lowest(min(len(self._found) + 1, count), highest)
+
     def _derived(self, mode: Mode) -> PostureMode:
         plan, state = self._plan, self._state
 
@@ -124,15 +128,28 @@ class PostureModes:
         if np.isfinite(strokes).all() and (found := self.near(strokes)) is not None:
             found[0].lowest(USUAL, USUALLY_BELOW)
 
+    def prepare_piece(self, strokes: Array) -> None:
+        """Do the next piece of what `prepare` does, a millisecond of work at most."""
+        if not np.isfinite(strokes).all():
+            return
+        is_known = self._place(strokes) in self._kept
+        found = self.near(strokes)
+        if is_known and found is not None:
+            found[0].find_next(USUAL, USUALLY_BELOW)
+
     def near(self, strokes: Array) -> tuple[Posture, Array] | None:
         """The posture on the grid next to `strokes` (m), and its joint angles (rad), both of shape (n,); None without one."""
-        place = tuple(round(stroke / GRID) for stroke in strokes.tolist())
+        place = self._place(strokes)
         if place not in self._kept:
             self._kept[place] = self._settled(np.array(place) * GRID)
             while len(self._kept) > KEPT:
                 self._kept.popitem(last=False)
         self._kept.move_to_end(place)
         return self._kept[place]
+
+    @staticmethod
+    def _place(strokes: Array) -> tuple[int, ...]:
+        return tuple(round(stroke / GRID) for stroke in strokes.tolist())
 
     def _settled(self, strokes: Array) -> tuple[Posture, Array] | None:
         state = self._plan.state()

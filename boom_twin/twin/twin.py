@@ -553,6 +553,8 @@ class Twin:
     def _hold(self, sample: Sample, event: str) -> Report:
         """Taken as a witness of time alone, at first."""
         self.counts[event] += 1
+        if sample.stream is Stream.STROKES:  # the model may start there: its modes are found while nothing is predicted
+            self._modes.postures.prepare_piece(self._zeroed(sample))
         return Report(sample.stamp, True, events=(event,))
 
     def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:

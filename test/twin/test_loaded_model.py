@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from threading import current_thread
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from boom_twin import Report, Sample, Stream, Twin, load_scene
 from boom_twin.analysis.modal import ModeSeries
 from boom_twin.errors import UsageError
+from boom_twin.estimation.posture_modes import PostureMode, PostureModes
 from boom_twin.health.baseline import load_baseline
 from boom_twin.health.monitor import HealthMonitor
 from boom_twin.kernels.jit import _kind
@@ -166,6 +168,38 @@ def test_a_restart_and_another_load_find_their_natural_modes_made(monkeypatch: p
     twin.requests.rest()
     assert twin.update(rows[120]).change is not None
     assert found == ["MainThread", "model"]
+
+
+def test_a_restart_elsewhere_finds_natural_modes_that_were_made_while_samples_were_held(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One at a sample, so that none of them waits for all; and outputs do not depend on it."""
+
+    made: list[PostureMode] = []
+    original = PostureMode.__init__
+
+    def noted(self: PostureMode, *arguments: Any) -> None:
+        made.append(self)
+        original(self, *arguments)
+
+    def reports(twin: Twin) -> list[tuple[int, Report]]:
+        found = []
+        for sample in rows:
+            made.clear()
+            report = twin.update(sample)
+            found.append((len(made), report))
+        return found
+
+    monkeypatch.setattr(PostureMode, "__init__", noted)
+    scene, rows = load_scene(), samples(60)
+    elsewhere = np.array([0.1, -0.08, 0.1, 0.05])
+    rows += [replace(each, stamp=each.stamp + 60_000_000_000, values=each.values + elsewhere) for each in rows]
+    found = reports(Twin(scene))
+    (restart,) = [k for k, (_, report) in enumerate(found) if any("restart" in each.events for each in report.all)]
+    held = [count for count, _ in found[60:restart]]
+    assert found[restart][0] == 0 and sum(held) >= 2 and max(held) == 1
+    monkeypatch.setattr(PostureModes, "prepare_piece", lambda *_: None)
+    assert all(equal(one, other) for (_, one), (_, other) in zip(found, reports(Twin(scene)), strict=True))
 
 
 def test_code_that_is_compiled_for_a_boom_takes_it_under_any_load() -> None:

@@ -202,7 +202,7 @@ class Diagnostics:
         self._pieces = node.create_timer(PIECE, self._go_on, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._pieces.cancel()
         self._work: Iterator[None] | None = None
-        self._newest_piece = 0.0
+        self._newest_piece, self._is_peers_turn = 0.0, False
         self._due, self._active = time.monotonic() + PERIOD, False
         self._watch = TwinWatch({}, {}, Thresholds())
         self._counts: dict[str, Mapping[str, int]] = {}
@@ -259,8 +259,10 @@ class Diagnostics:
         self._watch.broken(f"a message of {stream.value} could not be handled: {type(error).__name__}: {error}")
 
     def _tick(self) -> None:
-        """Look up one topic's other ends; look at everything, if it is due."""
-        self._peers.look()
+        """Look up one topic's other ends, every second time; look at everything, if it is due."""
+        self._is_peers_turn = not self._is_peers_turn
+        if self._is_peers_turn:
+            self._peers.look()
         now = time.monotonic()
         if self._work is None and (now >= self._due - 0.5 * TICK or (self._active and self._watch.is_urgent())):
             self._due = now + PERIOD
