@@ -120,7 +120,7 @@ def _prominences(frequencies: Array, power: Array, places: NDArray[np.int64], sp
         first, end = np.searchsorted(frequencies, above, "right"), np.searchsorted(frequencies, below, "left")
         count = np.maximum(end - first, 0)
         level = np.maximum(level, (sums[first + count] - sums[first]) / np.maximum(count, 1))
-    return np.divide(power[places], level, out=np.full(len(places), np.inf), where=level > 0.0)
+    return np.asarray(np.divide(power[places], level, out=np.full(len(places), np.inf), where=level > 0.0))
 
 
 def _direction(lines: NDArray[np.complex128]) -> Array:
