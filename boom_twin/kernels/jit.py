@@ -269,6 +269,7 @@ def hold(value: Any) -> Any:
     """
     if type(value) not in _BY_REFERENCE or not hasattr(write_fields.dispatcher, "overloads"):
         return value
+    _register_references()  # the class may have come after the first kernel was made
     kept, room = value._make(map(hold, value)), np.zeros(0, np.uint8)
     write = write_fields.for_types_of(value, room)  # numba would look long for the type of what holds an address
     while (size := write(kept, room)) > len(room):

@@ -26,6 +26,12 @@ class Pair(NamedTuple):
     second: int
 
 
+class Late(NamedTuple):
+    """Taken by reference from the middle of a test on."""
+
+    values: np.ndarray
+
+
 @by_reference
 class Inside(NamedTuple):
     values: np.ndarray
@@ -103,6 +109,11 @@ def test_a_copy_of_what_is_held_has_fields_of_its_own(copied):
     assert total(both[1]) == 96.0 + 1.5
     both[0].inside.values[:] = 1.0
     assert total(both[1]) == 15.0 + 1.5
+
+
+def test_a_class_that_came_after_the_first_kernel_is_held():
+    total(fields())
+    assert isinstance(hold(by_reference(Late)(np.ones(2))), HeldFields)
 
 
 def test_only_what_goes_by_reference_is_held():
