@@ -111,8 +111,8 @@ def test_a_copy_of_what_is_held_has_fields_of_its_own(copied):
     assert total(both[1]) == 15.0 + 1.5
 
 
-def test_a_class_that_came_after_the_first_kernel_is_held():
-    total(fields())
+def test_a_class_that_came_after_the_first_was_held_is_held_too():
+    hold(fields())
     assert isinstance(hold(by_reference(Late)(np.ones(2))), HeldFields)
 
 
