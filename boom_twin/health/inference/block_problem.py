@@ -253,9 +253,14 @@ class LinearModel:
         n = len(scene.joints)
         self.signatures = Signatures(scene, known, mounts)
         self._sensor2 = np.array([settings.variance(sensor_kind(name)) for name in judged_channels(n)])
-        self._late = [(i, each.index) for i, each in enumerate(known) if each.form is Form.DELAY]
-        self._of_stream = np.repeat(np.arange(len(JUDGED)), [len(channels_of(n)[stream]) for stream in JUDGED])
+        self._late = [(1 + i, self._channels_of(each.index, n)) for i, each in enumerate(known) if each.form is Form.DELAY]
         self.begin()
+
+    @staticmethod
+    def _channels_of(index: int, joints: int) -> slice:
+        """Those of the stream of this index."""
+        counts = [len(channels_of(joints)[stream]) for stream in JUDGED]
+        return slice(sum(counts[:index]), sum(counts[: index + 1]))
 
     def begin(self) -> None:
         """The boom starts from rest."""
@@ -305,7 +310,9 @@ class LinearModel:
         return self._in_work.popleft().problem
 
     def _table(self, block: BlockMeans, signature: Signature) -> Array:
-        table = np.column_stack([block.left, signature.channels])
-        for column, stream in self._late:
-            table[:, 1 + column] = np.where(self._of_stream == stream, -block.rates, 0.0)
+        table = np.empty((len(block.left), 1 + signature.channels.shape[1]))
+        table[:, 0], table[:, 1:] = block.left, signature.channels
+        for column, own in self._late:
+            table[:, column] = 0.0
+            table[own, column] = -block.rates[own]
         return table

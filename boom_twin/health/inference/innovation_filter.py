@@ -36,9 +36,10 @@ from ...analysis.modal import Mode, StrokeNoise, along
 from ...compiler.plan import Plan
 from ...estimation.deviation_filter import oscillate
 from ...estimation.sensor_model import Reading, specific_force
+from ...kernels.jit import SameTypes, hold
 from ...kernels.tables import FRAME_ANGLE, State, Work
 from ...types import Array
-from .kalman_update import filter_block
+from .kalman_update import LOAD, FilterWork, filter_block
 
 HIGHEST = 8.0  # Hz; faster vibration is averaged out within a block
 KEEPS_STEP = 1.0  # s, see above
@@ -50,7 +51,6 @@ LOAD_TIME, MEAN_TIME = 2.0, 60.0  # s, correlation of the load about its mean, a
 ROUGH = 0.5  # share of what the load adds to readings at once by which they may be off: it changes within a block
 MEAN = 1.0  # see above
 CALM = 2.0  # s, over which vibration that was found is remembered
-LOAD = 4  # states of the load: x and y about the mean, and the mean's
 BOTH = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])  # what of these is the whole load
 
 
@@ -183,6 +183,7 @@ class InnovationFilter:
         self._fresh, self._size = True, 0
         self._swinging = np.zeros(count)  # mean square of the tip's acceleration by vibration that was found
         self._posture: ModalStates | None = None
+        self._filter_block = SameTypes(filter_block)
 
     def tune(self, modes: ModalStates) -> None:
         """Take the modes of a posture, if they are others; coordinates of modes that were there go on."""
@@ -199,21 +200,26 @@ class InnovationFilter:
         (to, across), (of, beside) = np.ix_(at, at), np.ix_(places, places)
         x[:, at], p[:, to, across] = self._x[:, places], self._p[:, of, beside]
         self._x, self._p, self._size = x, p, size
-        self._shaken = SHAPE**2 * self._detuning2 * modes.shaken
         at_once = self._level2 * (modes.lifted**2).sum(axis=1)
-        self._rough, self._pushed = ROUGH**2 * at_once, at_once[:, -2:].sum(axis=1)
-        self._turn, self._least, self._driven = np.eye(states), np.zeros((states, states)), np.zeros((states, states))
-        self._turn[:size, :size] = modes.turn
-        self._turn[:size, size : size + LOAD] = np.hstack([modes.pushed, modes.pushed])
-        self._turn[size : size + LOAD, size : size + LOAD] = np.diag(self._kept)
-        self._least[:size, :size], self._driven[:size, :size] = modes.least, self._detuning2 * modes.driven
-        self._added = np.zeros((count, states))
-        self._added[:, size : size + LOAD] = (1.0 - self._kept**2) * self._stationary
-        self._shown = np.hstack([modes.shown, modes.lifted, modes.lifted, np.eye(self._channels)])
-        self._own = np.arange(size + LOAD, states)  # errors of the channels
-        self._scratch = np.zeros((states, max(states, columns)))
+        turn, least, driven = np.eye(states), np.zeros((states, states)), np.zeros((states, states))
+        turn[:size, :size] = modes.turn
+        turn[:size, size : size + LOAD] = np.hstack([modes.pushed, modes.pushed])
+        turn[size : size + LOAD, size : size + LOAD] = np.diag(self._kept)
+        least[:size, :size], driven[:size, :size] = modes.least, self._detuning2 * modes.driven
+        added = np.zeros((count, states))
+        added[:, size : size + LOAD] = (1.0 - self._kept**2) * self._stationary
         if is_first:
-            self._p[:, :size, :size] += _swung(modes, self._level2)
+            p[:, :size, :size] += _swung(modes, self._level2)
+        channels = self._channels
+        work = FilterWork(
+            turn=turn, least=least, driven=driven, added=added,
+            shown=np.hstack([modes.shown, modes.lifted, modes.lifted, np.eye(channels)]),
+            shaken=SHAPE**2 * self._detuning2 * modes.shaken, rough=ROUGH**2 * at_once, pushed=at_once[:, -2:].sum(axis=1),
+            swinging=self._swinging, x=x, p=p, rows=np.zeros(channels, np.int64), own=np.zeros(channels),
+            scratch=np.zeros((states, max(states, columns))), root=np.zeros((channels, channels)),
+            gain=np.zeros((channels, states)),
+        )  # fmt: skip
+        self._held = hold(work)
 
     def step(self, table: Array, noise: Array, errors2: Array, shaking: float | Array, travel: float) -> Innovations:
         """Innovations of one block.
@@ -238,20 +244,12 @@ class InnovationFilter:
         """
         kept = 0.0 if self._fresh else math.exp(-(travel + REST * self._block) / REACH)
         self._fresh = False
-        self._turn[self._own, self._own] = kept
-        self._added[:, self._own[0] :] = (1.0 - kept * kept) * errors2
-        rows = np.flatnonzero(np.isfinite(table[:, 0]))
-        count, measured = len(self._level2), len(rows)
-        white, log, shaken = np.zeros((count, measured, table.shape[1])), np.zeros(count), shaking + self._pushed
-        root, gain, state = np.zeros((measured, measured)), np.zeros((measured, len(self._turn))), (self._x, self._p)
-        own = shaken[:, None] * self._shaken + self._rough
-        change = self._turn, self._least, self._driven, shaken, self._added
-        filter_block(*change, rows, table, self._shown, noise, own, *state, self._scratch, root, gain, white, log)
+        count, calm = len(self._level2), math.exp(-self._block / CALM)
+        white, log, lately = np.zeros((count, *table.shape)), np.zeros(count), np.full(count, shaking)
+        measured = self._filter_block(self._held, table, noise, errors2, lately, kept, calm, white, log)
         if np.isnan(log).any():
             raise np.linalg.LinAlgError("covariance of innovations: not positive definite")
-        felt = self._x[:, : self._size, 0] @ self._shown[-2:, : self._size].T
-        np.maximum(self._swinging * math.exp(-self._block / CALM), 0.5 * (felt**2).sum(axis=1), out=self._swinging)
-        return Innovations(white.reshape(*self._levels, *white.shape[1:]), log.reshape(self._levels))
+        return Innovations(white[:, :measured].reshape(*self._levels, measured, table.shape[1]), log.reshape(self._levels))
 
     def vibration(self, predicted: float) -> Array:
         """Mean square of the tip's acceleration lately, (m/s^2)^2, shape (levels,): as `predicted`, or as found where more."""
