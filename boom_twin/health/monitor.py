@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -206,10 +205,10 @@ class HealthMonitor:
 
     def _judge_delays(self, block: Block, readings: dict[Stream, StreamReadings]) -> list[Alarm]:
         """Look for lags; gives the alarms that began, changed or ended."""
-        news: list[Alarm] = []
+        news, slowest = list[Alarm](), self._slowest()
         for stream, monitor in self._delays.items():
             is_doubted = partial(self._is_doubted, stream, block.end)
-            news += monitor.take(block.number, readings[stream], self._masked(stream), block.end, is_doubted, self._slowest())
+            news += monitor.take(block.number, readings[stream], self._masked(stream), block.end, is_doubted, slowest)
         return news
 
     def _is_doubted(self, stream: Stream, stamp: int) -> bool:
@@ -220,8 +219,7 @@ class HealthMonitor:
 
     def _slowest(self) -> float:
         """Period (s) of the slowest vibration at the present posture; 0 where it is not known."""
-        modes = () if self._noise is None else self._noise.modes
-        return 1.0 / min((mode.frequency for mode in modes), default=math.inf)
+        return 1.0 / self._noise.modes[0].frequency if self._noise is not None and self._noise.modes else 0.0
 
     def _check(self, stream: Stream, block: Block, stamps: NDArray[np.int64], raw: Array, expected: Array) -> list[Alarm]:
         """Check the sensors of a stream: stamps (k,) in ns, readings and what they should be (k, channels); gives the news."""

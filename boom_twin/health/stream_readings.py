@@ -30,6 +30,8 @@ from .sensor_survey import (
     summarise_predictions,
 )
 
+_summarise_predictions = SameTypes(summarise_predictions)
+
 SHAKEN = 3.0
 """Variances of a reading in its second differences, by which other sensors bear witness that the boom is shaken and that what
 looks like noise in strokes may be motion."""
@@ -176,5 +178,5 @@ class PredictionMeans:
         """Of one prediction or more."""
         found = np.empty((3, rows.measured.shape[1]))
         given = rows.stamps, rows.measured, rows.variances, rows.joints, rows.accelerations
-        largest, shaking = summarise_predictions(*map(np.ascontiguousarray, given), found)
+        largest, shaking = _summarise_predictions(*map(np.ascontiguousarray, given), found)
         return cls(found[MEASURED], found[SPREAD], found[TURNING], largest, shaking)

@@ -90,7 +90,7 @@ class ModalStates(NamedTuple):
 def modes_of(noise: StrokeNoise, read: ReadModes, block: float, before: ModalStates | None) -> ModalStates:
     """The modes of a posture, as sensors read them, for blocks of `block` s; of the signs of those `before`."""
     size, channels, h = sum(mode.frequency < HIGHEST for mode in noise.modes), read.still.shape[1], block
-    turn, least, driven, rest = (np.zeros((2 * size, 2 * size)) for _ in range(4))
+    turn, driven, unknown = (np.zeros((2 * size, 2 * size)) for _ in range(3))
     shown, shaken = np.zeros((channels, 2 * size)), np.zeros(channels)
     pushed, lifted = np.zeros((2 * size, 2)), np.zeros((channels, 2))
     for k, (mode, still, felt) in enumerate(zip(noise.modes, read.still, read.felt, strict=True)):
@@ -100,8 +100,6 @@ def modes_of(noise: StrokeNoise, read: ReadModes, block: float, before: ModalSta
             continue
         at, swing = slice(2 * k, 2 * k + 2), max(float(np.hypot(*motion)), 1e-12)
         turn[at, at] = own = oscillation(omega, max(noise.decay[k], LEAST_DAMPING * omega), h)
-        rest[at, at] = noise.collected[k] * np.diag([1.0, omega * omega])
-        least[at, at] = rest[at, at] - own @ rest[at, at] @ own.T
         driven[at, at] = KEEPS_STEP / swing**2 * np.array([[h**3 / 3.0, h * h / 2.0], [h * h / 2.0, h]])
         swinging, passed = still - omega**2 * felt, float(np.sinc(mode.frequency * h))
         shown[:, 2 * k] = passed * swinging
@@ -112,7 +110,15 @@ def modes_of(noise: StrokeNoise, read: ReadModes, block: float, before: ModalSta
             pushed[at] *= -1.0
         shaken += (shown[:, 2 * k] / (omega * omega * swing)) ** 2
     frequencies = np.array([mode.frequency for mode in noise.modes[:size]])
-    return ModalStates(frequencies, turn, least, driven, rest, shown, shaken, pushed, lifted)
+    return shaken_by(noise, ModalStates(frequencies, turn, unknown, driven, unknown, shown, shaken, pushed, lifted))
+
+
+def shaken_by(noise: StrokeNoise, modes: ModalStates) -> ModalStates:
+    """The same modes where strokes' noise has shaken them as it now does."""
+    size = len(modes.frequencies)
+    spread = np.column_stack([noise.collected[:size], noise.collected[:size] * (2.0 * math.pi * modes.frequencies) ** 2])
+    rest = np.diag(spread.ravel())
+    return modes._replace(rest=rest, least=rest - modes.turn @ rest @ modes.turn.T)
 
 
 def oscillation(omega: float, decay: float, h: float) -> Array:
@@ -183,13 +189,16 @@ class InnovationFilter:
         self._fresh, self._size = True, 0
         self._swinging = np.zeros(count)  # mean square of the tip's acceleration by vibration that was found
         self._posture: ModalStates | None = None
+        self._work: FilterWork  # of that posture
         self._filter_block = SameTypes(filter_block)
 
     def tune(self, modes: ModalStates) -> None:
         """Take the modes of a posture, if they are others; coordinates of modes that were there go on."""
-        if modes is self._posture:
+        before, self._posture = self._posture, modes
+        if before is not None and modes.turn is before.turn:
+            if modes is not before:
+                self._work.least[: self._size, : self._size] = modes.least
             return
-        is_first, self._posture = self._posture is None, modes
         size, old, others = len(modes.turn), self._size, LOAD + self._channels
         kept = min(size, old)
         places = [*range(kept), *range(old, old + others)]
@@ -208,10 +217,10 @@ class InnovationFilter:
         least[:size, :size], driven[:size, :size] = modes.least, self._detuning2 * modes.driven
         added = np.zeros((count, states))
         added[:, size : size + LOAD] = (1.0 - self._kept**2) * self._stationary
-        if is_first:
+        if before is None:
             p[:, :size, :size] += _swung(modes, self._level2)
         channels = self._channels
-        work = FilterWork(
+        self._work = FilterWork(
             turn=turn, least=least, driven=driven, added=added,
             shown=np.hstack([modes.shown, modes.lifted, modes.lifted, np.eye(channels)]),
             shaken=SHAPE**2 * self._detuning2 * modes.shaken, rough=ROUGH**2 * at_once, pushed=at_once[:, -2:].sum(axis=1),
@@ -219,7 +228,7 @@ class InnovationFilter:
             scratch=np.zeros((states, max(states, columns))), root=np.zeros((channels, channels)),
             gain=np.zeros((channels, states)),
         )  # fmt: skip
-        self._held = hold(work)
+        self._held = hold(self._work)
 
     def step(self, table: Array, noise: Array, errors2: Array, shaking: float | Array, travel: float) -> Innovations:
         """Innovations of one block.
