@@ -108,10 +108,19 @@ class _AtRest:
             yield omega
             low = omega * (1.0 - 1e-9)
 
-    def frequency(self, base: int, number: int, low: float, width: float) -> float:
-        """The frequency (rad/s), above `low`, at which the count less `base` rises from at most `number` to more."""
-        omega, _ = _checked(*bisect_frequency(*self._boom, base, number, low, width, self._scratch))
+    def frequency(self, base: int, number: int, low: float, width: float, near: float = 0.0) -> float:
+        """The frequency (rad/s), above `low`, at which the count less `base` rises from at most `number` to more.
+
+        `near` is what it is known to be about; 0 if it is not.
+        """
+        omega, _ = _checked(*bisect_frequency(*self._boom, base, number, low, near, width, self._scratch))
         return omega
+
+    def those_near(self, numbers: Sequence[int], near: Sequence[float], width: float) -> Iterator[float]:
+        """Natural frequencies by number, from 0, that are about `near` (rad/s); ascending."""
+        base = self.count_below(0.0)
+        for number, about in zip(numbers, near, strict=True):
+            yield self.frequency(base, number, 0.0, width, about)
 
     def response(self, omega: float, load: Array) -> Array:
         """Solve (K - omega^2 M) dz = M load, up to a factor.
@@ -183,6 +192,13 @@ class ModeSeries:
 def natural_frequencies(plan: Plan, state: State, work: Work, count: int, width: float) -> Array:
     """The lowest `count` natural frequencies (Hz) alone, or all if there are fewer; see `natural_modes`."""
     found = np.array(list(_AtRest(plan, state, work).lowest(count, width, HIGHEST)))
+    place(plan.tables, state, work)
+    return found / (2.0 * math.pi)
+
+
+def frequencies_near(plan: Plan, state: State, work: Work, numbers: Sequence[int], near: Array, width: float) -> Array:
+    """Natural frequencies (Hz) by number, from 0 and ascending, where it is known what they are about: `near` (Hz)."""
+    found = np.array(list(_AtRest(plan, state, work).those_near(numbers, (2.0 * math.pi * near).tolist(), width)))
     place(plan.tables, state, work)
     return found / (2.0 * math.pi)
 

@@ -51,6 +51,7 @@ class AngleReading:
     def __init__(self, scene: Scene, mounts: tuple[Mount | None, ...]) -> None:
         self._scene, self._are_encoders = scene, not any(mounts)
         self._found: list[_Exchange] = []
+        self._none = np.zeros(len(scene.joints), dtype=bool)
         self.begin()
 
     def begin(self) -> None:
@@ -67,6 +68,8 @@ class AngleReading:
     @property
     def masked(self) -> NDArray[np.bool_]:
         """Angle sensors that are not to be used, shape (n,)."""
+        if not self._found:
+            return self._none
         mask = np.full(len(self._scene.joints), self.has_wrong_strokes)
         for found in self._found:
             mask[list(found.joints)] = True

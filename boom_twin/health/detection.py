@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.elements.pin_contact import bisect
+from ..kernels.jit import SameTypes
 from ..types import Array
 from .deviation_sums import ALLOWANCE, WINDOW, follow_deviations
 
@@ -42,11 +43,12 @@ class Detector:
         self._squares = np.zeros((WINDOW, channels))
         self._lasting, self._window = 0.0, 0.0
         self._count = 0
+        self._follow = SameTypes(follow_deviations)
 
     def take(self, normal: Array) -> None:
         """Innovations of one block, shape (channels,), NaN where nothing was measured."""
         self._count += 1
-        self._lasting, self._window = follow_deviations(self._sums, self._began, self._squares, normal, self._count)
+        self._lasting, self._window = self._follow(self._sums, self._began, self._squares, normal, self._count)
 
     @property
     def levels(self) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -179,7 +178,7 @@ class HealthMonitor:
         for stream, each in readings.items():
             if stream in CHECKED:
                 stamps, raw, left = each.rows
-                expected = raw - left if is_followed else np.full_like(raw, np.nan)
+                expected = raw - left if is_followed else np.full(raw.shape, np.nan)
                 news += self._check(stream, block, stamps, raw, expected)
         if is_followed:
             news += self._void(self._mount.take(readings[Stream.IMU], start, block.end), block.end)
@@ -188,7 +187,7 @@ class HealthMonitor:
             news += self._forces.take(readings[Stream.FORCES], start, block.end)
             news += self._judge_delays(block, readings)
         strokes = predictions.measured
-        expected = np.full_like(strokes, np.nan if is_shaken else 0.0)
+        expected = np.full(strokes.shape, np.nan if is_shaken else 0.0)
         news += self._check(Stream.STROKES, block, predictions.stamps, strokes, expected)
         if self._sensors[Stream.STROKES].masked.any() or self._angles.has_wrong_strokes or self._noise is None:
             news += self.residuals.close(start)
@@ -206,10 +205,10 @@ class HealthMonitor:
 
     def _judge_delays(self, block: Block, readings: dict[Stream, StreamReadings]) -> list[Alarm]:
         """Look for lags; gives the alarms that began, changed or ended."""
-        news: list[Alarm] = []
+        news, slowest = list[Alarm](), self._slowest()
         for stream, monitor in self._delays.items():
             is_doubted = partial(self._is_doubted, stream, block.end)
-            news += monitor.take(block.number, readings[stream], self._masked(stream), block.end, is_doubted, self._slowest())
+            news += monitor.take(block.number, readings[stream], self._masked(stream), block.end, is_doubted, slowest)
         return news
 
     def _is_doubted(self, stream: Stream, stamp: int) -> bool:
@@ -220,14 +219,13 @@ class HealthMonitor:
 
     def _slowest(self) -> float:
         """Period (s) of the slowest vibration at the present posture; 0 where it is not known."""
-        modes = () if self._noise is None else self._noise.modes
-        return 1.0 / min((mode.frequency for mode in modes), default=math.inf)
+        return 1.0 / self._noise.modes[0].frequency if self._noise is not None and self._noise.modes else 0.0
 
     def _check(self, stream: Stream, block: Block, stamps: NDArray[np.int64], raw: Array, expected: Array) -> list[Alarm]:
         """Check the sensors of a stream: stamps (k,) in ns, readings and what they should be (k, channels); gives the news."""
         monitor = self._sensors[stream]
         before = monitor.masked
-        findings = self._checks[stream].look(np.asarray(stamps * NANO, float), raw, expected, block.end * NANO)
+        findings = self._checks[stream].look(np.asarray(stamps * NANO), raw, expected, block.end * NANO)
         may_come_back = stream is not Stream.STROKES and not findings.is_calm and findings.jumped.any()
         news = monitor.take(findings, block.number * BLOCK, block.end, self.residuals.blamed if may_come_back else frozenset())
         if stream in JUDGED and monitor.masked is not before and (monitor.masked & ~before).any():
@@ -240,9 +238,8 @@ class HealthMonitor:
         """Means of the residuals of every stream that is judged, of the block that begins at `start` (ns)."""
         means, counts, imu = [], [], readings[Stream.IMU]
         for stream in JUDGED:
-            each, stated = readings[stream], self._stated[stream]
-            counts.append(each.near_counts * stated / np.maximum(self._surveys[stream].noise2, stated))
-            means.append(np.where(self._masked(stream), np.nan, each.near))
+            counts.append(readings[stream].evened)
+            means.append(np.where(self._masked(stream), np.nan, readings[stream].near))
         return BlockMeans(
             start=start,
             left=np.concatenate(means),
@@ -250,7 +247,7 @@ class HealthMonitor:
             strokes=predictions.strokes[len(predictions.stamps) // 2],
             variances=predicted.variances,
             rates=np.concatenate([predicted.rates, np.where(np.isfinite(imu.rates), imu.rates, 0.0)]),
-            shaking=float((predictions.accelerations**2).sum(axis=1).mean()),
+            shaking=predicted.shaking,
             motion=(imu if len(imu.rows.stamps) else readings[Stream.ANGLES]).rows,
         )
 

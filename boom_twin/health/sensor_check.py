@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..kernels.jit import SameTypes, hold
 from ..scene.schema import Scene
 from ..types import Array, Mount, Stream, channels_of
-from .sensor_survey import ROOM, CheckWork, survey
+from .sensor_survey import FIRST, LASTING, NOISE, ROOM, CheckWork, survey
 
 
 def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
@@ -133,8 +133,13 @@ class SensorCheck:
         self._patience = repeats(sigma, resolution)
         count, rows = len(low), 3 + ROOM
         margin, stated2 = 5.0 * self._sigma, self._sigma**2
+        limits = [
+            SILENT_FOR, (4.0 * NOISY) ** 2 * stated2, stated2, NOISY_WINDOW, USUAL_WINDOW,
+            SPIKE * self._sigma, NOISY**2, NOISY**2 * stated2, MISSING, self._patience,
+        ]  # fmt: skip
         self._known = CheckWork(
-            limits=np.array([SILENT_FOR, (4.0 * NOISY) ** 2 * stated2, stated2]),
+            limits=np.array(limits, float),
+            lately=np.array([math.inf, 0.0, stated2, stated2]),
             times=np.zeros(rows),
             raw=np.full((rows, count), np.nan),
             left=np.full((rows, count), np.nan),
@@ -149,20 +154,18 @@ class SensorCheck:
         )
         self._held = hold(self._known)
         self._survey = SameTypes(survey)
-        self._usual2 = self._lasting2 = self._sigma**2  # of the noise, as it is with most channels: now, and lately
-        self._first = math.inf
         none, unknown = np.zeros(count, dtype=bool), np.full(count, np.nan)
         self._calm = SensorFindings(none, none, none, np.zeros(count), none, none, unknown, is_calm=True)
 
     @property
     def noise(self) -> float:
         """Times the noise that is stated, as it is with most channels, lately."""
-        return math.sqrt(self._lasting2) / self._sigma
+        return math.sqrt(self._known.lately[LASTING]) / self._sigma
 
     @property
     def noise_now(self) -> float:
         """The same over `NOISY_WINDOW` where it is worth a warning; else 1."""
-        times = math.sqrt(self._usual2) / self._sigma
+        times = math.sqrt(self._known.lately[NOISE]) / self._sigma
         return times if times > MISSTATED else 1.0
 
     def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
@@ -177,22 +180,12 @@ class SensorCheck:
         now : float
             End of the block, s.
         """
-        count, rows = raw.shape[1], len(stamps)
+        rows = len(stamps)
         if not rows:
-            return self._calm if self._first == math.inf else self._nothing(count, now)
+            return self._calm if self._known.lately[FIRST] == math.inf else self._nothing(raw.shape[1], now)
         self._make_room(3 + rows)
-        span, newest = max(float(stamps[-1] - stamps[0]), 1e-3), float(stamps[-1])
-        raw, expected = np.ascontiguousarray(raw), np.ascontiguousarray(expected)
-        *found, is_whole = self._survey(self._held, stamps, raw, expected, min(1.0, span / NOISY_WINDOW))
-        self._usual2 = self._usual_power()
-        self._lasting2 += min(1.0, span / USUAL_WINDOW) * (self._usual2 - self._lasting2)
-        loud = NOISY**2 * min(self._usual2, NOISY**2 * self._sigma**2)
-        self._first = min(self._first, float(stamps[0]))
-        is_calm = is_whole and now - newest <= SILENT_FOR and self._is_calm(found, loud, rows)
-        findings = self._calm if is_calm else self._findings(found[0], loud, rows, now)
-        for column in (self._known.times, self._known.raw, self._known.left):
-            column[:3] = column[rows : rows + 3]
-        return findings
+        is_calm, largest = self._survey(self._held, stamps, np.ascontiguousarray(raw), np.ascontiguousarray(expected), now)
+        return self._calm if is_calm else self._findings(largest, rows, now)
 
     def _make_room(self, rows: int) -> None:
         """Room for so many readings, the newest three before the block among them."""
@@ -202,8 +195,8 @@ class SensorCheck:
             self._known = known._replace(times=times, raw=raw, left=left)
             self._held = hold(self._known)
 
-    def _findings(self, largest: float, loud: float, rows: int, now: float) -> SensorFindings:
-        """What is found in so many readings, whose largest step is `largest`; variances up to `loud` are usual."""
+    def _findings(self, largest: float, rows: int, now: float) -> SensorFindings:
+        """What is found in so many readings, whose largest step is `largest`."""
         known, count = self._known, len(self._known.power)
         times, raw, left = (column[: 3 + rows] for column in (known.times, known.raw, known.left))
         spikes, jumped = np.zeros(count, dtype=bool), np.zeros(count)
@@ -213,7 +206,8 @@ class SensorCheck:
             spikes, jumped = self._spikes(steps, noise), self._jumps(times, raw, left, steps, noise)
         interval = (times[-1] - times[2]) / rows
         is_motion = self._fastest > 0.0 and SWIFT * interval**2 > NOISY * self._sigma  # what bends readings so much
-        is_known = now - self._first > NOISY_WINDOW and not is_motion  # how noisy the sensors are
+        is_known = now - known.lately[FIRST] > NOISY_WINDOW and not is_motion  # how noisy the sensors are
+        loud = NOISY**2 * min(known.lately[NOISE], NOISY**2 * self._sigma**2)  # a judgement takes at most that for usual
         return SensorFindings(
             stuck=self._stuck(float(times[-1])),
             noisy=is_known & (known.power > loud),
@@ -223,12 +217,6 @@ class SensorCheck:
             outside=known.outside > 0.5 * rows,
             level=left[-1].copy(),
         )
-
-    def _is_calm(self, found: Sequence[float], loud: float, rows: int) -> bool:
-        """Whether no channel can have a finding, by what `survey` gave of so many rows; variances up to `loud` are usual."""
-        largest, loudest, longest, lack, most = found
-        is_live = lack <= MISSING and longest < self._patience and most <= 0.5 * rows
-        return is_live and largest <= SPIKE * self._sigma and loudest <= loud
 
     def _nothing(self, count: int, now: float) -> SensorFindings:
         none, silent = np.zeros(count, dtype=bool), now - self._known.heard > SILENT_FOR
@@ -244,15 +232,6 @@ class SensorCheck:
             lone = (np.minimum(np.abs(out), np.abs(back)) > SPIKE * noise) & (out * back > 0.0)
             lone &= np.abs(out - back) < 0.5 * np.minimum(np.abs(out), np.abs(back))
         return np.asarray(lone.any(axis=0))
-
-    def _usual_power(self) -> float:
-        """Of the noise, as it is with most channels: a sensor is faulty that is noisier than its like, not than a data sheet.
-
-        At least what is stated; of a single channel just that. A judgement takes at most `NOISY` times that for usual.
-        """
-        known, stated = sorted(power for power in self._known.power.tolist() if math.isfinite(power)), self._sigma**2
-        middle = known[(len(known) - 1) // 2] if len(known) > 1 else stated
-        return max(middle, stated)
 
     def _stuck(self, newest: float) -> Flags:
         """One reading again and again until `newest` (s), while others of the stream are alive with noise."""

@@ -14,11 +14,12 @@ from ..types import NANO, Array
 Integers = NDArray[np.int64]
 
 ROOM = 32  # readings of a block for which callers make room at first
-COUNTS, OFF, NEAR, NEAR_COUNTS, RATES = range(5)  # rows of `ReadingsWork.numbers`
+COUNTS, OFF, NEAR, NEAR_COUNTS, RATES, EVENED = range(6)  # rows of `ReadingsWork.numbers`
 MEASURED, SPREAD, TURNING = range(3)  # rows of what `summarise_predictions` writes
 SLOW_READ, SLOW_EXPECTED, SLOW_SQUARES, WEIGHT = range(4)  # of `ReadingsWork.slow`
 VARIANCE, BENT, WHITE, FAR, LOUDEST, NOISE_SHARE = range(6)  # of `ReadingsWork.limits`
-GAP, CUT, USUAL = range(3)  # of `CheckWork.limits`
+GAP, CUT, STATED, WINDOW, LONG_WINDOW, LEAP, LOUD, LOUDEST_USUAL, LACK, PATIENCE = range(10)  # of `CheckWork.limits`
+FIRST, ROWS, NOISE, LASTING = range(4)  # of `CheckWork.lately`
 
 
 @by_reference
@@ -28,7 +29,7 @@ class ReadingsWork(NamedTuple):
     limits : (6,) variance that noise is stated to have; times of it by which readings bend that move, and share of that power
     which third differences have for noise; what lies that far from the median is an outlier; the largest variance that counts,
     and the weight of a block in what is measured.
-    numbers : (5, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
+    numbers : (6, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
     slow : (4, channels) weighted sums of what was read and expected, of the squares of the difference, and their weight.
     noise2 : (channels,) variance of the noise as measured.
     column : scratch, as long as the largest block.
@@ -45,8 +46,12 @@ class ReadingsWork(NamedTuple):
 class CheckWork(NamedTuple):
     """What `survey` goes on with, of one stream.
 
-    limits : (3,) readings that lie farther apart (s) are no neighbours; what a single outlier counts at most, and what noise is
-    stated to have, as variances.
+    limits : (10,) readings that lie farther apart (s) are no neighbours; what a single outlier counts at most, and what noise
+    is stated to have, as variances; times (s) over which the noise of a channel and the usual one are taken. What no channel
+    has where nothing is to be found: a larger change from one reading to the next, more than that many times the usual
+    variance, which counts up to the next one; a larger share that is missing; a reading repeated as often.
+    lately : (4,) time (s) of the first reading, and how many the newest block had; variance of the noise, as it is with most
+    channels: now, and lately.
     times, raw, left : (3 + k,), (3 + k, channels), (3 + k, channels) readings, the newest three before a block first: s, as
     measured, less what the model has.
     low, high : (channels,) the range of the sensors.
@@ -56,6 +61,7 @@ class CheckWork(NamedTuple):
     """
 
     limits: Array
+    lately: Array
     times: Array
     raw: Array
     left: Array
@@ -77,28 +83,80 @@ def bend2(values, t, i):
 
 
 @kernel
-def survey(sensors, stamps, raw, expected, share):
+def survey(sensors, stamps, raw, expected, now):
     """Take a block of readings, and go on with what is known of every channel.
 
     Parameters
     ----------
     sensors : CheckWork
-        With the newest three readings before the block; those of the block follow them then.
+        The readings follow the newest three before them there.
     stamps, raw, expected : ndarray, shape (k,), (k, channels), (k, channels)
-        s, as measured, as the model has it.
-    share : float
-        Weight of these readings.
+        s, as measured, as the model has it; k > 0.
+    now : float
+        End of the block, s.
 
     Returns
     -------
-    largest, loudest, longest, lack, most : float, float, int, float, float
-        The largest change of `left` from one reading to the next, but for those across a gap; the largest of `power`, `run`,
-        `missing` and `outside`.
-    is_whole : bool
-        No reading is missing.
+    is_calm : bool
+        No channel can have a finding.
+    largest : float
+        Change of `left` from one reading to the next, but for those across a gap.
+    """
+    limits, lately, rows = sensors.limits, sensors.lately, stamps.shape[0]
+    keep_newest(sensors)
+    lately[ROWS] = rows
+    if not lately[FIRST] <= stamps[0]:
+        lately[FIRST] = stamps[0]
+    span = max(stamps[rows - 1] - stamps[0], 1e-3)
+    largest, loudest, longest, lack, most, is_whole = go_on(sensors, stamps, raw, expected, min(1.0, span / limits[WINDOW]))
+    lately[NOISE] = usual_power(sensors.power, limits[STATED])
+    lately[LASTING] += min(1.0, span / limits[LONG_WINDOW]) * (lately[NOISE] - lately[LASTING])
+    is_live = is_whole and now - stamps[rows - 1] <= limits[GAP] and lack <= limits[LACK] and longest < limits[PATIENCE]
+    loud = limits[LOUD] * min(lately[NOISE], limits[LOUDEST_USUAL])
+    return is_live and most <= 0.5 * rows and largest <= limits[LEAP] and loudest <= loud, largest
+
+
+@inner
+def keep_newest(sensors):
+    """Move the newest three readings to the front."""
+    rows = int(sensors.lately[ROWS])
+    for t in range(3):
+        sensors.times[t] = sensors.times[rows + t]
+        for i in range(sensors.raw.shape[1]):
+            sensors.raw[t, i], sensors.left[t, i] = sensors.raw[rows + t, i], sensors.left[rows + t, i]
+
+
+@inner
+def usual_power(power, stated):
+    """Variance of the noise, as it is with most channels; at least what is stated, of a single channel just that.
+
+    A sensor is faulty that is noisier than its like, not than a data sheet.
+    """
+    known = 0
+    for i in range(power.shape[0]):
+        if math.isfinite(power[i]):
+            known += 1
+    if known < 2:
+        return stated
+    for i in range(power.shape[0]):
+        below = 0
+        for j in range(power.shape[0]):
+            if power[j] < power[i] or (power[j] == power[i] and j < i):
+                below += 1
+        if math.isfinite(power[i]) and below == (known - 1) // 2:
+            return max(power[i], stated)
+    return stated
+
+
+@inner
+def go_on(sensors, stamps, raw, expected, share):
+    """Take the readings, which have a weight of `share`.
+
+    Gives the largest change of `left` from one to the next, but for those across a gap; the largest of `power`, `run`,
+    `missing` and `outside`; and whether no reading is missing.
     """
     times, all_raw, left, count = sensors.times, sensors.raw, sensors.left, 3 + stamps.shape[0]
-    gap, cut, variance = sensors.limits[GAP], sensors.limits[CUT], sensors.limits[USUAL]
+    gap, cut, variance = sensors.limits[GAP], sensors.limits[CUT], sensors.limits[STATED]
     power, run, missing, outside = sensors.power, sensors.run, sensors.missing, sensors.outside
     for t in range(3, count):
         times[t] = stamps[t - 3]
@@ -187,6 +245,9 @@ def summarise(work, stamps, raw, left, masked, share):
             slow[WEIGHT, i] += share * (1.0 - slow[WEIGHT, i])
         mean_of_near(work, left, i)
     follow_noise(work, left)
+    stated = work.limits[VARIANCE]
+    for i in range(raw.shape[1]):
+        numbers[EVENED, i] = numbers[NEAR_COUNTS, i] * stated / max(work.noise2[i], stated)
     return is_bent(work, raw, masked)
 
 
@@ -244,20 +305,20 @@ def is_bent(work, raw, masked):
 
 
 @kernel
-def summarise_predictions(stamps, measured, variances, joints, found):
+def summarise_predictions(stamps, measured, variances, joints, accelerations, found):
     """Write means of a block of predictions: measured strokes, variances of the estimates, rates of the joints.
 
     Parameters
     ----------
-    stamps, measured, variances, joints : ndarray, shape (k,), (k, n), (k, n), (k, n)
-        ns, m, m^2, rad; k > 0.
+    stamps, measured, variances, joints, accelerations : ndarray, shape (k,), (k, n), (k, n), (k, n), (k, 2)
+        ns, m, m^2, rad, m/s^2; k > 0.
     found : ndarray, shape (3, n)
         m, m^2, rad/s; rates of 0 from the first to the last where no time lies between them.
 
     Returns
     -------
-    largest : float
-        Of the variances; NaN if one is.
+    largest, shaking : float
+        Of the variances; NaN if one is. Mean square of the accelerations.
     """
     count, largest = stamps.shape[0], 0.0
     span = (stamps[count - 1] - stamps[0]) * NANO
@@ -270,4 +331,7 @@ def summarise_predictions(stamps, measured, variances, joints, found):
                 largest = variances[t, i]
         found[MEASURED, i], found[SPREAD, i] = strokes / count, spread / count
         found[TURNING, i] = (joints[count - 1, i] - joints[0, i]) / span if span > 0.0 else 0.0
-    return largest
+    shaking = 0.0
+    for t in range(count):
+        shaking += accelerations[t, 0] * accelerations[t, 0] + accelerations[t, 1] * accelerations[t, 1]
+    return largest, shaking / count

@@ -12,6 +12,7 @@ from ..types import Array
 from .inference.block_problem import MeasuredRows, PredictionRows
 from .sensor_survey import (
     COUNTS,
+    EVENED,
     MEASURED,
     NEAR,
     NEAR_COUNTS,
@@ -28,6 +29,8 @@ from .sensor_survey import (
     summarise,
     summarise_predictions,
 )
+
+_summarise_predictions = SameTypes(summarise_predictions)
 
 SHAKEN = 3.0
 """Variances of a reading in its second differences, by which other sensors bear witness that the boom is shaken and that what
@@ -73,6 +76,8 @@ class StreamReadings:
         Mean by which these are off, in their unit; 0 of none.
     near, near_counts : ndarray, shape (channels,)
         The same without outliers, NaN of none; and of how many readings.
+    evened : ndarray, shape (channels,)
+        Of how many with the stated noise that mean would be as sure, as noisy as they are.
     rates : ndarray, shape (channels,)
         Of what the model expects from the first reading to the last, per s; NaN of fewer than two.
     slow : SlowMeans
@@ -86,6 +91,7 @@ class StreamReadings:
     off: Array
     near: Array
     near_counts: Array
+    evened: Array
     rates: Array
     slow: SlowMeans
     is_bent: bool
@@ -109,13 +115,13 @@ class StreamSurvey:
     def __init__(self, variance: float, channels: int) -> None:
         limits = np.array([variance, SHAKEN, WHITE, OUTLIER * variance**0.5, LOUDEST * variance, NOISE_SHARE])
         self.noise2 = np.full(channels, variance)
-        self._numbers, slow = np.zeros((5, channels)), np.zeros((4, channels))
+        self._numbers, slow = np.zeros((6, channels)), np.zeros((4, channels))
         self._work = ReadingsWork(limits, self._numbers, slow, self.noise2, np.zeros(ROOM))
         self._held = hold(self._work)
         self._slow = SlowMeans(slow[SLOW_READ], slow[SLOW_EXPECTED], slow[SLOW_SQUARES], slow[WEIGHT])
         none, unknown = np.zeros(channels), np.full(channels, np.nan)
         no_rows = MeasuredRows(np.zeros(0, np.int64), np.zeros((0, channels)), np.zeros((0, channels)))
-        self._nothing = StreamReadings(no_rows, none, none, unknown, none, unknown, self._slow, False)
+        self._nothing = StreamReadings(no_rows, none, none, unknown, none, none, unknown, self._slow, False)
         self._summarise = SameTypes(summarise)
 
     def take(self, rows: MeasuredRows, masked: NDArray[np.bool_], span: float) -> StreamReadings:
@@ -140,8 +146,9 @@ class StreamSurvey:
         is_bent = self._summarise(self._held, stamps, raw, left, masked, min(1.0, span / WINDOW))
         numbers = self._numbers.copy()
         return StreamReadings(
-            rows, numbers[COUNTS], numbers[OFF], numbers[NEAR], numbers[NEAR_COUNTS], numbers[RATES], self._slow, bool(is_bent)
-        )
+            rows=rows, counts=numbers[COUNTS], off=numbers[OFF], near=numbers[NEAR], near_counts=numbers[NEAR_COUNTS],
+            evened=numbers[EVENED], rates=numbers[RATES], slow=self._slow, is_bent=bool(is_bent),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,17 +163,20 @@ class PredictionMeans:
         Of the joints from the first prediction to the last, rad/s.
     largest : float
         Of the variances, m^2.
+    shaking : float
+        Mean square of the tip's acceleration, (m/s^2)^2.
     """
 
     strokes: Array
     variances: Array
     rates: Array
     largest: float
+    shaking: float
 
     @classmethod
     def of(cls, rows: PredictionRows) -> PredictionMeans:
         """Of one prediction or more."""
         found = np.empty((3, rows.measured.shape[1]))
-        columns = (np.ascontiguousarray(column) for column in (rows.stamps, rows.measured, rows.variances, rows.joints))
-        largest = summarise_predictions(*columns, found)
-        return cls(found[MEASURED], found[SPREAD], found[TURNING], largest)
+        given = rows.stamps, rows.measured, rows.variances, rows.joints, rows.accelerations
+        largest, shaking = _summarise_predictions(*map(np.ascontiguousarray, given), found)
+        return cls(found[MEASURED], found[SPREAD], found[TURNING], largest, shaking)

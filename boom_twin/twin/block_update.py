@@ -317,10 +317,9 @@ class BlockUpdate:
         if last.stop > last.start:
             streams = found.residual_streams[last]
             for code in sorted(set(streams.tolist())):
-                own, width = np.flatnonzero(streams == code) + last.start, int(self._widths[code])
-                self._judge.measured(
-                    STREAMS[code], MeasuredRows(found.residual_stamps[own], found.raw[own, :width], found.values[own, :width])
-                )
+                own, width = (streams == code).nonzero()[0] + last.start, int(self._widths[code])
+                raw, left = (rows.take(own, axis=0)[:, :width] for rows in (found.raw, found.values))
+                self._judge.measured(STREAMS[code], MeasuredRows(found.residual_stamps[own], raw, left))
         self._told = new.stop, last.stop
 
     def _residuals(self) -> ResidualBlock:

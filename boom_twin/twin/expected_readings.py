@@ -104,7 +104,11 @@ class Deviations:
         """Variances of modes as many as there are at the present posture."""
         assert self.noise is not None
         count = len(self.noise.modes)
-        return variances if len(variances) == count else np.pad(variances, (0, count))[:count]
+        if len(variances) == count:
+            return variances
+        found = np.zeros(count)
+        found[: len(variances)] = variances[:count]
+        return found
 
     def _decayed(self, span: int) -> Array:
         """What the modes' damping leaves of variances after `span` ns, shape (modes,)."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from boom_twin.health.inference.block_problem import BLOCK, MeasuredRows, PredictionRows
-from boom_twin.health.sensor_check import SensorCheck, bends2
+from boom_twin.health.sensor_check import SensorCheck, SensorFindings, bends2
 from boom_twin.health.stream_readings import PredictionMeans, StreamReadings, StreamSurvey
 from boom_twin.types import NANO, Array
 
@@ -88,8 +88,11 @@ def test_motion_bends_readings_smoothly_and_noise_does_not() -> None:
 class Careful(SensorCheck):
     """Never takes the short way of a block in which nothing is found."""
 
-    def _is_calm(self, *_: object) -> bool:
-        return False
+    def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
+        super().look(stamps, raw, expected, now)
+        known = self._known
+        largest = float(np.nanmax(np.abs(np.diff(known.left[: 3 + len(stamps)], axis=0)), initial=0.0))
+        return self._findings(largest, len(stamps), now)
 
 
 def test_a_block_without_findings_is_told_as_the_long_way_tells_it() -> None:

@@ -30,6 +30,7 @@ from boom_twin.health.inference.innovation_filter import (
     modes_of,
     oscillation,
     read_modes,
+    shaken_by,
 )
 from boom_twin.health.inference.sensitivities import Signatures
 from boom_twin.health.suspicion import load_levels
@@ -75,6 +76,19 @@ def test_stroke_noise_keeps_its_own_covariance(boom):
     assert np.linalg.eigvalsh(modes.least).min() > 0.0
     kept = [mode.frequency < HIGHEST for mode in boom[0].modes]
     assert np.diag(modes.rest)[::2] == pytest.approx(boom[0].collected[kept])
+
+
+def test_modes_under_other_noise_are_those_made_for_it(boom):
+    """Of the same modes, to the bit; a filter that goes on with them innovates as one that takes them for others does."""
+    noise = boom[0]
+    louder = replace(noise, collected=3.0 * noise.collected)
+    before, anew = modes_in(boom), modes_in((louder, *boom[1:]))
+    again = shaken_by(louder, before)
+    assert all(one.tobytes() == other.tobytes() for one, other in zip(again, anew, strict=True))
+    assert not np.array_equal(again.rest, before.rest)
+    tables = np.random.default_rng(4).normal(0.0, 1e-4, (20, 6, 1))
+    going_on, told = (filtered(InnovationFilter(6, 1, BLOCK, 0.01), [before, each], tables) for each in (again, anew))
+    assert going_on.tobytes() == told.tobytes() != filtered(InnovationFilter(6, 1, BLOCK, 0.01), [before] * 2, tables).tobytes()
 
 
 def test_what_angles_read_of_modes(boom):

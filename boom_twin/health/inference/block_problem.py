@@ -18,7 +18,7 @@ from ...types import NANO, Array, Mount, Stream, channels_of, sensor_kind
 from ..baseline import JUDGED, judged_channels
 from .fault_catalogue import Form, Parameter
 from .holds import HoldCollector, HoldProblem
-from .innovation_filter import CALM, ModalStates, modes_of, read_modes
+from .innovation_filter import CALM, ModalStates, modes_of, read_modes, shaken_by
 from .sensitivities import HoldInWork, Signature, Signatures
 
 BLOCK = 100_000_000  # ns
@@ -226,7 +226,9 @@ class BlockProblem(NamedTuple):
 
     def noise(self, factors2: Array) -> Array:
         """Covariance (c, c) of the residuals where the sensors' own noise is `factors2` (c,) times as strong in power."""
-        return np.asarray(np.diag(self.own * factors2) + self.strokes)
+        found = self.strokes.copy()
+        np.einsum("ii->i", found)[:] += self.own * factors2
+        return found
 
 
 class LinearModel:
@@ -253,9 +255,14 @@ class LinearModel:
         n = len(scene.joints)
         self.signatures = Signatures(scene, known, mounts)
         self._sensor2 = np.array([settings.variance(sensor_kind(name)) for name in judged_channels(n)])
-        self._late = [(i, each.index) for i, each in enumerate(known) if each.form is Form.DELAY]
-        self._of_stream = np.repeat(np.arange(len(JUDGED)), [len(channels_of(n)[stream]) for stream in JUDGED])
+        self._late = [(1 + i, self._channels_of(each.index, n)) for i, each in enumerate(known) if each.form is Form.DELAY]
         self.begin()
+
+    @staticmethod
+    def _channels_of(index: int, joints: int) -> slice:
+        """Those of the stream of this index."""
+        counts = [len(channels_of(joints)[stream]) for stream in JUDGED]
+        return slice(sum(counts[:index]), sum(counts[: index + 1]))
 
     def begin(self) -> None:
         """The boom starts from rest."""
@@ -278,10 +285,13 @@ class LinearModel:
         if self.signature is None:
             return None
         if noise is not self._tuned:
-            if self._tuned is None or noise.modes is not self._tuned.modes:
+            if self._tuned is None or self._modes is None or noise.modes is not self._tuned.modes:
                 boom = self.signatures.nominal
-                self._read = read_modes(noise.modes, boom.plan, boom.state, boom.work, boom.reading)
-            self._modes, self._tuned = modes_of(noise, self._read, BLOCK * NANO, self._modes), noise
+                read = read_modes(noise.modes, boom.plan, boom.state, boom.work, boom.reading)
+                self._modes = modes_of(noise, read, BLOCK * NANO, self._modes)
+            else:
+                self._modes = shaken_by(noise, self._modes)
+            self._tuned = noise
         travel = 0.0 if self._before is None else float(np.abs(block.strokes - self._before).max())
         shaking, self._before = self._shaking, block.strokes
         self._shaking = max(self._shaking * np.exp(-BLOCK * NANO / CALM), block.shaking)
@@ -305,7 +315,9 @@ class LinearModel:
         return self._in_work.popleft().problem
 
     def _table(self, block: BlockMeans, signature: Signature) -> Array:
-        table = np.column_stack([block.left, signature.channels])
-        for column, stream in self._late:
-            table[:, 1 + column] = np.where(self._of_stream == stream, -block.rates, 0.0)
+        table = np.empty((len(block.left), 1 + signature.channels.shape[1]))
+        table[:, 0], table[:, 1:] = block.left, signature.channels
+        for column, own in self._late:
+            table[:, column] = 0.0
+            table[own, column] = -block.rates[own]
         return table

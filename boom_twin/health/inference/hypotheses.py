@@ -36,6 +36,7 @@ from math import log
 
 import numpy as np
 
+from ...kernels.jit import SameTypes
 from ...types import Array
 from .fault_catalogue import Form, Parameter, variances
 from .kalman_update import correct
@@ -402,6 +403,7 @@ class Regression:
     def __init__(self, mean: Array, covariance: Array) -> None:
         self._prior = mean, covariance
         self._prior2, self._size = covariance.diagonal().copy(), -1
+        self._correct = SameTypes(correct)
         self.restart()
 
     def restart(self) -> None:
@@ -440,7 +442,7 @@ class Regression:
             self._own = np.arange(count), np.eye(count), np.zeros(count)
             self._scratch = np.empty((count, count)), np.empty((count, states))
         measured, noise, others = self._own
-        log = correct(measured, first, signature, noise, others, mean, covariance, *self._scratch, left)
+        log = self._correct(measured, first, signature, noise, others, mean, covariance, *self._scratch, left)
         if learn and np.abs(left).max() < GATE:
             self.mean, self.covariance = mean[:, 0], covariance
         return left[:, 0], -log - 0.5 * float(left[:, 0] @ left[:, 0])

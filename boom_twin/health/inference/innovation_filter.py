@@ -36,9 +36,10 @@ from ...analysis.modal import Mode, StrokeNoise, along
 from ...compiler.plan import Plan
 from ...estimation.deviation_filter import oscillate
 from ...estimation.sensor_model import Reading, specific_force
+from ...kernels.jit import SameTypes, hold
 from ...kernels.tables import FRAME_ANGLE, State, Work
 from ...types import Array
-from .kalman_update import filter_block
+from .kalman_update import LOAD, FilterWork, filter_block
 
 HIGHEST = 8.0  # Hz; faster vibration is averaged out within a block
 KEEPS_STEP = 1.0  # s, see above
@@ -50,7 +51,6 @@ LOAD_TIME, MEAN_TIME = 2.0, 60.0  # s, correlation of the load about its mean, a
 ROUGH = 0.5  # share of what the load adds to readings at once by which they may be off: it changes within a block
 MEAN = 1.0  # see above
 CALM = 2.0  # s, over which vibration that was found is remembered
-LOAD = 4  # states of the load: x and y about the mean, and the mean's
 BOTH = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])  # what of these is the whole load
 
 
@@ -90,7 +90,7 @@ class ModalStates(NamedTuple):
 def modes_of(noise: StrokeNoise, read: ReadModes, block: float, before: ModalStates | None) -> ModalStates:
     """The modes of a posture, as sensors read them, for blocks of `block` s; of the signs of those `before`."""
     size, channels, h = sum(mode.frequency < HIGHEST for mode in noise.modes), read.still.shape[1], block
-    turn, least, driven, rest = (np.zeros((2 * size, 2 * size)) for _ in range(4))
+    turn, driven, unknown = (np.zeros((2 * size, 2 * size)) for _ in range(3))
     shown, shaken = np.zeros((channels, 2 * size)), np.zeros(channels)
     pushed, lifted = np.zeros((2 * size, 2)), np.zeros((channels, 2))
     for k, (mode, still, felt) in enumerate(zip(noise.modes, read.still, read.felt, strict=True)):
@@ -100,8 +100,6 @@ def modes_of(noise: StrokeNoise, read: ReadModes, block: float, before: ModalSta
             continue
         at, swing = slice(2 * k, 2 * k + 2), max(float(np.hypot(*motion)), 1e-12)
         turn[at, at] = own = oscillation(omega, max(noise.decay[k], LEAST_DAMPING * omega), h)
-        rest[at, at] = noise.collected[k] * np.diag([1.0, omega * omega])
-        least[at, at] = rest[at, at] - own @ rest[at, at] @ own.T
         driven[at, at] = KEEPS_STEP / swing**2 * np.array([[h**3 / 3.0, h * h / 2.0], [h * h / 2.0, h]])
         swinging, passed = still - omega**2 * felt, float(np.sinc(mode.frequency * h))
         shown[:, 2 * k] = passed * swinging
@@ -112,7 +110,15 @@ def modes_of(noise: StrokeNoise, read: ReadModes, block: float, before: ModalSta
             pushed[at] *= -1.0
         shaken += (shown[:, 2 * k] / (omega * omega * swing)) ** 2
     frequencies = np.array([mode.frequency for mode in noise.modes[:size]])
-    return ModalStates(frequencies, turn, least, driven, rest, shown, shaken, pushed, lifted)
+    return shaken_by(noise, ModalStates(frequencies, turn, unknown, driven, unknown, shown, shaken, pushed, lifted))
+
+
+def shaken_by(noise: StrokeNoise, modes: ModalStates) -> ModalStates:
+    """The same modes where strokes' noise has shaken them as it now does."""
+    size = len(modes.frequencies)
+    spread = np.column_stack([noise.collected[:size], noise.collected[:size] * (2.0 * math.pi * modes.frequencies) ** 2])
+    rest = np.diag(spread.ravel())
+    return modes._replace(rest=rest, least=rest - modes.turn @ rest @ modes.turn.T)
 
 
 def oscillation(omega: float, decay: float, h: float) -> Array:
@@ -183,12 +189,16 @@ class InnovationFilter:
         self._fresh, self._size = True, 0
         self._swinging = np.zeros(count)  # mean square of the tip's acceleration by vibration that was found
         self._posture: ModalStates | None = None
+        self._work: FilterWork  # of that posture
+        self._filter_block = SameTypes(filter_block)
 
     def tune(self, modes: ModalStates) -> None:
         """Take the modes of a posture, if they are others; coordinates of modes that were there go on."""
-        if modes is self._posture:
+        before, self._posture = self._posture, modes
+        if before is not None and modes.turn is before.turn:
+            if modes is not before:
+                self._work.least[: self._size, : self._size] = modes.least
             return
-        is_first, self._posture = self._posture is None, modes
         size, old, others = len(modes.turn), self._size, LOAD + self._channels
         kept = min(size, old)
         places = [*range(kept), *range(old, old + others)]
@@ -199,21 +209,26 @@ class InnovationFilter:
         (to, across), (of, beside) = np.ix_(at, at), np.ix_(places, places)
         x[:, at], p[:, to, across] = self._x[:, places], self._p[:, of, beside]
         self._x, self._p, self._size = x, p, size
-        self._shaken = SHAPE**2 * self._detuning2 * modes.shaken
         at_once = self._level2 * (modes.lifted**2).sum(axis=1)
-        self._rough, self._pushed = ROUGH**2 * at_once, at_once[:, -2:].sum(axis=1)
-        self._turn, self._least, self._driven = np.eye(states), np.zeros((states, states)), np.zeros((states, states))
-        self._turn[:size, :size] = modes.turn
-        self._turn[:size, size : size + LOAD] = np.hstack([modes.pushed, modes.pushed])
-        self._turn[size : size + LOAD, size : size + LOAD] = np.diag(self._kept)
-        self._least[:size, :size], self._driven[:size, :size] = modes.least, self._detuning2 * modes.driven
-        self._added = np.zeros((count, states))
-        self._added[:, size : size + LOAD] = (1.0 - self._kept**2) * self._stationary
-        self._shown = np.hstack([modes.shown, modes.lifted, modes.lifted, np.eye(self._channels)])
-        self._own = np.arange(size + LOAD, states)  # errors of the channels
-        self._scratch = np.zeros((states, max(states, columns)))
-        if is_first:
-            self._p[:, :size, :size] += _swung(modes, self._level2)
+        turn, least, driven = np.eye(states), np.zeros((states, states)), np.zeros((states, states))
+        turn[:size, :size] = modes.turn
+        turn[:size, size : size + LOAD] = np.hstack([modes.pushed, modes.pushed])
+        turn[size : size + LOAD, size : size + LOAD] = np.diag(self._kept)
+        least[:size, :size], driven[:size, :size] = modes.least, self._detuning2 * modes.driven
+        added = np.zeros((count, states))
+        added[:, size : size + LOAD] = (1.0 - self._kept**2) * self._stationary
+        if before is None:
+            p[:, :size, :size] += _swung(modes, self._level2)
+        channels = self._channels
+        self._work = FilterWork(
+            turn=turn, least=least, driven=driven, added=added,
+            shown=np.hstack([modes.shown, modes.lifted, modes.lifted, np.eye(channels)]),
+            shaken=SHAPE**2 * self._detuning2 * modes.shaken, rough=ROUGH**2 * at_once, pushed=at_once[:, -2:].sum(axis=1),
+            swinging=self._swinging, x=x, p=p, rows=np.zeros(channels, np.int64), own=np.zeros(channels),
+            scratch=np.zeros((states, max(states, columns))), root=np.zeros((channels, channels)),
+            gain=np.zeros((channels, states)),
+        )  # fmt: skip
+        self._held = hold(self._work)
 
     def step(self, table: Array, noise: Array, errors2: Array, shaking: float | Array, travel: float) -> Innovations:
         """Innovations of one block.
@@ -238,20 +253,12 @@ class InnovationFilter:
         """
         kept = 0.0 if self._fresh else math.exp(-(travel + REST * self._block) / REACH)
         self._fresh = False
-        self._turn[self._own, self._own] = kept
-        self._added[:, self._own[0] :] = (1.0 - kept * kept) * errors2
-        rows = np.flatnonzero(np.isfinite(table[:, 0]))
-        count, measured = len(self._level2), len(rows)
-        white, log, shaken = np.zeros((count, measured, table.shape[1])), np.zeros(count), shaking + self._pushed
-        root, gain, state = np.zeros((measured, measured)), np.zeros((measured, len(self._turn))), (self._x, self._p)
-        own = shaken[:, None] * self._shaken + self._rough
-        change = self._turn, self._least, self._driven, shaken, self._added
-        filter_block(*change, rows, table, self._shown, noise, own, *state, self._scratch, root, gain, white, log)
+        count, calm = len(self._level2), math.exp(-self._block / CALM)
+        white, log, lately = np.zeros((count, *table.shape)), np.zeros(count), np.full(count, shaking)
+        measured = self._filter_block(self._held, table, noise, errors2, lately, kept, calm, white, log)
         if np.isnan(log).any():
             raise np.linalg.LinAlgError("covariance of innovations: not positive definite")
-        felt = self._x[:, : self._size, 0] @ self._shown[-2:, : self._size].T
-        np.maximum(self._swinging * math.exp(-self._block / CALM), 0.5 * (felt**2).sum(axis=1), out=self._swinging)
-        return Innovations(white.reshape(*self._levels, *white.shape[1:]), log.reshape(self._levels))
+        return Innovations(white[:, :measured].reshape(*self._levels, measured, table.shape[1]), log.reshape(self._levels))
 
     def vibration(self, predicted: float) -> Array:
         """Mean square of the tip's acceleration lately, (m/s^2)^2, shape (levels,): as `predicted`, or as found where more."""

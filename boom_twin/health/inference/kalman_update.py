@@ -3,16 +3,88 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from ...kernels.jit import inner, kernel
+import numpy as np
+from numpy.typing import NDArray
+
+from ...kernels.jit import by_reference, inner, kernel
+from ...types import Array
+
+LOAD = 4  # states of the load: x and y about the mean, and the mean's
+
+
+@by_reference
+class FilterWork(NamedTuple):
+    """What `filter_block` goes on with; l levels of the load, c channels, s states, the last c the errors of the channels.
+
+    turn, least, driven : (s, s) what states become within a block; covariance that stroke noise adds, and that wrong
+    frequencies add for a mean square of the tip's acceleration of 1 (m/s^2)^2.
+    added : (l, s) variances that come with a block; those of the errors of the channels are written.
+    shown : (c, s) how the means of the channels read the states.
+    shaken, rough, pushed : (c,), (l, c), (l,) variance of the means for a mean square of the tip's acceleration of
+    1 (m/s^2)^2, by the load, and that mean square by it.
+    swinging : (l,) mean square of the tip's acceleration by vibration that was found, (m/s^2)^2.
+    x, p : (l, s, columns), (l, s, s) states and covariance.
+    rows, own, scratch, root, gain : (c,), (c,), (s, the larger of s and columns), (c, c), (c, s) scratch.
+    """
+
+    turn: Array
+    least: Array
+    driven: Array
+    added: Array
+    shown: Array
+    shaken: Array
+    rough: Array
+    pushed: Array
+    swinging: Array
+    x: Array
+    p: Array
+    rows: NDArray[np.int64]
+    own: Array
+    scratch: Array
+    root: Array
+    gain: Array
 
 
 @kernel
-def filter_block(turn, least, driven, shaking, added, rows, table, shown, noise, own, x, p, scratch, root, gain, white, log):
-    """`predict` and `correct` for every level, the first axis of what depends on it."""
-    for k in range(x.shape[0]):
-        predict(turn, least, driven, shaking[k], added[k], x[k], p[k], scratch)
-        log[k] = correct(rows, table, shown, noise, own[k], x[k], p[k], root, gain, white[k])
+def filter_block(f, table, noise, errors2, shaking, kept, calm, white, log):
+    """`predict` and `correct` for every level; gives how many channels were measured.
+
+    Parameters
+    ----------
+    f : FilterWork
+    table, noise, errors2 : ndarray
+        See `boom_twin.health.inference.innovation_filter.InnovationFilter.step`.
+    shaking : ndarray, shape (l,)
+        (m/s^2)^2.
+    kept, calm : float
+        Share of the errors of the channels, and of the mean square of vibration found, that is left after a block.
+    white, log : ndarray, shape (l, c, columns), (l,)
+        Written; rows of channels that were not measured are left out. A log that is NaN: not positive definite.
+    """
+    (channels, states), measured = f.shown.shape, 0
+    errors = states - channels
+    for i in range(channels):
+        f.turn[errors + i, errors + i] = kept
+        if math.isfinite(table[i, 0]):
+            f.rows[measured] = i
+            measured += 1
+    for k in range(f.x.shape[0]):
+        shaken = shaking[k] + f.pushed[k]
+        for i in range(channels):
+            f.added[k, errors + i] = (1.0 - kept * kept) * errors2[i]
+            f.own[i] = shaken * f.shaken[i] + f.rough[k, i]
+        predict(f.turn, f.least, f.driven, shaken, f.added[k], f.x[k], f.p[k], f.scratch)
+        log[k] = correct(f.rows[:measured], table, f.shown, noise, f.own, f.x[k], f.p[k], f.root, f.gain, white[k])
+        felt2 = 0.0
+        for i in range(channels - 2, channels):
+            felt = 0.0
+            for j in range(errors - LOAD):
+                felt += f.shown[i, j] * f.x[k, j, 0]
+            felt2 += felt * felt
+        f.swinging[k] = max(f.swinging[k] * calm, 0.5 * felt2)
+    return measured
 
 
 @inner

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...analysis.equilibrium import settle
-from ...analysis.modal import natural_frequencies
+from ...analysis.modal import frequencies_near, natural_frequencies
 from ...compiler.compile import compile_scene
 from ...compiler.plan import Plan
 from ...errors import BoomTwinError, SolverError
@@ -158,9 +158,9 @@ class HoldInWork:
     made: int = 0
 
 
-def _frequencies(boom: _Boom, count: int = MODES) -> Array:
+def _frequencies(boom: _Boom) -> Array:
     """The lowest natural frequencies (Hz) of a boom where it is."""
-    return natural_frequencies(boom.plan, boom.state, boom.work, count, WIDTH)
+    return natural_frequencies(boom.plan, boom.state, boom.work, MODES, WIDTH)
 
 
 class Signatures:
@@ -203,8 +203,8 @@ class Signatures:
         boom.follow(work.stand)
         if boom.rest(work.problem.strokes) is None:
             raise SolverError("a changed boom finds no rest")
-        modes = work.problem.modes  # ascending; each is found from the one below it, whatever is above
-        work.problem.frequencies[:, 1 + place] = (_frequencies(boom, int(modes[-1]) + 1)[modes] / work.model - 1.0) / step
+        changed = frequencies_near(boom.plan, boom.state, boom.work, work.problem.modes.tolist(), work.model, WIDTH)
+        work.problem.frequencies[:, 1 + place] = (changed / work.model - 1.0) / step
         work.made += 1
         return work.made < len(self._changed)
 

@@ -19,8 +19,8 @@ NOT_COUNTED = -1
 RENEW = np.bool_(True)
 TRIES = 20  # frequencies, each a little beside the last, where one meets a pivot that is zero
 BALANCED = 6  # times that rows of a matrix are brought to one order of magnitude
-ROTATED = 50  # times at the most that all pairs of rows are turned
-TINY = 1e-32  # sum of squares beside the diagonal of a balanced matrix, below which its eigenvalues are there
+LARGE = 0.64  # of the largest entry beside the diagonal, from which on one of the diagonal is a pivot by itself
+FIRST_STEP = 1e-3  # of a frequency that is known about, by which it is looked for beside it at first
 
 
 @kernel
@@ -63,8 +63,10 @@ def condense(t, state, work, motion, drive, still):
 
 
 @kernel
-def bisect_frequency(t, state, work, position, drive, still, base, number, low, width, scratch):
-    """The frequency (rad/s) at which `count_below`, less `base`, rises from at most `number` to more.
+def bisect_frequency(t, state, work, position, drive, still, base, number, low, near, width, scratch):
+    """The frequency (rad/s), above `low`, at which `count_below`, less `base`, rises from at most `number` to more.
+
+    Where it is known about, `near` is not 0, and what it is looked for between first.
 
     Returns
     -------
@@ -72,14 +74,24 @@ def bisect_frequency(t, state, work, position, drive, still, base, number, low, 
         As `count_below`; of the middle of the last bracket, which is `width` of its upper end wide.
     """
     place(t, state, work)
-    high, found = max(2.0 * low, 1.0), False
-    while not found:
+    high, step, is_above = max(2.0 * low, 1.0), 0.0, False
+    if near > low:
+        high, step = near, FIRST_STEP * near
+    status, count, at = count_below(t, state, work, position, drive, still, high, scratch)
+    found = count - base > number
+    while count != NOT_COUNTED and not found:
+        low, high = high, high + step if step > 0.0 else 2.0 * high
+        step, is_above = 2.0 * step, True
         status, count, at = count_below(t, state, work, position, drive, still, high, scratch)
-        if count == NOT_COUNTED:
-            return status, count, at
         found = count - base > number
-        if not found:
-            low, high = high, 2.0 * high
+    while count != NOT_COUNTED and step > 0.0 and not is_above and high - step > low:
+        status, count, at = count_below(t, state, work, position, drive, still, high - step, scratch)
+        if count - base > number:
+            high, step = high - step, 2.0 * step
+        else:
+            low, step = high - step, 0.0
+    if count == NOT_COUNTED:
+        return status, count, at
     while high - low > width * high:
         middle = 0.5 * (low + high)
         status, count, at = count_below(t, state, work, position, drive, still, middle, scratch)
@@ -109,10 +121,7 @@ def negative_eigenvalues(blocks, scratch):
             for j in range(m):
                 if not math.isfinite(scratch[i, j]):
                     return NOT_COUNTED
-        rotate_to_diagonal(scratch, m)
-        for i in range(m):
-            if scratch[i, i] < 0.0:
-                count += 1
+        count += negative_pivots(scratch, m)
     return count
 
 
@@ -130,35 +139,54 @@ def balance(a, m):
 
 
 @inner
-def rotate_to_diagonal(a, m):
-    """Jacobi's rotations, pair by pair."""
-    for _ in range(ROTATED):
-        beside = 0.0
+def negative_pivots(a, m):
+    """Negative eigenvalues of a symmetric matrix, as many as its pivots have: eliminated from the largest on; `a` is lost.
+
+    A pivot is an entry of the diagonal, or two rows where one beside it is much larger: that block has one of each sign
+    (Bunch and Parlett, SIAM Journal on Numerical Analysis 8, 1971).
+    """
+    count = 0
+    while m > 0:
+        largest, at, beside, row, column = 0.0, 0, 0.0, 0, 0
         for i in range(m):
+            if abs(a[i, i]) > largest:
+                largest, at = abs(a[i, i]), i
             for j in range(i):
-                beside += a[i, j] * a[i, j]
-        if not beside > TINY:
-            return
-        for i in range(m):
-            for j in range(i):
-                rotate(a, m, i, j)
+                if abs(a[i, j]) > beside:
+                    beside, row, column = abs(a[i, j]), i, j
+        if largest == 0.0 and beside == 0.0:
+            return count
+        if largest >= LARGE * beside:
+            m -= 1
+            exchange(a, at, m, m + 1)
+            if a[m, m] < 0.0:
+                count += 1
+            for i in range(m):
+                share = a[i, m] / a[m, m]
+                for j in range(m):
+                    a[i, j] -= share * a[m, j]
+        else:
+            m -= 2
+            exchange(a, row, m + 1, m + 2)
+            exchange(a, column, m, m + 2)
+            count += 1
+            first, both, second = a[m, m], a[m, m + 1], a[m + 1, m + 1]
+            size = first * second - both * both
+            for i in range(m):
+                one = (a[i, m] * second - a[i, m + 1] * both) / size
+                other = (a[i, m + 1] * first - a[i, m] * both) / size
+                for j in range(m):
+                    a[i, j] -= one * a[m, j] + other * a[m + 1, j]
+    return count
 
 
 @inner
-def rotate(a, m, i, j):
-    """Make the entry (i, j) of a symmetric matrix zero."""
-    if a[i, j] == 0.0:
-        return
-    half = (a[j, j] - a[i, i]) / (2.0 * a[i, j])
-    tangent = math.copysign(1.0, half) / (abs(half) + math.sqrt(1.0 + half * half))
-    c = 1.0 / math.sqrt(1.0 + tangent * tangent)
-    s = tangent * c
+def exchange(a, i, j, m):
+    """Exchange rows and columns i and j of the first m."""
     for k in range(m):
-        one, other = a[k, i], a[k, j]
-        a[k, i], a[k, j] = c * one - s * other, s * one + c * other
+        a[i, k], a[j, k] = a[j, k], a[i, k]
     for k in range(m):
-        one, other = a[i, k], a[j, k]
-        a[i, k], a[j, k] = c * one - s * other, s * one + c * other
+        a[k, i], a[k, j] = a[k, j], a[k, i]
 
 
 @kernel
