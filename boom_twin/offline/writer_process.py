@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterable, Mapping
 from itertools import groupby
@@ -134,4 +135,6 @@ def _write(item: Packed, encoder: ReportEncoder, writer: SessionWriter) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1])))
+    code = main(Path(sys.argv[1]))
+    sys.stderr.flush()
+    os._exit(code)  # the replay waits for this end; taking the interpreter apart lasts as long as 1 s of session
