@@ -6,17 +6,16 @@ import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError
-from ruamel.yaml import YAML
 
 from ..config.yaml_text import plain, read_plain
 from ..errors import BagError
 from ..messages.topic_table import Qos
 from ..system.atomic_files import write_atomic
+from .block_yaml import dump
 
 FILE_NAME = "metadata.yaml"
 VERSION = 9
@@ -146,16 +145,6 @@ def offered_qos(qos: Qos) -> list[dict[str, Any]]:
             "avoid_ros_namespace_conventions": False,
         }
     ]
-
-
-def dump(document: Any) -> str:
-    """YAML text in block style, keys in the order given, no anchors."""
-    yaml = YAML()
-    yaml.default_flow_style = False
-    yaml.width = 4096
-    text = StringIO()
-    yaml.dump(document, text)
-    return text.getvalue()
 
 
 DEEPEST = 10_000

@@ -17,7 +17,7 @@ from ..errors import BagError
 from ..system.atomic_files import write_atomic
 from ..system.received_files import holds_file
 from ..system.result_folder import UNFINISHED, is_unfinished
-from .metadata import dump
+from .block_yaml import dump
 
 FILE_NAME = "session.yaml"
 _HEAD = "# What this session was made with. scene_sha256 is of the text under scene (UTF-8).\n"

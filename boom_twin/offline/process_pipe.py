@@ -76,7 +76,7 @@ class Pipe:
 
     def finish(self) -> None:
         """Close the pipe, wait for the process to end, and raise what it had to say if that was an error."""
-        _, told = self._process.communicate()
+        told = self._ended()
         if self._process.returncode != 0:
             text = told.decode(errors="replace").strip()
             if self._process.returncode != 1 or not text:
@@ -86,7 +86,22 @@ class Pipe:
     def stop(self) -> None:
         """End the process at once, whatever it is doing."""
         self._process.kill()
-        self._process.communicate()
+        self._ended()
+
+    def _ended(self) -> bytes:
+        """What the process says as it ends, which is waited for.
+
+        Nobody takes what it would still send: after a failure that may be gigabytes, and the closed pipe ends it.
+        """
+        for end in (self._stdin, self._stdout):
+            assert end is not None
+            end.close()
+        stderr = self._process.stderr
+        assert stderr is not None
+        told = b"" if stderr.closed else stderr.read()
+        stderr.close()
+        self._process.wait()
+        return told
 
 
 def _make_roomy(end: IO[bytes]) -> None:

@@ -195,6 +195,26 @@ def test_a_pipe_that_breaks_off_is_no_end() -> None:
         list(pipe.receive())
 
 
+ENDLESS = """
+import os, sys
+sent = os.write(1, b"no pickle")
+try:
+    while sent < 2**28:
+        sent += os.write(1, bytes(2**16))
+except BrokenPipeError:
+    pass
+sys.exit(str(sent))
+"""
+
+
+def test_what_comes_after_a_failure_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rest of a day's session was read into memory, 1.4 GB, before the failure was told: now hardly any is even sent."""
+    monkeypatch.setattr("boom_twin.offline.process_pipe.python_command", lambda *_: [sys.executable, "-c", ENDLESS])
+    with pytest.raises(BagError) as found:
+        list(Pipe("endless").receive())
+    assert int(str(found.value)) < 2**23
+
+
 @pytest.mark.parametrize("is_told", [True, False], ids=["end told", "end not told"])
 def test_a_writer_completes_its_bag_only_when_it_is_told_the_end(tmp_path: Path, is_told: bool) -> None:
     from boom_twin.messages.topic_table import load_topics
