@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from ..kernels.jit import inner
+from ..kernels.jit import inner, kernel
 from ..kernels.tables import FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y
 from ..types import NANO
 from .deviation_filter import (
@@ -58,7 +58,7 @@ INEXACT_MOTION = 0.01  # share of the predicted acceleration, over `SLOW` second
 SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.05  # s, between strokes; the longest of the covariance's differential equation too
 
 
-@inner
+@kernel
 def advance_estimate(f, live, results, estimates, moments, gravity, stamp):
     """Go on to the newest strokes, of this stamp (ns), and follow the prediction there.
 

@@ -84,7 +84,7 @@ def new_track(plan: Plan, lengths: Array) -> Track:
     )  # fmt: skip
 
 
-@inner
+@kernel
 def follow(t, anchor, live, work, tangents, track, tuning, time, y, out):
     """Take strokes y (m; NaN = missing) measured at `time` (s) and write the prediction for it.
 

@@ -64,7 +64,7 @@ from __future__ import annotations
 
 import math
 
-from ..kernels.jit import inner
+from ..kernels.jit import inner, kernel
 from .cause_mixture import covariance_of, mean_of, read_covariances, weigh_causes, write_covariance
 from .deviation_filter import ANGLE, BIAS, COUNT, FELT_X, FELT_Y, LOAD, STAYING, STEP, clear, states_of
 from .deviation_readings import read_acceleration, read_tip
@@ -81,7 +81,7 @@ VARIANCES = [0, 3, 5]
 """Places of the variances in such a triangle."""
 
 
-@inner
+@kernel
 def write_estimate(f, results, out):
     """Write the estimate at the newest prediction: see `WIDTH`.
 

@@ -50,6 +50,7 @@ from .state import (
 )  # fmt: skip
 
 PAUSE = 0.1  # s without strokes, after which
+ALONE = np.int64(0)  # row of a sample that comes alone; typed, because numba compiles once more for every literal
 AFTER_PAUSE = 0.15  # s of strokes come before the remembered boom is stepped over it: they tell how the pause ended
 
 DONE, ODD, REFRESH, LOOK, FAILED = range(5)
@@ -124,7 +125,7 @@ def measure(limits, state, tip, stream, stamp, values, trusted, found):
 
     One that is `trusted` is refused only if nothing was expected at its stamp.
     """
-    return compare(limits, state, tip, stream, stamp, values, 0, trusted, found)
+    return compare(limits, state, tip, stream, stamp, values, ALONE, trusted, found)
 
 
 # -- strokes --------------------------------------------------------------------------------------------------------------
@@ -306,7 +307,7 @@ def forget_waiting(ring, count):
     ring.bounds[COUNT] -= count
 
 
-@inner
+@kernel
 def write_residual(limits, state, tip, stream, stamp, values, row, found):
     """Residuals of one sample against what was expected at its stamp; False if nothing was."""
     after, share = matched(state.past, stamp)
