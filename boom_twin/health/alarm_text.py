@@ -19,6 +19,8 @@ from .inference.hypotheses import Cause, Explanation, Verdict
 from .inference.sensitivities import Signature, Signatures
 
 NAMED, GROWING = 0.95, 0.99  # probability of a cause beside the others that is taken for certain; of one that grows
+SHAKEN = 0.999  # likewise, of one that grows under a load
+PLAIN = 60.0  # ln of how much more probable than none a fault must be for a name under a load
 BORNE_OUT = 0.7  # likewise, by blocks in which the boom does not vibrate
 REFUTED = 1e-3  # probability of a cause below which evidence that fits rules it out; of that which was named, another may be
 GROWTH_AFTER, STEADY = 8.0, 0.9  # evidence (s) that gives a slope; share of the steepest that a lasting growth keeps
@@ -62,6 +64,10 @@ class AlarmText:
         self._advice = ""
         self._leading: tuple[str, int] = "", 0
         self._steepest: dict[int, float] = {}
+
+    def begin_anew(self) -> None:
+        """The evidence begins anew: how long a cause has been probable by what was outdated does not count."""
+        self._leading = "", 0
 
     def alarm(
         self, alarm: Alarm, whole: Verdict, calm: Verdict, is_told_apart: bool, span: float, stamp: int, is_calm: bool,
@@ -151,15 +157,18 @@ class AlarmText:
         """Whether the most probable cause is named: it fits, and has been probable enough for some time.
 
         Whatever else changes meanwhile may look like growth, and a neighbour's offset like a drift. So a fault that grows is
-        named on a calm boom, a drift as long as it is as fast as it was; or where the cause is the same if nothing grows: then
-        the name does not depend on the shape.
+        named on a calm boom, a drift as long as it is as fast as it was; under a load where it is surer, or the cause the same
+        if nothing grows: then the name does not depend on the shape. Under a load that hides most of a fault the onset is not
+        seen, nor the shape, and of a wrong one the neighbour makes up better: so a name takes one that is plainly there.
         """
         best, borne_out = whole.causes[0], calm.causes[0]
         is_growing = whole.best.is_growing or calm.best.is_growing
         is_drift = calm.best.is_growing and self._known[calm.best.place].form in DRIFTING
-        is_lasting = (self._grows_still(alarm, calm, span) or not is_drift) and is_calm
+        is_lasting = self._grows_still(alarm, calm, span) or not is_drift
         is_shapeless = best.steady >= NAMED and borne_out.steady >= BORNE_OUT
-        has_shape = not is_growing or (span >= GROWING_AFTER and (is_lasting or is_shapeless))
+        is_surer = min(best.probability, best.alone) >= SHAKEN and min(borne_out.probability, borne_out.alone) >= NAMED
+        has_shape = not is_growing or (span >= GROWING_AFTER and (is_shapeless or (is_lasting and (is_calm or is_surer))))
+        has_shape = has_shape and (is_calm or whole.best.log_factor >= PLAIN)
         leads = min(best.probability, best.alone) >= (GROWING if is_growing else NAMED)
         leads = leads and min(borne_out.probability, borne_out.alone) >= BORNE_OUT and is_told_apart
         shares = {cause.name: cause.probability for cause in whole.causes}

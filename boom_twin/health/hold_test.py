@@ -106,12 +106,18 @@ class HoldTest:
         return replace(best, is_far=was_far and best.tip >= FAR and best.verdict.strength >= LIKELY)
 
     def is_borne_out(self, found: HoldVerdict, mean: Array, covariance: Array) -> bool:
-        """Whether the most probable cause stays that, by e^`LIKELY`, whichever single frequency is left out.
+        """Whether the most probable cause stays that, by e^`LIKELY`, whichever single frequency or single hold is left out.
 
-        A wind that was not noticed makes one as wrong as a fault does.
+        A wind that was not noticed makes one as wrong as a fault does, and mean and frequencies of a hold together. So does a
+        fault that begins within a hold.
         """
         first, name = sum(hold.start < found.since for hold in self._holds), found.verdict.causes[0].name
-        for left_out in range(sum(len(hold.modes) for hold in self._holds)):
+        rows, hold_of = self._rows()
+        frequencies = np.flatnonzero(rows >= len(self._errors2))
+        parts = [*np.eye(len(rows), dtype=bool)[frequencies], *(hold_of == np.arange(len(self._holds))[:, None])]
+        for left_out in parts:
+            if left_out.all():
+                return False
             white, log, numbers = self._whitened(left_out)
             verdict = self._explained(white, numbers >= first, log, mean, covariance)
             if verdict.causes[0].name != name or verdict.strength < LIKELY:
@@ -139,27 +145,32 @@ class HoldTest:
         faulty = np.linalg.solve(root, np.where(since[:, None], root @ signature, 0.0))
         rows = np.column_stack([left, signature, faulty])[None]
         healthy = Evidence.of(rows, np.array([log])).given(mean, covariance)
-        matrix, vector = np.zeros((1, 2 * count, 2 * count)), np.zeros((1, 2 * count))
+        size = self._bank.coefficient_count
+        matrix, vector = np.zeros((1, size, size)), np.zeros((1, size))
         matrix[:, :count, :count], vector[:, :count] = healthy.matrix[:, count:, count:], healthy.vector[:, count:]
         return Evidence(matrix, vector, healthy.squares, healthy.rows, healthy.log)
 
-    def _whitened(self, left_out: int | None = None) -> tuple[tuple[Array, Array, Array], float, Array]:
+    def _rows(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Of every row of all holds the channel, or the number of channels and the mode's number; and its hold."""
+        channels = np.arange(len(self._errors2))
+        what = [np.concatenate([channels, len(channels) + hold.modes]) for hold in self._holds]
+        return np.concatenate(what), np.repeat(np.arange(len(self._holds)), [len(each) for each in what])
+
+    def _whitened(self, left_out: NDArray[np.bool_] | None = None) -> tuple[tuple[Array, Array, Array], float, Array]:
         """Root of the covariance, whitened residuals and signatures, logarithm of their probability, hold of every row.
 
-        `left_out`: number of a frequency among those of all holds.
+        `left_out`: rows among those of all holds that do not count.
         """
         parts = [rows_of(hold, self._errors2, self._frequency_error) for hold in self._holds]
         table, own, error2 = (np.concatenate(column) for column in zip(*parts, strict=True))
         for place, left in self._known:
             error2 += (left * table[:, 1 + place]) ** 2
-        channels = len(self._errors2)
-        what = np.concatenate([np.concatenate([np.arange(channels), channels + hold.modes]) for hold in self._holds])
-        numbers = np.repeat(np.arange(len(self._holds)), [len(part[0]) for part in parts])
+        what, numbers = self._rows()
         strokes, times = np.array([hold.strokes for hold in self._holds]), np.array([hold.start for hold in self._holds]) * NANO
         travel = np.abs(strokes[:, None] - strokes[None]).max(axis=2) + REST * np.abs(times[:, None] - times[None])
         known = np.isfinite(table[:, 0])
         if left_out is not None:
-            known[np.flatnonzero(what >= channels)[left_out]] = False
+            known &= ~left_out
         table, own, error2, what, numbers = table[known], own[known], error2[known], what[known], numbers[known]
         alike = (what[:, None] == what[None]) * np.exp(-travel / REACH)[np.ix_(numbers, numbers)]
         covariance = np.diag(own) + alike * np.sqrt(np.outer(error2, error2))

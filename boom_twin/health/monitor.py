@@ -68,7 +68,9 @@ class HealthMonitor:
         self._ranges = sensor_ranges(scene, mounts)
         self._stated = {stream: settings.variance(kind) for stream, kind in SENSORS.items()}
         self._trusted = {stream: np.zeros(len(names), dtype=bool) for stream, names in self._channels.items()}
-        self._sensors = {stream: SensorMonitor(self._channels[stream], SENSORS[stream]) for stream in CHECKED}
+        self._sensors = {
+            stream: SensorMonitor(self._channels[stream], SENSORS[stream], stream is not Stream.STROKES) for stream in CHECKED
+        }
         self._delays = {stream: DelayMonitor(stream) for stream in DELAYED}
         self._mount, self._forces = ImuMount(), ForceReading(self._channels[Stream.FORCES])
         self._angles = AngleReading(scene, mounts)
@@ -226,8 +228,8 @@ class HealthMonitor:
         monitor = self._sensors[stream]
         before = monitor.masked
         findings = self._checks[stream].look(np.asarray(stamps * NANO), raw, expected, block.end * NANO)
-        may_come_back = stream is not Stream.STROKES and not findings.is_calm and findings.jumped.any()
-        news = monitor.take(findings, block.number * BLOCK, block.end, self.residuals.blamed if may_come_back else frozenset())
+        may_come_back = not findings.is_calm and findings.jumped.any()
+        news = monitor.take(findings, block.number * BLOCK, block.end, self.residuals.blamed if may_come_back else {})
         if stream in JUDGED and monitor.masked is not before and (monitor.masked & ~before).any():
             self.residuals.forget()
         return news

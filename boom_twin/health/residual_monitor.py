@@ -29,6 +29,7 @@ from .inference.sensitivities import Signature
 from .suspicion import CRUDE, DETUNING, MISFIT, RECENT, SURE, WHOLE_MISFIT, Suspicion, carried_on, load_levels, refuted
 from .tip_load import TipLoadMonitor
 
+OFFSETS = ("bias", "drift")  # kinds of faults whose size is what a sensor is off by
 SUSPICIOUS, CLEAN = 0.25, 0.05  # levels at which a suspicion begins, and is given up if it has not become an alarm
 SKIPPED = 2  # blocks in which a fault may still be on its way
 LEAST_SPAN, SWINGS = 3.0, 4.5  # s that evidence has to take for an alarm if it is obvious; and else: a pump's stroke, a gust
@@ -147,9 +148,10 @@ class ResidualMonitor:
         return (*(each.alarm for each in self._known.values()), *open_ones)
 
     @property
-    def blamed(self) -> frozenset[str]:
-        """Causes that may explain the alarms that last."""
-        return frozenset(rank.cause for each in self.alarms for rank in each.ranked)
+    def blamed(self) -> dict[str, float]:
+        """Causes that may explain the alarms that last, and the offset that each would be, SI; NaN of one that is none."""
+        ranks = [rank for each in self.alarms for rank in each.ranked]
+        return {rank.cause: next((part[1] for part in rank.parts if part[0] in OFFSETS), math.nan) for rank in ranks}
 
     def is_shaken(self, stamp: int) -> bool:
         """Whether a load shakes the boom at `stamp` (ns), or has lately.
@@ -293,6 +295,7 @@ class ResidualMonitor:
         its lag is said by vibration, so a lag may be as large without a fault.
         """
         self._suspicion, self._blocks = self._suspicion_from(start, self._carried), 0
+        self._tell.begin_anew()
 
     def _suspicion_from(self, start: int, carried: dict[str, float]) -> Suspicion:
         """Evidence to be collected from `start` (ns) on, see `_suspect`."""

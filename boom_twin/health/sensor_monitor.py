@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from ..types import Alarm, SensorKind
 from .sensor_check import MISSTATED, NOISE_OVER, Flags, SensorFindings
 
+NOTHING: Mapping[str, float] = MappingProxyType({})
 SETTLED = 2_000_000_000  # ns without the fault after which it has ended
 CAME_BACK = 0.3  # of a jump, by which a sensor that came back may still be off
 TOLD = {
@@ -52,10 +54,12 @@ class SensorMonitor:
         Of its channels.
     kind : SensorKind
         Says which findings give an alarm.
+    is_predicted : bool
+        Whether a model says what the sensors should read.
     """
 
-    def __init__(self, names: tuple[str, ...], kind: SensorKind) -> None:
-        self._names, self._sensors = names, kind
+    def __init__(self, names: tuple[str, ...], kind: SensorKind, is_predicted: bool = True) -> None:
+        self._names, self._sensors, self._is_predicted = names, kind, is_predicted
         self._faults: dict[tuple[int, str], _Fault] = {}
         self._none: Flags = np.zeros(len(names), dtype=bool)
 
@@ -74,11 +78,11 @@ class SensorMonitor:
             flags[channel] |= kind != "spikes"
         return flags
 
-    def take(self, findings: SensorFindings, start: int, end: int, blamed: Set[str] = frozenset()) -> list[Alarm]:
+    def take(self, findings: SensorFindings, start: int, end: int, blamed: Mapping[str, float] = NOTHING) -> list[Alarm]:
         """Take what was found in a block from `start` to `end` (ns); gives alarms that began or ended.
 
-        `blamed`: causes that residuals' alarms are explained by. A sensor among them that jumps to what the model expects has
-        come back, and residuals tell so.
+        `blamed`: causes that residuals' alarms are explained by, and by how much a sensor would then be off. One among them
+        that jumps to what the model expects, or back by that much where none does, has come back, and residuals tell so.
         """
         news: list[Alarm] = []
         if findings.is_calm and not self._faults:
@@ -101,10 +105,13 @@ class SensorMonitor:
         """Whether jumps mean nothing more: the sensor has another fault, out of which it jumps when it recovers."""
         return (channel, "jump") not in self._faults and any(known == channel for known, _ in self._faults)
 
-    def _comes_back(self, channel: int, findings: SensorFindings, blamed: Set[str]) -> bool:
+    def _comes_back(self, channel: int, findings: SensorFindings, blamed: Mapping[str, float]) -> bool:
         """Whether a jump of a sensor that is blamed, and has not jumped before, leaves it at what is expected."""
-        is_first = (channel, "jump") not in self._faults and f"{self._names[channel]}.sensor" in blamed
-        return is_first and abs(float(findings.level[channel])) < CAME_BACK * abs(float(findings.jumped[channel]))
+        cause, jump = f"{self._names[channel]}.sensor", float(findings.jumped[channel])
+        if cause not in blamed or (channel, "jump") in self._faults:
+            return False
+        off = float(findings.level[channel]) if self._is_predicted else blamed[cause] + jump
+        return abs(off) < CAME_BACK * abs(jump)
 
     def _seen(self, channel: int, kind: str, start: int, end: int, jump: tuple[float, float] | None) -> list[Alarm]:
         """Begin, keep or end a fault that was found again; of a jump its step, and how far the reading is off after it."""

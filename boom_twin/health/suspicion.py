@@ -80,7 +80,7 @@ class Suspicion:
     ) -> None:  # fmt: skip
         self._bank, self.start, self.mean, self.covariance = bank, start, mean, covariance
         self._errors2, self._noise2, self._carried = errors2, noise2, carried
-        channels, coefficients = len(errors2), 2 * len(mean)
+        channels, coefficients = len(errors2), bank.coefficient_count
         self._filter = InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, DETUNING, levels)
         self.size, self.blocks, self._travel = np.zeros(channels), 0, 0.0
         self._evidence = self._calm = Evidence.none(coefficients, levels.shape)
@@ -102,7 +102,7 @@ class Suspicion:
         measured = np.isfinite(left)
         self.size[measured] += max(BLOCK * NANO / LEVEL, 1.0 / (1 + self.blocks)) * (left[measured] - self.size[measured])
         noise, crude = problem.noise(self._noise2), self._errors2 + (CRUDE * self.size) ** 2
-        table = np.hstack([problem.table, (problem.start - self.start) * NANO * problem.table[:, 1:]])
+        table = self._with_rates(problem.table, problem.start)
         weight = 1.0 / (1.0 + problem.shaking / SHAKEN**2)
         self._filter.tune(problem.modes)
         shaking = self._filter.vibration(problem.shaking)
@@ -119,11 +119,14 @@ class Suspicion:
             return
         table, own, error2 = rows_of(hold, self._errors2, frequency_error)
         rows, sigmas = table[len(self._errors2) :], np.sqrt(own + error2)[len(self._errors2) :, None]
-        middle = 0.5 * (hold.start + hold.end) - self.start
-        white = np.hstack([rows, middle * NANO * rows[:, 1:]]) / sigmas
+        white = self._with_rates(rows, (hold.start + hold.end) // 2) / sigmas
         found = Evidence.of(white[None], np.array([-0.5 * float(white[:, 0] @ white[:, 0]) - float(np.log(sigmas).sum())]))
         self._evidence += found
         self._calm += found
+
+    def _with_rates(self, rows: Array, stamp: int) -> Array:
+        """Rows (k, 1 + parameters) at `stamp` (ns), and signatures of the rates of what may grow; (k, 1 + coefficients)."""
+        return np.hstack([rows, (stamp - self.start) * NANO * rows[:, 1 + self._bank.growing]])
 
     def explain(self) -> Verdict:
         """Weigh all hypotheses."""
@@ -168,7 +171,7 @@ class Suspicion:
         return RecentFit(bool(self.blocks > LONGEST or is_misfit or is_other_load), changed > CHANGED)
 
     def _coefficients(self, each: Explanation | None) -> Array:
-        return np.zeros(2 * len(self.mean)) if each is None else self._bank.coefficients(each, self.span)
+        return np.zeros(self._bank.coefficient_count) if each is None else self._bank.coefficients(each, self.span)
 
     def log_factor(self, each: Explanation) -> float:
         """ln of how much more probable a steady fault of exactly this value is than none."""

@@ -41,8 +41,8 @@ class Problem:
 
     def evidence(self) -> Evidence:
         """In three parts; of one level of the load."""
-        found = Evidence.none(2 * SIZE, (1,))
-        table = np.hstack([self.signature, self.times[:, None] * self.signature])
+        found = Evidence.none(BANK.coefficient_count, (1,))
+        table = np.hstack([self.signature, self.times[:, None] * self.signature[:, BANK.growing]])
         for rows in np.array_split(np.arange(len(self.values)), 3):
             y = self.values[rows]
             log = log_density(y, np.zeros(len(y)), np.eye(len(y)))
@@ -76,7 +76,7 @@ def test_healthy_deviations_are_integrated_out(seed):
     solved = np.linalg.solve(problem.spread, np.column_stack([problem.signature, left]))
     assert healthy.matrix[0, :SIZE, :SIZE] == pytest.approx(problem.signature.T @ solved[:, :-1], abs=1e-9)
     assert healthy.vector[0, :SIZE] == pytest.approx(problem.signature.T @ solved[:, -1], abs=1e-9)
-    growing = problem.times[:, None] * problem.signature
+    growing = problem.times[:, None] * problem.signature[:, BANK.growing]
     assert healthy.vector[0, SIZE:] == pytest.approx(growing.T @ solved[:, -1], abs=1e-7)
 
 
@@ -269,7 +269,7 @@ def test_levels_together_are_those_of_each_alone():
     both = Evidence(*(np.concatenate([getattr(one, name) for one in each]) for name in ("matrix", "vector", "squares")),
                     each[0].rows, np.concatenate([one.log for one in each]))  # fmt: skip
     mean, covariance = problems[0].mean, problems[0].covariance
-    coefficients = np.random.default_rng(3).normal(size=2 * SIZE)
+    coefficients = np.random.default_rng(3).normal(size=BANK.coefficient_count)
     logs, squares = BANK.fit(both, coefficients, mean, covariance)
     alone = [BANK.fit(one, coefficients, mean, covariance) for one in each]
     assert logs == pytest.approx(np.concatenate([log for log, _ in alone]), rel=1e-12)
@@ -300,7 +300,7 @@ def test_a_fault_below_its_least_value_explains_nothing():
 def test_a_growing_fault_below_its_least_value_early_on_explains_nothing():
     """A section twice as stiff that grows as soft as the scene has it is none, though its size at the end may be."""
     rows, times = 30, np.linspace(0.0, 10.0, 30)
-    white = np.zeros((rows, 1 + 2 * SIZE))
+    white = np.zeros((rows, 1 + BANK.coefficient_count))
     white[:, 0] = 3.0 * (times / 10.0 - 1.0)
     white[:, 1], white[:, 1 + SIZE] = 3.0, 3.0 * times
     verdict = BANK.explain(Evidence.of(white[None], np.zeros(1)), np.zeros(SIZE), np.zeros((SIZE, SIZE)), 10.0, {})

@@ -10,7 +10,9 @@ from oracle import booms
 
 from boom_twin import load_scene
 from boom_twin.analysis.equilibrium import statics
+from boom_twin.config.settings import Settings
 from boom_twin.errors import BoomTwinError
+from boom_twin.health.inference.block_problem import BlockMeans, LinearModel, MeasuredRows
 from boom_twin.health.inference.fault_catalogue import Form, parameters, physical, step_of
 from boom_twin.health.inference.sensitivities import Signatures
 from boom_twin.scene.edit import parameter, with_parameters
@@ -105,6 +107,24 @@ def test_sensors_show_in_their_own_channel_alone(made):
             assert both.tolist() == wanted.tolist()
         if each.form is Form.DELAY:
             assert not both.any(), "what depends on time and motion is filled in later"
+
+
+def test_scales_are_of_what_is_read(made):
+    """At the posture of the block, though signatures are made anew only after a centimetre of stroke."""
+    scene, known, strokes, signature = made
+    n = len(strokes)
+    model = LinearModel(scene, Settings(), (None,) * n, known)
+    moved = strokes + 0.009
+    none, rows = np.zeros(n + 2), MeasuredRows(np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros((0, 2)))
+    table = model._table(BlockMeans(0, none, none, moved, np.zeros(n), none, 0.0, rows), signature)
+    here, there = (statics(scene, where, modes=1).joints for where in (strokes, moved))
+    for column, each in enumerate(known):
+        if each.form is Form.ANGLE_SCALE:
+            own, later, i = signature.channels[:, column], table[:, 1 + column], each.index
+            assert own[i] == pytest.approx(here[i], abs=1e-5) and np.count_nonzero(own) == 1
+            assert later[i] == pytest.approx(there[i], abs=0.02 * abs(there[i] - here[i])) and np.count_nonzero(later) == 1
+        if each.form is Form.SCALE:
+            assert table[:, 1 + column] == pytest.approx(-signature.by_stroke[:, each.index] * moved[each.index])
 
 
 def test_the_imu_at_rest_feels_gravity_turned_with_the_tip(made):

@@ -72,6 +72,15 @@ def test_an_angle_sensor_that_was_never_right(channel):
     assert outcome.causes() <= {f"joint_{channel + 1}.sensor"}
 
 
+@pytest.mark.parametrize("channel", [1, *(pytest.param(i, marks=pytest.mark.slow) for i in (0, 2, 3))])
+def test_a_scale_of_an_encoder_is_no_scale_of_its_stroke(channel):
+    """One percent, from the start; as long as it was no hypothesis it was named as the cylinder's, with a probability of 1."""
+    outcome = run(spoilt(session(60.0), Stream.ANGLES, channel, lambda v, t: 1.01 * v, -1.0))
+    assert first_after(outcome, 0.0) <= 15.0
+    assert outcome.causes() == {f"joint_{channel + 1}.sensor"}
+    assert {alarm.kind for _, alarm in outcome.states() if alarm.cause is not None} == {"scale"}
+
+
 @pytest.mark.parametrize("bias", [0.02, 0.05])
 @pytest.mark.parametrize("channel", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_large_offset_at_rest_is_not_named_by_its_size(channel, bias):

@@ -256,6 +256,8 @@ class LinearModel:
         self.signatures = Signatures(scene, known, mounts)
         self._sensor2 = np.array([settings.variance(sensor_kind(name)) for name in judged_channels(n)])
         self._late = [(1 + i, self._channels_of(each.index, n)) for i, each in enumerate(known) if each.form is Form.DELAY]
+        self._turns = [(1 + i, each.index) for i, each in enumerate(known) if each.form is Form.ANGLE_SCALE]
+        self._lengths = [(1 + i, each.index) for i, each in enumerate(known) if each.form is Form.SCALE]
         self.begin()
 
     @staticmethod
@@ -320,4 +322,10 @@ class LinearModel:
         for column, own in self._late:
             table[:, column] = 0.0
             table[own, column] = -block.rates[own]
+        moved = block.strokes - signature.strokes  # since signatures were made
+        turned = signature.by_stroke @ moved
+        for column, joint in self._turns:
+            table[joint, column] += turned[joint]
+        for column, cylinder in self._lengths:
+            table[:, column] -= signature.by_stroke[:, cylinder] * moved[cylinder]
         return table

@@ -25,6 +25,7 @@ class Form(Enum):
     ANGLE = "angle"  # adds to one angle
     STROKE = "stroke"  # adds to one stroke
     SCALE = "scale"  # multiplies one stroke
+    ANGLE_SCALE = "angle scale"  # multiplies one angle
     PLAY = "play"  # lengthens one cylinder the way it is pulled
     DELAY = "delay"  # readings of a stream are those of an earlier time
     IMU = "imu"  # adds to one axis of the IMU
@@ -97,6 +98,7 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
     ]
     found.append(Parameter("base.inclination", "changed", Form.SCENE, 0, "rad", 1e-3, 0.03, prior=0.5))
     found += [Parameter(f"joint_{i + 1}.sensor", "bias", Form.ANGLE, i, "rad", 1e-4, 5e-3) for i in each]
+    found += [Parameter(f"joint_{i + 1}.sensor", "scale", Form.ANGLE_SCALE, i, "", 1e-4, 0.03, prior=0.5) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.sensor", "bias", Form.STROKE, i, "m", 2e-5, 3e-3, prior=0.5) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.sensor", "scale", Form.SCALE, i, "", 1e-4, 0.03, prior=0.5) for i in each]
     found += [Parameter(f"cylinder_{i + 1}.rod.clearance", "grown", Form.PLAY, i, "m", 0.0, 4e-4, 0.0, 0.1) for i in each]

@@ -35,6 +35,7 @@ from dataclasses import dataclass
 from math import log
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...kernels.jit import SameTypes
 from ...types import Array
@@ -44,6 +45,7 @@ from .normal_distribution import log_normal_below
 
 STEADY, GROWING = 0, 1
 BOUNDLESS = (Form.ANGLE, Form.STROKE, Form.IMU)  # of sensors whose zero may be off by any amount
+LASTING = (Form.DELAY, Form.SCALE, Form.ANGLE_SCALE)  # lags and scales do not grow
 GROWING_PRIOR, GROWN = 1e-4, 10.0  # weight of that shape; time (s) in which a fault grows to its size
 EARLY = 0.25  # share of the span at which growth has its least value, too; a line through growth from halfway on has 0 there
 CRUDE = 0.001  # see above
@@ -209,24 +211,33 @@ class Verdict:
 
 
 class HypothesisTest:
-    """Explains evidence. Coefficients: of every parameter what it is at the beginning, then of every one its rate.
+    """Explains evidence. Coefficients: of every parameter what it is at the beginning, then of those that may grow the rate.
 
     Parameters
     ----------
     known : tuple of Parameter
+
+    Attributes
+    ----------
+    growing : ndarray of int
+        Places of the parameters that may grow.
+    coefficient_count : int
     """
 
     def __init__(self, known: tuple[Parameter, ...]) -> None:
         self.known = known
         self._places = np.array([i for i, each in enumerate(known) if each.faulty > 0.0])
+        may_grow = np.array([known[i].form not in LASTING for i in self._places])
+        self.growing, self._grows = self._places[may_grow], np.flatnonzero(may_grow)
+        self.coefficient_count = len(known) + len(self.growing)
+        self._rate_of = {int(place): len(known) + k for k, place in enumerate(self.growing)}
         self._faulty = variances(known, "faulty")[self._places]
         self._least = np.array([known[i].least for i in self._places])
-        self._priors = np.log([known[i].prior for i in self._places])
-        lasting = [known[i].form in (Form.DELAY, Form.SCALE) for i in self._places]  # lags and scales do not grow
-        self._growing_priors = np.where(lasting, -np.inf, log(GROWING_PRIOR))
         self._none_sided = log_normal_below(-self._least / np.sqrt(self._faulty))
+        self._explained = np.concatenate([self._places, self.growing])  # by both shapes: what follows is of these
+        self._priors = np.log([known[i].prior for i in self._explained])
         self._names = tuple(dict.fromkeys(known[i].cause for i in self._places))
-        self._group = 2 * [self._names.index(known[i].cause) for i in self._places]  # the cause of every place, in both shapes
+        self._group = [self._names.index(known[i].cause) for i in self._explained]
         self._is_boundless = np.array([known[i].form in BOUNDLESS for i in self._places])
 
     def explain(
@@ -261,30 +272,29 @@ class HypothesisTest:
         healthy = evidence.given(mean, covariance)
         logs = healthy.log
         fits = np.concatenate([self._steady(healthy), self._growing(healthy, span)], axis=2)
-        # fits: (levels, numbers, shapes * places)
+        # fits: (levels, numbers, explanations)
         factors = fits[:, 0] + (logs - logs.max())[:, None]
         squares = healthy.squares[:, None] - fits[:, 1]
         best = np.unravel_index(int(np.argmax(factors)), factors.shape)
         excess = max(1.0, float(squares[best]) / max(healthy.rows, 1.0))
-        priors = np.tile(self._priors, 2)
-        seen = (healthy.matrix.diagonal(axis1=-2, axis2=-1)[:, self._places] > 0.0).any(axis=0)
-        priors[~np.tile(seen, 2)] = -np.inf if seen.any() else 0.0  # what shows in no reading, say an IMU that is not there
+        priors = self._priors.copy()
+        seen = (healthy.matrix.diagonal(axis1=-2, axis2=-1)[:, self._explained] > 0.0).any(axis=0)
+        priors[~seen] = -np.inf if seen.any() else 0.0  # what shows in no reading, say an IMU that is not there
         crude = 0.5 * CRUDE * (1.0 + 1.0 / postures)
         weights = factors / (excess * (1.0 + crude * max(0.0, float(factors[best])))) + priors
         alone = np.exp(weights - weights.max()).sum(axis=0)
-        before = np.exp([carried.get(self.known[place].cause, 0.0) for place in self._places])
-        shares = alone * np.tile(before, 2)
+        shares = alone * np.exp([carried.get(self.known[place].cause, 0.0) for place in self._explained])
         levels = np.argmax(factors, axis=0)
         found = [
             Explanation(int(place), level, float(factors[level, i]), *fits[level, 2:, i].tolist())
-            for i, (place, level) in enumerate(zip(np.tile(self._places, 2), levels.tolist(), strict=True))
+            for i, (place, level) in enumerate(zip(self._explained, levels.tolist(), strict=True))
         ]
         is_faulty, none = float(factors[best]) > 0.0, int(np.argmax(logs))
         as_well = logs > logs[none] - AS_WELL
         none_excess = max(1.0, float(healthy.squares[as_well].min()) / max(healthy.rows, 1.0))
         constant = weights[:, : len(self._places)]
-        steady = np.exp(constant - constant.max()).sum(axis=0)
-        steady = np.concatenate([steady, np.zeros_like(steady)])
+        steady = np.zeros_like(alone)
+        steady[: len(self._places)] = np.exp(constant - constant.max()).sum(axis=0)
         causes = self._grouped(found, *(each / each.sum() for each in (shares, alone, steady)))
         return Verdict(causes, excess, none_excess, int(best[0]) if is_faulty else none)
 
@@ -306,16 +316,16 @@ class HypothesisTest:
         usual = np.where(self._is_boundless, np.maximum(self._faulty, (vector / known) ** 2 - 1.0 / known), self._faulty)
         spread = usual / (1.0 + usual * matrix)
         values, sigmas = spread * vector, np.sqrt(spread)
-        factors = 0.5 * vector * values - 0.5 * np.log1p(usual * matrix) + self._sided(values, sigmas)
+        factors = 0.5 * vector * values - 0.5 * np.log1p(usual * matrix) + self._sided(values, sigmas, slice(None))
         none = np.zeros_like(values)
         return np.stack([factors, vector * values, values, sigmas, none, none], axis=-2)
 
     def _growing(self, healthy: Evidence, span: float) -> Array:
         """Likewise of faults that grow; values are those at the end of `span` (s); least values hold there, and early on."""
-        count = len(self.known)
-        pairs = np.stack([self._places, self._places + count], axis=1)
+        count, grows = len(self.known), self._grows
+        pairs = np.stack([self.growing, count + np.arange(len(grows))], axis=1)
         vector = healthy.vector[..., pairs]
-        prior = np.sqrt(np.stack([self._faulty, self._faulty / GROWN**2], axis=1))
+        prior = np.sqrt(self._faulty[grows, None] * np.array([1.0, GROWN**-2]))
         matrix = healthy.matrix[..., pairs[:, :, None], pairs[:, None, :]]
         scaled = np.eye(2) + prior[:, :, None] * matrix * prior[:, None, :]
         spread = prior[:, :, None] * np.linalg.inv(scaled) * prior[:, None, :]
@@ -323,13 +333,15 @@ class HypothesisTest:
         explained = (vector * found).sum(axis=-1)
         now, early = np.array([1.0, span]), np.array([1.0, EARLY * span])
         values, sigmas = found @ now, np.sqrt(spread @ now @ now)
-        sided = np.minimum(self._sided(values, sigmas), self._sided(found @ early, np.sqrt(spread @ early @ early)))
-        factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + sided + self._growing_priors
+        sided = np.minimum(
+            self._sided(values, sigmas, grows), self._sided(found @ early, np.sqrt(spread @ early @ early), grows)
+        )
+        factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + sided + log(GROWING_PRIOR)
         return np.stack([factors, explained, values, sigmas, found[..., 1], np.sqrt(spread[..., 1, 1])], axis=-2)
 
-    def _sided(self, values: Array, sigmas: Array) -> Array:
-        """What it adds to the log factor that faults have a least value."""
-        return log_normal_below((values - self._least) / sigmas) - self._none_sided
+    def _sided(self, values: Array, sigmas: Array, at: NDArray[np.intp] | slice) -> Array:
+        """What it adds to the log factor that faults, `at` some of the places, have a least value."""
+        return log_normal_below((values - self._least[at]) / sigmas) - self._none_sided[at]
 
     def _grouped(self, found: list[Explanation], shares: Array, alone: Array, steady: Array) -> tuple[Cause, ...]:
         groups: dict[int, list[int]] = {}
@@ -343,7 +355,7 @@ class HypothesisTest:
         return tuple(sorted(causes, key=lambda cause: -cause.probability))
 
     def fit(self, evidence: Evidence, coefficients: Array, mean: Array, covariance: Array) -> tuple[Array, Array]:
-        """How well faults of known coefficients, shape (2 * parameters,), go with evidence.
+        """How well faults of known coefficients (coefficients,) go with evidence.
 
         Returns
         -------
@@ -363,23 +375,26 @@ class HypothesisTest:
         logs, squares : ndarray, shape (levels,)
             As `fit` gives them.
         changed : float
-            ln of how much more probable it is that its size or its rate is another one by then than that both are what they
-            were, each with the load that goes best with it: the flank of a pump's pulse is no other size.
+            ln of how much more probable it is that its size, or its rate if it may grow, is another one by then than that they
+            are what they were, each with the load that goes best with it: the flank of a pump's pulse is no other size.
         """
-        kept = [*range(len(mean)), each.place + len(self.known)]
-        healthy = evidence.about(self.coefficients(each, span), kept).given(mean, covariance)
-        pair, prior2 = np.array([each.place, len(mean)]), self.known[each.place].faulty ** 2 * np.array([1.0, GROWN**-2])
-        vector, matrix = healthy.vector[:, pair], healthy.matrix[:, pair[:, None], pair]
-        spread = np.eye(2) + prior2[:, None] * matrix
+        rate = [self._rate_of[each.place]] if each.place in self._rate_of else []
+        healthy = evidence.about(self.coefficients(each, span), [*range(len(mean)), *rate]).given(mean, covariance)
+        own = np.array([each.place, len(mean)][: 1 + len(rate)])
+        prior2 = self.known[each.place].faulty ** 2 * np.array([1.0, GROWN**-2])[: len(own)]
+        vector, matrix = healthy.vector[:, own], healthy.matrix[:, own[:, None], own]
+        spread = np.eye(len(own)) + prior2[:, None] * matrix
         found = np.linalg.solve(spread, (prior2 * vector)[..., None])[..., 0]
         gains = 0.5 * (vector * found).sum(axis=-1) - 0.5 * np.linalg.slogdet(spread)[1]
         changed = float((healthy.log + gains).max() - healthy.log.max())
         return healthy.log, healthy.squares / max(healthy.rows, 1.0), changed
 
     def coefficients(self, each: Explanation, span: float) -> Array:
-        """Of the fault alone, `span` (s) after its evidence began; shape (2 * parameters,)."""
-        found = np.zeros(2 * len(self.known))
-        found[[each.place, each.place + len(self.known)]] = each.value - each.rate * span, each.rate
+        """Of the fault alone, `span` (s) after its evidence began; shape (coefficients,)."""
+        found = np.zeros(self.coefficient_count)
+        found[each.place] = each.value - each.rate * span
+        if each.place in self._rate_of:
+            found[self._rate_of[each.place]] = each.rate
         return found
 
 

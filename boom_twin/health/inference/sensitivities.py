@@ -87,6 +87,7 @@ COLUMNS: dict[Form, Callable[[Posture, int], Array]] = {
     Form.IMU: lambda at, i: at.unit(at.joints + i),
     Form.STROKE: lambda at, i: -at.by_stroke[:, i],
     Form.SCALE: lambda at, i: -at.by_stroke[:, i] * at.strokes[i],
+    Form.ANGLE_SCALE: lambda at, i: at.unit(i) * at.readings[i],
     Form.PLAY: lambda at, i: at.by_stroke[:, i] * np.sign(at.forces[i]),
 }
 """Derivative of the readings by a parameter of that form and index; of `Form.SCENE` it comes from another boom at rest, and
