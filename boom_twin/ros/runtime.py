@@ -84,11 +84,60 @@ def spin(node: Node, queue: ReceiveQueue, is_over: Callable[[], bool]) -> None:
     except STOPPED:
         raise
     except Exception as error:
-        told = "events executor: %s; the single-threaded executor goes on, at twice the processor time"
-        Log(node).warning(told % one_line(error))
+        _warn_of_events_executor(node, error)
         _drive(SingleThreadedExecutor(), node, queue, is_over, _call_back_once)
     finally:
         node.destroy_timer(timer)
+
+
+@contextmanager
+def callback_turns(node: Node, is_due: Callable[[], bool]) -> Iterator[Callable[[], None]]:
+    """Give a function that lets the callbacks of `node` run until `is_due`, which is asked every `WAKE` s, or sooner.
+
+    By the events executor, whose turns a timer ends from here, see `spin`; by the single-threaded one where that one is missing
+    or fails.
+    """
+    turn, executors = Future(), [_events_executor, SingleThreadedExecutor]
+    executor: Any = None
+
+    def look() -> None:
+        if is_due() and not turn.done():
+            turn.set_result(None)
+
+    def call_back() -> None:
+        nonlocal turn, executor
+        turn = Future()
+        try:
+            if executor is None:
+                executor = executors[0]()
+                executor.add_node(node)
+            if len(executors) > 1:
+                executor.spin_until_future_complete(turn, timeout_sec=TURN)
+            else:
+                executor.spin_once(timeout_sec=WAKE)
+        except STOPPED:
+            raise
+        except Exception as error:
+            if len(executors) == 1:
+                raise
+            _warn_of_events_executor(node, error)
+            if executor is not None:
+                executor.remove_node(node)
+            executor = None
+            del executors[0]
+
+    timer = node.create_timer(WAKE, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+    try:
+        yield call_back
+    finally:
+        if executor is not None:
+            executor.remove_node(node)
+        node.destroy_timer(timer)
+
+
+def _warn_of_events_executor(node: Node, error: Exception) -> None:
+    told = "events executor: %s; the single-threaded executor goes on, at twice the processor time"
+    Log(node).warning(told % one_line(error))
 
 
 def _events_executor() -> Any:

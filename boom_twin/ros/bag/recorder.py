@@ -10,7 +10,6 @@ from functools import partial
 from typing import Any
 
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
@@ -26,6 +25,8 @@ from ...errors import BagError, BoomTwinError
 from ...messages.topic_table import NODE, Output, load_topics
 from ...types import NANO
 from ..node.diagnostics import DiagnosticsPublisher
+from ..runtime import callback_turns
+from ..subscription_callback import with_information
 from .subscriptions import RequestedTopic, subscription_of
 
 NAMES = ("scene", "mapping", "frame_prefix", *Settings.model_fields)
@@ -77,7 +78,6 @@ def twin_values(node: Node) -> dict[str, RemoteValue]:
 
 
 NAME = "boom_twin_recorder"
-WAKE = 0.1
 LOOK = 0.5
 """Seconds between looks for new topics, publishers and the disk."""
 LOOKS = 2
@@ -125,7 +125,8 @@ class _Channel:
         found = subscription_of(node, self.wanted)
         if found is not None:
             self._key, self._type = self._storage.add(found.recorded), found.recorded.type
-            self.subscription = node.create_subscription(found.kind, self.wanted.name, self._store, found.qos, raw=True)
+            take = with_information(self._store)
+            self.subscription = node.create_subscription(found.kind, self.wanted.name, take, found.qos, raw=True)
 
     def look(self, node: Any) -> int:
         """How many publishers there are; with more than one, their numbers tell nothing."""
@@ -243,7 +244,7 @@ def record(
     thresholds : Thresholds
         Of the state on ``/diagnostics``.
     stopped : callable
-        Asked after every message, and ten times a second.
+        Asked every `boom_twin.ros.runtime.WAKE` s.
     tell : callable
         Told in words when recording begins, once every required topic has a publisher (`COMPLETE`), and what is left out.
     on_twin : callable
@@ -285,13 +286,14 @@ def _spin(
     on_twin: Callable[[Mapping[str, object]], None],
 ) -> None:
     """Receive until `stopped`."""
-    executor = SingleThreadedExecutor()
-    executor.add_node(recording.node)
     recording.look()
     tell(f"recording {len(recording.channels)} topics; Ctrl-C ends it")
     due, looks, is_complete = time.monotonic() + LOOK, 0, False
-    while not stopped():
-        if time.monotonic() >= due:
+    with callback_turns(recording.node, lambda: stopped() or time.monotonic() >= due) as call_back:
+        while not stopped():
+            call_back()
+            if time.monotonic() < due:
+                continue
             due, looks = time.monotonic() + LOOK, looks + 1
             if recording.look() and not is_complete:
                 is_complete = True
@@ -300,4 +302,3 @@ def _spin(
                 on_twin(told)
             if looks % LOOKS == 0:
                 recording.tell()
-        executor.spin_once(timeout_sec=WAKE)

@@ -10,12 +10,12 @@ from __future__ import annotations
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
-from inspect import Parameter, Signature
 from math import nan
 from typing import Any
 
 from ...diagnostics.source_status import Reception
 from ...types import NANO
+from ..subscription_callback import with_information
 
 FRESH = 0.005
 """Age (s) of a message, at its receipt from the executor, above which more are taken to stand in the executor's own row."""
@@ -106,9 +106,7 @@ class ReceiveQueue:
         """
         self._topics[name] = topic = _Topic(depth, read)
 
-        def put(*received: Any) -> None:
-            # message and information; rclpy 7.1's events executor gives the two as one
-            data, info = received if len(received) == 2 else received[0]
+        def put(data: bytes, info: Mapping[str, Any]) -> None:
             now = self._clock()
             arrival = info["received_timestamp"] or now
             topic.count(info["publication_sequence_number"])
@@ -126,10 +124,7 @@ class ReceiveQueue:
             if self.on_put is not None:
                 self.on_put()
 
-        # rclpy tells by the signature that the information is wanted too
-        both = [Parameter(name, Parameter.POSITIONAL_ONLY) for name in ("data", "info")]
-        put.__signature__ = Signature(both)  # type: ignore[attr-defined]
-        return put
+        return with_information(put)
 
     def close(self) -> None:
         """Forget all topics, and what waits."""

@@ -1,0 +1,60 @@
+"""Turns in which a node's callbacks run: messages come with their information, a turn ends when it is due, whichever executor."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+import rclpy
+from std_msgs.msg import String
+
+from boom_twin.ros import runtime
+from boom_twin.ros.subscription_callback import with_information
+
+
+class _Worn:
+    """An executor that fails as soon as it is to turn."""
+
+    def add_node(self, node: Any) -> None:
+        pass
+
+    remove_node = add_node
+
+    def spin_until_future_complete(self, turn: Any, timeout_sec: float) -> None:
+        raise RuntimeError("worn out")
+
+
+def _missing() -> Any:
+    raise ImportError("no events executor")
+
+
+@pytest.mark.parametrize("executor, warnings", [(None, 0), (_Worn, 1), (_missing, 1)], ids=["events", "fails", "missing"])
+def test_messages_come_with_their_information_and_turns_end_when_due(
+    domain: None, monkeypatch: pytest.MonkeyPatch, executor: Any, warnings: int
+) -> None:
+    if executor is not None:
+        monkeypatch.setattr(runtime, "_events_executor", executor)
+    told: list[object] = []
+    monkeypatch.setattr(runtime, "_warn_of_events_executor", lambda node, error: told.append(error))
+    node, came = rclpy.create_node("turns"), list[Mapping[str, Any]]()
+    node.create_subscription(String, "text", with_information(lambda data, info: came.append(info)), 10, raw=True)
+    publisher, due = node.create_publisher(String, "text", 10), time.monotonic() + 1.0
+    turns, sent = 0, 0
+    with runtime.callback_turns(node, lambda: time.monotonic() >= due) as call_back:
+        while len(came) < 3 and time.monotonic() < due + 30.0:
+            if publisher.get_subscription_count() and sent < 3:
+                publisher.publish(String(data="x" * 100))
+                sent += 1
+            began = time.monotonic()
+            call_back()
+            turns += 1
+            assert time.monotonic() - began < runtime.TURN, "a turn ends when it is due, though nothing more comes"
+            due = time.monotonic() + 0.3
+    assert [info["publication_sequence_number"] for info in came] == [1, 2, 3]
+    assert len(told) == warnings and not list(node.timers)
+    node.destroy_node()
