@@ -160,6 +160,12 @@ def test_a_bad_argument_ends_the_node_with_its_name(spawn_node: Callable[..., An
     assert words in node.said() and "Traceback" not in node.said()
 
 
+def test_a_parameter_without_ros_args_is_told_where_it_belongs() -> None:
+    command = [sys.executable, "-P", "-m", "boom_twin.ros.node.main", "-p", "payload:=40.0"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60.0, check=False)
+    assert ended.returncode == 2 and "-p payload:=40.0: unknown. Parameters and remappings follow --ros-args" in ended.stderr
+
+
 ACTIVE, PREPARING = "active;", "preparing the model"
 MOMENTS = [("", signal.SIGINT), (PREPARING, signal.SIGTERM), (ACTIVE, signal.SIGINT), (ACTIVE, signal.SIGTERM)]
 CLOSED = pytest.mark.skipif(signal.getsignal(signal.SIGHUP) is signal.SIG_IGN, reason="nohup: a closed terminal ends nothing")

@@ -95,10 +95,18 @@ def test_a_change_to_what_was_so_before_is_not_an_empty_line() -> None:
     assert lines == ["at 1000000000.000000000: started from rest (first strokes)", "at 1000000000.005000000: payload 41"]
 
 
-@pytest.mark.parametrize(("wait", "told"), [(0.0, 1), (1.5, 0)])
-def test_messages_that_waited_are_not_stamped_by_another_clock(wait: float, told: int) -> None:
-    lines: list[tuple[str, str]] = []
-    watch = SimpleNamespace(newest=10**18, thresholds=SimpleNamespace(stamp_offset=1.0))
-    diagnostics: Any = SimpleNamespace(_active=True, _watch=watch, _tell=lambda *line: lines.append(line))
-    Diagnostics._tell_clock(diagnostics, 1e9 + 2.0, wait)
-    assert [name for name, _ in lines] == ["clock"] * told
+@pytest.mark.parametrize(
+    ("waits", "is_simulated", "told"), [([0.0], False, 0), ([0.0, 1.5], False, 0), ([0.0, 0.0], False, 1), ([0.0] * 3, True, 1)]
+)
+def test_another_clock_is_told_if_it_lasts_and_messages_did_not_wait(waits: list[float], is_simulated: bool, told: int) -> None:
+    """A bag that begins again is a jump of stamps and of clock, one after the other."""
+    lines: list[str] = []
+    diagnostics: Any = object.__new__(Diagnostics)
+    diagnostics._active, diagnostics._told, diagnostics._was_apart = True, set(), False
+    diagnostics._watch = SimpleNamespace(newest=10**18, thresholds=SimpleNamespace(stamp_offset=1.0))
+    diagnostics._logger = SimpleNamespace(warning=lines.append)
+    diagnostics._node = SimpleNamespace(get_parameter=lambda name: SimpleNamespace(value=is_simulated))
+    for wait in waits:
+        diagnostics._tell_clock(1e9 + 2.0, wait)
+    assert len(lines) == told
+    assert all(("set use_sim_time" in line) is not is_simulated for line in lines)

@@ -210,6 +210,7 @@ class Diagnostics:
         self._scene, self._joints = "", 0
         self._other_boom_names: dict[Stream, list[str]] = {}
         self._told: set[str] = set()
+        self._was_apart = False
 
     def watch(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
         """The node is configured with these."""
@@ -327,9 +328,15 @@ class Diagnostics:
             return
         if newest is None:
             return
-        apart = clock - newest * NANO
-        if abs(apart) > self._watch.thresholds.stamp_offset + wait:
-            self._tell("clock", f"newest stamp is {apart:.1f} s from the node's clock: set use_sim_time or play with --clock")
+        apart, before = clock - newest * NANO, self._was_apart
+        self._was_apart = abs(apart) > self._watch.thresholds.stamp_offset + wait
+        if self._was_apart and before:  # a bag that begins again steps at another moment than its clock
+            self._tell("clock", f"newest stamp is {apart:.1f} s from {self._clock_in_words()}")
+
+    def _clock_in_words(self) -> str:
+        if self._node.get_parameter("use_sim_time").value:
+            return "/clock: is this the clock of what is played?"
+        return "the node's clock: set use_sim_time or play with --clock"
 
     def _tell(self, name: str, text: str) -> None:
         """Log something once."""

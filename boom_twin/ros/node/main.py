@@ -48,7 +48,9 @@ def _run(arguments: list[str], stop: StopSignal) -> int:
     parser = ArgumentParser(prog="twin_node", description="The live boom twin, a ROS 2 lifecycle node.")
     parser.epilog = "Parameters: --ros-args -p scene:=PATH --params-file msg_config/twin.yaml"
     with ros(["twin_node", *arguments]):
-        parser.parse_args(remove_ros_args(["twin_node", *arguments])[1:])
+        _, rest = parser.parse_known_args(remove_ros_args(["twin_node", *arguments])[1:])
+        if rest:
+            parser.error(f"{' '.join(rest)}: unknown. Parameters and remappings follow --ros-args.")
         from .node import TwinNode
 
         node = TwinNode()
