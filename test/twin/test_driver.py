@@ -8,10 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import boom_twin
 from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene, statics
+from boom_twin.estimation.deviation_modes import DeviationModes
 from boom_twin.health.baseline import load_baseline
+from boom_twin.health.sensor_check import MISSTATED
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import Output
 from boom_twin.scene.kinematics import strokes_of_posture
@@ -105,14 +108,17 @@ def test_there_is_one_loop() -> None:
     assert {name for name, text in texts.items() if re.search(r"twin\.update\(\w", text)} == {"twin/driver.py"}
 
 
-def spoilt_samples(seconds: float) -> Iterator[Sample]:
-    """A boom at rest at 100 Hz whose third encoder stands still from 2 s on: its sensor gets masked."""
+def spoilt_samples(seconds: float, noise: float = 1.0) -> Iterator[Sample]:
+    """A boom at rest at 100 Hz whose third encoder stands still from 2 s on: its sensor gets masked.
+
+    All encoders have so many times the noise that is stated.
+    """
     random, angles = np.random.default_rng(3), statics(None, "arch").joints
     stuck = angles[2]
     for k in range(round(seconds * 100)):
         stamp = 10**18 + 2 * k * RATE
         yield Sample(Stream.STROKES, stamp, STROKES + random.normal(0.0, 2e-5, 4))
-        read = angles + random.normal(0.0, 1.7e-4, 4)
+        read = angles + random.normal(0.0, noise * 1.7e-4, 4)
         stuck = read[2] if k < 200 else stuck
         yield Sample(Stream.ANGLES, stamp, np.array([*read[:2], stuck, read[3]]))
 
@@ -145,3 +151,29 @@ def test_a_judgement_that_was_not_asked_for_still_guards_the_next_sample() -> No
         if one.report.estimate is not None:
             assert other.report.estimate is not None
             assert one.report.estimate.tip.tobytes() == other.report.estimate.tip.tobytes()
+
+
+def test_what_health_finds_changes_the_estimate_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Predictions, residuals and alarms are the same to the bit where no sensor is left out and no noise is allowed for.
+
+    So whoever judges health never holds up what is predicted.
+    """
+    kept, estimates = [], []
+    for is_heard in (True, False):
+        if not is_heard:
+            monkeypatch.setattr(DeviationModes, "mask", lambda *_: None)
+            monkeypatch.setattr(DeviationModes, "expect_noise", lambda *_: None)
+        reports = [step.report for step in drive(Twin(load_scene(), baseline=load_baseline()), spoilt_samples(5.0, 3.0))]
+        judged = [each.health for each in reports if each.health is not None]
+        assert {alarm.cause for alarm in judged[-1].alarms} == {"joint_3.sensor"}
+        assert judged[-1].noise["noise_over_angle_sigma"] > MISSTATED
+        numbers = [
+            *(each.prediction.tip_acceleration for each in reports if each.prediction is not None),
+            *(each.prediction.cylinder_forces for each in reports if each.prediction is not None),
+            *(part for each in reports for row in each.residuals for part in (row.values, row.sigmas)),
+            *(each.levels for each in judged),
+        ]
+        kept.append((b"".join(map(np.ndarray.tobytes, numbers)), [each.alarms for each in judged]))
+        estimates.append(np.array([each.estimate.tip for each in reports if each.estimate is not None]))
+    assert kept[0] == kept[1]
+    assert np.abs(estimates[0] - estimates[1]).max() > 1e-4
