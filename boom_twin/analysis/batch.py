@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from ..compiler.lanes import groups_of, lanes_of, numbers_of, room_for, side_by_side, work_of_lanes, write_back
 from ..compiler.plan import Plan, first_row, stacked, width_of
 from ..errors import UsageError
 from ..kernels.integrators import GENERALISED_ALPHA
-from ..kernels.tables import OK, SENTENCES, Work
+from ..kernels.tables import OK, SENTENCES, Tables, Work
+from ..kernels.transfer.lane_steps import LaneCourse, run_lanes
 from ..kernels.transfer.time_step import run_each
 from ..types import Array
 from .drive import PASSES, TOLERANCE
 from .equilibrium import settle
 from .simulate import RHO
 
+FEWEST_STEPS = 8  # of a call, for which booms are put side by side
 SHARES = 4  # pieces of work a core, so that one that is slowed down does not hold up the others
 
 
@@ -93,17 +97,54 @@ class Batch:
         rows = total // every
         steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
         out, self._ends = np.full((count, rows, width_of(self.plans[0])), np.nan), np.zeros((count, 3), np.int64)
+        course = (steps, counts, drives, speeds, GENERALISED_ALPHA, rho, TOLERANCE, PASSES)
+        alone = self._run_lanes(course, out) if self._may_have_lanes(total) else np.arange(count)
+        self._run_alone(alone, course, out)
+        return out
+
+    def _may_have_lanes(self, steps: int) -> bool:
+        """Whether booms go side by side: with ideal pins, compiled, and if what it takes to put them there pays."""
+        return not self.plans[0].pins and steps >= FEWEST_STEPS and len(self.plans) > 1 and run_lanes.is_compiled
+
+    @cached_property
+    def _groups(self) -> tuple[Tables, list[tuple[Work, np.ndarray]]]:
+        """Tables of the booms side by side, and works for them."""
+        works = min(groups_of(len(self.plans)), SHARES * self.cores)
+        return side_by_side(self._tables), [work_of_lanes(self.plans[0]) for _ in range(works)]
+
+    def _run_lanes(self, course: tuple[Any, ...], out: Array) -> np.ndarray:
+        """Step booms side by side; returns the numbers of those that failed, whose states are as they were."""
+        steps, counts, drives, speeds, *how = course
+        (tables, works), states, booms = self._groups, side_by_side(self._states), len(out)
+        drives, speeds = lanes_of(drives), lanes_of(speeds)
+        rows, ends = room_for((len(drives), *out.shape[1:])), room_for((len(drives), 2))
+
+        def share(own: tuple[Work, np.ndarray], bounds: tuple[int, int]) -> None:
+            work, kept = own
+            run_lanes(tables, states, work, LaneCourse(drives, speeds, rows, ends, kept), *bounds, steps, counts, *how)
+
+        self._shared(share, works, len(drives))
+        failed, passes = numbers_of(ends, booms).T
+        good = failed == 0.0
+        write_back(states, self._states, good)
+        out[good] = numbers_of(rows, booms)[good]
+        self._ends[good] = np.stack([np.full(booms, OK), np.full(booms, len(steps)), passes], axis=1)[good]
+        return np.flatnonzero(~good)
+
+    def _run_alone(self, booms: np.ndarray, course: tuple[Any, ...], out: Array) -> None:
+        """Step these booms one after the other."""
 
         def share(work: Work, bounds: tuple[int, int]) -> None:
-            run_each(
-                self._tables, self._states, work, *bounds, steps, counts, drives, speeds, GENERALISED_ALPHA, rho,
-                TOLERANCE, PASSES, out, self._ends,
-            )  # fmt: skip
+            for i in booms[slice(*bounds)]:
+                run_each(self._tables, self._states, work, i, i + 1, *course, out, self._ends)
 
-        limits = np.linspace(0, count, len(self._works) + 1).astype(int).tolist()
+        self._shared(share, self._works, len(booms))
+
+    def _shared(self, share: Callable[[Any, tuple[int, int]], None], works: Sequence[Any], count: int) -> None:
+        """Let `share` work on `count` pieces, over all cores, each in a work of its own."""
+        limits = np.linspace(0, count, len(works) + 1).astype(int).tolist()
         with ThreadPoolExecutor(self.cores) as pool:
-            list(pool.map(share, self._works, pairwise(limits)))
-        return out
+            list(pool.map(share, works, pairwise(limits)))
 
     def failures(self) -> dict[int, str]:
         """Booms whose last run ended early, and why."""

@@ -147,7 +147,13 @@ class Plan:
 def stacked(parts: Sequence[Any]) -> Any:
     """Named tuples of arrays as one, a leading axis over them; what is not an array is common."""
     columns = zip(*parts, strict=True)
-    return type(parts[0])(*(np.stack(column) if isinstance(column[0], np.ndarray) else column[0] for column in columns))
+    return type(parts[0])(*(_stack(column) if isinstance(column[0], np.ndarray) else column[0] for column in columns))
+
+
+def _stack(column: Sequence[np.ndarray]) -> np.ndarray:
+    """Record arrays stay such, for kernels that run as plain Python."""
+    found = np.stack(column)
+    return found.view(np.recarray) if isinstance(column[0], np.recarray) else found
 
 
 def width_of(plan: Plan) -> int:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from functools import cache, cached_property, update_wrapper
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -29,7 +30,8 @@ LAYOUT = 0x1 | 0x2 | 0x100 | 0x400
 """Of an array's flags those that its type depends on: C and Fortran order, aligned, writeable."""
 CONFIG_FILE = ".numba_config.yaml"
 """numba takes its settings from this file in the working directory, which may be a received session's."""
-
+LANES = "lanes"
+"""Name of the only field of a record that holds one number of each of several booms, see `boom_twin.kernels.lanes`."""
 
 _BY_REFERENCE: set[type] = set()
 _UNREGISTERED: list[type] = []
@@ -149,6 +151,11 @@ class Kernel:
                 _tell_not_kept(f"numba {numba.__version__} is not the one that was tested ({error})")
         return dispatcher
 
+    @property
+    def is_compiled(self) -> bool:
+        """Whether calls run compiled code, not plain Python."""
+        return hasattr(self.dispatcher, "overloads")
+
     def _compiler(self) -> dict[str, Any]:
         """Which compiler instead of numba's own."""
         from .inlining import KernelCompiler
@@ -170,7 +177,7 @@ class Kernel:
         kind of numbers would be read wrongly: the caller makes sure that there are none.
         """
         dispatcher = self.dispatcher
-        if not hasattr(dispatcher, "overloads"):  # kernels run as plain Python
+        if not self.is_compiled:
             return self
         if (kinds := _kind(examples)) not in self._compiled:
             types = tuple(dispatcher.typeof_pyval(each) for each in examples)
@@ -206,25 +213,30 @@ class Inner(Kernel):
         return self.py_func(*arguments)
 
 
-class _OfReferences:
-    """A function of `boom_twin.kernels.references`, which is imported when a kernel that calls it is compiled."""
+class _Intrinsic:
+    """A function of a module that is imported when a kernel that calls it is compiled; `plain` is what it is in Python."""
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, module: str, name: str, plain: Callable[..., Any]) -> None:
+        self._module, self._name, self._plain = module, name, plain
 
-    def __call__(self, fields: Fields) -> Fields:
-        return fields
+    def __call__(self, *arguments: Any) -> Any:
+        return self._plain(*arguments)
 
     @property
     def _numba_type_(self) -> Any:
-        from .references import kind_of
+        function = getattr(import_module(self._module, __package__), self._name)
+        from numba.core.registry import cpu_target
 
-        return kind_of(self._name)
+        return cpu_target.typing_context.resolve_value_type(function)
 
 
-referenced = _OfReferences("referenced")
+referenced = _Intrinsic(".references", "referenced", lambda fields: fields)
 """A named tuple made in a kernel, as one that came `by_reference`; Python gets it back as it is."""
-_copy_fields: Any = _OfReferences("copy_fields")
+_copy_fields = _Intrinsic(".references", "copy_fields", lambda fields, room: 0)
+some = _Intrinsic(".lanes", "some", bool)
+"""Whether a condition holds: of `boom_twin.kernels.lanes`, in any of them."""
+select = _Intrinsic(".lanes", "select", lambda condition, a, b: a if condition else b)
+"""`a` where a condition holds, else `b`: of `boom_twin.kernels.lanes`, in each lane by itself."""
 
 
 class StackArray:
@@ -267,7 +279,7 @@ def hold(value: Any) -> Any:
 
     Its fields are written once, here, and not with every call. It stands for this very tuple: what its arrays hold may change.
     """
-    if type(value) not in _BY_REFERENCE or not hasattr(write_fields.dispatcher, "overloads"):
+    if type(value) not in _BY_REFERENCE or not write_fields.is_compiled:
         return value
     _register_references()  # the class may have come after the first kernel was made
     kept, room = value._make(map(hold, value)), np.zeros(0, np.uint8)

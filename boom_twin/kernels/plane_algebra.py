@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .jit import inner
+from .jit import inner, select, some
 
 COS, SIN = 0, 1  # rows of a table of turns
 
@@ -45,18 +45,16 @@ def near_zero(x):
 @inner
 def cosine_and_sine(x):
     """Cosine and sine of an angle (rad), to one unit in the last place of 1; the library's two calls were a fifth of a step."""
-    if not abs(x) < FAR:
-        return math.cos(x), math.sin(x)
     quarters = np.floor(x * (2.0 / math.pi) + 0.5)
     c, s = near_zero(((x - quarters * HALF_PI[0]) - quarters * HALF_PI[1]) - quarters * HALF_PI[2])
-    quadrant = np.int64(quarters) & 3
-    if quadrant == 0:
-        return c, s
-    if quadrant == 1:
-        return -s, c
-    if quadrant == 2:
-        return -c, -s
-    return s, -c
+    quadrant = quarters - 4.0 * np.floor(0.25 * quarters)
+    odd, behind = (quadrant == 1.0) | (quadrant == 3.0), quadrant >= 2.0
+    c, s = select(odd, -s, c), select(odd, c, s)
+    c, s = select(behind, -c, c), select(behind, -s, s)
+    far = abs(x) >= FAR
+    if some(far):
+        return select(far, math.cos(x), c), select(far, math.sin(x), s)
+    return c, s
 
 
 @inner
@@ -65,7 +63,7 @@ def cosines(angles, count, turn):
     largest = 0.0
     for j in range(count):
         largest = max(largest, abs(angles[j]))
-    if largest < QUARTER:
+    if not some(largest >= QUARTER):
         for j in range(count):
             turn[COS, j], turn[SIN, j] = near_zero(angles[j])
         return
@@ -97,9 +95,9 @@ def condense(s, p, coupling, block, force, m, n):
     negative = 0
     for k in range(n - 1, -1, -1):
         pivot = block[k, k]
-        if not abs(pivot) > SMALLEST_PIVOT:
+        if not some(abs(pivot) > SMALLEST_PIVOT):
             return -1
-        if pivot.real < 0.0:
+        if some(pivot.real < 0.0):
             negative += 1
         inverse = 1.0 / pivot
         for j in range(k):
@@ -150,27 +148,37 @@ def condense_forces(p, coupling, block, force, m, n):
 
 
 @inner
+def exchange(a, k, best, n, first, last):
+    """Exchange row k of a with row `best`, one from k to n - 1, in columns `first` .. `last - 1`."""
+    if not some(best != k):
+        return
+    for i in range(k + 1, n):
+        here = best == i
+        if some(here):
+            for j in range(first, last):
+                a[k, j], a[i, j] = select(here, a[i, j], a[k, j]), select(here, a[k, j], a[i, j])
+
+
+@inner
 def factorise(a, n, order):
     """LU with row pivoting in place of a, shape (>= n, >= n); `order` notes which row each was exchanged with.
 
     False if singular.
     """
     for k in range(n):
-        best = k
+        best, largest = k, abs(a[k, k])
         for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[best, k]):
-                best = i
-        if not abs(a[best, k]) > SMALLEST_PIVOT:
+            size = abs(a[i, k])
+            best, largest = select(size > largest, i, best), select(size > largest, size, largest)
+        if not some(largest > SMALLEST_PIVOT):
             return False
         order[k] = best
-        if best != k:
-            for j in range(k, n):
-                a[k, j], a[best, j] = a[best, j], a[k, j]
+        exchange(a, k, best, n, k, n)
         inverse = 1.0 / a[k, k]
         a[k, k] = inverse
         for i in range(k + 1, n):
             factor = a[i, k] * inverse
-            if factor != 0.0:
+            if some(factor != 0.0):
                 for j in range(k + 1, n):
                     a[i, j] -= factor * a[k, j]
     return True
@@ -180,13 +188,10 @@ def factorise(a, n, order):
 def substitute(a, order, b, n, columns):
     """Solve with what `factorise` left in `a` and `order`: b, shape (>= n, >= columns), becomes the solution."""
     for k in range(n):
-        best = order[k]
-        if best != k:
-            for j in range(columns):
-                b[k, j], b[best, j] = b[best, j], b[k, j]
+        exchange(b, k, order[k], n, 0, columns)
         for i in range(k + 1, n):
             factor = a[i, k] * a[k, k]
-            if factor != 0.0:
+            if some(factor != 0.0):
                 for j in range(columns):
                     b[i, j] -= factor * b[k, j]
     for k in range(n - 1, -1, -1):

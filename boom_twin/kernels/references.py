@@ -19,12 +19,12 @@ from typing import Any
 from llvmlite import ir
 from numba.core import cgutils
 from numba.core.imputils import lower_getattr_generic
-from numba.core.registry import cpu_target
 from numba.core.types import NamedTuple, Type, int64  # type: ignore[attr-defined]
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import NativeValue, intrinsic, models, register_model, typeof_impl, unbox
 
 from .jit import HeldFields
+from .lanes import laned
 
 TUPLE_FLAG = 1 << 26  # Py_TPFLAGS_TUPLE_SUBCLASS
 
@@ -137,17 +137,12 @@ def copy_fields(_: Any, fields: Any, room: Any) -> Any:
     return int64(fields, room), write
 
 
-def kind_of(name: str) -> Any:
-    """numba's type of a function of this module."""
-    return cpu_target.typing_context.resolve_value_type(globals()[name])
-
-
 def register(kind: type) -> None:
     """Let kernels take named tuples of this class by reference."""
 
     @typeof_impl.register(kind)
     def type_of(value: Any, c: Any) -> Reference:
-        return Reference(NamedTuple([typeof_impl(field, c) for field in value], kind))
+        return Reference(NamedTuple([laned(typeof_impl(field, c)) for field in value], kind))
 
 
 @typeof_impl.register(HeldFields)

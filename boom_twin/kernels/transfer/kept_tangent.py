@@ -28,7 +28,7 @@ the corrections of three steps. Without it an error of one sign was left in ever
 from __future__ import annotations
 
 from ..integrators import A
-from ..jit import inner
+from ..jit import inner, select, some
 from ..tables import CORRECTIONS, Condensed, Work
 
 LEAD = 4.0  # at first
@@ -91,9 +91,8 @@ def work_of(work, tangents, k, condensed):
 @inner
 def may_keep(work, gain):
     """Whether the kept tangent is good enough for a step of a scheme with `gain`."""
-    if work.kept[GAIN] == 0.0:
-        return False
-    return max(work.kept[SHARE_LEAD], LEAD) * (work.kept[TRAVEL] + detuning(work, gain)) < MOST_SHARE
+    near = max(work.kept[SHARE_LEAD], LEAD) * (work.kept[TRAVEL] + detuning(work, gain)) < MOST_SHARE
+    return near & (work.kept[GAIN] != 0.0)
 
 
 @inner
@@ -145,17 +144,15 @@ def is_converged(t, state, work, size, before, renewed, tolerance, gain):
     way += detuning(work, gain)
     if is_rough(tolerance):
         way += NEAR
-    if before > SEEN and way > 0.0:
+    shows = (before > SEEN) & (way > 0.0)
+    if some(shows):
         lead, seen = work.kept[SHARE_LEAD], size / before / way
-        if is_rough(tolerance):
-            work.kept[SHARE_LEAD] = max(LEAST_LEAD, 0.5 * lead, SAFE * seen)
-        else:
-            work.kept[SHARE_LEAD] = max(lead, seen)
-    if size < tolerance and (renewed or size > ROUNDING * before > 0.0):
-        return True
+        more = max(max(LEAST_LEAD, 0.5 * lead), SAFE * seen) if is_rough(tolerance) else max(lead, seen)
+        work.kept[SHARE_LEAD] = select(shows, more, lead)
+    rounding = (size > ROUNDING * before) & (before > 0.0)
     share = min(STEP_SHARE * tolerance * min(1.0, LONG_GAIN / gain), LARGEST_SHARE)
     left = max(CLOSER * tolerance * tolerance, LEAST_ERROR, share * step_error(t, state, work, gain))
-    return work.kept[SHARE_LEAD] * way * size < left
+    return (work.kept[SHARE_LEAD] * way * size < left) | ((size < tolerance) & (rounding | renewed))
 
 
 @inner
@@ -164,11 +161,11 @@ def correct_guess(state, work):
     known, c = work.kept[CORRECTED], work.corrections
     for i in range(state.z.shape[0]):
         work.guess[i] = state.z[i]
-        if known == 1.0:
+        if some(known == 1.0):
             state.z[i] += c[0, i]
-        elif known == 2.0:
+        elif some(known == 2.0):
             state.z[i] += 2.0 * c[0, i] - c[1, i]
-        elif known == 3.0:
+        elif some(known == 3.0):
             state.z[i] += 3.0 * (c[0, i] - c[1, i]) + c[2, i]
 
 

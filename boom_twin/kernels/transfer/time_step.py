@@ -8,7 +8,7 @@ import numpy as np
 
 from ..elements.pin_contact import CLOSED, Journal, pin_force
 from ..integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
-from ..jit import inner, kernel, referenced
+from ..jit import inner, kernel, referenced, select, some
 from ..result_row import results_in
 from ..tables import FRAME_ANGLE, JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Z_SECTION, Motion, State, Tables
 from .clearance_pins import axis_of, coarseness, load_pins, note_contacts, shorten
@@ -92,7 +92,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
                 solved = plain_pass(t, state, work, motion, work.drive, work.drive_rate, product)
             if solved == OK:
                 shorten(t, state, work)
-                size = add_increments(t, state, work, longest)
+                size = add_increments(t, state, work, longest, True)
                 place(t, state, work)
             left -= 1
             if keep:
@@ -176,7 +176,7 @@ def predict(t, state, reach):
     """First guess of the unknowns `reach` s ahead: x + h v + h^2 a/2 for coordinates, forces as they were."""
     x, v, a = state.history[X], state.history[V], state.history[A]
     for i in range(state.z.shape[0]):
-        if t.moving[i] > 0.0:
+        if some(t.moving[i] > 0.0):
             state.z[i] = x[i] + reach * (v[i] + 0.5 * reach * a[i])
 
 
@@ -194,24 +194,31 @@ def newton_status(work, solved, size, tolerance, passes):
 
 
 @inner
-def add_increments(t, state, work, longest):
-    """Add increments to the unknowns; returns the largest as an angle (rad), NaN if any of them is not finite."""
-    z, dz, size = state.z, work.dz, 0.0
+def add_increments(t, state, work, longest, going):
+    """Add increments to the unknowns, where a step is `going` on, unless one of them is not finite.
+
+    Returns the largest as an angle (rad), or NaN.
+    """
+    z, dz, size, finite = state.z, work.dz, 0.0, going
     for i in range(z.shape[0]):
-        if not math.isfinite(dz[i]):
-            return math.nan
+        finite = finite & math.isfinite(dz[i])
         size = max(size, t.scale[i] * abs(dz[i]))
-    share = 1.0
-    if size > longest:
-        share = longest / size
+    share = select(size > longest, longest / size, 1.0)
     for i in range(z.shape[0]):
-        z[i] += share * dz[i]
-    return size
+        z[i] = select(finite, z[i] + share * dz[i], z[i])
+    return select(finite, size, math.nan)
 
 
 @kernel
 def observe(t, state, out):
     """Write the instant in `state` into a row, shape (row_width or more,); see `kernels.result_row.Results`."""
+    found = observe_boom(t, state, out)
+    observe_pins(t, state, found.pins)
+
+
+@inner
+def observe_boom(t, state, out):
+    """Write what `observe` does, but not what the pins do; returns the row as `Results`."""
     n, at = t.joints.shape[0], 0
     found = results_in(out, n, t.clearances.shape[0])
     for k in range(t.operations.shape[0]):
@@ -224,7 +231,7 @@ def observe(t, state, out):
     for j in range(3):
         found.tip[0, j], found.tip[1, j] = state.history[X, t.tip + j], state.history[V, t.tip + j]
         found.tip[2, j] = state.history[A, t.tip + j]
-    observe_pins(t, state, found.pins)
+    return found
 
 
 @inner
