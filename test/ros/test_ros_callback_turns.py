@@ -1,4 +1,4 @@
-"""Turns in which a node's callbacks run: messages come with their information, a turn ends when it is due, whichever executor."""
+"""Turns in which callbacks run: messages come with their information, a turn ends when it is due, by either executor."""
 
 from __future__ import annotations
 
