@@ -102,7 +102,8 @@ def test_another_clock_is_told_if_it_lasts_and_messages_did_not_wait(waits: list
     """A bag that begins again is a jump of stamps and of clock, one after the other."""
     lines: list[str] = []
     diagnostics: Any = object.__new__(Diagnostics)
-    diagnostics._active, diagnostics._told, diagnostics._was_apart = True, set(), False
+    diagnostics._active, diagnostics._told = True, set()
+    diagnostics._was_apart, diagnostics._newest = False, (0, 0.0)
     diagnostics._watch = SimpleNamespace(newest=10**18, thresholds=SimpleNamespace(stamp_offset=1.0))
     diagnostics._logger = SimpleNamespace(warning=lines.append)
     diagnostics._node = SimpleNamespace(get_parameter=lambda name: SimpleNamespace(value=is_simulated))
@@ -110,3 +111,17 @@ def test_another_clock_is_told_if_it_lasts_and_messages_did_not_wait(waits: list
         diagnostics._tell_clock(1e9 + 2.0, wait)
     assert len(lines) == told
     assert all(("set use_sim_time" in line) is not is_simulated for line in lines)
+
+
+def test_a_session_that_ended_is_not_stamped_by_another_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The newest stamp grows old while nothing comes."""
+    lines: list[str] = []
+    diagnostics: Any = object.__new__(Diagnostics)
+    diagnostics._active, diagnostics._told = True, set()
+    diagnostics._was_apart, diagnostics._newest = False, (0, 0.0)
+    diagnostics._watch = SimpleNamespace(newest=10**18, thresholds=SimpleNamespace(stamp_offset=1.0))
+    diagnostics._logger = SimpleNamespace(warning=lines.append)
+    for silent in range(5):
+        monkeypatch.setattr("boom_twin.ros.node.diagnostics.time.monotonic", lambda now=float(silent): now)
+        diagnostics._tell_clock(1e9 + silent, 0.0)
+    assert not lines

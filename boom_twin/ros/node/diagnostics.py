@@ -210,7 +210,7 @@ class Diagnostics:
         self._scene, self._joints = "", 0
         self._other_boom_names: dict[Stream, list[str]] = {}
         self._told: set[str] = set()
-        self._was_apart = False
+        self._was_apart, self._newest = False, (0, 0.0)  # newest stamp (ns), and when it was first seen
 
     def watch(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
         """The node is configured with these."""
@@ -328,8 +328,11 @@ class Diagnostics:
             return
         if newest is None:
             return
+        if newest != self._newest[0]:
+            self._newest = newest, time.monotonic()
+        silent = time.monotonic() - self._newest[1]
         apart, before = clock - newest * NANO, self._was_apart
-        self._was_apart = abs(apart) > self._watch.thresholds.stamp_offset + wait
+        self._was_apart = abs(apart) > self._watch.thresholds.stamp_offset + wait + silent
         if self._was_apart and before:  # a bag that begins again steps at another moment than its clock
             self._tell("clock", f"newest stamp is {apart:.1f} s from {self._clock_in_words()}")
 
