@@ -42,7 +42,7 @@ RUNS = {"ideal": ("20",), "worn": ("4", *WORN)}  # steps and pins with clearance
 def numbers(words, **variables):
     environment = os.environ | variables
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *words], env=environment, capture_output=True, text=True, check=False, timeout=500
+        [sys.executable, "-c", PROGRAM, *words], env=environment, capture_output=True, text=True, check=False, timeout=1000
     )
     assert done.returncode == 0, done.stderr[-2000:]
     return np.array(json.loads(done.stdout))
