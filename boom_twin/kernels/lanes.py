@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import operator
-from functools import reduce
+from functools import cache, reduce
 from typing import Any
 
 import numpy as np
@@ -86,6 +86,13 @@ class MaskModel(models.PrimitiveModel):
         super().__init__(manager, kind, ir.VectorType(ir.IntType(1), kind.width))
 
 
+@cache
+def install() -> None:
+    """Tell numba of what is registered here: it loads SciPy's BLAS for that, which a start without lanes does not need."""
+    cpu_target.typing_context.refresh()
+    cpu_target.target_context.refresh()
+
+
 def laned(kind: Any) -> Any:
     """A type with `Lanes` in place of the records that numba takes them for."""
     if isinstance(kind, Array):
@@ -94,6 +101,7 @@ def laned(kind: Any) -> Any:
     if not isinstance(kind, Record):
         return kind
     if list(kind.fields) == [LANES]:
+        install()
         numbers: Any = kind.fields[LANES].type
         return Lanes(numbers.shape[0])
     types = {name: laned(field.type) for name, field in kind.fields.items()}
@@ -265,7 +273,3 @@ def select(typingctx: Any, condition: Any, a: Any, b: Any) -> Any:
         return builder.select(*arguments)
 
     return kind(condition, kind, kind), write
-
-
-cpu_target.typing_context.refresh()
-cpu_target.target_context.refresh()
