@@ -79,11 +79,16 @@ def _tell_not_kept(reason: str) -> None:
 
 
 def _register_references() -> None:
-    """Make the classes known that are to be taken by reference."""
-    from .references import register
+    """Make the classes known that are to be taken by reference; no thread takes one for known that is not yet."""
+    if _UNREGISTERED:
+        from numba.core.compiler_lock import global_compiler_lock
 
-    while _UNREGISTERED:
-        register(_UNREGISTERED.pop())
+        from .references import register
+
+        with global_compiler_lock:
+            while _UNREGISTERED:
+                register(_UNREGISTERED[0])
+                del _UNREGISTERED[0]
 
 
 def _known(options: dict[str, Any]) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.imputils import lower_builtin, lower_cast, lower_getattr
 from numba.core.registry import cpu_target
 from numba.core.typeconv import Conversion
@@ -88,9 +89,13 @@ class MaskModel(models.PrimitiveModel):
 
 @cache
 def install() -> None:
-    """Tell numba of what is registered here: it loads SciPy's BLAS for that, which a start without lanes does not need."""
-    cpu_target.typing_context.refresh()
-    cpu_target.target_context.refresh()
+    """Tell numba of what is registered here: it loads SciPy's BLAS for that, which a start without lanes does not need.
+
+    Under numba's lock: two threads that meet the first lanes at once would take each other's registrations away.
+    """
+    with global_compiler_lock:
+        cpu_target.typing_context.refresh()
+        cpu_target.target_context.refresh()
 
 
 def laned(kind: Any) -> Any:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from typing import NamedTuple
 
 import numpy as np
@@ -121,3 +124,50 @@ def test_a_branch_by_lanes_does_not_compile():
 
     with pytest.raises(NumbaError, match="mask4"):
         careless(Pairs(room_for((1,)), room_for((1, 1))))
+
+
+FIRST_USE_IN_THREADS = """
+import sys
+import threading
+from typing import NamedTuple
+
+import numpy as np
+
+from boom_twin.compiler.lanes import room_for
+from boom_twin.kernels.jit import by_reference, kernel
+
+
+@by_reference
+class Numbers(NamedTuple):
+    x: np.ndarray
+
+
+@kernel
+def double(numbers):
+    for i in range(numbers.x.shape[0]):
+        numbers.x[i] = 2.0 * numbers.x[i]
+
+
+def use():
+    together.wait()
+    double(Numbers(room_for((3,))))
+    done.append(True)
+
+
+sys.setswitchinterval(1e-6)
+together, done = threading.Barrier(24), []
+threads = [threading.Thread(target=use) for _ in range(24)]
+for each in threads:
+    each.start()
+for each in threads:
+    each.join()
+print(len(done))
+"""
+
+
+def test_threads_may_meet_the_first_lanes_at_once(tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(FIRST_USE_IN_THREADS)
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, str(program)], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "24", done.stderr
