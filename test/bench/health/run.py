@@ -40,7 +40,7 @@ def main(args: Namespace) -> None:
     if args.only:
         wanted = [each for each in wanted if each.number in args.only]
     for rig, scene in sorted({(each.rig, each.scene) for each in wanted if each.rig}):
-        _learn(rig, args.sessions, args.out, scene)
+        learn(rig, args.sessions, args.out, scene)
     with Pool(args.jobs, maxtasksperchild=20) as pool, kept.open("a") as file:
         for row in pool.imap_unordered(partial(outcome, args.sessions, args.out), wanted):
             file.write(json.dumps(row) + "\n")
@@ -52,7 +52,8 @@ def baseline_file(out: Path, rig: int, scene: str = "") -> Path:
     return out / f"baseline_{scene}{'_' if scene else ''}{rig}.json"
 
 
-def _learn(rig: int, sessions: Path, out: Path, scene: str = "") -> None:
+def learn(rig: int, sessions: Path, out: Path, scene: str = "") -> None:
+    """Learn the baseline of a rig, unless it is there."""
     path = baseline_file(out, rig, scene)
     if not path.is_file():
         own = [each for each in learning(scene) if each.rig == rig]

@@ -131,12 +131,16 @@ def scenario(number: int) -> Scenario:
 
 def _loads(rng: np.random.Generator) -> tuple[RigLoad, ...]:
     """None in half of the sessions, else a pump, a wind, or both."""
-    kind = rng.choice(["none", "pump", "wind", "both"], p=[0.5, 0.2, 0.1, 0.2])
+    return draw_loads(rng, str(rng.choice(["none", "pump", "wind", "both"], p=[0.5, 0.2, 0.1, 0.2])))
+
+
+def draw_loads(rng: np.random.Generator, kind: str) -> tuple[RigLoad, ...]:
+    """Loads of a kind: none, pump, wind or both."""
     onset = float(rng.choice([0.0, 5.0]))
     height = float(np.exp(rng.uniform(np.log(30.0), np.log(300.0))))
     pump = PumpLoad(round(float(rng.uniform(0.2, 0.6)), 3), round(height, 1), onset=onset)
     wind = WindLoad(round(float(rng.uniform(10.0, 60.0)), 1))
-    return {"none": (), "pump": (pump,), "wind": (wind,), "both": (pump, wind)}[str(kind)]
+    return {"none": (), "pump": (pump,), "wind": (wind,), "both": (pump, wind)}[kind]
 
 
 def _faults(group: str, rng: np.random.Generator, joints: int) -> tuple[RigFault, ...]:
