@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Mapping
 from math import nan, sqrt
 from typing import NamedTuple
@@ -11,7 +11,7 @@ import numpy as np
 
 from ..config.settings import Thresholds
 from ..estimation.load_spectrum import TipLoadFinder
-from ..health.alarms import Alarms, values_of
+from ..health.alarms import Alarms, repeated, values_of
 from ..health.sensor_monitor import noise_as_text
 from ..types import SECOND, Alarm, Array, Estimate, Health, Report
 from .levels import Bounds, ComponentJudge, Evaluation, Level, Status
@@ -38,6 +38,9 @@ class ModelWatch:
     def begin(self, now: float) -> None:
         """The model is started at the time `now`, s of a clock that only goes forward."""
         self.predictions = self.failures = self.broken = 0
+        self._predicted_at = self._unfed_at = now  # newest looks with a prediction, and without strokes
+        self._counts: Mapping[str, str | int] = {}  # of that with a prediction
+        self._is_deflected = False
         self._failure, self._failed_at, self._new = "", -HOLD, False
         self._looked, self._steps = now, 0
         self._passes, self._busy, self._longest = 0, 0.0, 0.0
@@ -48,6 +51,7 @@ class ModelWatch:
         if report.is_predicted:
             self._steps += 1
             self._passes += report.passes
+            self._is_deflected = "deflected" in report.events
             if duration > self._longest:
                 self._longest = duration
         elif report.status != "ok":
@@ -71,16 +75,20 @@ class ModelWatch:
     def _fail(self, reason: str) -> None:
         self._failure, self._new = reason, True
 
-    def status(self, values: Mapping[str, str | int], is_active: bool, is_fed: bool, at: Evaluation) -> Status:
+    def status(
+        self, values: Mapping[str, str | int], is_active: bool, is_fed: bool, at: Evaluation, words: Mapping[str, str]
+    ) -> Status:
         """State of the model.
 
         Parameters
         ----------
         values : dict
-            Told too.
+            Told too; counts of what is out of the ordinary among them.
         is_active, is_fed : bool
             Whether the twin listens, and strokes come.
         at : Evaluation
+        words : dict of str to str
+            What those counts are of.
         """
         judge = self._judge
         judge.begin(at)
@@ -92,13 +100,31 @@ class ModelWatch:
         judge.note("unhandled messages", self.broken)
         if self._new:
             self._failed_at, self._new = at.now, False
+        if not is_fed:
+            self._unfed_at = at.now
+        silent = at.now - max(self._predicted_at, self._unfed_at)
         if not is_active:
             judge.fault(Level.WARN, "not active")
         elif at.now - self._failed_at <= HOLD:
             judge.fault(Level.ERROR, self._failure)
-        elif not is_fed or not self.predictions:
+        elif not is_fed or (not self.predictions and silent <= at.thresholds.stale_after):
             judge.fault(Level.WARN, "waiting for strokes")
+        elif silent > at.thresholds.stale_after:
+            judge.fault(Level.ERROR, f"no prediction for {silent:.1f} s, though strokes come{self._why(values, words)}")
+        elif self._is_deflected:
+            judge.fault(Level.WARN, f"deflected: {words.get('deflected', '')}")
+        if self._predicted_at == at.now:
+            self._counts = dict(values)
         return judge.finish("following the strokes")
+
+    def _why(self, values: Mapping[str, str | int], words: Mapping[str, str]) -> str:
+        """What has been counted most since the newest prediction, in words; empty if nothing was."""
+        new = {key: value - int(self._counts.get(key, 0)) for key, value in values.items() if isinstance(value, int)}
+        most = max(new, key=lambda key: new[key], default="")
+        if not most or new[most] <= 0:
+            return ""
+        name = most.partition(": ")[2]
+        return f": {new[most]} times {name} ({words.get(name, 'see the counts')})"
 
     def _check_load(self, thresholds: Thresholds, now: float) -> None:
         """Time of a step against the time there is for it."""
@@ -111,6 +137,8 @@ class ModelWatch:
         judge.note("step_budget_s", span / steps if steps else nan)
         told = f"the model takes {load:.0%} of the time there is: end other work of this computer, or raise step or look_step"
         judge.check("load", load, Bounds(thresholds.load_warn, thresholds.load_error), told)
+        if steps:
+            self._predicted_at = now
         self._looked, self._steps, self._passes, self._busy, self._longest = now, 0, 0, 0.0, 0.0
 
 
@@ -240,6 +268,7 @@ class HealthWatch:
     def __init__(self) -> None:
         self._judge = ComponentJudge("health")
         self._alarms, self._noise = Alarms(), dict[str, float]()
+        self._before = Counter[tuple[str, str, str | None]]()  # of ended alarms: how often they had come and gone before
         self.has_news = False
 
     def took(self, health: Health) -> None:
@@ -248,11 +277,13 @@ class HealthWatch:
         self._noise = dict(health.noise)
         self._alarms.take(health)
         self.has_news |= len(self._alarms.all) > before
+        self._before.update(map(repeated, self._alarms.fold_ended()))
 
     def acknowledge(self) -> str:
         """Let go of alarms that ended; says which."""
         ended = [alarm for alarm in self._alarms.all if alarm.until is not None]
         self._alarms.forget_ended()
+        self._before.clear()
         return "; ".join(f"{alarm.channel}: {alarm.told}" for alarm in ended) or "no alarm has ended"
 
     def of(self, channel: str) -> Alarm | None:
@@ -276,9 +307,9 @@ class HealthWatch:
         judge.begin(at)
         alarms = self._alarms.all
         judge.note("alarms", len(self._alarms.lasting))
-        judge.note("not_acknowledged", len(alarms) - len(self._alarms.lasting))
+        judge.note("not_acknowledged", len(alarms) - len(self._alarms.lasting) + self._before.total())
         for number, alarm in enumerate(alarms, 1):
-            judge.fault(level_of(alarm), told_of(alarm))
+            judge.fault(level_of(alarm), told_of(alarm, 1 + self._before[repeated(alarm)]))
             for key, value in {"channel": alarm.channel, **values_of(alarm)}.items():
                 judge.note(f"{number} {key}", value)
         for name, times in self._noise.items():
@@ -293,6 +324,7 @@ def level_of(alarm: Alarm) -> Level:
     return Level.WARN if alarm.until is not None or alarm.cause is None else Level.ERROR
 
 
-def told_of(alarm: Alarm) -> str:
-    """In words."""
-    return f"{alarm.channel}: {alarm.told}" + ("" if alarm.until is None else " (ended; not acknowledged)")
+def told_of(alarm: Alarm, times: int = 1) -> str:
+    """In words, of an alarm that has come so many times."""
+    ended = f"ended, {times} times" if times > 1 else "ended"
+    return f"{alarm.channel}: {alarm.told}" + ("" if alarm.until is None else f" ({ended}; not acknowledged)")

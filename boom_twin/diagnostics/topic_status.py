@@ -60,7 +60,7 @@ class TopicJudge:
         publishers: Peers,
         offset: float,
         at: Evaluation,
-        other_boom: str = "",
+        wrong_names: tuple[Level, str] | None = None,
     ) -> Status:
         """State of the topic.
 
@@ -72,15 +72,15 @@ class TopicJudge:
         offset : float
             By how much the stamps are behind those of the strokes, s; NaN where it is not known.
         at : Evaluation
-        other_boom : str
-            That its messages are of another boom, in words; empty if they are not.
+        wrong_names : tuple of Level and str, optional
+            What is wrong with the names in its messages, in words.
         """
         judge, age = self._judge, stream.age(at.now)
         judge.begin(at)
         judge.note("topic", publishers.address)
         self._count(stream, at.now)
-        if other_boom:
-            judge.fault(Level.ERROR, other_boom)
+        if wrong_names is not None:
+            judge.fault(*wrong_names)
         judge.note("publishers", len(publishers.names))
         judge.note("publisher_names", ", ".join(publishers.names))
         if publishers.incompatible:
@@ -94,7 +94,8 @@ class TopicJudge:
         if stream.newest is not None:
             judge.note("newest_stamp_s", seconds(stream.newest))
             judge.note("clock_minus_stamp_s", at.clock - stream.newest * NANO)
-        told = f"stamped {offset:+.3f} s behind the strokes: synchronise the sensors' clocks"
+        where = "behind" if offset > 0.0 else "ahead of"
+        told = f"stamped {abs(offset):.3f} s {where} the strokes: synchronise the sensors' clocks"
         judge.check("clock_offset_s", abs(offset), Bounds(at.thresholds.clock_offset), told)
         return judge.finish("listened to" if stream.newest is not None else "waiting for a message")
 

@@ -145,8 +145,9 @@ class TwinWatch:
         subscribers: Iterable[Peers],
         clock: float,
         reception: Mapping[str, Reception] | None = None,
-        other_booms: Mapping[Stream, str] | None = None,
+        wrong_names: Mapping[Stream, tuple[Level, str]] | None = None,
         left_out: Mapping[str, int] | None = None,
+        words: Mapping[str, str] | None = None,
     ) -> Generator[None, None, list[Status]]:
         """The state of model, topics, health, sensors and residuals; of the model alone while the twin does not listen.
 
@@ -167,10 +168,12 @@ class TwinWatch:
             Time that people know, s.
         reception : dict of str to Reception, optional
             By name of the topic; None where nothing is received live, and so nobody publishes.
-        other_booms : dict of Stream to str, optional
-            Of inputs whose messages are of another boom: that in words.
+        wrong_names : dict of Stream to tuple of Level and str, optional
+            Of inputs whose messages have names that the scene does not have: that in words.
         left_out : dict of str to int, optional
             What was left out for lack of time since the node was configured, by what it is.
+        words : dict of str to str, optional
+            What the counts are of, by the last part of their names.
 
         Yields
         ------
@@ -185,9 +188,9 @@ class TwinWatch:
         def now() -> Evaluation:
             return Evaluation(self.thresholds, self._monotonic(), clock)
 
-        at, others, sensors = now(), other_booms or {}, list[Status]()
+        at, wrong, sensors = now(), wrong_names or {}, list[Status]()
         is_fed = is_active and not self._is_silent(self._streams[Stream.STROKES], at.now)
-        found = [self._model.status(counts, is_active, is_fed, at)]
+        found = [self._model.status(counts, is_active, is_fed, at, words or {})]
         if not is_active:
             return found
         for stream in self._streams:
@@ -195,7 +198,7 @@ class TwinWatch:
             sensors += self._look_at(stream, now())
         yield
         at = now()
-        found += [self._topic(stream, publishers[stream], at, others.get(stream, "")) for stream in self._streams]
+        found += [self._topic(stream, publishers[stream], at, wrong.get(stream)) for stream in self._streams]
         if reception is not None:
             followed = {stream: seconds(each.newest) for stream, each in self._streams.items()}
             found.insert(0, self._publishers.status(publishers, followed, at))
@@ -213,10 +216,10 @@ class TwinWatch:
     def _is_silent(self, stream: StreamWatch, now: float) -> bool:
         return stream.newest is None or stream.age(now) > self.thresholds.stale_after
 
-    def _topic(self, stream: Stream, peers: Peers, at: Evaluation, other_boom: str) -> Status:
+    def _topic(self, stream: Stream, peers: Peers, at: Evaluation, wrong_names: tuple[Level, str] | None) -> Status:
         watch = self._streams[stream]
         offset = watch.lag - self._streams[Stream.STROKES].lag
-        return self._topics[stream].status(watch, peers, offset, at, other_boom)
+        return self._topics[stream].status(watch, peers, offset, at, wrong_names)
 
     def _look_at(self, stream: Stream, at: Evaluation) -> list[Status]:
         """The sensors of one stream."""

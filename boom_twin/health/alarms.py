@@ -38,13 +38,29 @@ class Alarms:
 
     def forget_ended(self) -> None:
         """Keep only those that last."""
-        self.all = self.lasting
-        self._lasting = {key: place for place, key in enumerate(self._lasting)}
+        self._keep(self.lasting)
+
+    def fold_ended(self) -> list[Alarm]:
+        """Keep of those that ended and are of the same channel, kind and cause the newest; gives the others."""
+        newest = {repeated(alarm): alarm for alarm in self.all if alarm.until is not None}
+        gone = [alarm for alarm in self.all if alarm.until is not None and newest[repeated(alarm)] is not alarm]
+        if gone:
+            self._keep([alarm for alarm in self.all if alarm.until is None or newest[repeated(alarm)] is alarm])
+        return gone
+
+    def _keep(self, alarms: list[Alarm]) -> None:
+        self.all = alarms
+        self._lasting = {(alarm.channel, alarm.since): place for place, alarm in enumerate(alarms) if alarm.until is None}
 
     @property
     def lasting(self) -> list[Alarm]:
         """Those that have not ended."""
         return [self.all[place] for place in self._lasting.values()]
+
+
+def repeated(alarm: Alarm) -> tuple[str, str, str | None]:
+    """What is the same of an alarm that comes again: channel, kind and cause."""
+    return alarm.channel, alarm.kind, alarm.cause
 
 
 def values_of(alarm: Alarm) -> dict[str, str]:

@@ -1,8 +1,7 @@
-"""Monitor which joint's angle every encoder reads, and with which sign: swapped encoders and swapped strokes are told as such.
+"""Monitor which joint's angle every encoder reads, and with which sign and unit: what is swapped is told as that.
 
-Readings of two joints that are exchanged, or of the other sign, differ from the model by far more than a boom can give way,
-and by an amount that is known: each is what the model expects elsewhere. As evidence of a fault they would point at a stroke's
-scale or an offset.
+Readings of two joints that are exchanged, of the other sign or in degrees, differ from the model by far more than a boom can give
+way, and by an amount that is known. As evidence of a fault they would point at a stroke's scale or an offset.
 """
 
 from __future__ import annotations
@@ -25,17 +24,19 @@ FAR = radians(1.0)  # by which readings have to be off, and two expected angles 
 FAR_SIGN = radians(10.0)  # likewise a reading for its sign: an offset looks like it where the angle is minus half of it
 FAR_STROKES = radians(6.0)  # likewise two joints for strokes that are swapped
 CLOSE = 0.1  # of how far a reading is off: by so much it may miss what it is taken for
+TURN = radians(360.0)  # beyond which no joint reads: one does where all read in degrees
 SAG = radians(2.0)  # what cylinders and links give way by, which rigid angles of strokes leave out
 RIGHT = 0.3  # of how far an exchange would put it off: a reading that is less off is right again
 
 
 @dataclass(frozen=True)
 class _Exchange:
-    """Joints (0-based) of which readings are exchanged, one if its sign is; whether strokes are; what was told."""
+    """Joints (0-based) of which readings are exchanged, one if its sign or unit is; whether strokes are; what was told."""
 
     joints: tuple[int, ...]
     is_of_strokes: bool
     alarm: Alarm
+    is_in_degrees: bool = False
 
 
 class AngleReading:
@@ -83,7 +84,7 @@ class AngleReading:
     def explains(self, alarm: Alarm) -> bool:
         """Whether an alarm of a single sensor says less of what is told here."""
         joints = {joint for found in self._found if not found.is_of_strokes for joint in found.joints}
-        return alarm.kind in {"range", "jump"} and alarm.channel in {f"joint_{i + 1}" for i in joints}
+        return alarm.kind in {"range", "jump", "noise", "spikes"} and alarm.channel in {f"joint_{i + 1}" for i in joints}
 
     def take(self, readings: StreamReadings, strokes: Array, span: float, start: int, end: int) -> list[Alarm]:
         """Take a block; gives alarms that began or ended.
@@ -121,6 +122,8 @@ class AngleReading:
     @staticmethod
     def _is_over(found: _Exchange, read: Array, expected: Array) -> bool:
         """Whether joints read their own angles; where an exchange would make no difference, that is not known."""
+        if found.is_in_degrees:
+            return all(abs(read[i] - expected[i]) < max(FAR, RIGHT * abs(degrees(expected[i]))) for i in found.joints)
         first, last = found.joints[0], found.joints[-1]
         apart = abs(expected[first] - (expected[last] if last != first else -expected[first]))
         least = FAR_STROKES if found.is_of_strokes else apart
@@ -133,7 +136,10 @@ class AngleReading:
         if not off.any():
             return []
         news: list[Alarm] = []
-        for found in self._exchanges(np.flatnonzero(off).tolist(), read, expected, strokes):
+        candidates = self._exchanges(np.flatnonzero(off).tolist(), read, expected, strokes)
+        if is_known.all() and _are_in_degrees(read, expected):
+            candidates = (self._in_degrees(i, read[i], expected[i]) for i in np.flatnonzero(off).tolist())
+        for found in candidates:
             if not any(taken[i] for i in found.joints):
                 self._found.append(found)
                 news.append(found.alarm)
@@ -179,6 +185,13 @@ class AngleReading:
         )
         return _Exchange((i,), False, self._alarm(i, "range", f"joint_{i + 1}.sensor", told))
 
+    def _in_degrees(self, i: int, read: float, expected: float) -> _Exchange:
+        told = (
+            f"joint_{i + 1}.sensor reads {read:+.4g} where the model has {expected:+.4g} rad, as if in degrees, as all of "
+            "them: not used; give the mapping `unit: deg`"
+        )
+        return _Exchange((i,), False, self._alarm(i, "range", f"joint_{i + 1}.sensor", told), is_in_degrees=True)
+
     def _swapped_strokes(self, i: int, j: int) -> _Exchange:
         told = (
             f"cylinder_{i + 1}.sensor and cylinder_{j + 1}.sensor read each other's stroke: joint_{i + 1} and joint_{j + 1} "
@@ -189,3 +202,9 @@ class AngleReading:
 
     def _alarm(self, i: int, kind: str, cause: str, told: str) -> Alarm:
         return Alarm(f"joint_{i + 1}", kind, int(self._since[i]), None, cause, told, (Ranked(cause, 1.0, ()),))
+
+
+def _are_in_degrees(read: Array, expected: Array) -> bool:
+    """Whether all readings are what the model expects, rad, in degrees, and one of them can be nothing else."""
+    is_near = np.abs(np.radians(read) - expected) < FAR + CLOSE * np.abs(expected)
+    return bool(is_near.all() and np.abs(read).max() > TURN)

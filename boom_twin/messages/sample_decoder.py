@@ -98,6 +98,8 @@ class SampleDecoder:
         How often each of `ODDITIES` was met.
     other_boom_names : dict of Stream to list of str
         The names that the newest of these messages had, of another boom.
+    strange_names : dict of Stream to tuple of list of str
+        Names that the newest messages lacked, and those that they had and the scene does not, where there are both.
     delays : dict of Stream to int
         By how much stamps of messages are later than those of their samples, ns.
     """
@@ -111,6 +113,7 @@ class SampleDecoder:
         self._by_axis = {stream for stream, kind in SENSORS.items() if kind.is_imu}
         self.oddities: Counter[str] = Counter()
         self.other_boom_names: dict[Stream, list[str]] = {}
+        self.strange_names: dict[Stream, tuple[list[str], list[str]]] = {}
 
     def samples(self, streams: Iterable[Stream], stamp_ns: int, msg: Any) -> Iterator[Sample]:
         """Those that `msg` holds of `streams`, the roles of the topic that it came by; see `put`."""
@@ -171,14 +174,26 @@ class SampleDecoder:
         if channels.beyond:
             self.other_boom_names[stream] = channels.beyond
             return None, ["names of another boom"]
+        other = self._sharing.get(stream)
+        if -1 in places and stream not in self.strange_names and (other is None or max(places) >= 0):
+            self._note_strange(stream, names, places)
         if max(places) < 0:
-            other = self._sharing.get(stream)
             is_unknown = other is None or max(self._channels[other].places(names)) < 0
             return None, ["unknown names only"] if is_unknown else []
         odd = ["unequal arrays"] if end != len(names) else []
         if -1 in places:
             odd.append("missing names")
         return [place if place < end else -1 for place in places] if end < len(names) else places, odd
+
+    def _note_strange(self, stream: Stream, names: Sequence[str], places: list[int]) -> None:
+        """Note names that the scene does not have, beside those that are not there: they may be meant."""
+        known = {
+            name for each in (stream, self._sharing.get(stream)) if each is not None for name in self._channels[each].names
+        }
+        strange = [name for name in names if name not in known]
+        lacking = [name for name, place in zip(self._channels[stream].names, places, strict=True) if place < 0]
+        if strange:
+            self.strange_names[stream] = lacking, strange
 
     def scales(self, stream: Stream) -> Array:
         """What is taken off a reading, and by what it is then multiplied, shape (2, channels)."""

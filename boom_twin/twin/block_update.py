@@ -256,7 +256,8 @@ class BlockUpdate:
             return
         if not self._shedding.leaves_out_shape():
             news.drawn[at] = self._boom.drawn
-        if self._judge is not None and self._shedding.leaves_out_health():
+        is_doubtful = bool(clock[IS_DEFLECTED])  # what the model is not valid for accuses no sensor
+        if self._judge is not None and (is_doubtful or self._shedding.leaves_out_health()):
             self._told = tuple(self._found.counts.tolist())
         elif self._judge is not None:
             self._due = run

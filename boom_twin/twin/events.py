@@ -8,7 +8,7 @@ EVENTS = {
     "waiting": "no message with all strokes yet, or started less than a second ago; the model has not started",
     "gap": "longer pause between strokes, bridged",
     "restart": "pause too long to bridge, or strokes elsewhere after it; started again from rest",
-    "leap": "stamp far from where its stream was; left out unless the next sample follows it",
+    "leap": "stamp far from where its stream was; left out unless the next follows it within `gap`: slower strokes need a larger one",
     "clock set": "stamps went on elsewhere, strokes where they were; the model goes on, by the new stamps",
     "jump back": "time was set back, and strokes did not go on where they were; started again from rest",
     "second source": "samples of another source among those that are followed; left out",

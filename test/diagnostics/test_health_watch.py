@@ -75,6 +75,24 @@ def test_an_alarm_that_is_told_of_no_more_has_ended() -> None:
     assert status(watch).values["1 to_s"] == "18.000" and watch.of("joint_3") is None
 
 
+def test_an_alarm_that_comes_and_goes_is_told_once_with_how_often() -> None:
+    """A sensor with a loose contact would let the message grow all day."""
+    watch = HealthWatch()
+    for k in range(8):
+        again = replace(BIAS, since=(20 + 2 * k) * SECOND)
+        watch.took(health(20 + 2 * k, again, OPEN))
+        watch.took(health(21 + 2 * k, OPEN))
+    found = status(watch)
+    assert found.message.count(BIAS.told) == 1 and "(ended, 8 times; not acknowledged)" in found.message
+    assert (found.values["alarms"], found.values["not_acknowledged"]) == (1, 8)
+    assert len([key for key in found.values if key.endswith(" cause")]) == 2
+    watch.took(health(40, replace(BIAS, since=40 * SECOND), OPEN))
+    assert watch.of("joint_3") is not None and watch.of("joint_1") is not None
+    watch.acknowledge()
+    watch.took(health(42, OPEN))
+    assert "(ended; not acknowledged)" in status(watch).message
+
+
 def test_residuals_are_left_to_an_alarm_that_was_inferred_from_them() -> None:
     """Not to that of a sensor which gives itself away: it explains no other channel."""
     watch = HealthWatch()

@@ -130,6 +130,55 @@ def test_a_failure_of_the_model_is_urgent_once(rig: Rig) -> None:
     assert after(rig, 2, failing=False)["model"].level == Level.OK
 
 
+def test_strokes_that_give_no_prediction_are_an_error_with_what_is_wrong_with_them(rig: Rig, monkeypatch: Any) -> None:
+    def refused(stream: Stream, stamp: int) -> Report:
+        return Report(stamp, True, events=("leap",))
+
+    def look(leaps: int) -> Status:
+        for _ in range(100):
+            rig.now += 0.01
+            rig._message(Stream.STROKES)
+        words = {"leap": "far from where it was", "late": "late"}
+        counts = {"scene": "s", "samples: leap": leaps, "samples: late": 7}
+        return all_pieces(rig.watch.look(counts, True, rig.peers, [], rig.now + 1e9, words=words))[0]
+
+    after(rig, 2)
+    assert look(3).level == Level.OK
+    monkeypatch.setattr(rig, "_report", refused)
+    found = [look(3 + 100 * k) for k in range(1, 5)]
+    assert found[0].level == Level.OK and found[-1].level == Level.ERROR
+    assert found[-1].message == "no prediction for 4.0 s, though strokes come: 400 times leap (far from where it was)"
+    monkeypatch.undo()
+    assert look(403).level == Level.OK
+
+
+def test_strokes_that_never_gave_a_prediction(rig: Rig, monkeypatch: Any) -> None:
+    monkeypatch.setattr(rig, "_report", lambda stream, stamp: Report(stamp, False, events=("empty",)))
+    assert rig.second((Stream.STROKES,))["model"].message == "waiting for strokes"
+    status = after(rig, 3)["model"]
+    assert status.level == Level.ERROR and status.message.startswith("no prediction for 4.0 s, though strokes come")
+
+
+def test_strokes_that_come_back_are_no_error_while_the_model_waits_to_be_sure(rig: Rig, monkeypatch: Any) -> None:
+    after(rig, 2)
+    rig.now += 5.0
+    assert {s.name: s for s in all_pieces(rig.watch.look({}, True, rig.peers, [], rig.now))}["model"].level == Level.WARN
+    monkeypatch.setattr(rig, "_report", lambda stream, stamp: Report(stamp, True, events=("leap",)))
+    assert rig.second((Stream.STROKES,))["model"].level == Level.OK
+
+
+def test_a_boom_outside_the_models_validity_is_a_warning_as_long_as_it_is(rig: Rig, monkeypatch: Any) -> None:
+    def bent(stream: Stream, stamp: int) -> Report:
+        return Report(stamp, True, prediction=object(), events=("deflected",))  # type: ignore[arg-type]
+
+    after(rig, 2)
+    monkeypatch.setattr(rig, "_report", bent)
+    status = rig.second((Stream.STROKES,))["model"]
+    assert status.level == Level.WARN and status.message.startswith("deflected")
+    monkeypatch.undo()
+    assert after(rig, 2)["model"].level == Level.OK
+
+
 def test_silence_is_urgent(rig: Rig) -> None:
     after(rig, 2)
     rig.watch.is_urgent()
@@ -148,7 +197,7 @@ def test_a_model_that_is_too_slow(rig: Rig) -> None:
 def test_clocks_that_differ(rig: Rig) -> None:
     rig.behind[Stream.ANGLES] = 0.08
     status = after(rig, 4)["joint_angles"]
-    assert status.level == Level.WARN and "stamped +0.080 s behind the strokes" in status.message
+    assert status.level == Level.WARN and "stamped 0.080 s behind the strokes" in status.message
     assert status.values["clock_offset_s"] == pytest.approx(0.08) and status.values["clock_offset_s_warn"] == 0.05
 
 

@@ -66,6 +66,19 @@ def test_one_encoder_of_the_other_sign() -> None:
     assert judge.masked.tolist() == [False, False, True, False]
 
 
+def test_all_encoders_in_degrees() -> None:
+    """One that reads beyond a turn can be nothing else; where all angles are small they may as well be offsets."""
+    judge, expected = AngleReading(SCENE, ENCODERS), angles(tuple(STROKES))
+    alarms = told(judge, np.degrees(expected), expected)
+    assert [alarm.channel for alarm in alarms] == ["joint_1", "joint_2", "joint_3", "joint_4"]
+    assert all(alarm.kind == "range" and "as if in degrees" in alarm.told for alarm in alarms)
+    assert judge.masked.all()
+    ended = told(judge, expected, expected, first=60)
+    assert len(ended) == 4 and all(alarm.until is not None for alarm in ended) and judge.alarms == ()
+    small = np.full(4, 0.05)
+    assert told(AngleReading(SCENE, ENCODERS), np.degrees(small), small) == []
+
+
 def test_two_strokes_that_are_swapped() -> None:
     """Angles are those of the true strokes, the model's those of the swapped ones; both of the bent boom."""
     judge, swapped = AngleReading(SCENE, ENCODERS), STROKES[SWAP_34]

@@ -102,6 +102,15 @@ def test_oddities_are_counted_by_name(
         np.testing.assert_array_equal(sample.values, expected)
 
 
+def test_names_that_are_not_the_scenes_are_noted_beside_those_that_are_not_there() -> None:
+    decoder = SampleDecoder(2)
+    decoder.put(Stream.STROKES, 1, joint_state(["cylinder_1", "cylinder2", "swing"], [0.1, 0.2, 0.3]))
+    decoder.put(Stream.ANGLES, 1, joint_state(["joint_1"], [0.1]))
+    assert decoder.strange_names == {Stream.STROKES: (["cylinder_2"], ["cylinder2", "swing"])}
+    decoder.put(Stream.ANGLES, 2, joint_state(["a", "b"], [0.1, 0.2]))
+    assert decoder.strange_names[Stream.ANGLES] == (["joint_1", "joint_2"], ["a", "b"])
+
+
 def test_imu_gives_x_and_z() -> None:
     sample = SampleDecoder(4).put(Stream.IMU, 9, imu(0.25, 9.81))
     assert sample is not None and sample.stream is Stream.IMU

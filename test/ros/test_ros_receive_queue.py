@@ -134,6 +134,16 @@ def test_what_waits_is_forgotten_when_listening_ends(bus: Bus) -> None:
     assert not bus.queue and bus.read == [] and bus.queue.look() == {}
 
 
+def test_a_message_that_still_stood_in_the_executors_row_is_not_taken_after_listening_ended(bus: Bus) -> None:
+    old = bus.put["a"]
+    bus.queue.close()
+    bus.put["a"] = bus.queue.open("a", 4, bus.read.append)
+    old(b"0", {"received_timestamp": bus.now, "publication_sequence_number": 1})
+    bus.send("a", b"1")
+    bus.queue.work(1.0)
+    assert bus.read == [b"1"]
+
+
 @pytest.mark.parametrize("as_one", [True, False], ids=["events executor of rclpy 7.1", "single-threaded executor"])
 def test_both_ways_in_which_rclpy_calls_back(bus: Bus, as_one: bool) -> None:
     put: Callable[..., Any] = bus.put["a"]

@@ -15,7 +15,7 @@ from rclpy.duration import Duration, Infinite
 from rclpy.node import Node
 from rclpy.qos import LivelinessPolicy, QoSCompatibility, QoSProfile, qos_check_compatible
 
-from ...bag.joint_names import extra_names_message
+from ...bag.joint_names import extra_names_message, strange_names_message
 from ...config.settings import Thresholds
 from ...diagnostics.levels import Level, Status
 from ...diagnostics.sensor_status import sensors_of
@@ -208,7 +208,7 @@ class Diagnostics:
         self._counts: dict[str, Mapping[str, int]] = {}
         self._shedding: LoadShedding | None = None
         self._scene, self._joints = "", 0
-        self._other_boom_names: dict[Stream, list[str]] = {}
+        self._decoder: SampleDecoder | None = None
         self._told: set[str] = set()
         self._was_apart, self._newest = False, (0, 0.0)  # newest stamp (ns), and when it was first seen
 
@@ -220,7 +220,7 @@ class Diagnostics:
         self._counts, self._shedding = {"samples": twin.counts, "messages": decoder.oddities}, twin.shedding
         self._queue.oddities.clear()
         self._counts["received"] = self._queue.oddities
-        self._scene, self._joints, self._other_boom_names = scene, twin.plan.joints, decoder.other_boom_names
+        self._scene, self._joints, self._decoder = scene, twin.plan.joints, decoder
         self._told.clear()
 
     def tune(self, thresholds: Thresholds) -> None:
@@ -287,24 +287,29 @@ class Diagnostics:
         told: dict[str, str | int] = {"scene": self._scene}
         told |= {f"{kind}: {name}": count for kind, found in self._counts.items() for name, count in sorted(found.items())}
         peers = self._peers
-        others, received = self._other_booms(), self._queue.look()
+        wrong, received = self._wrong_names(), self._queue.look()
         ends = peers.publishers, peers.subscribers.values()
         shed = self._shedding
         left_out = {} if shed is None else {"shapes": shed.shapes, "looks at health": shed.health}
-        found = yield from self._watch.look(told, self._active, *ends, clock, received, others, left_out)
+        found = yield from self._watch.look(told, self._active, *ends, clock, received, wrong, left_out, WORDS)
         yield
         self._publisher.show(found)
         self._tell_oddities()
         self._tell_types()
         self._tell_clock(clock, max((each.wait for each in received.values() if each.wait > 0.0), default=0.0))
 
-    def _other_booms(self) -> dict[Stream, str]:
-        """The inputs that named cylinders or joints of another boom since the last look, in words."""
-        found = {
-            stream: extra_names_message(self._inputs[stream], names, stream, self._joints, self._scene)
-            for stream, names in self._other_boom_names.items()
-        }
-        self._other_boom_names.clear()
+    def _wrong_names(self) -> dict[Stream, tuple[Level, str]]:
+        """The inputs that named cylinders or joints that the scene does not have since the last look, in words."""
+        decoder, found = self._decoder, dict[Stream, tuple[Level, str]]()
+        if decoder is None:
+            return found
+        for stream, (lacking, strange) in decoder.strange_names.items():
+            told = strange_names_message(self._inputs[stream], lacking, strange)
+            found[stream] = (Level.ERROR if len(lacking) == self._joints else Level.WARN, told)
+        for stream, names in decoder.other_boom_names.items():
+            found[stream] = Level.ERROR, extra_names_message(self._inputs[stream], names, stream, self._joints, self._scene)
+        decoder.strange_names.clear()
+        decoder.other_boom_names.clear()
         return found
 
     def _tell_oddities(self) -> None:

@@ -72,7 +72,9 @@ def declare(node: Node) -> None:
         for row in TABLE:
             node.declare_parameter(row.name, row.default, _descriptor(row))
     except InvalidParameterTypeException as error:
-        raise UsageError(f"{SOURCE}: {one_line(error)}. A number needs a decimal point: 1.0, not 1.") from error
+        is_whole = "INTEGER" in str(error) and "DOUBLE" in str(error)
+        remedy = "A number needs a decimal point: 1.0, not 1." if is_whole else "See msg_config/twin.yaml."
+        raise UsageError(f"{SOURCE}: {one_line(error)}. {remedy}") from error
     except ParameterException as error:
         raise UsageError(f"{SOURCE}: {one_line(error)}. See msg_config/twin.yaml.") from error
     if told := _unknown(node, node._parameter_overrides):

@@ -107,6 +107,8 @@ class ReceiveQueue:
         self._topics[name] = topic = _Topic(depth, read)
 
         def put(data: bytes, info: Mapping[str, Any]) -> None:
+            if self._topics.get(name) is not topic:  # closed while this message stood in the executor's row
+                return
             now = self._clock()
             arrival = info["received_timestamp"] or now
             topic.count(info["publication_sequence_number"])
