@@ -23,6 +23,10 @@ from .error_estimate import EstimatedError, ringing, row_errors, step_errors, to
 from .initial_state import InitialState, started, state_now
 
 RHO = 0.8
+CLOSEST = (
+    1e-6  # s, between rows: rounding of positions over the square of a shorter step is an acceleration of 0.01 m/s^2 and more
+)
+MOST_STEPS = 2e7  # of a motion, whose drive takes 64 bytes a step and cylinder
 
 
 @dataclass(frozen=True, repr=False)
@@ -224,6 +228,17 @@ def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Arr
     if np.any(np.diff(times) <= 0.0):
         row = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
         raise UsageError(f"t_s = {times[row + 1]:g} s in row {row + 2} of the drive: not after row {row + 1}. Sort the rows.")
+    if np.any(np.diff(times) < CLOSEST):
+        row = int(np.flatnonzero(np.diff(times) < CLOSEST)[0])
+        raise UsageError(
+            f"t_s = {times[row + 1]:.9g} s in row {row + 2} of the drive: {times[row + 1] - times[row]:.2g} s after row "
+            f"{row + 1}, {CLOSEST:g} s at least. Leave one of the two out."
+        )
+    if (steps := (times[-1] - times[0]) / dt) > MOST_STEPS:
+        raise UsageError(
+            f"t_s = {times[-1]:g} s in row {len(times)} of the drive: {steps:.2g} steps of {dt:g} s, {MOST_STEPS:.2g} at most. "
+            "Give times in s, if these are in ms, us or ns; else a larger step, or the motion in pieces (--start)."
+        )
     most = np.array([joint.cylinder.max_stroke for joint in scene.joints])
     beyond = np.argwhere((strokes < 0.0) | (strokes > most))
     if len(beyond):

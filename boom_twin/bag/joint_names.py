@@ -65,8 +65,8 @@ def extra_names_message(topic: str, names: Collection[str], stream: Stream, join
 def strange_names_message(topic: str, lacking: Collection[str], strange: Collection[str]) -> str:
     """That a topic does not name what the scene has, but something else, and what to do about it."""
     return (
-        f"{topic} names {_listed(strange)}, but not {_listed(lacking)}, which the scene has: if they are the same, correct them "
-        "at their source, or give the mapping these names"
+        f"{topic} names {_listed(strange)}, but not {_listed(lacking)}, which the scene has: if they are the same, correct "
+        "them at their source, or give the mapping these names"
     )
 
 

@@ -1,7 +1,7 @@
 """Monitor which joint's angle every encoder reads, and with which sign and unit: what is swapped is told as that.
 
-Readings of two joints that are exchanged, of the other sign or in degrees, differ from the model by far more than a boom can give
-way, and by an amount that is known. As evidence of a fault they would point at a stroke's scale or an offset.
+Readings of two joints that are exchanged, of the other sign or in degrees, differ from the model by far more than a boom can
+give way, and by an amount that is known. As evidence of a fault they would point at a stroke's scale or an offset.
 """
 
 from __future__ import annotations

@@ -87,6 +87,8 @@ class HealthMonitor:
             stream: SensorCheck(*settings.noise(SENSORS[stream]), *self._ranges[stream], fastest.get(stream, 0.0))
             for stream in CHECKED
         }
+        for sensors in self._sensors.values():
+            sensors.begin()
         self._ended += self.residuals.close(self._told)
         self._surveys: dict[Stream, StreamSurvey] = {
             stream: StreamSurvey(self._stated[stream], len(names))
@@ -229,7 +231,8 @@ class HealthMonitor:
         before = monitor.masked
         findings = self._checks[stream].look(np.asarray(stamps * NANO), raw, expected, block.end * NANO)
         may_come_back = not findings.is_calm and findings.jumped.any()
-        news = monitor.take(findings, block.number * BLOCK, block.end, self.residuals.blamed if may_come_back else {})
+        blamed, newest = self.residuals.blamed if may_come_back else {}, raw[-1] if len(raw) else None
+        news = monitor.take(findings, block.number * BLOCK, block.end, blamed, newest)
         if stream in JUDGED and monitor.masked is not before and (monitor.masked & ~before).any():
             self.residuals.forget()
         return news

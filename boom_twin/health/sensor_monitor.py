@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..types import Alarm, SensorKind
+from ..types import Alarm, Array, SensorKind
 from .sensor_check import MISSTATED, NOISE_OVER, Flags, SensorFindings
 
 NOTHING: Mapping[str, float] = MappingProxyType({})
@@ -62,6 +62,11 @@ class SensorMonitor:
         self._names, self._sensors, self._is_predicted = names, kind, is_predicted
         self._faults: dict[tuple[int, str], _Fault] = {}
         self._none: Flags = np.zeros(len(names), dtype=bool)
+        self._is_anew = False
+
+    def begin(self) -> None:
+        """The boom starts from rest: what jumped may have come back unseen."""
+        self._is_anew = True
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -78,13 +83,21 @@ class SensorMonitor:
             flags[channel] |= kind != "spikes"
         return flags
 
-    def take(self, findings: SensorFindings, start: int, end: int, blamed: Mapping[str, float] = NOTHING) -> list[Alarm]:
+    def take(
+        self,
+        findings: SensorFindings,
+        start: int,
+        end: int,
+        blamed: Mapping[str, float] = NOTHING,
+        newest: Array | None = None,
+    ) -> list[Alarm]:
         """Take what was found in a block from `start` to `end` (ns); gives alarms that began or ended.
 
         `blamed`: causes that residuals' alarms are explained by, and by how much a sensor would then be off. One among them
         that jumps to what the model expects, or back by that much where none does, has come back, and residuals tell so.
+        `newest`: the block's last readings, shape (channels,), if it has any.
         """
-        news: list[Alarm] = []
+        news = self._back_after_start(end, newest)
         if findings.is_calm and not self._faults:
             return news
         for kind, flags in findings.by_kind().items():
@@ -99,6 +112,18 @@ class SensorMonitor:
             if key[1] != "jump" and end - fault.seen > SETTLED:
                 del self._faults[key]
                 news.append(replace(fault.alarm, until=fault.seen))
+        return news
+
+    def _back_after_start(self, end: int, newest: Array | None) -> list[Alarm]:
+        """End jumps of sensors that read what they had before, with the first readings after a start from rest."""
+        if not self._is_anew or newest is None:
+            return []
+        self._is_anew, news = False, list[Alarm]()
+        for key, fault in list(self._faults.items()):
+            is_jump = key[1] == "jump" and not self._is_predicted
+            if is_jump and abs(newest[key[0]] - fault.before) < CAME_BACK * abs(fault.offset):
+                del self._faults[key]
+                news.append(replace(fault.alarm, until=end))
         return news
 
     def _is_wild(self, channel: int) -> bool:
@@ -120,7 +145,7 @@ class SensorMonitor:
         size, level = jump or (0.0, math.nan)
         if fault is not None:
             off = min(abs(fault.offset + size), abs(level - fault.before)) if math.isfinite(level) else abs(fault.offset + size)
-            if jump and end - fault.seen > SETTLED // 10 and off < CAME_BACK * abs(fault.offset):
+            if size * fault.offset < 0.0 and off < CAME_BACK * abs(fault.offset):
                 del self._faults[key]
                 return [replace(fault.alarm, until=end)]
             fault.seen = end

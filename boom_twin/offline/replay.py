@@ -42,6 +42,7 @@ from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
 from ..system.summary_display import SummaryDisplay, data_frame
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
+from ..twin.events import EVENTS
 from ..types import NANO, Alarm, Array, Change, Report, Stream, channels_of
 from .ground_truth import TipErrors, TipTruth, load_truth
 from .process_pipe import Pipe
@@ -264,6 +265,12 @@ def replay_into(
                 f"cylinders' travel, and stamps.{refused.told}"
             )
         recording.close()
+        if recording.totals.samples == 1 < recording.refused:
+            most = max(twin.counts, key=lambda name: twin.counts[name])
+            raise BagError(
+                f"{session.path}: of {1 + recording.refused} stroke samples only the first could be used ({_told(twin)}); "
+                f"{most}: {EVENTS.get(most, 'see the counts')}."
+            )
         if with_bag:
             SessionSheet(__version__, taken.text).write(out / "bag")
         summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME if with_bag else None) | {

@@ -8,11 +8,12 @@ EVENTS = {
     "waiting": "no message with all strokes yet, or started less than a second ago; the model has not started",
     "gap": "longer pause between strokes, bridged",
     "restart": "pause too long to bridge, or strokes elsewhere after it; started again from rest",
-    "leap": "stamp far from where its stream was; left out unless the next follows it within `gap`: slower strokes need a larger one",
+    "stroke elsewhere": "a stroke jumped where its cylinder cannot go, and stayed there for a second; started from rest",
+    "leap": "stamp far from where its stream was; left out unless the next follows it within `gap`: slower strokes need more",
     "clock set": "stamps went on elsewhere, strokes where they were; the model goes on, by the new stamps",
     "jump back": "time was set back, and strokes did not go on where they were; started again from rest",
     "second source": "samples of another source among those that are followed; left out",
-    "implausible": "a stroke where its cylinder cannot be; left out unless the next ones agree",
+    "implausible": "a stroke where its cylinder cannot be; left out, for up to a second if it jumped there",
     "out of range": "a stroke outside 0 to max_stroke of its cylinder; used where it is plausible",
     "held": "a stroke missing for long; taken to stay where it was",
     "model": "the model failed; it starts again with the next full sample",
@@ -25,5 +26,5 @@ EVENTS = {
     "unmatched": "no prediction at the stamp of this sample; no residual",
 }
 
-TOLD_AT_ONCE = frozenset({"restart", "clock set", "jump back", "reset", "load", "limits", "zero"})
+TOLD_AT_ONCE = frozenset({"restart", "stroke elsewhere", "clock set", "jump back", "reset", "load", "limits", "zero"})
 """Events that `Report.change` goes with."""

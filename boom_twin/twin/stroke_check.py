@@ -9,9 +9,12 @@ from ..config.settings import Settings
 from ..types import NANO, Array
 from .state import CHECKED, OTHERS, TRUSTED
 
-MOST = 5  # readings in a row that are not believed; the next one is
+MOST = 5  # readings in a row that are not believed though none jumps from the one before; the next one is
 FAR = 8.0  # deviations of the noise
 SILENT = 100_000_000  # ns after which a missing stroke is taken to stay where it was
+LASTING = 1_000_000_000  # ns after which readings that jumped elsewhere, and stay there, are believed
+USUAL_RATE = 0.05  # m/s, which a cylinder may have gone at meanwhile, beside twice what it was going at: then it is back
+NEVER = -1
 Flags = NDArray[np.bool_]
 
 
@@ -27,6 +30,7 @@ class StrokeCheck:
     def __init__(self, clock: NDArray[np.int64]) -> None:
         self._clock = clock
         self._before = 0
+        self._jumped = np.zeros(0, np.int64)  # stamp (ns) since when a stroke is where it jumped; NEVER
 
     def is_of_others(self, stamp: int, values: Array, estimate: Array, settings: Settings) -> bool:
         """Whether two strokes or more are where no cylinder can be: those of another boom, unless more than `MOST` agree."""
@@ -42,28 +46,62 @@ class StrokeCheck:
         span = (stamp - int(self._clock[CHECKED])) * NANO
         return float(FAR * settings.stroke_variance**0.5 + settings.stroke_rate * span)
 
-    def of(self, stamp: int, values: Array, estimate: Array | None, settings: Settings) -> tuple[Array, list[str]]:
-        """Strokes (m; NaN = missing), shape (n,), as the model is to take them at `stamp` (ns), and events.
+    def of(
+        self, stamp: int, values: Array, before: Array, estimate: Array | None, rates: Array, settings: Settings
+    ) -> tuple[Array, list[str]]:
+        """Strokes as the model is to take them, and events; `must_restart` tells whether it can.
 
-        There is no estimate for the first sample of a run.
+        Parameters
+        ----------
+        stamp : int
+            ns.
+        values, before : ndarray, shape (n,)
+            As measured now and by the sample before, m; NaN = missing.
+        estimate : ndarray, shape (n,), or None
+            m; None for the first sample of a run.
+        rates : ndarray, shape (n,)
+            Of the strokes, as estimated at the sample before, m/s.
+        settings : Settings
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            m; NaN = missing.
+        list of str
         """
         if estimate is None:
             self._strange, self._seen = np.zeros(len(values), dtype=np.int64), np.full(len(values), stamp)
+            self._jumped = np.full(len(values), NEVER)
             self._clock[CHECKED] = self._clock[TRUSTED] = stamp
             return values, []
-        far = _are_far(values, estimate, self._limit(stamp, settings))
+        limit = self._limit(stamp, settings)
+        far = _are_far(values, estimate, limit)
         self._clock[CHECKED] = stamp
         if not far.any() and np.isfinite(values).all():
             self._clock[TRUSTED] = stamp
             return values, []
-        return self._doubted(stamp, values, estimate, far)
+        if self._clock[TRUSTED] > self._before:  # all were well since the last doubt
+            self._strange[:], self._seen[:], self._jumped[:] = 0, self._clock[TRUSTED], NEVER
+        self._before = stamp
+        is_back = self._note_jumps(stamp, far, _are_far(values, before, limit), np.abs(values - estimate), np.abs(rates), limit)
+        return self._doubted(stamp, values, estimate, far & ~is_back)
+
+    @property
+    def must_restart(self) -> bool:
+        """Whether a stroke has been elsewhere for so long that it is believed: no motion leads there."""
+        jumped = self._jumped != NEVER
+        return bool(jumped.any() and (self._before - self._jumped[jumped]).max() >= LASTING)
+
+    def _note_jumps(self, stamp: int, far: Flags, jumps: Flags, off: Array, speeds: Array, limit: float) -> Flags:
+        """Note which readings jump where no cylinder can go within a sample; gives those that jump back."""
+        elapsed = np.where(self._jumped == NEVER, 0, stamp - self._jumped) * NANO
+        is_back: Flags = (self._jumped != NEVER) & jumps & (off <= limit + (USUAL_RATE + 2.0 * speeds) * elapsed)
+        self._jumped = np.where(far & jumps & ~is_back, stamp, np.where(is_back | ~far, NEVER, self._jumped))
+        return is_back
 
     def _doubted(self, stamp: int, values: Array, estimate: Array, far: Flags) -> tuple[Array, list[str]]:
-        if self._clock[TRUSTED] > self._before:  # all were well since the last doubt
-            self._strange[:], self._seen[:] = 0, self._clock[TRUSTED]
-        self._before = stamp
         self._strange = np.where(far, self._strange + 1, np.where(np.isnan(values), self._strange, 0))
-        implausible = far & (self._strange <= MOST)
+        implausible = far & ((self._strange <= MOST) | (self._jumped != NEVER))
         taken = np.where(implausible, np.nan, values)
         self._strange[far & ~implausible] = 0
         self._seen = np.where(np.isfinite(taken), stamp, self._seen)

@@ -216,13 +216,17 @@ class Twin:
             from_rest |= self._zeros.put(stamp, asked.zeros)
         if (from_rest or "load" in events) and self._run is not None:
             events += [] if events else ["reset"]
-            speeds = np.fmin(np.abs(self._boom.speeds), self.settings.stroke_rate)
-            self._begin_anew()
-            self._speeds = speeds
-            keep_waiting(self._state, stamp, -NONE)
+            self._begin_anew_at(stamp)
         if "load" in events:
             self._adopt(model or self.model(self.settings), self._compiled)
         return events
+
+    def _begin_anew_at(self, stamp: int) -> None:
+        """Start from rest with the strokes of `stamp` (ns), though the boom may be at work; what was measured since waits."""
+        speeds = np.fmin(np.abs(self._boom.speeds), self.settings.stroke_rate)
+        self._begin_anew()
+        self._speeds = speeds
+        keep_waiting(self._state, stamp, -NONE)
 
     def _begin_anew(self) -> None:
         self._run = None
@@ -361,8 +365,7 @@ class Twin:
         span = sample.stamp - run.newest
         if line.is_next(sample.stamp) and span >= SHORTEST:
             if run.plausible.is_of_others(sample.stamp - run.epoch, values, self._boom.estimate, self.settings):
-                self.counts["implausible"] += 1
-                return Report(sample.stamp, True, events=("implausible",))
+                return self._refuse(sample, "implausible")
             return self._follow(sample, values, complete, [])
         if 0 <= span < SHORTEST:
             same = is_close(values, run.strokes, 0.0, self.settings)
@@ -380,7 +383,9 @@ class Twin:
             return self._hold(sample, event)
         why = self._explain(run, line)
         is_young = run.is_again and run.newest - run.epoch < LASTING
-        if why is TimeStep.NEITHER and not line.is_confirmed(LASTING if is_young or line.is_second else gap):
+        is_in_time = 0 < line.held[0][0].stamp - run.newest <= gap  # no clock and no pause: all strokes jumped at once
+        is_odd = is_young or is_in_time or line.is_second
+        if why is TimeStep.NEITHER and not line.is_confirmed(LASTING if is_odd else gap):
             return self._hold(sample, event)
         return self._step_in_time(run, line, why)
 
@@ -508,7 +513,11 @@ class Twin:
         """Step the model to strokes that were looked at, their values less the sensors' zeros."""
         self._lines[Stream.STROKES].take(sample.stamp)
         estimate = self._boom.estimate if run.is_predicted else None
-        taken, oddities = run.plausible.of(sample.stamp - run.epoch, sample.values, estimate, self.settings)
+        before, rates, check = self._state.strokes, self._boom.speeds, run.plausible
+        taken, oddities = check.of(sample.stamp - run.epoch, sample.values, before, estimate, rates, self.settings)
+        if check.must_restart and np.isfinite(sample.values).all():
+            self._begin_anew_at(sample.stamp)
+            return self._follow(sample, sample.values, True, [*events, "stroke elsewhere"])
         run.is_predicted = True
         events += oddities
         self._state.strokes[:], self._state.taken[:] = sample.values, taken

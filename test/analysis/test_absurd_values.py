@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from boom_twin.analysis.equilibrium import statics
+from boom_twin.analysis.simulate import simulate
 from boom_twin.cli.main import main
-from boom_twin.errors import SolverError
+from boom_twin.errors import SolverError, UsageError
 from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.load import default_text
 from boom_twin.scene.schema import Scene
 
@@ -76,3 +78,16 @@ def test_a_deflection_beyond_half_the_reach_is_told(limp: Path, tmp_path: Path, 
 def test_the_default_scene_is_within_validity() -> None:
     scene: Scene = load_scene()
     assert all(statics(scene, posture=name).doubts == () for name in scene.postures)
+
+
+@pytest.mark.parametrize(
+    "times, told",
+    [
+        ([0.0, 5e6, 1e7], "t_s = 1e+07 s in row 3 of the drive: 1e+10 steps of 0.001 s, 2e+07 at most. Give times in s"),
+        ([0.0, 1e-9, 1.0], "t_s = 1e-09 s in row 2 of the drive: 1e-09 s after row 1, 1e-06 s at least"),
+    ],
+)
+def test_times_that_cannot_be_stepped_are_refused(times: list[float], told: str) -> None:
+    scene = load_scene()
+    with pytest.raises(UsageError, match=re.escape(told)):
+        simulate(scene, np.array(times), np.tile(strokes_of_posture(scene, "arch"), (3, 1)))

@@ -106,6 +106,15 @@ def test_a_stroke_sensor(kind, channel):
         assert first_after(outcome, ONSET) <= {"bias": 5.0, "spikes": 1.0, "dropout": 1.0}[kind]
 
 
+@pytest.mark.parametrize("lasts", [0.1, 0.5, 3.0])
+def test_a_stroke_that_reads_zero_for_a_while_is_a_jump_until_it_is_back(lasts):
+    """Before it was held it was followed: a tip 2 m off, and no alarm."""
+    found = spoilt(session(), Stream.STROKES, 1, lambda v, t: v - 0.02 if ONSET <= t < ONSET + lasts else v, -1.0)
+    alarms = {alarm.since: alarm for _, alarm in run(found).states() if alarm.cause == "cylinder_2.sensor"}
+    (alarm,) = alarms.values()
+    assert alarm.kind == "jump" and alarm.until is not None
+
+
 @pytest.mark.parametrize("channel", [1, *(pytest.param(i, marks=pytest.mark.slow) for i in (0, 2, 3))])
 def test_spikes_of_a_stroke_do_not_move_the_tip(channel):
     outcome = faulty(Stream.STROKES, "spikes", channel)

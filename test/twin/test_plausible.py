@@ -7,7 +7,7 @@ import pytest
 
 from boom_twin.config.settings import Settings
 from boom_twin.twin.state import new_state
-from boom_twin.twin.stroke_check import FAR, MOST, SILENT, StrokeCheck
+from boom_twin.twin.stroke_check import FAR, LASTING, MOST, SILENT, StrokeCheck
 
 MS, SETTINGS = 1_000_000, Settings()
 LIMIT = FAR * SETTINGS.stroke_variance**0.5 + SETTINGS.stroke_rate * 0.005
@@ -18,10 +18,12 @@ class Run:
 
     def __init__(self) -> None:
         self.plausible, self.stamp, self.estimate = StrokeCheck(new_state(2, np.array([2, 2, 2])).clock), 0, None
+        self.before = np.full(2, np.nan)
         self.take(0.3, 0.4)
 
     def take(self, *values: float):
-        taken, events = self.plausible.of(self.stamp, np.array(values), self.estimate, SETTINGS)
+        before, self.before = self.before, np.array(values)
+        taken, events = self.plausible.of(self.stamp, self.before, before, self.estimate, np.zeros(2), SETTINGS)
         self.estimate = taken if self.estimate is None else np.where(np.isnan(taken), self.estimate, taken)
         self.stamp += 5 * MS
         return taken.tolist(), events
@@ -44,13 +46,43 @@ def test_what_is_near_passes():
     assert run.take(0.3 + 0.99 * LIMIT, 0.4)[1] == []
 
 
-def test_a_burst_is_left_out_and_then_believed():
+def test_what_jumps_elsewhere_is_held_until_it_jumps_back():
+    """A transmitter that is lost for half a second, while the cylinder goes on a little."""
     run = Run()
-    for _ in range(MOST):
+    for k in range(100):
         taken, events = run.take(0.35, 0.4)
-        assert same(taken, np.nan, 0.4) and events == ["implausible"]
-    assert run.take(0.35, 0.4) == ([0.35, 0.4], []), "so many readings that agree are the cylinder's place"
-    assert run.take(0.35, 0.4) == ([0.35, 0.4], [])
+        late = (k + 1) * 5 * MS > SILENT
+        assert same(taken, 0.3 if late else np.nan, 0.4) and events == ["implausible", "held"] if late else ["implausible"]
+        assert not run.plausible.must_restart
+    assert run.take(0.31, 0.4) == ([0.31, 0.4], [])
+    assert run.take(0.31, 0.4) == ([0.31, 0.4], [])
+
+
+def test_what_stays_elsewhere_for_a_second_is_believed_by_a_start_from_rest():
+    run = Run()
+    for _ in range(LASTING // (5 * MS)):
+        run.take(0.35, 0.4)
+        assert not run.plausible.must_restart
+    run.take(0.35, 0.4)
+    assert run.plausible.must_restart
+
+
+def test_every_further_jump_counts_anew():
+    run = Run()
+    for k in range(500):
+        run.take(0.35 if k // 50 % 2 else 0.4, 0.4)
+    assert not run.plausible.must_restart
+
+
+def test_an_estimate_that_lags_is_no_jump_and_the_sixth_reading_is_believed():
+    """Each reading is where the one before let it be; it is the estimate that stays."""
+    run, stroke = Run(), 0.3
+    for k in range(MOST + 1):
+        stroke += 0.9 * LIMIT
+        run.estimate = np.array([0.3 - 0.2 * LIMIT, 0.4])
+        taken, events = run.take(stroke, 0.4)
+        assert events == (["implausible"] if k < MOST else []) and not run.plausible.must_restart
+    assert taken == [pytest.approx(stroke), 0.4]
 
 
 def test_a_shorter_burst_leaves_no_trace():

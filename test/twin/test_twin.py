@@ -207,12 +207,41 @@ def test_wild_strokes_for_less_than_a_gap_do_not_reach_the_model(twin, still):
 
 
 def test_a_failed_step_is_a_status_and_the_twin_starts_again(twin, still):
-    """Wild strokes are followed once they have gone on for `gap`."""
+    """Wild strokes are followed once they have gone on for a second."""
     follow(twin, still, 300)
-    wild = [twin.update(strokes(300 + 5 * k, still + 1e5)) for k in range(30)]
+    wild = [twin.update(strokes(300 + 5 * k, still + 1e5)) for k in range(220)]
     assert any(not report.accepted and report.status != "ok" for report in wild)
     recovered = [twin.update(strokes(450 + 5 * k, still)) for k in range(200)][-1]
     assert recovered.accepted and np.isfinite(recovered.prediction.tip_position).all()
+
+
+@pytest.mark.parametrize("cylinder, size", [(3, -0.18), (0, 0.02), (1, 0.2)])
+def test_a_stroke_that_is_lost_for_half_a_second_does_not_move_the_tip(scene, still, cylinder, size):
+    """It is held, with its cylinder at rest; what the strokes of the others do is followed."""
+    twin, right = Twin(scene), []
+    follow(twin, still, 1000)
+    other = Twin(scene)
+    follow(other, still, 1000)
+    for k in range(200):
+        ms = 1000 + 5 * k
+        end = moved(still, 1.0)
+        lost = end.copy()
+        lost[cylinder] += size if k < 100 else 0.0
+        right.append((twin.update(strokes(ms, lost)), other.update(strokes(ms, end))))
+    off = [found.prediction.tip_position - wanted.prediction.tip_position for found, wanted in right]
+    assert np.abs(off).max() < 1e-3 and twin.counts["implausible"] == 100 and "stroke elsewhere" not in twin.counts
+    shaken = [found.prediction.tip_acceleration - wanted.prediction.tip_acceleration for found, wanted in right]
+    assert np.abs(shaken).max() < 0.1
+
+
+def test_a_stroke_that_stays_elsewhere_for_a_second_starts_the_model_from_rest_there(twin, still):
+    follow(twin, still, 500)
+    elsewhere = moved(still, 1.0) + np.array([0.0, 0.02, 0.0, 0.0])
+    reports = [twin.update(strokes(500 + 5 * k, elsewhere)) for k in range(300)]
+    (again,) = [report for report in reports if "stroke elsewhere" in report.events]
+    assert again.change.from_rest and again.stamp == START + 1500 * MS
+    assert np.all(again.prediction.tip_acceleration == 0.0) and "implausible" not in reports[-1].events
+    assert reports[-1].prediction.strokes == pytest.approx(elsewhere, abs=1e-6)
 
 
 @pytest.mark.parametrize("order", ["before", "after", "shuffled"])
