@@ -223,8 +223,9 @@ def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Arr
     if times.ndim != 1 or strokes.shape != (len(times), n) or len(times) < 1:
         raise UsageError(f"strokes = array of shape {strokes.shape}: give one row per time and {n} columns.")
     if not (np.isfinite(times).all() and np.isfinite(strokes).all()):
-        row = int(np.flatnonzero(~np.isfinite(np.column_stack([times, strokes])).all(axis=1))[0])
-        raise UsageError(f"row {row + 1} of the drive: not finite. Give a number in every column.")
+        row, column = np.argwhere(~np.isfinite(np.column_stack([times, strokes])))[0].tolist()
+        name = f"stroke_{column}_m" if column else "t_s"
+        raise UsageError(f"row {row + 1} of the drive, {name}: not finite. Give a number in every column.")
     if np.any(np.diff(times) <= 0.0):
         row = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
         raise UsageError(f"t_s = {times[row + 1]:g} s in row {row + 2} of the drive: not after row {row + 1}. Sort the rows.")

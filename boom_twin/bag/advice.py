@@ -92,8 +92,9 @@ def remarks(info: BagInfo, topics: Topics) -> list[str]:
     for one, other in pairwise(known):
         apart = (other.skews[2] / other.skewed - one.skews[2] / one.skewed) * NANO
         if abs(apart) > SKEW:
+            where = "before" if apart > 0.0 else "after"
             found.append(
-                f"Clocks of {one.name} and {other.name} differ: on average {other.name} is stamped {apart:+.3f} s before "
+                f"Clocks of {one.name} and {other.name} differ: on average {other.name} is stamped {abs(apart):.3f} s {where} "
                 f"its log time, compared with {one.name}. Synchronise the sensors' clocks."
             )
     return found

@@ -16,6 +16,7 @@ from .sensor_check import MISSTATED, NOISE_OVER, Flags, SensorFindings
 NOTHING: Mapping[str, float] = MappingProxyType({})
 SETTLED = 2_000_000_000  # ns without the fault after which it has ended
 CAME_BACK = 0.3  # of a jump, by which a sensor that came back may still be off
+MEASURED = 4.0  # times the stated noise, above which there may be more: a single reading counts for so much at most
 TOLD = {
     "stuck": "repeats one reading again and again",
     "noise": "is noisier than its like and than stated",
@@ -30,7 +31,8 @@ def noise_as_text(figures: Mapping[str, Any]) -> list[str]:
     """A warning for every stream whose sensors are noisier than stated, by figures as in `Health.noise`."""
     found = {name.removeprefix(NOISE_OVER): times for name, times in figures.items() if name.startswith(NOISE_OVER)}
     return [
-        f"most sensors are {times:.1f} times as noisy as {name} states; judgement allows for it: set {name} to what they have"
+        f"most sensors are {times:.1f} times {'or more ' if times > MEASURED else ''}as noisy as {name} states; judgement allows "
+        f"for it: set {name} to what they have"
         for name, times in found.items()
         if times > MISSTATED
     ]
