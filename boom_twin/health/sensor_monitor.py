@@ -56,27 +56,29 @@ class SensorMonitor:
         Says which findings give an alarm.
     is_predicted : bool
         Whether a model says what the sensors should read.
+
+    Attributes
+    ----------
+    masked : ndarray of bool, shape (channels,)
+        Channels that are not to be trusted; another array once these are others.
     """
 
     def __init__(self, names: tuple[str, ...], kind: SensorKind, is_predicted: bool = True) -> None:
         self._names, self._sensors, self._is_predicted = names, kind, is_predicted
         self._faults: dict[tuple[int, str], _Fault] = {}
         self._none: Flags = np.zeros(len(names), dtype=bool)
+        self.masked = self._none
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
         """Those that last."""
-        return tuple(fault.alarm for fault in self._faults.values())
+        return tuple(fault.alarm for fault in self._faults.values()) if self._faults else ()
 
-    @property
-    def masked(self) -> Flags:
-        """Channels that are not to be trusted, shape (channels,)."""
-        if not self._faults:
-            return self._none
-        flags = self._none.copy()
+    def _mask(self) -> None:
+        """Mask the channels that have faults by now."""
+        self.masked = self._none.copy()
         for channel, kind in self._faults:
-            flags[channel] |= kind != "spikes"
-        return flags
+            self.masked[channel] |= kind != "spikes"
 
     def take(self, findings: SensorFindings, start: int, end: int, blamed: Mapping[str, float] = NOTHING) -> list[Alarm]:
         """Take what was found in a block from `start` to `end` (ns); gives alarms that began or ended.
@@ -99,6 +101,8 @@ class SensorMonitor:
             if key[1] != "jump" and end - fault.seen > SETTLED:
                 del self._faults[key]
                 news.append(replace(fault.alarm, until=fault.seen))
+        if news:
+            self._mask()
         return news
 
     def _is_wild(self, channel: int) -> bool:
