@@ -21,13 +21,23 @@ from .delay_monitor import DelayMonitor, delay_cause
 from .detection import Detector
 from .force_reading import ForceReading
 from .imu_mount import ImuMount
-from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows
-from .inference.hypotheses import Regression
+from .inference.block_problem import (
+    BLOCK,
+    Block,
+    BlockBuilder,
+    BlockMeans,
+    BlockProblem,
+    MeasuredRows,
+    PredictionRows,
+    warm_up_blocks,
+)
+from .inference.hypotheses import Evidence, Regression
 from .inference.innovation_filter import InnovationFilter, ModalStates
+from .inference.normal_distribution import log_normal_below
 from .residual_monitor import ResidualMonitor
 from .sensor_check import NOISE_OVER, SensorCheck, sensor_ranges
 from .sensor_monitor import SensorMonitor
-from .sensor_survey import collect_means
+from .sensor_survey import collect_means, follow_heard
 from .stream_readings import PredictionMeans, StreamReadings, StreamSurvey
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news
@@ -284,5 +294,12 @@ def warm_up() -> None:
     whitening = InnovationFilter(2, 2, BLOCK * NANO, 0.0)
     whitening.tune(ModalStates(np.zeros(0), none, none, none, none, np.zeros((2, 0)), two[0], np.zeros((0, 2)), two))
     found = whitening.step(np.ones((2, 2)), np.eye(2), two[0], 0.0, 0.0)
-    Regression(np.zeros(1), np.eye(1)).take(found.white, True)
+    regression = Regression(np.zeros(1), np.eye(1))
+    regression.take(found.white, True)
+    _ = regression.has_strayed
+    Evidence.none(1, (1,)).with_rows(found.white[None], np.zeros(1)).given(np.zeros(1), np.eye(1))
+    log_normal_below(two)
+    warm_up_blocks()
+    SameTypes(follow_heard)(two[0], two[0], two[0], 0.0, two[0])
+    SameTypes(collect_means)(np.zeros((6, 2)), np.zeros(2, dtype=bool), 0, two[0], two[0])
     Detector(2, BLOCK * NANO, 1e-6).take(np.zeros(2))

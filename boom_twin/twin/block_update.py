@@ -214,6 +214,8 @@ class BlockUpdate:
             one, width = np.zeros(1, np.int64), int(self._widths.max())
             advance = update.for_types_of(*boom, *twin, one, one, np.zeros((1, width)), 0, False, False, found)
             self._code = advance, measure.for_types_of(*twin, 0, 0, np.zeros(width), False, found)
+            self._copy_predictions(found, 0, self._pins, *PredictionRows.room(0, self._joints))
+            self._copy_residuals(found, 0, 0, 0, *MeasuredRows.room(0, 1))
         self._held = self._code, (boom, twin, found)
         return self._held
 

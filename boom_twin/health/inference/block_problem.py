@@ -340,3 +340,12 @@ class LinearModel:
         scales = self._turns, by_stroke @ moved, self._lengths, by_stroke, moved
         self._write_table(table, block.left, signature.channels, self._late, block.rates, *scales)
         return table
+
+
+def warm_up_blocks() -> None:
+    """Compile the kernels by which blocks become linear problems, on made-up numbers of two channels."""
+    _first_and_last(np.zeros(2, np.int64), BLOCK)
+    two, pairs = np.zeros((2, 2)), np.zeros((0, 2), np.int64)
+    _largest_step(two[0], two[1])
+    late = np.zeros((0, 3), np.int64)
+    SameTypes(write_table)(np.zeros((2, 3)), two[0], two, late, two[0], pairs, two[0], pairs, two, two[0])
