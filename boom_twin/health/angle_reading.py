@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BoomTwinError
+from ..kernels.jit import SameTypes
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Alarm, Array, Mount, Ranked
+from .sensor_survey import follow_heard
 from .stream_readings import ENOUGH, WINDOW, StreamReadings
 
 FAR = radians(1.0)  # by which readings have to be off, and two expected angles apart, for their exchange to be told
@@ -53,6 +55,7 @@ class AngleReading:
         self._scene, self._are_encoders = scene, not any(mounts)
         self._found: list[_Exchange] = []
         self._none = np.zeros(len(scene.joints), dtype=bool)
+        self._follow_heard = SameTypes(follow_heard)
         self.begin()
 
     def begin(self) -> None:
@@ -75,6 +78,11 @@ class AngleReading:
         for found in self._found:
             mask[list(found.joints)] = True
         return mask
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether there are alarms."""
+        return bool(self._found)
 
     @property
     def has_wrong_strokes(self) -> bool:
@@ -100,13 +108,11 @@ class AngleReading:
         start, end : int
             Of the block, ns.
         """
-        heard = readings.counts > 0.0
-        if not heard.any():
+        counts, off = readings.counts, readings.off
+        is_heard, largest = self._follow_heard(self._strokes, strokes, counts, min(1.0, span / WINDOW), off)
+        if not is_heard or not (self._is_off or self._found or largest > FAR):
             return []
-        self._strokes += np.where(heard, min(1.0, span / WINDOW), 0.0) * (strokes - self._strokes)
-        is_off = np.abs(readings.off) > FAR
-        if not (self._is_off or self._found or is_off.any()):
-            return []
+        heard, is_off = counts > 0.0, np.abs(off) > FAR
         self._since = np.where(is_off, np.where(self._since < 0, start, self._since), np.where(heard, -1, self._since))
         self._is_off = bool((self._since >= 0).any())
         weight = np.maximum(readings.slow.weight, 1e-9)

@@ -60,7 +60,7 @@ class DelayMonitor:
     def begin(self) -> None:
         """The boom starts from rest; what is known of the lag stays known no longer, an alarm lasts until it is refuted."""
         self._number = 0
-        self._blocks: deque[tuple[Array, Array]] = deque()
+        self._blocks: deque[tuple[StreamReadings, NDArray[np.bool_]]] = deque()
         self._spans: deque[tuple[Array, Array, Array]] = deque(maxlen=KEPT)
 
     def take(
@@ -95,13 +95,13 @@ class DelayMonitor:
         self._number = number
         if is_empty:
             return []
-        is_unknown = (readings.counts < len(stamps)) | masked
-        self._blocks.append((np.where(is_unknown, np.nan, readings.off), readings.rates))
+        self._blocks.append((readings, masked))
         half = max(LEAST, math.ceil(period / BLOCK))
         if len(self._blocks) < SPAN + 2 * (half - 1):
             return []
         newest = list(self._blocks)[-(SPAN + 2 * (half - 1)) :]
-        rows, slopes = (self._averaged([block[i] for block in newest], half) for i in range(2))
+        lags, rates = [_off(*block) for block in newest], [each.rates for each, _ in newest]
+        rows, slopes = self._averaged(lags, half), self._averaged(rates, half)
         for _ in range(SPAN):
             self._blocks.popleft()
         found = -(rows * slopes).sum(axis=0), (slopes**2).sum(axis=0), (rows**2).sum(axis=0)
@@ -139,3 +139,8 @@ class DelayMonitor:
         alarm = self.alarm or Alarm(self._stream.value, "late", end, None, cause, told, ranked)
         self.alarm = replace(alarm, told=told, ranked=ranked)
         return [self.alarm]
+
+
+def _off(readings: StreamReadings, masked: NDArray[np.bool_]) -> Array:
+    """By how much readings are off in the mean, shape (channels,); NaN where one is missing, or masked."""
+    return np.where((readings.counts < len(readings.rows.stamps)) | masked, np.nan, readings.off)

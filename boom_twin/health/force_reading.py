@@ -60,14 +60,15 @@ class ForceReading:
 
     def take(self, readings: StreamReadings, start: int, end: int) -> list[Alarm]:
         """Take a block from `start` to `end` (ns) of forces in N; gives alarms that began or ended."""
-        heard, slow = readings.counts > 0.0, readings.slow
-        if not heard.any():
+        if not any(readings.counts.tolist()):
             return []
+        heard, slow = readings.counts > 0.0, readings.slow
         expected = np.abs(slow.expected)
         self._is_large = (expected > LARGE * expected.max()) & (expected > 0.0)
         news: list[Alarm] = []
+        means, models = slow.read.tolist(), slow.expected.tolist()
         for i in np.flatnonzero(heard & self._is_large).tolist():
-            factor = slow.read[i] / slow.expected[i]
+            factor = means[i] / models[i]
             if i not in self._alarms and slow.weight[i] > ENOUGH and (reason := _reason(factor)):
                 self._alarms[i] = self._begun(i, reason, slow, start)
                 news.append(self._alarms[i])
@@ -90,5 +91,7 @@ def _three_digits(force: float) -> str:
 
 
 def _reason(factor: float) -> str:
-    """What explains that the model's force is read times `factor`, in words; empty where nothing does."""
+    """What explains that the model's force is read times `factor`, in words; empty where nothing does, or needs to."""
+    if abs(factor - 1.0) < RIGHT:
+        return ""
     return next((reason for reason, by in REASONS.items() if abs(factor / by - 1.0) < CLOSE), "")

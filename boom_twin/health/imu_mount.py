@@ -47,10 +47,10 @@ class ImuMount:
 
     def take(self, readings: StreamReadings, start: int, end: int) -> list[Alarm]:
         """Take a block from `start` to `end` (ns) of readings in m/s^2; gives an alarm that began or ended."""
-        if readings.counts.min() == 0.0:
+        if not all(readings.counts.tolist()):
             return []
         slow = readings.slow
-        weight, read, expected = float(slow.weight.min()), slow.read.tolist(), slow.expected.tolist()
+        weight, read, expected = min(slow.weight.tolist()), slow.read.tolist(), slow.expected.tolist()
         off = math.dist(read, expected)  # of sums that begin at 0: less than the means' at first
         if self.alarm is None and off > FAR:
             swing2 = float(slow.squares.sum()) * weight - off**2  # of vibration out of step: it stays in the means

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from operator import is_
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.modal import StrokeNoise
 from ..config.settings import Settings
+from ..kernels.jit import SameTypes
 from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
 from .angle_reading import AngleReading
@@ -19,12 +21,23 @@ from .delay_monitor import DelayMonitor, delay_cause
 from .detection import Detector
 from .force_reading import ForceReading
 from .imu_mount import ImuMount
-from .inference.block_problem import BLOCK, Block, BlockBuilder, BlockMeans, BlockProblem, MeasuredRows, PredictionRows
-from .inference.hypotheses import Regression
+from .inference.block_problem import (
+    BLOCK,
+    Block,
+    BlockBuilder,
+    BlockMeans,
+    BlockProblem,
+    MeasuredRows,
+    PredictionRows,
+    warm_up_blocks,
+)
+from .inference.hypotheses import Evidence, Regression
 from .inference.innovation_filter import InnovationFilter, ModalStates
+from .inference.normal_distribution import log_normal_below
 from .residual_monitor import ResidualMonitor
 from .sensor_check import NOISE_OVER, SensorCheck, sensor_ranges
 from .sensor_monitor import SensorMonitor
+from .sensor_survey import collect_means, follow_heard
 from .stream_readings import PredictionMeans, StreamReadings, StreamSurvey
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news
@@ -76,6 +89,9 @@ class HealthMonitor:
         self._angles = AngleReading(scene, mounts)
         self._ended: list[Alarm] = []
         self._told = 0
+        self._parts: tuple[NDArray[np.bool_], ...] = ()
+        self._all_masked = np.zeros(0, dtype=bool)  # of these parts
+        self._collect_means = SameTypes(collect_means)
         self.begin()
 
     def begin(self) -> None:
@@ -112,26 +128,26 @@ class HealthMonitor:
     @property
     def noise(self) -> tuple[float, float]:
         """Times the noise that is stated, of the strokes and of the angle sensors, as it is with most of them now."""
-        strokes, angles = (self._checks[stream].noise_now for stream in MEASURED_NOISE)
-        return strokes, angles
+        return self._checks[Stream.STROKES].noise_now, self._checks[Stream.ANGLES].noise_now
 
     @property
     def masked(self) -> NDArray[np.bool_]:
         """Of all measured channels in the order of the streams, those whose sensor is known to fail."""
-        return np.concatenate([self._masked(stream) for stream in self._channels if stream is not Stream.STROKES])
+        parts = tuple(map(self._masked, self._surveys))
+        if not (self._parts and all(map(is_, parts, self._parts))):
+            self._parts, self._all_masked = parts, np.concatenate(parts)
+        return self._all_masked
 
     def _masked(self, stream: Stream) -> NDArray[np.bool_]:
-        """The same of one stream."""
+        """The same of one stream; another array once these are others."""
+        masked = self._sensors[stream].masked if stream in self._sensors else self._trusted[stream]
         if stream is Stream.FORCES and self._forces.alarms:
-            return self._sensors[stream].masked | self._forces.masked
-        if stream is Stream.ANGLES:
-            return self._sensors[stream].masked | self._angles.masked
-        if stream in self._sensors:
-            return self._sensors[stream].masked
-        masked = self._trusted[stream]
+            return masked | self._forces.masked
+        if stream is Stream.ANGLES and self._angles.is_wrong:
+            return masked | self._angles.masked
         return ~masked if stream is Stream.IMU and self._mount.alarm is not None else masked
 
-    def judge(self, stamp: int, variances: Array, noise: StrokeNoise | None, tip: Array) -> Health | None:
+    def judge(self, stamp: int, variances: Array, noise: StrokeNoise | None, tip: Callable[[], Array]) -> Health | None:
         """Judge what is complete now that strokes came with `stamp` (ns); None if there is nothing to tell.
 
         Parameters
@@ -140,10 +156,11 @@ class HealthMonitor:
             Of the strokes' estimates, m^2.
         noise : StrokeNoise or None
             With the modes at the present posture.
-        tip : ndarray, shape (2,)
-            Deviation (m) of the tip that a start from rest leaves, and that the estimate shows.
+        tip : callable
+            Asked, if there is something to tell, for the deviation (m) of the tip, shape (2,), that a start from rest leaves,
+            and that the estimate shows.
         """
-        self._variances, self._noise, self._tip = variances, noise, tip
+        self._noise = noise
         news: list[Alarm] = []
         done = self._blocks.close(stamp)
         for block in done:
@@ -167,7 +184,12 @@ class HealthMonitor:
         alarms += lags.values()
         measured = {NOISE_OVER + SENSORS[stream].noise: self._checks[stream].noise for stream in MEASURED_NOISE}
         return Health(
-            self._told, tuple(alarms), self.names, self.residuals.levels, self._tip_sigmas(), measured | self.residuals.limits
+            self._told,
+            tuple(alarms),
+            self.names,
+            self.residuals.levels,
+            self._tip_sigmas(variances, tip()),
+            measured | self.residuals.limits,
         )
 
     def _judge(self, block: Block) -> list[Alarm]:
@@ -176,8 +198,7 @@ class HealthMonitor:
         is_followed = predicted.largest < UNCERTAIN * self._settings.stroke_variance
         readings, span = dict[Stream, StreamReadings](), BLOCK * NANO if is_followed else 0.0
         for stream, survey in self._surveys.items():
-            rows = block.readings(stream, len(self._channels[stream]))
-            readings[stream] = survey.take(rows, self._masked(stream), span)
+            readings[stream] = survey.take(block.readings(stream), self._masked(stream), span)
         is_shaken = any(each.is_bent for each in readings.values())
         for stream, each in readings.items():
             if stream in CHECKED:
@@ -230,6 +251,8 @@ class HealthMonitor:
         monitor = self._sensors[stream]
         before = monitor.masked
         findings = self._checks[stream].look(np.asarray(stamps * NANO), raw, expected, block.end * NANO)
+        if findings.is_calm and not monitor.alarms:
+            return []
         may_come_back = not findings.is_calm and findings.jumped.any()
         blamed, newest = self.residuals.blamed if may_come_back else {}, raw[-1] if len(raw) else None
         news = monitor.take(findings, block.number * BLOCK, block.end, blamed, newest)
@@ -241,14 +264,14 @@ class HealthMonitor:
         self, start: int, predictions: PredictionRows, predicted: PredictionMeans, readings: dict[Stream, StreamReadings]
     ) -> BlockMeans:
         """Means of the residuals of every stream that is judged, of the block that begins at `start` (ns)."""
-        means, counts, imu = [], [], readings[Stream.IMU]
+        left, counts, first, imu = np.empty(len(self.names)), np.empty(len(self.names)), 0, readings[Stream.IMU]
         for stream in JUDGED:
-            counts.append(readings[stream].evened)
-            means.append(np.where(self._masked(stream), np.nan, readings[stream].near))
+            self._collect_means(readings[stream].numbers, self._masked(stream), first, left, counts)
+            first += len(self._channels[stream])
         return BlockMeans(
             start=start,
-            left=np.concatenate(means),
-            counts=np.concatenate(counts),
+            left=left,
+            counts=counts,
             strokes=predictions.strokes[len(predictions.stamps) // 2],
             variances=predicted.variances,
             rates=np.concatenate([predicted.rates, np.where(np.isfinite(imu.rates), imu.rates, 0.0)]),
@@ -256,13 +279,13 @@ class HealthMonitor:
             motion=(imu if len(imu.rows.stamps) else readings[Stream.ANGLES]).rows,
         )
 
-    def _tip_sigmas(self) -> Array:
-        """Of the predicted tip, m: what strokes and parameters may be off by."""
+    def _tip_sigmas(self, variances: Array, tip: Array) -> Array:
+        """Of the predicted tip, m: what strokes with these variances (n,) and parameters may be off by, and `tip` (2,)."""
         signature, watch = self.residuals.signature, self.residuals
         if signature is None:
             return np.full(2, np.nan)
-        by_parameters = np.einsum("ij,jk,ik->i", signature.tip, watch.covariance, signature.tip) + self._tip**2
-        return np.asarray(np.sqrt(by_parameters + signature.tip_by_stroke**2 @ self._variances))
+        by_parameters = np.einsum("ij,jk,ik->i", signature.tip, watch.covariance, signature.tip) + tip**2
+        return np.asarray(np.sqrt(by_parameters + signature.tip_by_stroke**2 @ variances))
 
 
 def warm_up() -> None:
@@ -274,5 +297,12 @@ def warm_up() -> None:
     whitening = InnovationFilter(2, 2, BLOCK * NANO, 0.0)
     whitening.tune(ModalStates(np.zeros(0), none, none, none, none, np.zeros((2, 0)), two[0], np.zeros((0, 2)), two))
     found = whitening.step(np.ones((2, 2)), np.eye(2), two[0], 0.0, 0.0)
-    Regression(np.zeros(1), np.eye(1)).take(found.white, True)
+    regression = Regression(np.zeros(1), np.eye(1))
+    regression.take(found.white, True)
+    _ = regression.has_strayed
+    Evidence.none(1, (1,)).with_rows(found.white[None], np.zeros(1)).given(np.zeros(1), np.eye(1))
+    log_normal_below(two)
+    warm_up_blocks()
+    SameTypes(follow_heard)(two[0], two[0], two[0], 0.0, two[0])
+    SameTypes(collect_means)(np.zeros((6, 2)), np.zeros(2, dtype=bool), 0, two[0], two[0])
     Detector(2, BLOCK * NANO, 1e-6).take(np.zeros(2))

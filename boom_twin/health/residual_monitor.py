@@ -257,8 +257,7 @@ class ResidualMonitor:
         shaking = self._healthy.vibration(problem.shaking)
         found = self._healthy.step(problem.table, noise, self._errors_about(problem), shaking, problem.travel)
         left, _ = known.take(found.white, self._suspicion is None)
-        self.surprise = np.full(len(self._names), np.nan)
-        self.surprise[np.isfinite(problem.table[:, 0])] = left
+        self.surprise = left if len(left) == len(self._names) else self._among_all(problem, left)
         if self._alarm is not None:
             return
         self._detector.take(self.surprise)
@@ -268,6 +267,12 @@ class ResidualMonitor:
         if self._suspicion is None and self._detector.suspicion > SUSPICIOUS:
             self._carried = {}
             self._suspect(problem.start + SKIPPED * BLOCK)
+
+    def _among_all(self, problem: BlockProblem, left: Array) -> Array:
+        """What is left of the channels that were measured in their places among all; NaN of the others."""
+        surprise = np.full(len(self._names), np.nan)
+        surprise[np.isfinite(problem.table[:, 0])] = left
+        return surprise
 
     def _errors_about(self, problem: BlockProblem) -> Array:
         """Variance of the model's error (channels,), and of the signatures of known faults."""

@@ -16,7 +16,7 @@ from .sensor_check import MISSTATED, NOISE_OVER, Flags, SensorFindings
 NOTHING: Mapping[str, float] = MappingProxyType({})
 SETTLED = 2_000_000_000  # ns without the fault after which it has ended
 CAME_BACK = 0.3  # of a jump, by which a sensor that came back may still be off
-MEASURED = 4.0  # times the stated noise, above which there may be more: a single reading counts for so much at most
+MEASURED = 4.0  # times the stated noise, above which there may be more: a reading counts for so much at most
 TOLD = {
     "stuck": "repeats one reading again and again",
     "noise": "is noisier than its like and than stated",
@@ -31,8 +31,8 @@ def noise_as_text(figures: Mapping[str, Any]) -> list[str]:
     """A warning for every stream whose sensors are noisier than stated, by figures as in `Health.noise`."""
     found = {name.removeprefix(NOISE_OVER): times for name, times in figures.items() if name.startswith(NOISE_OVER)}
     return [
-        f"most sensors are {times:.1f} times {'or more ' if times > MEASURED else ''}as noisy as {name} states; judgement allows "
-        f"for it: set {name} to what they have"
+        f"most sensors are {times:.1f} times {'or more ' if times > MEASURED else ''}as noisy as {name} states; judgement "
+        f"allows for it: set {name} to what they have"
         for name, times in found.items()
         if times > MISSTATED
     ]
@@ -58,13 +58,18 @@ class SensorMonitor:
         Says which findings give an alarm.
     is_predicted : bool
         Whether a model says what the sensors should read.
+
+    Attributes
+    ----------
+    masked : ndarray of bool, shape (channels,)
+        Channels that are not to be trusted; another array once these are others.
     """
 
     def __init__(self, names: tuple[str, ...], kind: SensorKind, is_predicted: bool = True) -> None:
         self._names, self._sensors, self._is_predicted = names, kind, is_predicted
         self._faults: dict[tuple[int, str], _Fault] = {}
         self._none: Flags = np.zeros(len(names), dtype=bool)
-        self._is_anew = False
+        self.masked, self._is_anew = self._none, False
 
     def begin(self) -> None:
         """The boom starts from rest: what jumped may have come back unseen."""
@@ -73,17 +78,13 @@ class SensorMonitor:
     @property
     def alarms(self) -> tuple[Alarm, ...]:
         """Those that last."""
-        return tuple(fault.alarm for fault in self._faults.values())
+        return tuple(fault.alarm for fault in self._faults.values()) if self._faults else ()
 
-    @property
-    def masked(self) -> Flags:
-        """Channels that are not to be trusted, shape (channels,)."""
-        if not self._faults:
-            return self._none
-        flags = self._none.copy()
+    def _mask(self) -> None:
+        """Mask the channels that have faults by now."""
+        self.masked = self._none.copy()
         for channel, kind in self._faults:
-            flags[channel] |= kind != "spikes"
-        return flags
+            self.masked[channel] |= kind != "spikes"
 
     def take(
         self,
@@ -114,6 +115,8 @@ class SensorMonitor:
             if key[1] != "jump" and end - fault.seen > SETTLED:
                 del self._faults[key]
                 news.append(replace(fault.alarm, until=fault.seen))
+        if news:
+            self._mask()
         return news
 
     def _back_after_start(self, end: int, newest: Array | None) -> list[Alarm]:
@@ -126,6 +129,7 @@ class SensorMonitor:
             if is_jump and abs(newest[key[0]] - fault.before) < CAME_BACK * abs(fault.offset):
                 del self._faults[key]
                 news.append(replace(fault.alarm, until=end))
+                self._mask()
         return news
 
     def _is_wild(self, channel: int) -> bool:

@@ -305,6 +305,39 @@ def is_bent(work, raw, masked):
 
 
 @kernel
+def follow_heard(slow, values, counts, share, off):
+    """Go on with slow means by `values` (k,) of those sensors that have `counts` (k,) readings.
+
+    Gives whether one has any, and the largest magnitude of `off` (k,).
+    """
+    is_heard, largest = False, 0.0
+    for i in range(slow.shape[0]):
+        if counts[i] > 0.0:
+            slow[i] += share * (values[i] - slow[i])
+            is_heard = True
+        largest = max(largest, abs(off[i]))
+    return is_heard, largest
+
+
+@kernel
+def collect_means(numbers, masked, first, left, counts):
+    """Write the means of a stream's readings without outliers, and of how many each is worth, from channel `first` on.
+
+    Parameters
+    ----------
+    numbers : ndarray, shape (6, channels)
+        See `boom_twin.health.stream_readings.StreamReadings`.
+    masked : ndarray of bool, shape (channels,)
+        Channels that are not to be trusted: NaN is written.
+    left, counts : ndarray
+        Of all streams.
+    """
+    for i in range(masked.shape[0]):
+        left[first + i] = math.nan if masked[i] else numbers[NEAR, i]
+        counts[first + i] = numbers[EVENED, i]
+
+
+@kernel
 def summarise_predictions(stamps, measured, variances, joints, accelerations, found):
     """Write means of a block of predictions: measured strokes, variances of the estimates, rates of the joints.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,23 +64,14 @@ class SlowMeans:
     weight: Array
 
 
-@dataclass(frozen=True, slots=True)
-class StreamReadings:
+class StreamReadings(NamedTuple):
     """What a block of k readings says.
 
     Attributes
     ----------
     rows : MeasuredRows
-    counts : ndarray, shape (channels,)
-        Of the readings that the model has something to compare with.
-    off : ndarray, shape (channels,)
-        Mean by which these are off, in their unit; 0 of none.
-    near, near_counts : ndarray, shape (channels,)
-        The same without outliers, NaN of none; and of how many readings.
-    evened : ndarray, shape (channels,)
-        Of how many with the stated noise that mean would be as sure, as noisy as they are.
-    rates : ndarray, shape (channels,)
-        Of what the model expects from the first reading to the last, per s; NaN of fewer than two.
+    numbers : ndarray, shape (6, channels)
+        What follows, by `boom_twin.health.sensor_survey.COUNTS`.
     slow : SlowMeans
     is_bent : bool
         Whether trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by second and
@@ -87,14 +79,39 @@ class StreamReadings:
     """
 
     rows: MeasuredRows
-    counts: Array
-    off: Array
-    near: Array
-    near_counts: Array
-    evened: Array
-    rates: Array
+    numbers: Array
     slow: SlowMeans
     is_bent: bool
+
+    @property
+    def counts(self) -> Array:
+        """Of the readings that the model has something to compare with, shape (channels,)."""
+        return np.asarray(self.numbers[COUNTS])
+
+    @property
+    def off(self) -> Array:
+        """Mean by which these are off, in their unit; 0 of none; shape (channels,)."""
+        return np.asarray(self.numbers[OFF])
+
+    @property
+    def near(self) -> Array:
+        """The same without outliers, NaN of none."""
+        return np.asarray(self.numbers[NEAR])
+
+    @property
+    def near_counts(self) -> Array:
+        """Of how many readings that is the mean."""
+        return np.asarray(self.numbers[NEAR_COUNTS])
+
+    @property
+    def rates(self) -> Array:
+        """Of what the model expects from the first reading to the last, per s; NaN of fewer than two; shape (channels,)."""
+        return np.asarray(self.numbers[RATES])
+
+    @property
+    def evened(self) -> Array:
+        """Of how many with the stated noise `near` would be as sure, as noisy as they are; shape (channels,)."""
+        return np.asarray(self.numbers[EVENED])
 
 
 class StreamSurvey:
@@ -119,40 +136,34 @@ class StreamSurvey:
         self._work = ReadingsWork(limits, self._numbers, slow, self.noise2, np.zeros(ROOM))
         self._held = hold(self._work)
         self._slow = SlowMeans(slow[SLOW_READ], slow[SLOW_EXPECTED], slow[SLOW_SQUARES], slow[WEIGHT])
-        none, unknown = np.zeros(channels), np.full(channels, np.nan)
-        no_rows = MeasuredRows(np.zeros(0, np.int64), np.zeros((0, channels)), np.zeros((0, channels)))
-        self._nothing = StreamReadings(no_rows, none, none, unknown, none, none, unknown, self._slow, False)
+        nothing = np.zeros((6, channels))
+        nothing[NEAR], nothing[RATES] = np.nan, np.nan
+        self._nothing = StreamReadings(MeasuredRows.room(0, channels), nothing, self._slow, False)
         self._summarise = SameTypes(summarise)
 
-    def take(self, rows: MeasuredRows, masked: NDArray[np.bool_], span: float) -> StreamReadings:
+    def take(self, rows: MeasuredRows | None, masked: NDArray[np.bool_], span: float) -> StreamReadings:
         """Take a block.
 
         Parameters
         ----------
-        rows : MeasuredRows
-            None or more; NaN of what is missing, or what the model does not have.
+        rows : MeasuredRows or None
+            NaN of what is missing, or what the model does not have.
         masked : ndarray of bool, shape (channels,)
             Sensors that are not to be trusted.
         span : float
             Length (s) of the block that the slow means take; 0 if they are to leave it out.
         """
-        count = len(rows.stamps)
-        if not count:
+        if rows is None or not (count := len(rows.stamps)):
             return self._nothing
         if count > len(self._work.column):
             self._work = self._work._replace(column=np.zeros(2 * count))
             self._held = hold(self._work)
-        stamps, raw, left = (np.ascontiguousarray(column) for column in rows)
+        stamps, raw, left = map(np.ascontiguousarray, rows)
         is_bent = self._summarise(self._held, stamps, raw, left, masked, min(1.0, span / WINDOW))
-        numbers = self._numbers.copy()
-        return StreamReadings(
-            rows=rows, counts=numbers[COUNTS], off=numbers[OFF], near=numbers[NEAR], near_counts=numbers[NEAR_COUNTS],
-            evened=numbers[EVENED], rates=numbers[RATES], slow=self._slow, is_bent=bool(is_bent),
-        )  # fmt: skip
+        return StreamReadings(rows, self._numbers.copy(), self._slow, bool(is_bent))
 
 
-@dataclass(frozen=True, slots=True)
-class PredictionMeans:
+class PredictionMeans(NamedTuple):
     """What a block of predictions of n joints says.
 
     Attributes

@@ -106,9 +106,9 @@ class Suspicion:
         weight = 1.0 / (1.0 + problem.shaking / SHAKEN**2)
         self._filter.tune(problem.modes)
         shaking = self._filter.vibration(problem.shaking)
-        found = Evidence.of(*self._filter.step(table, noise, crude, shaking, problem.travel))
-        self._evidence += found
-        self._calm += found.weighted(weight)
+        found = self._filter.step(table, noise, crude, shaking, problem.travel)
+        self._evidence = self._evidence.with_rows(*found)
+        self._calm = self._calm.with_rows(*found, weight)
         self._before.append(self._evidence)
         self.blocks += 1
         self._travel += problem.travel
@@ -126,7 +126,7 @@ class Suspicion:
 
     def _with_rates(self, rows: Array, stamp: int) -> Array:
         """Rows (k, 1 + parameters) at `stamp` (ns), and signatures of the rates of what may grow; (k, 1 + coefficients)."""
-        return np.hstack([rows, (stamp - self.start) * NANO * rows[:, 1 + self._bank.growing]])
+        return np.concatenate([rows, (stamp - self.start) * NANO * rows[:, 1 + self._bank.growing]], axis=1)
 
     def explain(self) -> Verdict:
         """Weigh all hypotheses."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -22,11 +23,12 @@ from ..estimation.step_choice import StepChoice
 from ..estimation.stroke_filter import filter_tuning
 from ..health.inference.block_problem import MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
-from ..kernels.jit import hold
+from ..kernels.jit import SameTypes, hold
 from ..kernels.result_row import PIN
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, Array, Health, Mount, Outline, Report, Stream, channels_of
 from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
+from .health_rows import copy_predictions, copy_residuals
 from .load_shedding import LoadShedding
 from .report_rows import ReportRows
 from .run import Run
@@ -129,6 +131,8 @@ class BlockUpdate:
         self._modes, self._judge, self._told_counts = modes, judge, counts
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
         self._widths, compiled = limits.channels, boom.compiled
+        self._measured = [(code, int(width)) for code, width in enumerate(self._widths) if code]
+        self._copy_predictions, self._copy_residuals = SameTypes(copy_predictions), SameTypes(copy_residuals)
         sizes = self._joints, len(compiled.row), len(compiled.bending), limits.channels
         self._found: UpdateOutput = new_output(2 * CAPACITY, *sizes) if before is None else before._found
         self._found.counts[:] = 0
@@ -210,6 +214,8 @@ class BlockUpdate:
             one, width = np.zeros(1, np.int64), int(self._widths.max())
             advance = update.for_types_of(*boom, *twin, one, one, np.zeros((1, width)), 0, False, False, found)
             self._code = advance, measure.for_types_of(*twin, 0, 0, np.zeros(width), False, found)
+            self._copy_predictions(found, 0, self._pins, *PredictionRows.room(0, self._joints))
+            self._copy_residuals(found, 0, 0, 0, *MeasuredRows.room(0, 1))
         self._held = self._code, (boom, twin, found)
         return self._held
 
@@ -276,11 +282,14 @@ class BlockUpdate:
         if run is None or self._judge is None:
             return None
         self._tell_health(run.newest // SLOT * SLOT)
-        off = np.sqrt(run.deviations.tip**2 + self._modes.tip_variances)
-        health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, off)
+        health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, partial(self._tip_deviation, run))
         self._modes.mask(self._judge.masked)
         self._modes.expect_noise(*self._judge.noise)
         return health
+
+    def _tip_deviation(self, run: Run) -> Array:
+        """Of the predicted tip, m, shape (2,): by vibration that the model cannot know of, and as the estimate shows it."""
+        return np.asarray(np.sqrt(run.deviations.tip**2 + self._modes.tip_variances))
 
     def _take_judgement(self, row: int) -> None:
         """Judge, if that is due, and give the news with sample `row`."""
@@ -292,7 +301,7 @@ class BlockUpdate:
 
         The first of a slot so come with the rest of it, in one piece.
         """
-        found, at = self._found, self._boom.places
+        found = self._found
         if self._judge is None:
             return
         if self._begins_health:
@@ -302,26 +311,17 @@ class BlockUpdate:
         for which, stamps in enumerate((found.stamps, found.residual_stamps)):
             while counts[which] > self._told[which] and stamps[counts[which] - 1] >= end:
                 counts[which] -= 1
-        new, last = (slice(told, count) for told, count in zip(self._told, counts, strict=True))
-        if new.stop > new.start:
-            rows = found.rows[new].copy()
-            acceleration = rows[:, at.tip].reshape(-1, 3, 3)[:, 2, :2]
-            followed = PredictionRows(
-                stamps=found.stamps[new].copy(),
-                measured=found.measured[new].copy(),
-                strokes=rows[:, at.strokes],
-                variances=rows[:, at.variances],
-                joints=rows[:, at.joints],
-                accelerations=acceleration,
-            )
+        _, _, held = (self._held or self._hold())[1]
+        (predicted, compared), self._told = self._told, (counts[0], counts[1])
+        if counts[0] > predicted:
+            followed = PredictionRows.room(counts[0] - predicted, self._joints)
+            self._copy_predictions(held, predicted, self._pins, *followed)
             self._judge.predicted(followed)
-        if last.stop > last.start:
-            streams = found.residual_streams[last]
-            for code in sorted(set(streams.tolist())):
-                own, width = (streams == code).nonzero()[0] + last.start, int(self._widths[code])
-                raw, left = (rows.take(own, axis=0)[:, :width] for rows in (found.raw, found.values))
-                self._judge.measured(STREAMS[code], MeasuredRows(found.residual_stamps[own], raw, left))
-        self._told = new.stop, last.stop
+        if counts[1] > compared:
+            for code, width in self._measured:
+                rows = MeasuredRows.room(counts[1] - compared, width)
+                if count := self._copy_residuals(held, compared, counts[1], code, *rows):
+                    self._judge.measured(STREAMS[code], rows.first(count))
 
     def _residuals(self) -> ResidualBlock:
         found, own = self._found, slice(self._begin[1], int(self._found.counts[1]))

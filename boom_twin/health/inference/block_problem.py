@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -13,9 +12,11 @@ from numpy.typing import NDArray
 from ...analysis.modal import StrokeNoise
 from ...config.settings import Settings
 from ...errors import BoomTwinError
+from ...kernels.jit import SameTypes
 from ...scene.schema import Scene
 from ...types import NANO, Array, Mount, Stream, channels_of, sensor_kind
 from ..baseline import JUDGED, judged_channels
+from .block_kernels import first_and_last, largest_step, write_table
 from .fault_catalogue import Form, Parameter
 from .holds import HoldCollector, HoldProblem
 from .innovation_filter import CALM, ModalStates, modes_of, read_modes, shaken_by
@@ -49,6 +50,12 @@ class PredictionRows(NamedTuple):
     joints: Array
     accelerations: Array
 
+    @classmethod
+    def room(cls, rows: int, joints: int) -> PredictionRows:
+        """For so many rows, not filled."""
+        measured, strokes, variances, predicted = np.empty((4, rows, joints))
+        return cls(np.empty(rows, np.int64), measured, strokes, variances, predicted, np.empty((rows, 2)))
+
 
 class MeasuredRows(NamedTuple):
     """Measured samples of one stream.
@@ -65,8 +72,20 @@ class MeasuredRows(NamedTuple):
     raw: Array
     left: Array
 
+    @classmethod
+    def room(cls, rows: int, channels: int) -> MeasuredRows:
+        """For so many rows, not filled."""
+        raw, left = np.empty((2, rows, channels))
+        return cls(np.empty(rows, np.int64), raw, left)
+
+    def first(self, count: int) -> MeasuredRows:
+        """So many of them."""
+        return MeasuredRows(self.stamps[:count], self.raw[:count], self.left[:count])
+
 
 Rows = TypeVar("Rows", PredictionRows, MeasuredRows)
+
+_first_and_last, _largest_step = SameTypes(first_and_last), SameTypes(largest_step)
 
 
 class Block:
@@ -76,28 +95,23 @@ class Block:
     ----------
     number : int
         Its stamps over `BLOCK`.
+    end : int
+        Stamp (ns) at which it ends.
     """
 
     def __init__(self, number: int) -> None:
-        self.number = number
+        self.number, self.end = number, (number + 1) * BLOCK
         self.followed: list[PredictionRows] = []
         self.compared: dict[Stream, list[MeasuredRows]] = {}
-
-    @property
-    def end(self) -> int:
-        """Stamp (ns) at which it ends."""
-        return (self.number + 1) * BLOCK
 
     def predictions(self) -> PredictionRows:
         """All of them; there is at least one."""
         return joined(self.followed)
 
-    def readings(self, stream: Stream, channels: int) -> MeasuredRows:
-        """All samples of a stream with so many channels."""
+    def readings(self, stream: Stream) -> MeasuredRows | None:
+        """All samples of a stream; None without any."""
         rows = self.compared.get(stream)
-        if rows is None:
-            return MeasuredRows(np.zeros(0, np.int64), np.zeros((0, channels)), np.zeros((0, channels)))
-        return joined(rows)
+        return None if rows is None else joined(rows)
 
 
 def joined(parts: list[Rows]) -> Rows:
@@ -109,7 +123,7 @@ def joined(parts: list[Rows]) -> Rows:
 
 def by_block(rows: Rows) -> Iterator[tuple[int, Rows]]:
     """The rows of every block that they are of, with its number."""
-    first, last = int(rows.stamps.min()) // BLOCK, int(rows.stamps.max()) // BLOCK
+    first, last = _first_and_last(rows.stamps, BLOCK)
     if first == last:
         yield first, rows
         return
@@ -162,11 +176,11 @@ class BlockBuilder:
 
 
 STEP = 0.01  # m of stroke after which signatures are made anew
+LASTING = float(np.exp(-BLOCK * NANO / CALM))  # share of the mean square of vibration that counts in the next block
 SMOOTHED = 0.5  # of the variance of a stroke's estimate, what is left of it in the mean of a block
 
 
-@dataclass(frozen=True)
-class BlockMeans:
+class BlockMeans(NamedTuple):
     """One block as residuals have it.
 
     Attributes
@@ -227,7 +241,7 @@ class BlockProblem(NamedTuple):
     def noise(self, factors2: Array) -> Array:
         """Covariance (c, c) of the residuals where the sensors' own noise is `factors2` (c,) times as strong in power."""
         found = self.strokes.copy()
-        np.einsum("ii->i", found)[:] += self.own * factors2
+        found.reshape(-1)[:: len(found) + 1] += self.own * factors2
         return found
 
 
@@ -255,16 +269,20 @@ class LinearModel:
         n = len(scene.joints)
         self.signatures = Signatures(scene, known, mounts)
         self._sensor2 = np.array([settings.variance(sensor_kind(name)) for name in judged_channels(n)])
-        self._late = [(1 + i, self._channels_of(each.index, n)) for i, each in enumerate(known) if each.form is Form.DELAY]
-        self._turns = [(1 + i, each.index) for i, each in enumerate(known) if each.form is Form.ANGLE_SCALE]
-        self._lengths = [(1 + i, each.index) for i, each in enumerate(known) if each.form is Form.SCALE]
+        late = [(1 + i, *self._channels_of(each.index, n)) for i, each in enumerate(known) if each.form is Form.DELAY]
+        turns = [(1 + i, each.index) for i, each in enumerate(known) if each.form is Form.ANGLE_SCALE]
+        lengths = [(1 + i, each.index) for i, each in enumerate(known) if each.form is Form.SCALE]
+        self._late, self._turns, self._lengths = (
+            np.array(places, np.int64).reshape(-1, width) for places, width in ((late, 3), (turns, 2), (lengths, 2))
+        )
+        self._write_table = SameTypes(write_table)
         self.begin()
 
     @staticmethod
-    def _channels_of(index: int, joints: int) -> slice:
-        """Those of the stream of this index."""
+    def _channels_of(index: int, joints: int) -> tuple[int, int]:
+        """The first of the stream of this index, and the one behind its last."""
         counts = [len(channels_of(joints)[stream]) for stream in JUDGED]
-        return slice(sum(counts[:index]), sum(counts[: index + 1]))
+        return sum(counts[:index]), sum(counts[: index + 1])
 
     def begin(self) -> None:
         """The boom starts from rest."""
@@ -282,7 +300,7 @@ class LinearModel:
         if held is not None and (begun := self.signatures.hold(held)) is not None:
             self._in_work.append(begun)
         hold = self._hold()
-        if self.signature is None or np.abs(block.strokes - self.signature.strokes).max() > STEP:
+        if self.signature is None or _largest_step(block.strokes, self.signature.strokes) > STEP:
             self.signature = self.signatures.at(block.strokes) or self.signature
         if self.signature is None:
             return None
@@ -294,9 +312,9 @@ class LinearModel:
             else:
                 self._modes = shaken_by(noise, self._modes)
             self._tuned = noise
-        travel = 0.0 if self._before is None else float(np.abs(block.strokes - self._before).max())
+        travel = 0.0 if self._before is None else _largest_step(block.strokes, self._before)
         shaking, self._before = self._shaking, block.strokes
-        self._shaking = max(self._shaking * np.exp(-BLOCK * NANO / CALM), block.shaking)
+        self._shaking = max(self._shaking * LASTING, block.shaking)
         own = self._sensor2 / np.maximum(block.counts, 1.0)
         by = self.signature.by_stroke
         spread = (by * (SMOOTHED * block.variances)) @ by.T
@@ -318,14 +336,16 @@ class LinearModel:
 
     def _table(self, block: BlockMeans, signature: Signature) -> Array:
         table = np.empty((len(block.left), 1 + signature.channels.shape[1]))
-        table[:, 0], table[:, 1:] = block.left, signature.channels
-        for column, own in self._late:
-            table[:, column] = 0.0
-            table[own, column] = -block.rates[own]
-        moved = block.strokes - signature.strokes  # since signatures were made
-        turned = signature.by_stroke @ moved
-        for column, joint in self._turns:
-            table[joint, column] += turned[joint]
-        for column, cylinder in self._lengths:
-            table[:, column] -= signature.by_stroke[:, cylinder] * moved[cylinder]
+        by_stroke, moved = signature.by_stroke, block.strokes - signature.strokes  # since signatures were made
+        scales = self._turns, by_stroke @ moved, self._lengths, by_stroke, moved
+        self._write_table(table, block.left, signature.channels, self._late, block.rates, *scales)
         return table
+
+
+def warm_up_blocks() -> None:
+    """Compile the kernels by which blocks become linear problems, on made-up numbers of two channels."""
+    _first_and_last(np.zeros(2, np.int64), BLOCK)
+    two, pairs = np.zeros((2, 2)), np.zeros((0, 2), np.int64)
+    _largest_step(two[0], two[1])
+    late = np.zeros((0, 3), np.int64)
+    SameTypes(write_table)(np.zeros((2, 3)), two[0], two, late, two[0], pairs, two[0], pairs, two, two[0])

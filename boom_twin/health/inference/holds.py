@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.free_vibration import Vibration, free_vibrations, is_free
+from ...kernels.jit import SameTypes
 from ...types import NANO, Array
+from .block_kernels import largest_step
 
 PACE = 1e-4  # m of travel from block to block, above which a boom does not stand still
 WHITE = 1.0  # see `_mean_at_rest`
@@ -24,6 +26,8 @@ PART = 1.0  # s, over which means are compared, to see how calm a hold is
 KEPT_UP = 0.8  # of its power that a vibration still has in the second half, if something keeps it up
 COLOURED = 3.0  # times the power of white noise that is left, from which on something else than free vibration is in it
 HEARD = 4.0  # times the power of noise, below which nothing is told of that
+
+_largest_step = SameTypes(largest_step)
 
 
 class StillReadings(NamedTuple):
@@ -106,7 +110,7 @@ class HoldCollector:
         """
         is_next = bool(self._starts) and start - self._starts[-1] < 3 * block
         is_next = is_next and motion[1].shape[1] == self._motion[-1][1].shape[1]  # of the same sensor
-        is_still = is_next and float(np.abs(strokes - self._strokes[-1]).max()) < PACE
+        is_still = is_next and _largest_step(strokes, self._strokes[-1]) < PACE
         found = None
         if self._starts and (not is_still or (start - self._starts[0]) * NANO >= LONGEST):
             found = self._finished(block)

@@ -32,15 +32,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import log
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...kernels.jit import SameTypes
 from ...types import Array
+from .evidence_kernels import add_rows, integrate_out
 from .fault_catalogue import Form, Parameter, variances
-from .kalman_update import correct
+from .kalman_update import correct, has_strayed
 from .normal_distribution import log_normal_below
 
 STEADY, GROWING = 0, 1
@@ -50,6 +53,8 @@ GROWING_PRIOR, GROWN = 1e-4, 10.0  # weight of that shape; time (s) in which a f
 EARLY = 0.25  # share of the span at which growth has its least value, too; a line through growth from halfway on has 0 there
 CRUDE = 0.001  # see above
 AS_WELL = 12.0  # ln by which a level of the load may be less probable than the best and still explain the evidence
+
+_add_rows, _integrate_out = SameTypes(add_rows), SameTypes(integrate_out)
 
 
 @dataclass(frozen=True)
@@ -87,6 +92,13 @@ class Evidence:
         matrix, vector = signature.mT @ signature, (signature.mT @ left)[..., 0]
         return Evidence(matrix, vector, (left.mT @ left)[..., 0, 0], white.shape[-2], log)
 
+    def with_rows(self, white: Array, log: Array, weight: float = 1.0) -> Evidence:
+        """With what further blocks say, counting `weight` times as much; innovations as in `of`, of several levels."""
+        *given, white = map(np.ascontiguousarray, (self.matrix, self.vector, self.squares, white))
+        matrix, vector, squares = map(np.empty_like, given)
+        _add_rows(*given, white, weight, matrix, vector, squares)
+        return Evidence(matrix, vector, squares, self.rows + weight * white.shape[-2], self.log + weight * log)
+
     def weighted(self, weight: float) -> Evidence:
         """Counting `weight` times as much."""
         matrix, vector = weight * self.matrix, weight * self.vector
@@ -113,22 +125,17 @@ class Evidence:
         mean, covariance : ndarray, shape (k,), (k, k)
             Of the first k coefficients; the others have none.
         """
-        k = len(mean)
-        by = self.matrix[..., :k]
-        vector = self.vector - by @ mean
-        spread = np.eye(k) + by[..., :k, :] @ covariance
-        solved = np.linalg.solve(spread, np.concatenate([by.mT, vector[..., :k, None]], axis=-1))
-        _, log_det = np.linalg.slogdet(spread)
-        taken = (by @ covariance) @ solved
-        matrix, reduced = self.matrix - taken[..., :-1], vector - taken[..., -1]
-        weighted = (vector[..., None, :k] @ (covariance @ solved[..., -1:]))[..., 0, 0]
-        fitted = (self.vector + vector)[..., :k] @ mean + weighted
-        log = self.log + 0.5 * (fitted - log_det)
-        return Evidence(0.5 * (matrix + matrix.mT), reduced, self.squares - fitted, self.rows, log)
+        count, k, levels = self.vector.shape[-1], len(mean), self.log.shape
+        given = self.matrix.reshape(-1, count, count), self.vector.reshape(-1, count), mean, covariance
+        matrix, vector, *healthy = map(np.ascontiguousarray, given)
+        scratch = np.empty((k, k)), np.empty((k, count + 1)), np.empty((k, k))
+        left, reduced, fitted, log_det = np.empty_like(matrix), np.empty_like(vector), np.empty(levels), np.empty(levels)
+        _integrate_out(matrix, vector, *healthy, *scratch, left, reduced, fitted.reshape(-1), log_det.reshape(-1))
+        log, squares = self.log + 0.5 * (fitted - log_det), self.squares - fitted
+        return Evidence(left.reshape(self.matrix.shape), reduced.reshape(self.vector.shape), squares, self.rows, log)
 
 
-@dataclass(frozen=True, slots=True)
-class Explanation:
+class Explanation(NamedTuple):
     """One fault after the measurements.
 
     Attributes
@@ -159,8 +166,7 @@ class Explanation:
         return abs(self.rate) > 4.0 * self.rate_sigma
 
 
-@dataclass(frozen=True, slots=True)
-class Cause:
+class Cause(NamedTuple):
     """Explanations that have one cause, the most probable first, and their probability together, if there is a fault.
 
     Attributes
@@ -178,7 +184,7 @@ class Cause:
     steady: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Verdict:
     """All causes, the most probable first.
 
@@ -204,7 +210,7 @@ class Verdict:
         """Of the most probable cause."""
         return self.causes[0].parts[0]
 
-    @property
+    @cached_property
     def strength(self) -> float:
         """ln of how much more probable a fault is than none, with the excess taken into account."""
         return max(part.log_factor for cause in self.causes for part in cause.parts) / self.excess
@@ -285,10 +291,9 @@ class HypothesisTest:
         alone = np.exp(weights - weights.max()).sum(axis=0)
         shares = alone * np.exp([carried.get(self.known[place].cause, 0.0) for place in self._explained])
         levels = np.argmax(factors, axis=0)
-        found = [
-            Explanation(int(place), level, float(factors[level, i]), *fits[level, 2:, i].tolist())
-            for i, (place, level) in enumerate(zip(self._explained, levels.tolist(), strict=True))
-        ]
+        at = np.arange(len(levels))
+        which = self._explained.tolist(), levels.tolist(), factors[levels, at].tolist()
+        found = [Explanation(*each) for each in zip(*which, *fits[levels, 2:, at].T.tolist(), strict=True)]
         is_faulty, none = float(factors[best]) > 0.0, int(np.argmax(logs))
         as_well = logs > logs[none] - AS_WELL
         none_excess = max(1.0, float(healthy.squares[as_well].min()) / max(healthy.rows, 1.0))
@@ -402,6 +407,8 @@ GATE = 4.5  # deviations
 STRAYED = 5.0  # deviations of the prior
 LEAST = 1e-3  # of the prior's variance, what must have been learnt for that
 
+_has_strayed = SameTypes(has_strayed)
+
 
 class Regression:
     """Parameters that are constant in time, normal before anything is measured; what is measured narrows them.
@@ -428,9 +435,7 @@ class Regression:
     @property
     def has_strayed(self) -> bool:
         """Whether what was learnt bit by bit is, all together, more than healthy parameters may be off by."""
-        learnt = self._prior2 - self.covariance.diagonal()
-        off2 = (self.mean - self._prior[0]) ** 2
-        return bool((off2 > STRAYED**2 * np.maximum(learnt, LEAST * self._prior2)).any())
+        return bool(_has_strayed(self.mean, self.covariance, self._prior[0], self._prior2, STRAYED, LEAST))
 
     def take(self, white: Array, learn: bool) -> tuple[Array, float]:
         """Narrow by whitened innovations, shape (rows, 1 + parameters), what is known.
@@ -450,14 +455,14 @@ class Regression:
         spread : float
             Logarithm of the deviations that it had, in all.
         """
-        first, signature = np.ascontiguousarray(white[:, :1]), np.ascontiguousarray(white[:, 1:])
+        white, signature = np.ascontiguousarray(white), np.ascontiguousarray(white[:, 1:])
         mean, covariance, left = self.mean[:, None].copy(), self.covariance.copy(), np.empty((len(white), 1))
         if self._size != len(white):
             self._size, (count, states) = len(white), signature.shape
             self._own = np.arange(count), np.eye(count), np.zeros(count)
             self._scratch = np.empty((count, count)), np.empty((count, states))
         measured, noise, others = self._own
-        log = self._correct(measured, first, signature, noise, others, mean, covariance, *self._scratch, left)
+        log = self._correct(measured, white, signature, noise, others, mean, covariance, *self._scratch, left)
         if learn and np.abs(left).max() < GATE:
             self.mean, self.covariance = mean[:, 0], covariance
         return left[:, 0], -log - 0.5 * float(left[:, 0] @ left[:, 0])

@@ -254,9 +254,10 @@ class InnovationFilter:
         kept = 0.0 if self._fresh else math.exp(-(travel + REST * self._block) / REACH)
         self._fresh = False
         count, calm = len(self._level2), math.exp(-self._block / CALM)
-        white, log, lately = np.zeros((count, *table.shape)), np.zeros(count), np.full(count, shaking)
+        white, log, lately = np.empty((count, *table.shape)), np.empty(count), np.empty(count)
+        lately[:] = shaking
         measured = self._filter_block(self._held, table, noise, errors2, lately, kept, calm, white, log)
-        if np.isnan(log).any():
+        if math.isnan(log.sum()):
             raise np.linalg.LinAlgError("covariance of innovations: not positive definite")
         return Innovations(white[:, :measured].reshape(*self._levels, measured, table.shape[1]), log.reshape(self._levels))
 

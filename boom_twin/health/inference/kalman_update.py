@@ -173,3 +173,13 @@ def correct(rows, table, shown, noise, own, x, p, root, gain, white):
             for c in range(states):
                 p[i, c] -= gain[a, i] * gain[a, c]
     return log
+
+
+@kernel
+def has_strayed(mean, covariance, mean_before, variances_before, deviations, least):
+    """Whether parameters were learnt to be off by so many deviations of what was learnt, `least` of the variances or more."""
+    for i in range(mean.shape[0]):
+        learnt, off = variances_before[i] - covariance[i, i], mean[i] - mean_before[i]
+        if off * off > deviations * deviations * max(learnt, least * variances_before[i]):
+            return True
+    return False

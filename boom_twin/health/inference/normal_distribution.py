@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from ...kernels.jit import SameTypes, kernel
 from ...types import Array
 
 FAR = -30.0
@@ -17,10 +18,25 @@ FAR = -30.0
 
 def log_normal_below(values: Array) -> Array:
     """ln of the probability that a standard normal variable is below each of `values`, any shape; infinite ones too."""
-    tails = 0.5 * np.array([math.erfc(each) for each in np.abs(values * math.sqrt(0.5)).ravel().tolist()]).reshape(values.shape)
-    far = np.minimum(values, FAR)
-    over2 = 1.0 / (far * far)
-    series = 1.0 - over2 * (1.0 - 3.0 * over2 * (1.0 - 5.0 * over2 * (1.0 - 7.0 * over2)))
-    log_far = -0.5 * far * far - np.log(-far * math.sqrt(2.0 * math.pi)) + np.log(series)
-    near = np.where(values < 0.0, np.log(np.maximum(tails, 1e-300)), np.log1p(-tails))
-    return np.asarray(np.where(values < FAR, log_far, near))
+    found = np.empty(values.shape)
+    _write_logs(np.ascontiguousarray(values).reshape(-1), found.reshape(-1))
+    return found
+
+
+@kernel
+def write_logs(values: Array, found: Array) -> None:
+    """Write the same of values (k,)."""
+    for i in range(values.shape[0]):
+        tail = 0.5 * math.erfc(abs(values[i] * math.sqrt(0.5)))
+        if values[i] < FAR:
+            over2 = 1.0 / (values[i] * values[i])
+            series = 1.0 - over2 * (1.0 - 3.0 * over2 * (1.0 - 5.0 * over2 * (1.0 - 7.0 * over2)))
+            log_size = math.log(-values[i] * math.sqrt(2.0 * math.pi))
+            found[i] = -0.5 * values[i] * values[i] - log_size + math.log(series)
+        elif values[i] < 0.0:
+            found[i] = math.log(tail)
+        else:
+            found[i] = math.log1p(-tail)
+
+
+_write_logs = SameTypes(write_logs)

@@ -15,7 +15,7 @@ from ...compiler.plan import Plan
 from ...errors import BoomTwinError, SolverError
 from ...estimation.sensor_model import Mounting, Reading
 from ...kernels.integrators import REST, X, prepare
-from ...kernels.jit import SameTypes
+from ...kernels.jit import SameTypes, hold
 from ...kernels.tables import OK, State, Work
 from ...kernels.transfer.time_step import ANEW, advance
 from ...scene.edit import with_parameters
@@ -104,7 +104,9 @@ class _Boom:
         self.work: Work = self.plan.work()
         self._still = np.zeros(self.plan.joints)
         self._advance = SameTypes(advance)
-        self._scheme = prepare(REST, 0.0, 0.0, self.work.weights)
+        scheme = prepare(REST, 0.0, 0.0, self.work.weights)
+        self._held = tuple(map(hold, (self.plan.tables, self.state, self.work, scheme)))
+        self._closed = self.plan.closed_lengths
         self.reading = Reading(self.plan, Mounting(self.plan, scene.base.inclination, mounts))
 
     def start(self, strokes: Array) -> None:
@@ -113,9 +115,8 @@ class _Boom:
 
     def rest(self, strokes: Array) -> Array | None:
         """What sensors read at rest there, next to where the boom is; None without an equilibrium."""
-        drive = self.plan.closed_lengths + strokes
-        boom = self.plan.tables, self.state, self.work, self._scheme
-        status, _, _ = self._advance(*boom, drive, self._still, TOLERANCE, PASSES, LONGEST, None, ANEW)
+        drive = self._closed + strokes
+        status, _, _ = self._advance(*self._held, drive, self._still, TOLERANCE, PASSES, LONGEST, None, ANEW)
         return self.reading.of(self.state) if status == OK else None
 
     def follow(self, other: Stand) -> None:
