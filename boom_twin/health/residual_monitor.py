@@ -128,6 +128,7 @@ class ResidualMonitor:
         self._refuted: frozenset[str] = frozenset()  # causes that evidence which has fitted rules out for this alarm
         self._blocks = 0
         self._tip_load.begin()
+        self._resized: int | None = None  # stamp (ns) from which on another size goes better with what is recent
         self._unexplained: int | None = None  # stamp (ns) from which on nothing explains the deviation
         self._shaken = np.full(len(self._levels), -math.inf)  # when the load last was of each level, ns
         self._limits: dict[str, float] = {}
@@ -295,6 +296,7 @@ class ResidualMonitor:
         its lag is said by vibration, so a lag may be as large without a fault.
         """
         self._suspicion, self._blocks = self._suspicion_from(start, self._carried), 0
+        self._resized = None
         self._tell.begin_anew()
 
     def _suspicion_from(self, start: int, carried: dict[str, float]) -> Suspicion:
@@ -354,11 +356,15 @@ class ResidualMonitor:
             return news
         recent = suspicion.recent_fit(verdict)
         is_resized = recent.is_resized and self._alarm is not None
-        if recent.is_outdated or is_resized:
+        self._resized = (self._resized or start) if is_resized else None
+        is_flank = self._load_lately(start) > 0.0 and not verdict.best.is_growing  # may be: it has passed after that
+        is_resized = is_resized and (not is_flank or start - (self._resized or start) >= RECENT * BLOCK)
+        holds_onset = self._alarm is not None and suspicion.start < self._alarm.since  # which neither shape has
+        if recent.is_outdated or is_resized or (holds_onset and verdict.strength > OBVIOUS):
             is_odd = verdict.none_excess > WHOLE_MISFIT or verdict.strength >= SURE  # no load explained it
             lately = max(suspicion.start, start - RECENT * BLOCK)  # before that it was explained
             self._unexplained = (self._unexplained or lately) if is_odd else None
-            has_shape = not (is_resized or verdict.best.is_growing) and self._alarm is not None
+            has_shape = not (is_resized or holds_onset or verdict.best.is_growing) and self._alarm is not None
             self._carried = carried_on(verdict) if has_shape else {}
             if has_shape and verdict.strength >= SURE:
                 self._refuted |= refuted(verdict)
@@ -423,7 +429,7 @@ class ResidualMonitor:
         """The alarm in words; a name has to go with the calm blocks as well, and with all that came before."""
         calm = suspicion.explain_calmly()
         is_told_apart = calm.causes[0].name == verdict.causes[0].name and calm.causes[0].name not in self._refuted
-        return self._tell.alarm(alarm, verdict, calm, is_told_apart, span, start, is_calm, self.signature)
+        return self._tell.alarm(alarm, verdict, calm, is_told_apart, span, suspicion.travel, start, is_calm, self.signature)
 
     def _change_of_known(self, suspicion: Suspicion, verdict: Verdict) -> _KnownFault | None:
         """The known fault whose end goes with what is measured about as well as any other explanation does."""

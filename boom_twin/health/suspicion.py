@@ -24,6 +24,9 @@ LEVELS = np.array([0.0, 0.0007, 0.0023, 0.0077, 0.026])
 DETUNING = 0.15  # share by which a fault may change natural frequencies
 SHAKEN = 0.6  # m/s^2 rms of the predicted tip acceleration at which a block counts half for a name: faults change vibration
 CRUDE = 0.01  # share of a deviation by which its signature, a derivative, may be wrong
+LEVER, LOAD_BLOCKS = 2.0, 10
+"""What becomes softer is bent by the load, too: of a deviation by the load's share of the boom's weight, which acts at half the
+reach, times the first; for as many blocks on end as the second."""
 LEVEL = 2.0  # s, over which the size of a deviation is taken for that
 RECENT = 20  # blocks that must go with what explains all of them
 MISFIT, WHOLE_MISFIT = 2.5, 1.6  # times the squares that noise leaves, in the recent blocks and in all of them
@@ -31,6 +34,7 @@ SURE = 15.0  # ln of how much more probable a fault must be than none for an ala
 EXCITED = 12.0  # ln of how much better another level of load goes with the recent blocks
 LONGEST = 900  # blocks of one suspicion
 CHANGED = 12.0  # ln of how much better another size of the same fault goes with the recent blocks
+SAME = 0.1  # share of a size that does not grow by which it may seem to change: a load bends what has become softer, too
 CARRIED = 0.02  # least probability that a cause keeps from one suspicion to the next
 
 
@@ -105,6 +109,7 @@ class Suspicion:
         table = self._with_rates(problem.table, problem.start)
         weight = 1.0 / (1.0 + problem.shaking / SHAKEN**2)
         self._filter.tune(problem.modes)
+        self._filter.roughen(LOAD_BLOCKS * np.outer(LEVER * LEVELS, self.size) ** 2)
         shaking = self._filter.vibration(problem.shaking)
         found = Evidence.of(*self._filter.step(table, noise, crude, shaking, problem.travel))
         self._evidence += found
@@ -127,6 +132,11 @@ class Suspicion:
     def _with_rates(self, rows: Array, stamp: int) -> Array:
         """Rows (k, 1 + parameters) at `stamp` (ns), and signatures of the rates of what may grow; (k, 1 + coefficients)."""
         return np.hstack([rows, (stamp - self.start) * NANO * rows[:, 1 + self._bank.growing]])
+
+    @property
+    def travel(self) -> float:
+        """Of the strokes since it began, m."""
+        return self._travel
 
     def explain(self) -> Verdict:
         """Weigh all hypotheses."""
@@ -162,13 +172,25 @@ class Suspicion:
             return RecentFit(False, False)
         recent = self._evidence + self._before[0].weighted(-1.0)
         if verdict.strength > 0.0:
-            logs, squares, changed = self._bank.change(recent, verdict.best, self.span, self.mean, self.covariance)
+            middle = self.span - 0.5 * RECENT * BLOCK * NANO
+            about = self.mean, self.covariance
+            logs, squares, changed, moved = self._bank.change(recent, verdict.best, self.span, middle, *about)
         else:
-            (logs, squares), changed = self._bank.fit(recent, self._coefficients(None), self.mean, self.covariance), 0.0
+            (logs, squares), changed, moved = self._bank.fit(recent, self._coefficients(None), self.mean, self.covariance), 0.0, 0.0
         is_misfit = verdict.excess > WHOLE_MISFIT or squares[verdict.level] > MISFIT
         others = logs[verdict.level :] if verdict.strength >= SURE else logs
-        is_other_load = others.max() - logs[verdict.level] > EXCITED
-        return RecentFit(bool(self.blocks > LONGEST or is_misfit or is_other_load), changed > CHANGED)
+        other = len(logs) - len(others) + int(np.argmax(others))
+        is_other_load = logs[other] - logs[verdict.level] > EXCITED and not self._is_sure_under(verdict, other)
+        is_same = moved < SAME and not verdict.best.is_growing
+        return RecentFit(bool(self.blocks > LONGEST or is_misfit or is_other_load), changed > CHANGED and not is_same)
+
+    def _is_sure_under(self, verdict: Verdict, level: int) -> bool:
+        """Whether what explains the evidence would do so under a load of that level, too: then the load makes no difference."""
+        if verdict.strength < SURE:
+            return False
+        with_fault, _ = self._bank.fit(self._evidence, self._coefficients(verdict.best), self.mean, self.covariance)
+        none, _ = self._bank.fit(self._evidence, self._coefficients(None), self.mean, self.covariance)
+        return bool(with_fault[level] - none[level] >= SURE * verdict.excess)
 
     def _coefficients(self, each: Explanation | None) -> Array:
         return np.zeros(self._bank.coefficient_count) if each is None else self._bank.coefficients(each, self.span)
