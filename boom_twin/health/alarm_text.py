@@ -21,7 +21,7 @@ from .inference.sensitivities import Signature, Signatures
 NAMED, GROWING = 0.95, 0.99  # probability of a cause beside the others that is taken for certain; of one that grows
 SHAKEN = 0.999  # likewise, of one that grows under a load
 PLAIN = 60.0  # ln of how much more probable than none a fault must be for a name under a load
-LED, MOVED = 10.0, 0.1  # time (s) and travel of the strokes (m) for which it is so probable for a name under a load that is less plain
+LED, MOVED = 10.0, 0.1  # time (s), and travel of the strokes (m), for which it has to lead where it is less plain than that
 BORNE_OUT = 0.7  # likewise, by blocks in which the boom does not vibrate
 REFUTED = 1e-3  # probability of a cause below which evidence that fits rules it out; of that which was named, another may be
 GROWTH_AFTER, STEADY = 8.0, 0.9  # evidence (s) that gives a slope; share of the steepest that a lasting growth keeps
@@ -74,7 +74,7 @@ class AlarmText:
         self, alarm: Alarm, whole: Verdict, calm: Verdict, is_told_apart: bool, span: float, travel: float, stamp: int,
         is_calm: bool, signature: Signature | None,
     ) -> Alarm:  # fmt: skip
-        """The alarm with its explanation at `stamp` (ns), of evidence of `span` s; a name stays until it is refuted.
+        """The alarm with its explanation at `stamp` (ns), of evidence of `span` s and `travel` m; a name stays until refuted.
 
         A name is given by the whole of the evidence; what the blocks in which the boom does not vibrate say has to bear it out,
         and is what is told until then. `is_calm`: no load shakes the boom. `is_told_apart`: nothing else that was measured
@@ -153,7 +153,14 @@ class AlarmText:
         return tuple(self._ranked(cause, verdict.excess) for cause in likely)
 
     def _is_certain(
-        self, alarm: Alarm, whole: Verdict, calm: Verdict, is_told_apart: bool, span: float, travel: float, stamp: int,
+        self,
+        alarm: Alarm,
+        whole: Verdict,
+        calm: Verdict,
+        is_told_apart: bool,
+        span: float,
+        travel: float,
+        stamp: int,
         is_calm: bool,
     ) -> bool:
         """Whether the most probable cause is named: it fits, and has been probable enough for some time.
@@ -161,7 +168,8 @@ class AlarmText:
         Whatever else changes meanwhile may look like growth, and a neighbour's offset like a drift. So a fault that grows is
         named on a calm boom, a drift as long as it is as fast as it was; under a load where it is surer, or the cause the same
         if nothing grows: then the name does not depend on the shape. Under a load that hides most of a fault the onset is not
-        seen, nor the shape, and of a wrong one the neighbour makes up better: so a name takes one that is plainly there.
+        seen, nor the shape, and of a wrong one the neighbour makes up better for a while: so a name takes one that is plainly
+        there, or that leads for longer and while the boom moves.
         """
         best, borne_out = whole.causes[0], calm.causes[0]
         is_growing = whole.best.is_growing or calm.best.is_growing

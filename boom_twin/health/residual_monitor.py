@@ -37,6 +37,7 @@ UNEXPLAINED = 4.0  # s for which nothing explains the deviation, before that is 
 EXCITED_FOR = 20.0  # s for which a load counts after it last showed
 LOAD_MEANS = 3.0  # times the load's level: less weight than that may be its mean, and is no fault
 LIMITS_PERIOD = 60  # blocks of a suspicion between two looks at what could be told, a multiple of the next
+SETTLING = 3 * SECOND  # ns after growth that goes otherwise than it did, before evidence begins anew
 PERIOD = 3  # blocks between two looks at a suspicion
 OBVIOUS = 60.0  # ln of how much more probable than none a fault must be not to wait for a load to show
 GONE, GONE_AFTER = 3.0, 3.0  # likewise, of a suspicion that has taken so long (s), below which the fault is there no more
@@ -198,7 +199,7 @@ class ResidualMonitor:
         news += self._look_for_end(problem)
         if self._suspicion is None or problem.start < self._suspicion.start:
             return news
-        self._suspicion.take(problem)
+        self._suspicion.take(problem, self.is_shaken(problem.start))
         self._blocks += 1
         if self._blocks % PERIOD == 0:
             news += self._look(block.start)
@@ -318,7 +319,7 @@ class ResidualMonitor:
         if not self._afresh or self._afresh[-1].evidence.blocks == EVERY:
             self._afresh = (*self._afresh, _Afresh(self._suspicion_from(problem.start, {}), self._explain_now()))
         for each in self._afresh:
-            each.evidence.take(problem)
+            each.evidence.take(problem, self.is_shaken(problem.start))
         if self._afresh[0].evidence.blocks < AFRESH:
             return []
         (oldest, *_), self._afresh = self._afresh, self._afresh[1:]
@@ -357,8 +358,8 @@ class ResidualMonitor:
         recent = suspicion.recent_fit(verdict)
         is_resized = recent.is_resized and self._alarm is not None
         self._resized = (self._resized or start) if is_resized else None
-        is_flank = self._load_lately(start) > 0.0 and not verdict.best.is_growing  # may be: it has passed after that
-        is_resized = is_resized and (not is_flank or start - (self._resized or start) >= RECENT * BLOCK)
+        if self._resized is not None and self._load_lately(start) > 0.0 and not verdict.best.is_growing:
+            is_resized = start - self._resized >= RECENT * BLOCK  # the flank of a pulse has passed by then
         holds_onset = self._alarm is not None and suspicion.start < self._alarm.since  # which neither shape has
         if recent.is_outdated or is_resized or (holds_onset and verdict.strength > OBVIOUS):
             is_odd = verdict.none_excess > WHOLE_MISFIT or verdict.strength >= SURE  # no load explained it
@@ -368,7 +369,8 @@ class ResidualMonitor:
             self._carried = carried_on(verdict) if has_shape else {}
             if has_shape and verdict.strength >= SURE:
                 self._refuted |= refuted(verdict)
-            self._suspect(start + BLOCK)
+            is_still_growing = is_resized and verdict.best.is_growing  # perhaps: it may grow on more slowly
+            self._suspect(start + (SETTLING if is_still_growing else BLOCK))
         elif suspicion.is_settled:
             self._unexplained = None
         return news

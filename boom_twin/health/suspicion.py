@@ -28,13 +28,14 @@ LEVER, LOAD_BLOCKS = 2.0, 10
 """What becomes softer is bent by the load, too: of a deviation by the load's share of the boom's weight, which acts at half the
 reach, times the first; for as many blocks on end as the second."""
 LEVEL = 2.0  # s, over which the size of a deviation is taken for that
+LATELY = 100  # blocks of evidence of which the later half is looked at for the end of growth
 RECENT = 20  # blocks that must go with what explains all of them
 MISFIT, WHOLE_MISFIT = 2.5, 1.6  # times the squares that noise leaves, in the recent blocks and in all of them
 SURE = 15.0  # ln of how much more probable a fault must be than none for an alarm
 EXCITED = 12.0  # ln of how much better another level of load goes with the recent blocks
 LONGEST = 900  # blocks of one suspicion
 CHANGED = 12.0  # ln of how much better another size of the same fault goes with the recent blocks
-SAME = 0.1  # share of a size that does not grow by which it may seem to change: a load bends what has become softer, too
+SAME = 0.1  # share by which a size that does not grow may seem to change under a load: it bends what has become softer, too
 CARRIED = 0.02  # least probability that a cause keeps from one suspicion to the next
 
 
@@ -50,10 +51,11 @@ class RecentFit(NamedTuple):
     ----------
     is_outdated : bool
         Not any more: the fault or the load has changed. A load that is less than it was refutes no fault: what explained
-        the evidence under the larger one still does.
+        the evidence under the larger one still does. Nor does one under which the fault is as plain.
     is_resized : bool
         With another size or rate of the same fault much better than with those that it has by all of the evidence: it has
-        grown, or grows no more. What such evidence says of causes depends on which makes up best for the wrong shape.
+        grown, or grows no more (for that the later half of the evidence counts, too). What such evidence says of causes
+        depends on which makes up best for the wrong shape.
     """
 
     is_outdated: bool
@@ -89,6 +91,7 @@ class Suspicion:
         self.size, self.blocks, self._travel = np.zeros(channels), 0, 0.0
         self._evidence = self._calm = Evidence.none(coefficients, levels.shape)
         self._before = deque([self._evidence], maxlen=RECENT + 1)  # after each of the recent blocks, and before them
+        self._halfway = deque([self._evidence])  # likewise after every so many blocks, from half of them on
 
     @property
     def span(self) -> float:
@@ -100,8 +103,8 @@ class Suspicion:
         """Whether it is old enough to be outdated, see `recent_fit`."""
         return self.blocks > RECENT
 
-    def take(self, problem: BlockProblem) -> None:
-        """Take one block."""
+    def take(self, problem: BlockProblem, is_shaken: bool) -> None:
+        """Take one block; `is_shaken`: a load shakes the boom, so that it bends what has become softer, too."""
         left = problem.table[:, 0]
         measured = np.isfinite(left)
         self.size[measured] += max(BLOCK * NANO / LEVEL, 1.0 / (1 + self.blocks)) * (left[measured] - self.size[measured])
@@ -109,13 +112,17 @@ class Suspicion:
         table = self._with_rates(problem.table, problem.start)
         weight = 1.0 / (1.0 + problem.shaking / SHAKEN**2)
         self._filter.tune(problem.modes)
-        self._filter.roughen(LOAD_BLOCKS * np.outer(LEVER * LEVELS, self.size) ** 2)
+        self._filter.roughen(is_shaken * LOAD_BLOCKS * np.outer(LEVER * LEVELS, self.size) ** 2)
         shaking = self._filter.vibration(problem.shaking)
         found = Evidence.of(*self._filter.step(table, noise, crude, shaking, problem.travel))
         self._evidence += found
         self._calm += found.weighted(weight)
         self._before.append(self._evidence)
         self.blocks += 1
+        if self.blocks % RECENT == 0:
+            self._halfway.append(self._evidence)
+            if self.blocks // RECENT % 2 == 1:
+                self._halfway.popleft()
         self._travel += problem.travel
 
     def take_hold(self, hold: HoldProblem, frequency_error: float) -> None:
@@ -171,17 +178,19 @@ class Suspicion:
         if not self.is_settled:
             return RecentFit(False, False)
         recent = self._evidence + self._before[0].weighted(-1.0)
+        about, middle = (self.mean, self.covariance), self.span - 0.5 * RECENT * BLOCK * NANO
         if verdict.strength > 0.0:
-            middle = self.span - 0.5 * RECENT * BLOCK * NANO
-            about = self.mean, self.covariance
             logs, squares, changed, moved = self._bank.change(recent, verdict.best, self.span, middle, *about)
+            if verdict.best.is_growing and self.blocks > LATELY:
+                lately = self._evidence + self._halfway[0].weighted(-1.0)
+                changed = max(changed, self._bank.change(lately, verdict.best, self.span, middle, *about)[2])
         else:
-            (logs, squares), changed, moved = self._bank.fit(recent, self._coefficients(None), self.mean, self.covariance), 0.0, 0.0
+            (logs, squares), changed, moved = self._bank.fit(recent, self._coefficients(None), *about), 0.0, 0.0
         is_misfit = verdict.excess > WHOLE_MISFIT or squares[verdict.level] > MISFIT
         others = logs[verdict.level :] if verdict.strength >= SURE else logs
         other = len(logs) - len(others) + int(np.argmax(others))
         is_other_load = logs[other] - logs[verdict.level] > EXCITED and not self._is_sure_under(verdict, other)
-        is_same = moved < SAME and not verdict.best.is_growing
+        is_same = moved < SAME and verdict.level > 1 and not verdict.best.is_growing
         return RecentFit(bool(self.blocks > LONGEST or is_misfit or is_other_load), changed > CHANGED and not is_same)
 
     def _is_sure_under(self, verdict: Verdict, level: int) -> bool:

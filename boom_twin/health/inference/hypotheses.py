@@ -321,7 +321,11 @@ class HypothesisTest:
         return np.stack([factors, vector * values, values, sigmas, none, none], axis=-2)
 
     def _growing(self, healthy: Evidence, span: float) -> Array:
-        """Likewise of faults that grow; values are those at the end of `span` (s); least values hold there, and early on."""
+        """Likewise of faults that grow; values are those at the end of `span` (s); least values hold there, and early on.
+
+        What has no least value has had the same sign early on: nothing grows through 0. Else an onset within the evidence is
+        a line through 0 for a sensor, but not for a spring.
+        """
         count, grows = len(self.known), self._grows
         pairs = np.stack([self.growing, count + np.arange(len(grows))], axis=1)
         vector = healthy.vector[..., pairs]
@@ -335,8 +339,8 @@ class HypothesisTest:
         values, sigmas = found @ now, np.sqrt(spread @ now @ now)
         once, once_sigmas = found @ early, np.sqrt(spread @ early @ early)
         sided = np.minimum(self._sided(values, sigmas, grows), self._sided(once, once_sigmas, grows))
-        is_free = np.isinf(self._least[grows])
-        sided = np.where(is_free, log_normal_below(np.sign(values) * once / once_sigmas) + log(2.0), sided)
+        of_one_sign = log_normal_below(np.sign(values) * once / once_sigmas) + log(2.0)
+        sided = np.where(np.isinf(self._least[grows]), of_one_sign, sided)
         factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + sided + log(GROWING_PRIOR)
         return np.stack([factors, explained, values, sigmas, found[..., 1], np.sqrt(spread[..., 1, 1])], axis=-2)
 
@@ -389,9 +393,10 @@ class HypothesisTest:
         spread = np.eye(len(own)) + prior2[:, None] * matrix
         found = np.linalg.solve(spread, (prior2 * vector)[..., None])[..., 0]
         gains = 0.5 * (vector * found).sum(axis=-1) - 0.5 * np.linalg.slogdet(spread)[1]
-        level = int(np.argmax(healthy.log + gains))
-        changed, moved = float((healthy.log + gains)[level] - healthy.log.max()), found[level] @ np.array([1.0, middle])[: len(own)]
-        return healthy.log, healthy.squares / max(healthy.rows, 1.0), changed, abs(float(moved)) / max(abs(each.value), 1e-300)
+        logs = healthy.log + gains
+        level = int(np.argmax(logs))
+        changed, by = float(logs[level] - healthy.log.max()), float(found[level] @ np.array([1.0, middle])[: len(own)])
+        return healthy.log, healthy.squares / max(healthy.rows, 1.0), changed, abs(by) / max(abs(each.value), 1e-300)
 
     def coefficients(self, each: Explanation, span: float) -> Array:
         """Of the fault alone, `span` (s) after its evidence began; shape (coefficients,)."""

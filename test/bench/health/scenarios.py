@@ -40,7 +40,11 @@ RATES = {50.0: 0.1, 100.0: 0.2, 200.0: 0.6, 500.0: 0.1}  # Hz, and how often
 Z_FOLD, Z_FOLD_FROM, FAST_FROM = "five_section_z_fold", 5000, 7000  # an example scene; numbers
 Z_FOLD_RATES = {50.0: 0.1, 100.0: 0.2, 200.0: 0.4, 1000.0: 0.3}
 TARGETS_FROM, SHAKEN_FROM = 8000, 9000  # numbers
-TARGETS = (*(("cylinder_%d.k" % i, "softer", 0.4 if i == 4 else 0.3) for i in range(1, 5)), ("tip.payload", "more", 20.0), ("tip.payload", "less", 20.0))
+TARGETS = (
+    *((f"cylinder_{i}.k", "softer", 0.4 if i == 4 else 0.3) for i in range(1, 5)),
+    ("tip.payload", "more", 20.0),
+    ("tip.payload", "less", 20.0),
+)
 LOADED, PAYLOAD = "loaded", 60.0  # the default boom with an end hose, kg: who loses a payload has one
 GROUPS = {"healthy": 0.4, "one": 0.42, "recovery": 0.08, "two": 0.1}
 

@@ -4,8 +4,8 @@
     python test/bench/health/run.py --sessions out/health/sessions --out out/health
     python test/bench/health/targets.py out/health/outcomes.jsonl [--each]
 
-Half of the fault is there H, all of it F seconds after the start. An alarm is in time within 10 s after H; a name by the start of
-the third move after H, or after F. The size is that of the alarm as it was last told: the loss of stiffness as a share, or kg.
+Half of the fault is there H, all of it F seconds after the start. An alarm is in time within 10 s after H; a name by the start
+of the third move after H, or after F. The size is that of the alarm as it was last told: the loss of stiffness as a share, kg.
 """
 
 from __future__ import annotations
@@ -69,7 +69,12 @@ def line(name: str, rows: list[Row]) -> str:
     shares = [sum(is_named_in_time(row, part) for row in rows) for part in (0.5, 1.0)] + [len(right)]
     errors = [abs(error) for error in map(size_error, right) if error is not None]
     off = f"{100 * np.median(errors):.1f}; {100 * np.quantile(errors, 0.9):.1f}" if errors else "-"
-    cells = [in_time, median, *(share(hits, count) for hits in shares), share(sum(bool(wrong_names(row)) for row in rows), count)]
+    cells = [
+        in_time,
+        median,
+        *(share(hits, count) for hits in shares),
+        share(sum(bool(wrong_names(row)) for row in rows), count),
+    ]
     return " | ".join([f"| {name}", *cells, share(sum(map(is_close, right)), len(right)), f"{off} |"])
 
 
