@@ -42,6 +42,7 @@ PERIOD = 3  # blocks between two looks at a suspicion
 OBVIOUS = 60.0  # ln of how much more probable than none a fault must be not to wait for a load to show
 GONE, GONE_AFTER = 3.0, 3.0  # likewise, of a suspicion that has taken so long (s), below which the fault is there no more
 KNOWN_AFTER, KNOWN_WITHIN = 5.0, 0.1  # s that a suspicion takes, and deviation over size, before the twin goes on with a fault
+KIND_TOLD = 4.6  # ln of how much more probable what is the matter with a sensor must be than another of its faults, likewise
 HELD, LET_GO = 12.0, 4.0  # ln of how much more probable by holds a fault must be than none for an alarm, and to keep it
 ENDED = 8.0  # ln by which a known fault's end may go worse with what is measured than the best explanation
 AFRESH, EVERY = 30, 15  # blocks of evidence that is collected afresh beside an alarm (is its fault there?), begun so often
@@ -462,6 +463,8 @@ class ResidualMonitor:
         assert self._alarm is not None
         best, cause = verdict.best, self._alarm.cause
         is_sure = cause == verdict.causes[0].name and best.sigma < KNOWN_WITHIN * abs(best.value)
+        others = [part.log_factor for part in verdict.causes[0].parts if part.place != best.place]  # a scale is no bias elsewhere
+        is_sure = is_sure and max(others, default=-math.inf) < best.log_factor - KIND_TOLD * verdict.excess
         if not is_sure or best.is_growing or suspicion.span < KNOWN_AFTER or any(suspicion.recent_fit(verdict)):
             return
         before = self._known.get(cause or "")
