@@ -86,6 +86,7 @@ class Suspicion:
     ) -> None:  # fmt: skip
         self._bank, self.start, self.mean, self.covariance = bank, start, mean, covariance
         self._errors2, self._noise2, self._carried = errors2, noise2, carried
+        self._shares = LEVELS[: len(levels)]
         channels, coefficients = len(errors2), bank.coefficient_count
         self._filter = InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, DETUNING, levels)
         self.size, self.blocks, self._travel = np.zeros(channels), 0, 0.0
@@ -112,7 +113,7 @@ class Suspicion:
         table = self._with_rates(problem.table, problem.start)
         weight = 1.0 / (1.0 + problem.shaking / SHAKEN**2)
         self._filter.tune(problem.modes)
-        self._filter.roughen(is_shaken * LOAD_BLOCKS * np.outer(LEVER * LEVELS, self.size) ** 2)
+        self._filter.roughen(is_shaken * LOAD_BLOCKS * np.outer(LEVER * self._shares, self.size) ** 2)
         shaking = self._filter.vibration(problem.shaking)
         found = Evidence.of(*self._filter.step(table, noise, crude, shaking, problem.travel))
         self._evidence += found
