@@ -21,6 +21,7 @@ from .inference.sensitivities import Signature, Signatures
 NAMED, GROWING = 0.95, 0.99  # probability of a cause beside the others that is taken for certain; of one that grows
 SHAKEN = 0.999  # likewise, of one that grows under a load
 PLAIN = 60.0  # ln of how much more probable than none a fault must be for a name under a load
+LED, MOVED = 10.0, 0.1  # time (s), and travel of the strokes (m), for which it has to lead where it is less plain than that
 BORNE_OUT = 0.7  # likewise, by blocks in which the boom does not vibrate
 REFUTED = 1e-3  # probability of a cause below which evidence that fits rules it out; of that which was named, another may be
 GROWTH_AFTER, STEADY = 8.0, 0.9  # evidence (s) that gives a slope; share of the steepest that a lasting growth keeps
@@ -62,24 +63,24 @@ class AlarmText:
         self._names = judged_channels(len(scene.joints))
         self._advised: tuple[str, str] | None = None
         self._advice = ""
-        self._leading: tuple[str, int] = "", 0
+        self._leading: tuple[str, int, float] = "", 0, 0.0
         self._steepest: dict[int, float] = {}
 
     def begin_anew(self) -> None:
         """The evidence begins anew: how long a cause has been probable by what was outdated does not count."""
-        self._leading = "", 0
+        self._leading = "", 0, 0.0
 
     def alarm(
-        self, alarm: Alarm, whole: Verdict, calm: Verdict, is_told_apart: bool, span: float, stamp: int, is_calm: bool,
-        signature: Signature | None,
+        self, alarm: Alarm, whole: Verdict, calm: Verdict, is_told_apart: bool, span: float, travel: float, stamp: int,
+        is_calm: bool, signature: Signature | None,
     ) -> Alarm:  # fmt: skip
-        """The alarm with its explanation at `stamp` (ns), of evidence of `span` s; a name stays until it is refuted.
+        """The alarm with its explanation at `stamp` (ns), of evidence of `span` s and `travel` m; a name stays until refuted.
 
         A name is given by the whole of the evidence; what the blocks in which the boom does not vibrate say has to bear it out,
         and is what is told until then. `is_calm`: no load shakes the boom. `is_told_apart`: nothing else that was measured
         speaks against the likeliest cause.
         """
-        if self._is_certain(alarm, whole, calm, is_told_apart, span, stamp, is_calm):
+        if self._is_certain(alarm, whole, calm, is_told_apart, span, travel, stamp, is_calm):
             ranks = self._likely(whole)
             told = self._sentence(ranks[0], whole.best)
             return replace(alarm, kind=ranks[0].parts[0][0], cause=whole.causes[0].name, told=told, ranked=ranks)
@@ -152,14 +153,23 @@ class AlarmText:
         return tuple(self._ranked(cause, verdict.excess) for cause in likely)
 
     def _is_certain(
-        self, alarm: Alarm, whole: Verdict, calm: Verdict, is_told_apart: bool, span: float, stamp: int, is_calm: bool
+        self,
+        alarm: Alarm,
+        whole: Verdict,
+        calm: Verdict,
+        is_told_apart: bool,
+        span: float,
+        travel: float,
+        stamp: int,
+        is_calm: bool,
     ) -> bool:
         """Whether the most probable cause is named: it fits, and has been probable enough for some time.
 
         Whatever else changes meanwhile may look like growth, and a neighbour's offset like a drift. So a fault that grows is
         named on a calm boom, a drift as long as it is as fast as it was; under a load where it is surer, or the cause the same
         if nothing grows: then the name does not depend on the shape. Under a load that hides most of a fault the onset is not
-        seen, nor the shape, and of a wrong one the neighbour makes up better: so a name takes one that is plainly there.
+        seen, nor the shape, and of a wrong one the neighbour makes up better for a while: so a name takes one that is plainly
+        there, or that leads for longer and while the boom moves.
         """
         best, borne_out = whole.causes[0], calm.causes[0]
         is_growing = whole.best.is_growing or calm.best.is_growing
@@ -168,17 +178,19 @@ class AlarmText:
         is_shapeless = best.steady >= NAMED and borne_out.steady >= BORNE_OUT
         is_surer = min(best.probability, best.alone) >= SHAKEN and min(borne_out.probability, borne_out.alone) >= NAMED
         has_shape = not is_growing or (span >= GROWING_AFTER and (is_shapeless or (is_lasting and (is_calm or is_surer))))
-        has_shape = has_shape and (is_calm or whole.best.log_factor >= PLAIN)
         leads = min(best.probability, best.alone) >= (GROWING if is_growing else NAMED)
         leads = leads and min(borne_out.probability, borne_out.alone) >= BORNE_OUT and is_told_apart
         shares = {cause.name: cause.probability for cause in whole.causes}
         is_held = alarm.cause not in (None, best.name) and shares[alarm.cause or ""] > REFUTED
         if not (leads and has_shape and max(whole.excess, calm.excess) <= FITS) or is_held:
-            self._leading = "", stamp
+            self._leading = "", stamp, travel
             return False
         if not alarm.told or self._leading[0] != best.name:
-            self._leading = best.name, stamp
-        return (stamp - self._leading[1]) * NANO >= NAMED_AFTER
+            self._leading = best.name, stamp, travel
+        _, since, before = self._leading
+        led = (stamp - since) * NANO
+        is_plain = is_calm or whole.best.log_factor >= PLAIN
+        return led >= NAMED_AFTER if is_plain else led >= LED and travel - before >= MOVED
 
     def _grows_still(self, alarm: Alarm, verdict: Verdict, span: float) -> bool:
         """Whether growth is as fast as it was: of what grew and then stayed, the slope over all its evidence becomes less."""

@@ -37,10 +37,12 @@ UNEXPLAINED = 4.0  # s for which nothing explains the deviation, before that is 
 EXCITED_FOR = 20.0  # s for which a load counts after it last showed
 LOAD_MEANS = 3.0  # times the load's level: less weight than that may be its mean, and is no fault
 LIMITS_PERIOD = 60  # blocks of a suspicion between two looks at what could be told, a multiple of the next
+SETTLING = 3 * SECOND  # ns after growth that goes otherwise than it did, before evidence begins anew
 PERIOD = 3  # blocks between two looks at a suspicion
 OBVIOUS = 60.0  # ln of how much more probable than none a fault must be not to wait for a load to show
 GONE, GONE_AFTER = 3.0, 3.0  # likewise, of a suspicion that has taken so long (s), below which the fault is there no more
 KNOWN_AFTER, KNOWN_WITHIN = 5.0, 0.1  # s that a suspicion takes, and deviation over size, before the twin goes on with a fault
+KIND_TOLD = 4.6  # ln of how much more probable what is the matter with a sensor must be than another of its faults, likewise
 HELD, LET_GO = 12.0, 4.0  # ln of how much more probable by holds a fault must be than none for an alarm, and to keep it
 ENDED = 8.0  # ln by which a known fault's end may go worse with what is measured than the best explanation
 AFRESH, EVERY = 30, 15  # blocks of evidence that is collected afresh beside an alarm (is its fault there?), begun so often
@@ -128,6 +130,7 @@ class ResidualMonitor:
         self._refuted: frozenset[str] = frozenset()  # causes that evidence which has fitted rules out for this alarm
         self._blocks = 0
         self._tip_load.begin()
+        self._resized: int | None = None  # stamp (ns) from which on another size goes better with what is recent
         self._unexplained: int | None = None  # stamp (ns) from which on nothing explains the deviation
         self._shaken = np.full(len(self._levels), -math.inf)  # when the load last was of each level, ns
         self._limits: dict[str, float] = {}
@@ -197,7 +200,7 @@ class ResidualMonitor:
         news += self._look_for_end(problem)
         if self._suspicion is None or problem.start < self._suspicion.start:
             return news
-        self._suspicion.take(problem)
+        self._suspicion.take(problem, self.is_shaken(problem.start))
         self._blocks += 1
         if self._blocks % PERIOD == 0:
             news += self._look(block.start)
@@ -300,6 +303,7 @@ class ResidualMonitor:
         its lag is said by vibration, so a lag may be as large without a fault.
         """
         self._suspicion, self._blocks = self._suspicion_from(start, self._carried), 0
+        self._resized = None
         self._tell.begin_anew()
 
     def _suspicion_from(self, start: int, carried: dict[str, float]) -> Suspicion:
@@ -321,7 +325,7 @@ class ResidualMonitor:
         if not self._afresh or self._afresh[-1].evidence.blocks == EVERY:
             self._afresh = (*self._afresh, _Afresh(self._suspicion_from(problem.start, {}), self._explain_now()))
         for each in self._afresh:
-            each.evidence.take(problem)
+            each.evidence.take(problem, self.is_shaken(problem.start))
         if self._afresh[0].evidence.blocks < AFRESH:
             return []
         (oldest, *_), self._afresh = self._afresh, self._afresh[1:]
@@ -359,15 +363,20 @@ class ResidualMonitor:
             return news
         recent = suspicion.recent_fit(verdict)
         is_resized = recent.is_resized and self._alarm is not None
-        if recent.is_outdated or is_resized:
+        self._resized = (self._resized or start) if is_resized else None
+        if self._resized is not None and self._load_lately(start) > 0.0 and not verdict.best.is_growing:
+            is_resized = start - self._resized >= RECENT * BLOCK  # the flank of a pulse has passed by then
+        holds_onset = self._alarm is not None and suspicion.start < self._alarm.since  # which neither shape has
+        if recent.is_outdated or is_resized or (holds_onset and verdict.strength > OBVIOUS):
             is_odd = verdict.none_excess > WHOLE_MISFIT or verdict.strength >= SURE  # no load explained it
             lately = max(suspicion.start, start - RECENT * BLOCK)  # before that it was explained
             self._unexplained = (self._unexplained or lately) if is_odd else None
-            has_shape = not (is_resized or verdict.best.is_growing) and self._alarm is not None
+            has_shape = not (is_resized or holds_onset or verdict.best.is_growing) and self._alarm is not None
             self._carried = carried_on(verdict) if has_shape else {}
             if has_shape and verdict.strength >= SURE:
                 self._refuted |= refuted(verdict)
-            self._suspect(start + BLOCK)
+            is_still_growing = is_resized and verdict.best.is_growing  # perhaps: it may grow on more slowly
+            self._suspect(start + (SETTLING if is_still_growing else BLOCK))
         elif suspicion.is_settled:
             self._unexplained = None
         return news
@@ -428,7 +437,7 @@ class ResidualMonitor:
         """The alarm in words; a name has to go with the calm blocks as well, and with all that came before."""
         calm = suspicion.explain_calmly()
         is_told_apart = calm.causes[0].name == verdict.causes[0].name and calm.causes[0].name not in self._refuted
-        return self._tell.alarm(alarm, verdict, calm, is_told_apart, span, start, is_calm, self.signature)
+        return self._tell.alarm(alarm, verdict, calm, is_told_apart, span, suspicion.travel, start, is_calm, self.signature)
 
     def _change_of_known(self, suspicion: Suspicion, verdict: Verdict) -> _KnownFault | None:
         """The known fault whose end goes with what is measured about as well as any other explanation does."""
@@ -459,6 +468,10 @@ class ResidualMonitor:
         assert self._alarm is not None
         best, cause = verdict.best, self._alarm.cause
         is_sure = cause == verdict.causes[0].name and best.sigma < KNOWN_WITHIN * abs(best.value)
+        others = [
+            part.log_factor for part in verdict.causes[0].parts if part.place != best.place
+        ]  # a scale is no bias elsewhere
+        is_sure = is_sure and max(others, default=-math.inf) < best.log_factor - KIND_TOLD * verdict.excess
         if not is_sure or best.is_growing or suspicion.span < KNOWN_AFTER or any(suspicion.recent_fit(verdict)):
             return
         before = self._known.get(cause or "")

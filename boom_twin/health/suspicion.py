@@ -24,13 +24,18 @@ LEVELS = np.array([0.0, 0.0007, 0.0023, 0.0077, 0.026])
 DETUNING = 0.15  # share by which a fault may change natural frequencies
 SHAKEN = 0.6  # m/s^2 rms of the predicted tip acceleration at which a block counts half for a name: faults change vibration
 CRUDE = 0.01  # share of a deviation by which its signature, a derivative, may be wrong
+LEVER, LOAD_BLOCKS = 2.0, 10
+"""What becomes softer is bent by the load, too: of a deviation by the load's share of the boom's weight, which acts at half the
+reach, times the first; for as many blocks on end as the second."""
 LEVEL = 2.0  # s, over which the size of a deviation is taken for that
+LATELY = 100  # blocks of evidence of which the later half is looked at for the end of growth
 RECENT = 20  # blocks that must go with what explains all of them
 MISFIT, WHOLE_MISFIT = 2.5, 1.6  # times the squares that noise leaves, in the recent blocks and in all of them
 SURE = 15.0  # ln of how much more probable a fault must be than none for an alarm
 EXCITED = 12.0  # ln of how much better another level of load goes with the recent blocks
 LONGEST = 900  # blocks of one suspicion
 CHANGED = 12.0  # ln of how much better another size of the same fault goes with the recent blocks
+SAME = 0.1  # share by which a size that does not grow may seem to change under a load: it bends what has become softer, too
 CARRIED = 0.02  # least probability that a cause keeps from one suspicion to the next
 
 
@@ -46,10 +51,11 @@ class RecentFit(NamedTuple):
     ----------
     is_outdated : bool
         Not any more: the fault or the load has changed. A load that is less than it was refutes no fault: what explained
-        the evidence under the larger one still does.
+        the evidence under the larger one still does. Nor does one under which the fault is as plain.
     is_resized : bool
         With another size or rate of the same fault much better than with those that it has by all of the evidence: it has
-        grown, or grows no more. What such evidence says of causes depends on which makes up best for the wrong shape.
+        grown, or grows no more (for that the later half of the evidence counts, too). What such evidence says of causes
+        depends on which makes up best for the wrong shape.
     """
 
     is_outdated: bool
@@ -80,11 +86,13 @@ class Suspicion:
     ) -> None:  # fmt: skip
         self._bank, self.start, self.mean, self.covariance = bank, start, mean, covariance
         self._errors2, self._noise2, self._carried = errors2, noise2, carried
+        self._shares = LEVELS[: len(levels)]
         channels, coefficients = len(errors2), bank.coefficient_count
         self._filter = InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, DETUNING, levels)
         self.size, self.blocks, self._travel = np.zeros(channels), 0, 0.0
         self._evidence = self._calm = Evidence.none(coefficients, levels.shape)
         self._before = deque([self._evidence], maxlen=RECENT + 1)  # after each of the recent blocks, and before them
+        self._halfway = deque([self._evidence])  # likewise after every so many blocks, from half of them on
 
     @property
     def span(self) -> float:
@@ -96,8 +104,8 @@ class Suspicion:
         """Whether it is old enough to be outdated, see `recent_fit`."""
         return self.blocks > RECENT
 
-    def take(self, problem: BlockProblem) -> None:
-        """Take one block."""
+    def take(self, problem: BlockProblem, is_shaken: bool) -> None:
+        """Take one block; `is_shaken`: a load shakes the boom, so that it bends what has become softer, too."""
         left = problem.table[:, 0]
         measured = np.isfinite(left)
         self.size[measured] += max(BLOCK * NANO / LEVEL, 1.0 / (1 + self.blocks)) * (left[measured] - self.size[measured])
@@ -105,12 +113,17 @@ class Suspicion:
         table = self._with_rates(problem.table, problem.start)
         weight = 1.0 / (1.0 + problem.shaking / SHAKEN**2)
         self._filter.tune(problem.modes)
+        self._filter.roughen(is_shaken * LOAD_BLOCKS * np.outer(LEVER * self._shares, self.size) ** 2)
         shaking = self._filter.vibration(problem.shaking)
         found = self._filter.step(table, noise, crude, shaking, problem.travel)
         self._evidence = self._evidence.with_rows(*found)
         self._calm = self._calm.with_rows(*found, weight)
         self._before.append(self._evidence)
         self.blocks += 1
+        if self.blocks % RECENT == 0:
+            self._halfway.append(self._evidence)
+            if self.blocks // RECENT % 2 == 1:
+                self._halfway.popleft()
         self._travel += problem.travel
 
     def take_hold(self, hold: HoldProblem, frequency_error: float) -> None:
@@ -127,6 +140,11 @@ class Suspicion:
     def _with_rates(self, rows: Array, stamp: int) -> Array:
         """Rows (k, 1 + parameters) at `stamp` (ns), and signatures of the rates of what may grow; (k, 1 + coefficients)."""
         return np.concatenate([rows, (stamp - self.start) * NANO * rows[:, 1 + self._bank.growing]], axis=1)
+
+    @property
+    def travel(self) -> float:
+        """Of the strokes since it began, m."""
+        return self._travel
 
     def explain(self) -> Verdict:
         """Weigh all hypotheses."""
@@ -161,14 +179,28 @@ class Suspicion:
         if not self.is_settled:
             return RecentFit(False, False)
         recent = self._evidence + self._before[0].weighted(-1.0)
+        about, middle = (self.mean, self.covariance), self.span - 0.5 * RECENT * BLOCK * NANO
         if verdict.strength > 0.0:
-            logs, squares, changed = self._bank.change(recent, verdict.best, self.span, self.mean, self.covariance)
+            logs, squares, changed, moved = self._bank.change(recent, verdict.best, self.span, middle, *about)
+            if verdict.best.is_growing and self.blocks > LATELY:
+                lately = self._evidence + self._halfway[0].weighted(-1.0)
+                changed = max(changed, self._bank.change(lately, verdict.best, self.span, middle, *about)[2])
         else:
-            (logs, squares), changed = self._bank.fit(recent, self._coefficients(None), self.mean, self.covariance), 0.0
+            (logs, squares), changed, moved = self._bank.fit(recent, self._coefficients(None), *about), 0.0, 0.0
         is_misfit = verdict.excess > WHOLE_MISFIT or squares[verdict.level] > MISFIT
         others = logs[verdict.level :] if verdict.strength >= SURE else logs
-        is_other_load = others.max() - logs[verdict.level] > EXCITED
-        return RecentFit(bool(self.blocks > LONGEST or is_misfit or is_other_load), changed > CHANGED)
+        other = len(logs) - len(others) + int(np.argmax(others))
+        is_other_load = logs[other] - logs[verdict.level] > EXCITED and not self._is_sure_under(verdict, other)
+        is_same = moved < SAME and verdict.level > 1 and not verdict.best.is_growing
+        return RecentFit(bool(self.blocks > LONGEST or is_misfit or is_other_load), changed > CHANGED and not is_same)
+
+    def _is_sure_under(self, verdict: Verdict, level: int) -> bool:
+        """Whether what explains the evidence would do so under a load of that level, too: then the load makes no difference."""
+        if verdict.strength < SURE:
+            return False
+        with_fault, _ = self._bank.fit(self._evidence, self._coefficients(verdict.best), self.mean, self.covariance)
+        none, _ = self._bank.fit(self._evidence, self._coefficients(None), self.mean, self.covariance)
+        return bool(with_fault[level] - none[level] >= SURE * verdict.excess)
 
     def _coefficients(self, each: Explanation | None) -> Array:
         return np.zeros(self._bank.coefficient_count) if each is None else self._bank.coefficients(each, self.span)

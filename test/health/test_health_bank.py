@@ -119,6 +119,12 @@ def test_a_one_sided_fault(value):
     assert found.log_factor == pytest.approx(np.log(whole), abs=1e-6)
 
 
+def test_no_sensor_drifts_through_zero():
+    """As little as a spring: a line that has another sign early on is no growing fault."""
+    away, through = (explained(Problem(1, {3: at}, rate=0.2).verdict(), growing=True)[3] for at in (1.0, -8.0))
+    assert away.log_factor > through.log_factor + 20.0
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_growing_fault_is_as_probable_as_densely(seed):
     """Its size at the beginning and its rate, both unknown; the estimate is that at the end."""
@@ -129,7 +135,7 @@ def test_a_growing_fault_is_as_probable_as_densely(seed):
     spread = problem.spread + columns @ prior @ columns.T
     left = problem.signature @ problem.mean
     wanted = log_density(problem.values, left, spread) - problem.log() + np.log(GROWING_PRIOR)
-    assert found.log_factor == pytest.approx(wanted, abs=1e-7)
+    assert found.log_factor == pytest.approx(wanted + np.log(2.0), abs=1e-7), "and of one sign all the time"
     assert found.rate == pytest.approx(0.2, abs=5.0 * found.rate_sigma) and found.is_growing
     assert found.value == pytest.approx(0.5 + 0.2 * SPAN, abs=5.0 * found.sigma)
 
@@ -238,7 +244,7 @@ def test_fit_of_a_known_fault():
 def test_another_size_of_a_known_fault_is_as_probable_as_densely(rate, bound):
     """Of a size and a rate that differ from those of the explanation, each normal; only what grows on has changed."""
     problem, each = Problem(6, {3: 2.0}, 40, rate), Explanation(3, 0, 0.0, 2.0, 0.1)
-    logs, squares, changed = BANK.change(problem.evidence(), each, SPAN, problem.mean, problem.covariance)
+    logs, squares, changed, _ = BANK.change(problem.evidence(), each, SPAN, SPAN, problem.mean, problem.covariance)
     same, left = BANK.fit(problem.evidence(), BANK.coefficients(each, SPAN), problem.mean, problem.covariance)
     assert logs == pytest.approx(same) and squares == pytest.approx(left)
     columns = np.stack([np.ones(40), problem.times], axis=1) * problem.signature[:, [3]]
@@ -254,12 +260,12 @@ def test_what_another_load_explains_is_no_other_size():
     each, rises, stays = Explanation(3, 0, 0.0, 2.0, 0.1), Problem(6, {3: 2.0}, 40, 0.3), Problem(7, {3: 2.0}, 40)
     mean, covariance = rises.mean, rises.covariance
     own, other = rises.evidence(), stays.evidence()
-    alone = BANK.change(own, each, SPAN, mean, covariance)[2]
+    alone = BANK.change(own, each, SPAN, SPAN, mean, covariance)[2]
     assert alone > 12.0
     for ahead, least, most in ((-1e4, alone, alone), (1e4, -10.0, 2.0)):  # of the load under which nothing has changed
         pairs = [(getattr(own, name), getattr(other, name)) for name in ("matrix", "vector", "squares")]
         both = Evidence(*(np.concatenate(pair) for pair in pairs), own.rows, np.concatenate([own.log, own.log + ahead]))
-        assert least - 1e-6 <= BANK.change(both, each, SPAN, mean, covariance)[2] <= most + 1e-6
+        assert least - 1e-6 <= BANK.change(both, each, SPAN, SPAN, mean, covariance)[2] <= most + 1e-6
 
 
 def test_levels_together_are_those_of_each_alone():

@@ -326,7 +326,11 @@ class HypothesisTest:
         return np.stack([factors, vector * values, values, sigmas, none, none], axis=-2)
 
     def _growing(self, healthy: Evidence, span: float) -> Array:
-        """Likewise of faults that grow; values are those at the end of `span` (s); least values hold there, and early on."""
+        """Likewise of faults that grow; values are those at the end of `span` (s); least values hold there, and early on.
+
+        What has no least value has had the same sign early on: nothing grows through 0. Else an onset within the evidence is
+        a line through 0 for a sensor, but not for a spring.
+        """
         count, grows = len(self.known), self._grows
         pairs = np.stack([self.growing, count + np.arange(len(grows))], axis=1)
         vector = healthy.vector[..., pairs]
@@ -338,9 +342,10 @@ class HypothesisTest:
         explained = (vector * found).sum(axis=-1)
         now, early = np.array([1.0, span]), np.array([1.0, EARLY * span])
         values, sigmas = found @ now, np.sqrt(spread @ now @ now)
-        sided = np.minimum(
-            self._sided(values, sigmas, grows), self._sided(found @ early, np.sqrt(spread @ early @ early), grows)
-        )
+        once, once_sigmas = found @ early, np.sqrt(spread @ early @ early)
+        sided = np.minimum(self._sided(values, sigmas, grows), self._sided(once, once_sigmas, grows))
+        of_one_sign = log_normal_below(np.sign(values) * once / once_sigmas) + log(2.0)
+        sided = np.where(np.isinf(self._least[grows]), of_one_sign, sided)
         factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + sided + log(GROWING_PRIOR)
         return np.stack([factors, explained, values, sigmas, found[..., 1], np.sqrt(spread[..., 1, 1])], axis=-2)
 
@@ -371,9 +376,9 @@ class HypothesisTest:
         return healthy.log, healthy.squares / max(healthy.rows, 1.0)
 
     def change(
-        self, evidence: Evidence, each: Explanation, span: float, mean: Array, covariance: Array
-    ) -> tuple[Array, Array, float]:
-        """How well a fault, `span` (s) after its evidence began, goes with further evidence of the same filter.
+        self, evidence: Evidence, each: Explanation, span: float, middle: float, mean: Array, covariance: Array
+    ) -> tuple[Array, Array, float, float]:
+        """How well a fault, `span` (s) after its evidence began, goes with evidence of the same filter about `middle` (s).
 
         Returns
         -------
@@ -382,6 +387,8 @@ class HypothesisTest:
         changed : float
             ln of how much more probable it is that its size, or its rate if it may grow, is another one by then than that they
             are what they were, each with the load that goes best with it: the flank of a pump's pulse is no other size.
+        moved : float
+            By what share of its size it would have changed by the middle.
         """
         rate = [self._rate_of[each.place]] if each.place in self._rate_of else []
         healthy = evidence.about(self.coefficients(each, span), [*range(len(mean)), *rate]).given(mean, covariance)
@@ -391,8 +398,10 @@ class HypothesisTest:
         spread = np.eye(len(own)) + prior2[:, None] * matrix
         found = np.linalg.solve(spread, (prior2 * vector)[..., None])[..., 0]
         gains = 0.5 * (vector * found).sum(axis=-1) - 0.5 * np.linalg.slogdet(spread)[1]
-        changed = float((healthy.log + gains).max() - healthy.log.max())
-        return healthy.log, healthy.squares / max(healthy.rows, 1.0), changed
+        logs = healthy.log + gains
+        level = int(np.argmax(logs))
+        changed, by = float(logs[level] - healthy.log.max()), float(found[level] @ np.array([1.0, middle])[: len(own)])
+        return healthy.log, healthy.squares / max(healthy.rows, 1.0), changed, abs(by) / max(abs(each.value), 1e-300)
 
     def coefficients(self, each: Explanation, span: float) -> Array:
         """Of the fault alone, `span` (s) after its evidence began; shape (coefficients,)."""

@@ -219,16 +219,20 @@ class InnovationFilter:
         added[:, size : size + LOAD] = (1.0 - self._kept**2) * self._stationary
         if before is None:
             p[:, :size, :size] += _swung(modes, self._level2)
-        channels = self._channels
+        channels, self._rough = self._channels, ROUGH**2 * at_once
         self._work = FilterWork(
             turn=turn, least=least, driven=driven, added=added,
             shown=np.hstack([modes.shown, modes.lifted, modes.lifted, np.eye(channels)]),
-            shaken=SHAPE**2 * self._detuning2 * modes.shaken, rough=ROUGH**2 * at_once, pushed=at_once[:, -2:].sum(axis=1),
+            shaken=SHAPE**2 * self._detuning2 * modes.shaken, rough=self._rough.copy(), pushed=at_once[:, -2:].sum(axis=1),
             swinging=self._swinging, x=x, p=p, rows=np.zeros(channels, np.int64), own=np.zeros(channels),
             scratch=np.zeros((states, max(states, columns))), root=np.zeros((channels, channels)),
             gain=np.zeros((channels, states)),
         )  # fmt: skip
         self._held = hold(self._work)
+
+    def roughen(self, variances: Array) -> None:
+        """Let readings be off by further `variances`, shape (levels, channels), under a load of each level."""
+        self._work.rough[:] = self._rough + variances
 
     def step(self, table: Array, noise: Array, errors2: Array, shaking: float | Array, travel: float) -> Innovations:
         """Innovations of one block.

@@ -5,8 +5,10 @@ cause                           kind       size
 ==============================  =========  ======================================================================
 ``cylinder_i.k``                softer     share of the oil spring that is lost
 ``section_i.EI``                softer     share of the bending stiffness that is lost
-``tip.payload``                 more       kg
-``line_fill``                   more       kg/m
+``tip.payload``                 more,      kg, gained or lost
+..                              less
+``line_fill``                   more,      kg/m, gained or lost
+..                              less
 ``cylinder_i.rod.clearance``    play       radial clearance of the rod pin, m
 ``joint_i.sensor``              bias       rad (of a ``cylinder_i.sensor``: m, of a ``cylinder_force_i.sensor``: N)
 (``cylinder_i.sensor``,         drift      rad/s (m/s, N/s)
@@ -34,7 +36,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import UsageError
-from ...scene.edit import section_mass
+from ...scene.edit import parameter, section_mass
 from ...scene.schema import Scene
 from ...types import SECOND, Array
 from .session import RigSession
@@ -50,13 +52,13 @@ _HOLDS = {
     _FACTOR: lambda size: size > 1.0,
 }
 _SENSOR = {"bias": _ANY, "drift": _ANY, "scale": _ANY, "stuck": None, "noisy": _FACTOR, "spikes": _ANY, "dropout": _SHARE}
-_PHYSICAL = ("softer", "more", "play")
+_PHYSICAL = ("softer", "more", "less", "play")
 _WITHOUT_RAMP = ("drift", "stuck", "play")
 _CAUSES: dict[str, dict[str, str | None]] = {
     r"cylinder_([1-9]\d*)\.k": {"softer": _LOSS},
     r"section_([1-9]\d*)\.EI": {"softer": _LOSS},
-    r"tip\.payload": {"more": _MORE},
-    r"line_fill": {"more": _MORE},
+    r"tip\.payload": {"more": _MORE, "less": _MORE},
+    r"line_fill": {"more": _MORE, "less": _MORE},
     r"cylinder_([1-9]\d*)\.rod\.clearance": {"play": _PLAY},
     r"(?:joint|cylinder|cylinder_force)_([1-9]\d*)\.sensor": _SENSOR,
     r"joint_angles\.delay": {"late": _MORE},
@@ -66,6 +68,8 @@ _SIZES = {
     "softer": "share of the stiffness that is lost",
     "more tip.payload": "kg, at most the boom's mass",
     "more line_fill": "kg/m, at most the boom's mass over its reach",
+    "less tip.payload": "kg, at most what the scene has",
+    "less line_fill": "kg/m, at most what the scene has",
     "play": "radial clearance of the rod pin, m",
     "bias": "rad, m or N; at most 1 rad, the travel, 1e6 N",
     "drift": "the same in a second",
@@ -211,6 +215,8 @@ def largest_size(fault: RigFault, scene: Scene) -> float:
     if fault.kind == "more":
         mass = sum(map(section_mass, scene.sections))
         return mass if fault.cause == "tip.payload" else mass / scene.reach
+    if fault.kind == "less":
+        return parameter(scene, fault.cause)
     if fault.kind in ("bias", "spikes", "drift"):
         if fault.cause.startswith("joint_"):
             return MOST_ANGLE

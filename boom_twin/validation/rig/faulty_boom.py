@@ -56,8 +56,8 @@ def with_faults(scene: Scene, faults: Sequence[RigFault]) -> Scene:
             scene = _worn(scene, fault.cause.removesuffix(".clearance"), fault.size)
         elif fault.is_physical:
             now = parameter(scene, fault.cause)
-            changed = now + fault.size if fault.kind == "more" else now * (1.0 - fault.size)
-            scene = with_parameters(scene, {fault.cause: changed})
+            changed = {"more": now + fault.size, "less": now - fault.size, "softer": now * (1.0 - fault.size)}
+            scene = with_parameters(scene, {fault.cause: changed[fault.kind]})
     return scene
 
 

@@ -63,7 +63,7 @@ def learn(rig: int, sessions: Path, out: Path, scene: str = "") -> None:
 
 
 def outcome(sessions: Path, out: Path, each: Scenario, shipped: bool = False) -> dict[str, Any]:
-    """What is true of a session and everything that was told of it: each alarm at each of its changes.
+    """What is true of a session and everything that was told of it: each alarm at each of its changes, and as it was last.
 
     By the baseline of its rig, or by the one that ships.
     """
@@ -71,16 +71,18 @@ def outcome(sessions: Path, out: Path, each: Scenario, shipped: bool = False) ->
     twin = Twin(each.model, baseline=baseline)
     told: list[dict[str, Any]] = []
     last: dict[tuple[str, int, str], tuple[Any, ...]] = {}
+    newest: dict[tuple[str, int, str], dict[str, Any]] = {}
     samples = stored.load_samples(sessions, each)
     for first in range(0, len(samples), AT_ONCE):
         for health in _health(twin, samples[first : first + AT_ONCE]):
             for alarm in health.alarms:
                 key = alarm.channel, alarm.since, alarm.kind if alarm.cause is None else alarm.cause
+                newest[key] = _told(alarm, health.stamp)
                 state = alarm.until, tuple(rank.cause for rank in alarm.ranked[:2])
                 if last.get(key) != state:
                     last[key] = state
-                    told.append(_told(alarm, health.stamp))
-    return each.row | {"told": told}
+                    told.append(newest[key])
+    return each.row | {"told": told, "newest": [*newest.values()]}
 
 
 def _health(twin: Twin, samples: list[Sample]) -> list[Health]:

@@ -4,7 +4,8 @@ What is drawn: whether there is a fault, its cause, size, onset, ramp and end, a
 sensors; the rig, whose parameters are right or 2 % wrong. A fifth of all numbers is held out: see `Scenario.is_held_out`.
 
 Numbers below 5000 are of the default boom at 50 to 500 Hz; from 5000 on of a five-section boom that folds in a Z, at 50 to 1000
-Hz; from 7000 on of the default boom at 1000 Hz.
+Hz; from 7000 on of the default boom at 1000 Hz. From 8000 on they are of the targets alone, see `_target`: quiet ones, and from
+9000 on ones under a load; of these every other six are held out.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from boom_twin.scene import load_scene
+from boom_twin.scene.edit import with_parameters
 from boom_twin.scene.load import examine_text, example_text
 from boom_twin.scene.schema import Scene
 from boom_twin.validation.rig import Sensors
@@ -37,6 +39,13 @@ SIZES: dict[str, tuple[float, ...]] = {
 RATES = {50.0: 0.1, 100.0: 0.2, 200.0: 0.6, 500.0: 0.1}  # Hz, and how often
 Z_FOLD, Z_FOLD_FROM, FAST_FROM = "five_section_z_fold", 5000, 7000  # an example scene; numbers
 Z_FOLD_RATES = {50.0: 0.1, 100.0: 0.2, 200.0: 0.4, 1000.0: 0.3}
+TARGETS_FROM, SHAKEN_FROM = 8000, 9000  # numbers
+TARGETS = (
+    *((f"cylinder_{i}.k", "softer", 0.4 if i == 4 else 0.3) for i in range(1, 5)),
+    ("tip.payload", "more", 20.0),
+    ("tip.payload", "less", 20.0),
+)
+LOADED, PAYLOAD = "loaded", 60.0  # the default boom with an end hose, kg: who loses a payload has one
 GROUPS = {"healthy": 0.4, "one": 0.42, "recovery": 0.08, "two": 0.1}
 
 
@@ -74,6 +83,8 @@ class Scenario:
     @property
     def is_held_out(self) -> bool:
         """Whether it is not to be looked at while health is being worked on."""
+        if self.number >= TARGETS_FROM:
+            return self.number // len(TARGETS) % 2 == 1
         return self.number % 5 == 4
 
     @property
@@ -96,9 +107,11 @@ class Scenario:
 
 @lru_cache
 def nominal(name: str) -> Scene:
-    """The default scene, or an example by its name."""
+    """The default scene, the same with a payload, or an example by its name."""
     if not name:
         return load_scene()
+    if name == LOADED:
+        return with_parameters(load_scene(), {"tip.payload": PAYLOAD})
     found, _ = examine_text(example_text(name), name)
     assert found is not None
     return found
@@ -106,7 +119,7 @@ def nominal(name: str) -> Scene:
 
 def learning(scene: str = "") -> list[Scenario]:
     """Healthy sessions of the rigs of a boom that are wrong."""
-    streams, first = ("angles", "imu"), -101 if scene else -1
+    streams, first = ("angles", "imu"), {"": -1, Z_FOLD: -101, LOADED: -201}[scene]
     names = sorted(nominal(scene).postures)
     pairs = [(rig, k) for rig in range(1, RIGS) for k in range(LEARN_EACH)]
     return [
@@ -117,6 +130,8 @@ def learning(scene: str = "") -> list[Scenario]:
 
 def scenario(number: int) -> Scenario:
     """The session of a number, from 0."""
+    if number >= TARGETS_FROM:
+        return _target(number)
     scene = Z_FOLD if Z_FOLD_FROM <= number < FAST_FROM else ""
     rates = {1000.0: 1.0} if number >= FAST_FROM else Z_FOLD_RATES if scene else RATES
     rng = np.random.default_rng([number, 17])
@@ -127,6 +142,24 @@ def scenario(number: int) -> Scenario:
     posture = str(rng.choice(sorted(nominal(scene).postures)))
     rig, faults = int(rng.integers(RIGS)), _faults(group, rng, len(nominal(scene).joints))
     return Scenario(number, group, rig, posture, DURATION, faults, _loads(rng), noise, rate, streams, scene)
+
+
+def _target(number: int) -> Scenario:
+    """What issues a target: one fault of a size and cause that follow from the number, over 0.05 to 30 s, with IMU, at 200 Hz.
+
+    Half of those under a load have a pump of 130 N and a wind of 15 N, a quarter each only one of them.
+    """
+    rng = np.random.default_rng([number, 17])
+    cause, kind, size = TARGETS[number % len(TARGETS)]
+    scene = LOADED if kind == "less" else ""
+    ramp, onset = float(rng.choice([0.05, 2.0, 5.0, 15.0, 30.0])), round(float(rng.uniform(5.0, 15.0)), 2)
+    pump, wind = PumpLoad(round(float(rng.uniform(0.2, 0.6)), 3), 130.0), WindLoad(15.0)
+    loads = [(pump, wind), (pump, wind), (pump,), (wind,)][int(rng.integers(4))]
+    streams = ("angles", "imu", *(["forces"] if rng.random() < 0.3 else []))
+    posture, rig = str(rng.choice(sorted(nominal(scene).postures))), int(rng.integers(RIGS))
+    faults = (RigFault(cause, kind, size, onset, ramp),)
+    shaken = loads if number >= SHAKEN_FROM else ()
+    return Scenario(number, "target", rig, posture, DURATION, faults, shaken, 1.0, 200.0, streams, scene)
 
 
 def _loads(rng: np.random.Generator) -> tuple[RigLoad, ...]:

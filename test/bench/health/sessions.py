@@ -21,7 +21,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # one process per core; and files
 
 import numpy as np
 import stored
-from scenarios import FAST_FROM, Z_FOLD, Z_FOLD_FROM, Scenario, learning, scenario
+from scenarios import Scenario, learning, scenario
 
 from boom_twin.errors import SolverError
 from boom_twin.validation.rig import Scheme, at_rest, move, observe, random_programme
@@ -69,8 +69,9 @@ def main() -> None:
     parser.add_argument("--only", type=int, nargs="*", help="numbers, instead of all from the first on")
     args = parser.parse_args()
     numbers = args.only or range(args.first, args.first + args.count)
-    is_folding = any(Z_FOLD_FROM <= number < FAST_FROM for number in numbers)
-    todo = [*learning(), *(learning(Z_FOLD) if is_folding else []), *map(scenario, numbers)]
+    wanted = [*map(scenario, numbers)]
+    others = sorted({each.scene for each in wanted} - {""})
+    todo = [*learning(), *(each for scene in others for each in learning(scene)), *wanted]
     with Pool(args.jobs, os.nice, (NICE,), AT_ONCE) as pool:
         for done, failure in enumerate(pool.imap(partial(make, folder=args.out), todo), 1):
             print(failure or f"{done} of {len(todo)}", file=sys.stderr, flush=True)

@@ -47,6 +47,7 @@ def test_a_boom_without_postures_is_told_so() -> None:
     [
         "tip.payload:more:1e6",
         "line_fill:more:1e4",
+        "tip.payload:less:20",
         "joint_2.sensor:bias:90",
         "cylinder_1.sensor:spikes:-20",
         "joint_1.sensor:noisy:1e9",
@@ -63,5 +64,5 @@ def test_the_list_names_every_cause_and_kind() -> None:
     text = "\n".join(faults.listing())
     for cause in ("cylinder_I.k", "section_I.EI", "tip.payload", "joint_angles.delay", "cylinder_I.rod.clearance"):
         assert f"\n{cause} " in text
-    assert all(f" {kind} " in text for kind in ("softer", "more", "bias", "dropout", "late", "missing"))
+    assert all(f" {kind} " in text for kind in ("softer", "more", "less", "bias", "dropout", "late", "missing"))
     assert "\\" not in text and max(map(len, text.splitlines())) < 130

@@ -39,6 +39,12 @@ def test_more_on_what_is_there():
     assert again.tip.payload == 25.0 and again.line_fill == 2.0
 
 
+def test_less_of_what_is_there():
+    scene = with_faults(load_scene(), [parse("tip.payload:more:60"), parse("line_fill:more:2")])
+    again = with_faults(scene, [parse("tip.payload:less:20"), parse("line_fill:less:2")])
+    assert again.tip.payload == 40.0 and not again.line_fill
+
+
 def test_play_grows():
     scene = with_faults(load_scene(), [parse("cylinder_2.rod.clearance:play:0.0005")])
     (pin,) = scene.pins_of("cylinder_2")
