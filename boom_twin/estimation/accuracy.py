@@ -1,12 +1,13 @@
 """Which accuracy of the tip which sensors give at a posture at rest: the estimate's covariance, once it has settled.
 
-A Kalman filter's covariance does not depend on what is measured. So the filter of `boom_twin.estimation.tip_estimate` is run
-over sensors that read just what is predicted, from nothing known until its covariance changes no more; a load of the usual
-level acts that the model does not know.
+The filter of `boom_twin.estimation.tip_estimate` is run over sensors that read what is predicted, from nothing known until its
+covariance changes no more; a load of the usual level acts that the model does not know. A Kalman filter's covariance does
+not depend on what is measured, but the chances of its causes do: so angles have noise, and what is stated is averaged.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -29,7 +30,8 @@ from .deviation_step import advance_estimate
 from .stroke_filter import corners
 from .tip_estimate import ACCELERATION_COVARIANCE, FORCE_VARIANCE, TIP_COVARIANCE, VARIANCES, WIDTH, write_estimate
 
-SETTLED = 20.0  # s
+SETTLED, AVERAGED = 20.0, 20.0  # s, and s behind it over which the variances that are stated are averaged
+OFTEN = 20  # samples from one that is averaged to the next
 SHARE = 2.0  # of the variance of an integrated white jerk filtered at omega_c: P = 2 omega_c T r while omega_c T is small
 
 
@@ -65,7 +67,7 @@ def accuracy_at(
     Returns
     -------
     TipAccuracy
-        What is stated after `SETTLED` s.
+        What is stated after `SETTLED` s, on the mean over `AVERAGED`.
 
     Raises
     ------
@@ -91,24 +93,37 @@ def accuracy_at(
     counts = np.array([sum(each is stream for each in sensors) for stream in SENSORS])
     size = np.array([plan.joints, len(plan.pins)])
     gravity, zeros = np.array(plan.tables.gravity), np.zeros(max(plan.joints, 2))
-    run_covariance(
-        modes.filter, live, row, size, moments, gravity, counts, round(SECOND / rate), round(SETTLED * rate), zeros, out
-    )
+    settled, all_steps = round(SETTLED * rate), round((SETTLED + AVERAGED) * rate)
+    errors = math.sqrt(settings.angle_variance) * np.random.default_rng(1).normal(size=(all_steps, counts[1], plan.joints))
+    told, done, span = [], 0, round(SECOND / rate)
+    for until in range(settled, all_steps + 1, OFTEN):
+        run_covariance(
+            modes.filter, live, row, size, moments, gravity, counts, done * span, span, errors[done:until], zeros, out
+        )
+        told.append(out.copy())
+        done = until
+    out = np.mean(told, axis=0)
     tip, acceleration = (out[first + np.array(VARIANCES)] for first in (TIP_COVARIANCE, ACCELERATION_COVARIANCE))
     return TipAccuracy(np.sqrt(tip), np.sqrt(acceleration[:2]), np.sqrt(out[FORCE_VARIANCE:]))
 
 
 @kernel
-def run_covariance(f, live, row, size, moments, gravity, counts, span, steps, zeros, out):
-    """Run the filter at rest, `counts` (streams,) sensors of each stream reading what is predicted every `span` ns."""
+def run_covariance(f, live, row, size, moments, gravity, counts, stamp, span, errors, zeros, out):
+    """Run the filter at rest, `counts` (streams,) sensors of each stream reading what is predicted every `span` ns.
+
+    It stood at `stamp`. Angles read it with `errors` (steps, sensors, n), rad. The estimate is that at the last strokes, before
+    the readings of their stamp, as a twin's.
+    """
     results, estimates = results_in(row, size[0], size[1]), estimates_in(row, size[0], size[1])
-    for k in range(1, steps + 1):
-        advance_estimate(f, live, results, estimates, moments, gravity, k * span)
-        for _ in range(counts[1]):
-            take_angles(f, zeros, 0, k * span)
+    for k in range(errors.shape[0]):
+        stamp += span
+        advance_estimate(f, live, results, estimates, moments, gravity, stamp)
+        if k == errors.shape[0] - 1:
+            write_estimate(f, results, out)
+        for i in range(counts[1]):
+            take_angles(f, errors[k, i], 0, stamp)
         for _ in range(counts[2]):
-            take_imu(f, zeros, size[0], k * span)
+            take_imu(f, zeros, size[0], stamp)
         for _ in range(counts[3]):
-            take_forces(f, zeros, size[0] + 2, k * span)
+            take_forces(f, zeros, size[0] + 2, stamp)
         f.level[:] = f.loads[USUAL_LOAD]  # readings without noise would let it fall
-    write_estimate(f, results, out)

@@ -18,7 +18,8 @@ from ..types import Array
 MODES = 6  # at most
 LEAST_LOAD, MOST_LOAD, USUAL_LOAD, FIRST_LOAD = range(4)  # of `loads`
 STAYS, STAY_TIME = 2.0, 100.0  # standard deviation of the load that stays over the usual one; s
-SCENE_ERROR = 0.02  # standard deviation of a of a cylinder that is as the scene says
+SCENE_ERROR = 0.02  # standard deviation of a before anything is measured
+SCENE_ERRORS = 0.05, 0.003  # likewise of cylinders that are as the scene says: roughly, exactly
 FORCE_OFF, FORCE_DRIFT = 1.0, 0.03  # standard deviation of o once forces are measured, and what is added to it in a second
 LEAST_FORCE = 0.1  # both of a cylinder's force and this share of the largest one
 SOFT, SOFTENING = 0.5, 0.02  # standard deviation of a once anything is measured, and what is added to it in a second
@@ -54,9 +55,10 @@ class DeviationFilter(NamedTuple):
     variances : (n,) of the strokes' estimates, m^2. pushes : (2,) of e, (m/s^2)^2.
     x, p : state and covariance. row, gain, rows : (s,), (s,), (8, s) scratch.
     within, cross : (8, 8), (8, n) scratch, covariances of what the rows read with one another and with a.
-    shifts : (8, n + 1) scratch, by how much the causes change what the rows read; that all are off changes nothing.
-    inverse, healed, drag : (n, n), (8, n), (n,) scratch, B of `weigh_causes`, and B times `cross` and times the mean of a.
-    chances : (n + 2,) of the causes: no cylinder is off, one of them is, all are.
+    shifts : (8, l (n + 1)) scratch, by how much the causes change what the rows read, l levels of the scene's error;
+    that all are off changes nothing.
+    inverse, healed, drag : (l, n, n), (l, 8, n), (l, n) scratch, B of `weigh_level`, B times `cross` and times the mean of a.
+    chances : (l (n + 1) + 1,) of the causes: of each level no cylinder is off, one of them is; all are.
     likely : (5,) scratch, see `boom_twin.estimation.load_level`. before : (2, 2) what angles and IMU said last of the two
     components of the load. level : (2,) of these, N.
     loads : (4,) least and largest level, the usual one, and that which it begins with, N.

@@ -21,6 +21,7 @@ from ..scene.oil_spring import middle_stiffness
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
 from ..types import SENSORS, Array, Mount, Stream
+from .cause_mixture import LEVELS
 from .deviation_filter import ANGLES_STAMP, COUNT, FED, FIRST_LOAD, IMU_STAMP, MODES, SHARES, STAMP, STARTED, DeviationFilter
 from .posture_modes import PostureMode, PostureModes
 from .sensor_model import Mounting
@@ -175,8 +176,8 @@ def _new_filter(scene: Scene, plan: Plan, settings: Settings, mounting: Mounting
         tip=np.zeros((MODES, 3)), turns=np.zeros((MODES, n)), lever=np.zeros((n, 3)),
         coupling=np.zeros((MODES, 4 + 2 * n)), drawn=np.zeros(n), ahead=np.zeros(n), variances=np.zeros(n), pushes=np.zeros(2),
         x=np.zeros(size), p=np.zeros((size, size)), row=np.zeros(size), gain=np.zeros(size), rows=np.zeros((8, size)),
-        within=np.zeros((8, 8)), cross=np.zeros((8, n)), healed=np.zeros((8, n)), inverse=np.zeros((n, n)), drag=np.zeros(n),
-        shifts=np.zeros((8, n + 1)), chances=np.zeros(n + 2),
+        within=np.zeros((8, 8)), cross=np.zeros((8, n)), healed=np.zeros((LEVELS, 8, n)), inverse=np.zeros((LEVELS, n, n)),
+        drag=np.zeros((LEVELS, n)), shifts=np.zeros((8, LEVELS * (n + 1))), chances=np.zeros(LEVELS * (n + 1) + 1),
         spread=np.zeros((2, 2)), level=np.zeros(2), loads=LOADS * STIFFEST * weight_of(scene),
         likely=np.zeros(5), before=np.zeros((2, 2)), now=np.zeros(6),
     )  # fmt: skip

@@ -44,8 +44,12 @@ that which the few modes lack is added (static correction). Bending turns no joi
 
 At rest a load that stays and softer cylinders look alike. Gaussian deviations as wide as a soft cylinder needs would always
 take it for these, all of them a little softer at once; so what is told is a mixture over the causes: no cylinder is off by
-more than a scene's error, or one of them is, or all. The filter itself knows the wide deviations only; what each cause makes
-of its state is a reading of a_i = 0 on top, and the cause's chance is what that reading and its prior say (`weigh_causes`).
+more than a scene's error, or one of them is, or all. How large a scene's error is nobody tells: it fits its boom exactly, or
+roughly (`SCENE_ERRORS`), the one as likely as the other before anything is measured. Four angles tell more than a load of two
+components can make of them; while that agrees with the scene, the exact cause gains, and a load is told from softness. The
+filter itself knows the wide deviations only; what each cause makes of its state is a reading of a_i = 0 on top, and the
+cause's chance is what that reading and its prior say (`weigh_causes`). Sections have no such causes: no sensor tells whether
+they bend as the scene says, and cylinders that do so tell nothing of them.
 
 A section that sags turns the tip and no joint, and to an IMU that turn is a bias. As far as the biases are beyond doubt, the
 stated covariance of the tip is wider: by the shares b, alike in all sections, that make such a turn.
@@ -65,13 +69,14 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .cause_mixture import covariance_of, mean_of, read_covariances, weigh_causes, write_covariance
+from .cause_mixture import chance_of_soft, covariance_of, mean_of, read_covariances, weigh_causes, write_covariance
 from .deviation_filter import ANGLE, BIAS, COUNT, FELT_X, FELT_Y, LOAD, STAYING, STEP, clear, states_of
 from .deviation_readings import read_acceleration, read_tip
 
 REMEMBERED = 2.0  # s, over which the mean square of the deviation is taken
 BEYOND_DOUBT = 2.0  # standard deviations of the IMU's bias, beyond which it may be a sag that no angle shows
-INEXACT = 0.05  # share of the deviation that modes and static corrections may be wrong by
+INEXACT = 0.02  # share of the deviation that modes and static corrections may be wrong by: 1.8 % of a load's, of statics
+SOFT_INEXACT = 0.05  # the same where a cylinder is softer: modes are then others
 
 WIDTH = 22
 TIP, ACCELERATION, FORCE, TIP_COVARIANCE, ACCELERATION_COVARIANCE, FORCE_VARIANCE = 0, 3, 6, 8, 14, 20
@@ -106,9 +111,10 @@ def write_estimate(f, results, out):
     for a in range(8):
         place = (TIP if a < 3 else ACCELERATION - 3 if a < 6 else FORCE - 6) + a
         out[place] += mean_of(f, a, size)
-    at = TIP_COVARIANCE
+    at, soft = TIP_COVARIANCE, chance_of_soft(f)
+    inexact2 = soft * SOFT_INEXACT * SOFT_INEXACT + (1.0 - soft) * INEXACT * INEXACT
     for a in range(3):
-        out[at] += (INEXACT * (out[TIP + a] - results.tip[0, a])) ** 2
+        out[at] += inexact2 * (out[TIP + a] - results.tip[0, a]) ** 2
         at += 3 - a
     add_sag(f, out)
     write_spread(f, results, out)

@@ -1,9 +1,10 @@
 """The estimate of the tip against the virtual rig: errors, stated deviations and the load's pulses, for docs/estimate.md.
 
-    python test/bench/estimate.py --out out/estimate [--seeds 1 2] [--only rest moving] [--sensors angles angles,imu]
+    python test/bench/estimate.py --out out/estimate [--seeds 1 2] [--only rest moving] [--sensors angles] [--wrong 0.02]
 
 Sessions are made once and kept in the folder. Prints of every session and set of sensors: rms error of the tip (mm) and of its
-acceleration (m/s^2), predicted and estimated; rms of error over stated deviation of the two estimates; the load in words.
+acceleration (m/s^2), predicted and estimated; rms of error over stated deviation of the two estimates; the load in words. With
+`--wrong`, stiffnesses and masses of every session's boom are off from its scene by that share at random, others for each seed.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from boom_twin.types import NANO, Array, Stream
 from boom_twin.validation.rig import Programme, Scheme, Sensors, at_rest, move, observe, random_programme
 from boom_twin.validation.rig.faults import RigFault
 from boom_twin.validation.rig.faulty_boom import changes as changes_by
+from boom_twin.validation.rig.faulty_boom import wrong_by
 from boom_twin.validation.rig.loads import parse, tip_load
 from boom_twin.validation.rig.motion import ease, ease_rate
 
@@ -143,15 +145,17 @@ def programme_of(case: Case, scene: Scene, seed: int) -> Callable[[Array], tuple
     return {"stops": stops, "sweep": sweep}[case.motion]
 
 
-def made(name: str, case: Case, seed: int, folder: Path) -> Session:
+def made(name: str, case: Case, seed: int, folder: Path, wrong: float = 0.0) -> Session:
     """The session, from its file if it is there."""
-    path = folder / f"{name.replace(' ', '_').replace(',', '')}-{seed}.npz"
+    share = f"-wrong_{wrong:g}" if wrong else ""
+    path = folder / f"{name.replace(' ', '_').replace(',', '')}-{seed}{share}.npz"
     if path.is_file():
         with np.load(path) as stored:
             return Session(*(stored[field] for field in Session._fields))
     scene = scene_of(case)
-    changes = {key: parameter(scene, key) * by if by < 10.0 else parameter(scene, key) + by for key, by in case.off}
-    boom, changing = changes_by(with_parameters(scene, changes) if changes else scene, case.faults)
+    true = wrong_by(scene, wrong, seed) if wrong else scene
+    changes = {key: parameter(true, key) * by if by < 10.0 else parameter(true, key) + by for key, by in case.off}
+    boom, changing = changes_by(with_parameters(true, changes) if changes else true, case.faults)
     programme = programme_of(case, scene, seed)
     load = tip_load(boom, [parse(text) for text in case.loads], case.seconds, seed) if case.loads else None
     step = 1e-3 if case.rate > 200.0 or case.motion in ("stops", "sweep") else 5e-3
@@ -221,6 +225,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--only", nargs="+", help="words with which names of cases begin")
     parser.add_argument("--sensors", nargs="+", default=["angles,imu", "angles"])
+    parser.add_argument("--wrong", type=float, default=0.0, help="share by which the booms are off from their scenes")
     parser.add_argument("--skip", type=float, default=0.0, help="s at the start that count for nothing")
     args = parser.parse_args()
     print(
@@ -230,7 +235,7 @@ def main() -> None:
         if args.only and not any(name.startswith(word) for word in args.only):
             continue
         for seed in args.seeds:
-            session = made(name, case, seed, args.out)
+            session = made(name, case, seed, args.out, args.wrong)
             for sensors in args.sensors:
                 found = measured(session, case, sensors, args.skip)
                 shown = [f"{each:.3g}" if isinstance(each, float) else each for each in found.values()]

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin import Sample, Stream, Twin, load_scene, statics
 from boom_twin.cli.accuracy import sensors_of, sets_of
 from boom_twin.errors import UsageError
 from boom_twin.estimation import deviation_filter
@@ -34,18 +34,17 @@ def test_more_sensors_are_never_worse(found: list[TipAccuracy]) -> None:
 
 
 def test_it_is_what_a_twin_comes_to(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same sensors on a twin whose load level is held: its covariance after 20 s of readings of a boom at rest."""
+    """The same sensors on a twin whose load level is held: mean of its variances after 10 s of readings of a boom at rest."""
     stated, twin = accuracy_at(SCENE, ARCH, [Stream.ANGLES]), Twin(SCENE)
-    rng, angles = np.random.default_rng(1), None
+    rng, angles = np.random.default_rng(1), np.array(statics(SCENE, strokes=ARCH).joints)
     estimates = []
     for k in range(4000):
         report = twin.update(Sample(Stream.STROKES, 5_000_000 * k, ARCH + 2e-5 * rng.normal(size=4)))
-        assert report.prediction is not None and report.estimate is not None
-        angles = report.prediction.joints if angles is None else angles
+        assert report.estimate is not None
         twin._modes.filter.level[:] = twin._modes.filter.loads[deviation_filter.USUAL_LOAD]
         twin.update(Sample(Stream.ANGLES, 5_000_000 * k, _noisy(angles, rng)))
-        estimates.append(np.sqrt(report.estimate.tip_covariance[[0, 3, 5]]))
-    assert estimates[-1] == pytest.approx(stated.tip, rel=0.1)
+        estimates.append(report.estimate.tip_covariance[[0, 3, 5]])
+    assert np.sqrt(np.mean(estimates[2000:], axis=0)) == pytest.approx(stated.tip, rel=0.03)
 
 
 def _noisy(angles: Array, rng: np.random.Generator) -> Array:
