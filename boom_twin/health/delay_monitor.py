@@ -25,6 +25,7 @@ SPAN = 40  # blocks of one estimate
 KEPT = 30  # spans that are looked at, the newest
 FEWEST = 4.0  # spans, by how much they weigh, before anything is told
 FLOOR = 3e-3  # s, deviation of what a lag is taken for, by the model's own
+HASTE = 0.025  # s, by which readings may be ahead of a prediction: it lags where strokes are smoothed in haste
 SURE, GONE = 5.0, 3.0  # deviations from which on it is told, and below which it has ended
 TINY = 1e-300
 
@@ -131,7 +132,7 @@ class DelayMonitor:
         if self.alarm is not None and abs(lag) < GONE * sigma and math.isfinite(sigma):
             ended, self.alarm = replace(self.alarm, until=end), None
             return [ended]
-        if abs(lag) < SURE * sigma or (self.alarm is None and is_doubted):
+        if abs(lag) - (HASTE if lag < 0.0 else 0.0) < SURE * sigma or (self.alarm is None and is_doubted):
             return []
         cause = delay_cause(self._stream)
         told = f"{cause} late: {lag:+.3g} +- {sigma:.1g} s" + delay_remedy(self._stream)

@@ -15,6 +15,8 @@ from ..types import SENSORS, Alarm, Ranked, Stream
 from .stream_readings import ENOUGH, SlowMeans, StreamReadings
 
 LARGE = 0.2  # of the largest force, from which on a cylinder's is judged: a smaller one may be as large by a load
+NEAR_PEAK = 0.3  # likewise of the largest that this cylinder ever had: while it passes zero a load may make it anything
+LASTING = 3_000_000_000  # ns for which a reason has to explain a reading: in a move a wrong mean passes by many factors
 CLOSE = 0.2  # of the factor by which a reason explains it: share by which the reading may be off it
 RIGHT = 0.5  # of the force: a reading that is less off has the right unit and sign
 
@@ -40,12 +42,13 @@ class ForceReading:
     """
 
     def __init__(self, names: tuple[str, ...]) -> None:
-        self._names, self._alarms = names, dict[int, Alarm]()
+        self._names, self._alarms, self._peaks = names, dict[int, Alarm](), np.zeros(len(names))
         self.begin()
 
     def begin(self) -> None:
         """The boom starts from rest; alarms last until they are refuted."""
         self._is_large = np.zeros(len(self._names), dtype=bool)
+        self._reasons: dict[int, tuple[str, int]] = {}  # of a channel, and since when it explains what is read, ns
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -64,19 +67,28 @@ class ForceReading:
             return []
         heard, slow = readings.counts > 0.0, readings.slow
         expected = np.abs(slow.expected)
-        self._is_large = (expected > LARGE * expected.max()) & (expected > 0.0)
+        self._peaks = np.fmax(self._peaks, expected / np.fmax(slow.weight, ENOUGH))
+        is_near_peak = expected > NEAR_PEAK * self._peaks * slow.weight
+        self._is_large = (expected > LARGE * expected.max()) & is_near_peak & (expected > 0.0)
         news: list[Alarm] = []
         means, models = slow.read.tolist(), slow.expected.tolist()
         for i in np.flatnonzero(heard & self._is_large).tolist():
             factor = means[i] / models[i]
-            if i not in self._alarms and slow.weight[i] > ENOUGH and (reason := _reason(factor)):
-                self._alarms[i] = self._begun(i, reason, slow, start)
+            if i in self._alarms:
+                if abs(factor - 1.0) < RIGHT:
+                    news.append(replace(self._alarms.pop(i), until=end))
+            elif self._is_lasting(i, _reason(factor) if slow.weight[i] > ENOUGH else "", start, end):
+                self._alarms[i] = self._begun(i, *self._reasons.pop(i), slow)
                 news.append(self._alarms[i])
-            elif i in self._alarms and abs(factor - 1.0) < RIGHT:
-                news.append(replace(self._alarms.pop(i), until=end))
         return news
 
-    def _begun(self, i: int, reason: str, slow: SlowMeans, start: int) -> Alarm:
+    def _is_lasting(self, i: int, reason: str, start: int, end: int) -> bool:
+        """Whether this reason has explained what channel `i` reads for long, up to the block from `start` to `end` (ns)."""
+        if self._reasons.get(i, ("", 0))[0] != reason:
+            self._reasons[i] = reason, start
+        return bool(reason) and end - self._reasons[i][1] >= LASTING
+
+    def _begun(self, i: int, reason: str, start: int, slow: SlowMeans) -> Alarm:
         name, cause = self._names[i], f"{self._names[i]}.sensor"
         read, expected = slow.read[i] / slow.weight[i], slow.expected[i] / slow.weight[i]
         told = (

@@ -46,6 +46,10 @@ def test_a_lag_is_told_with_its_size(lag: float) -> None:
     assert monitor.alarm.ranked[0].parts == (("late", value, sigma, "s"),)
 
 
+def test_a_prediction_that_lags_in_haste_makes_no_stream_early() -> None:
+    assert judged(DelayMonitor(Stream.FORCES), -0.02, 60.0) == []
+
+
 @pytest.mark.parametrize("wrong", [{}, {"bias": 2e3}, {"scale": 1.05}, {"lost": 1.0}])
 def test_nothing_else_is_a_lag(wrong: dict[str, float]) -> None:
     """Force pins that read 5 % too much, or so many N, or one that is silent."""

@@ -59,6 +59,25 @@ def test_scales_and_loads_are_no_units(factor: float) -> None:
     assert told(ForceReading(NAMES), factor) == [] == told(ForceReading(NAMES), 1.0, by_load)
 
 
+def test_a_force_that_passes_zero_under_a_load_is_in_no_other_unit() -> None:
+    """At a tenth of what it has been, a load may make it a fifth of that, or turn it, for seconds."""
+    forces, near_zero = ForceReading(NAMES), np.array([-58e3, 9.3e3, 24e3, 1.5e3])
+    assert told(forces, 1.0) == []
+    for first, share in ((60, 1.0 / LBF), (120, -1.0), (180, 0.1)):
+        raw = near_zero * [1.0, share, 1.0, 1.0]
+        for k in range(first, first + 60):
+            assert forces.take(block_of(forces, np.tile(raw, (20, 1)), near_zero, k), k * BLOCK, (k + 1) * BLOCK) == []
+
+
+def test_a_factor_that_does_not_last_is_no_unit() -> None:
+    forces = ForceReading(NAMES)
+    for first in (0, 60):
+        for k in range(first, first + 25):
+            raw = np.tile(EXPECTED * [1.0, 1.0 / LBF, 1.0, 1.0], (20, 1))
+            assert forces.take(block_of(forces, raw, EXPECTED, k), k * BLOCK, (k + 1) * BLOCK) == []
+        assert told(forces, 1.0, first=first + 25) == []
+
+
 def test_what_was_not_measured_tells_nothing() -> None:
     forces, nothing = ForceReading(NAMES), np.full((20, 4), np.nan)
     for readings in (nothing, np.zeros((0, 4))):
