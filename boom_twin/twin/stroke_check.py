@@ -83,7 +83,10 @@ class StrokeCheck:
         if self._clock[TRUSTED] > self._before:  # all were well since the last doubt
             self._strange[:], self._seen[:], self._jumped[:] = 0, self._clock[TRUSTED], NEVER
         self._before = stamp
-        is_back = self._note_jumps(stamp, far, _are_far(values, before, limit), np.abs(values - estimate), np.abs(rates), limit)
+        step = values - before
+        jumps, is_onward = np.abs(step) > limit, step * (before - estimate) > 0.0
+        returned = jumps & (np.abs(values - estimate) <= limit + self._gone(stamp, rates))
+        is_back = self._note_jumps(stamp, far, jumps, is_onward, returned)
         return self._doubted(stamp, values, estimate, far & ~is_back)
 
     @property
@@ -92,11 +95,20 @@ class StrokeCheck:
         jumped = self._jumped != NEVER
         return bool(jumped.any() and (self._before - self._jumped[jumped]).max() >= LASTING)
 
-    def _note_jumps(self, stamp: int, far: Flags, jumps: Flags, off: Array, speeds: Array, limit: float) -> Flags:
-        """Note which readings jump where no cylinder can go within a sample; gives those that jump back."""
+    def _gone(self, stamp: int, rates: Array) -> Array:
+        """How far (m) strokes may have gone since they jumped elsewhere, shape (n,)."""
         elapsed = np.where(self._jumped == NEVER, 0, stamp - self._jumped) * NANO
-        is_back: Flags = (self._jumped != NEVER) & jumps & (off <= limit + (USUAL_RATE + 2.0 * speeds) * elapsed)
-        self._jumped = np.where(far & jumps & ~is_back, stamp, np.where(is_back | ~far, NEVER, self._jumped))
+        return np.asarray((USUAL_RATE + 2.0 * np.abs(rates)) * elapsed)
+
+    def _note_jumps(self, stamp: int, far: Flags, jumps: Flags, is_onward: Flags, returned: Flags) -> Flags:
+        """Note which readings jumped elsewhere, and which are there no more; gives those that jumped back.
+
+        One that jumps on, the same way, is a sensor that tells seldom of a cylinder that moves.
+        """
+        is_away = self._jumped != NEVER
+        is_back: Flags = is_away & returned
+        is_over = is_back | ~far | (is_away & jumps & is_onward)
+        self._jumped = np.where(is_over, NEVER, np.where(far & jumps, stamp, self._jumped))
         return is_back
 
     def _doubted(self, stamp: int, values: Array, estimate: Array, far: Flags) -> tuple[Array, list[str]]:
