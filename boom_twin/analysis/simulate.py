@@ -23,9 +23,7 @@ from .error_estimate import EstimatedError, ringing, row_errors, step_errors, to
 from .initial_state import InitialState, started, state_now
 
 RHO = 0.8
-CLOSEST = (
-    1e-6  # s, between rows: rounding of positions over the square of a shorter step is an acceleration of 0.01 m/s^2 and more
-)
+CLOSEST = 1e-6  # s, between rows: rounding of positions over the square of a shorter step is more than 0.01 m/s^2
 MOST_STEPS = 2e7  # of a motion, whose drive takes 64 bytes a step and cylinder
 
 

@@ -468,10 +468,9 @@ class ResidualMonitor:
         assert self._alarm is not None
         best, cause = verdict.best, self._alarm.cause
         is_sure = cause == verdict.causes[0].name and best.sigma < KNOWN_WITHIN * abs(best.value)
-        others = [
-            part.log_factor for part in verdict.causes[0].parts if part.place != best.place
-        ]  # a scale is no bias elsewhere
-        is_sure = is_sure and max(others, default=-math.inf) < best.log_factor - KIND_TOLD * verdict.excess
+        others = (part.log_factor for part in verdict.causes[0].parts if part.place != best.place)
+        is_told = max(others, default=-math.inf) < best.log_factor - KIND_TOLD * verdict.excess  # a scale is no bias elsewhere
+        is_sure = is_sure and is_told
         if not is_sure or best.is_growing or suspicion.span < KNOWN_AFTER or any(suspicion.recent_fit(verdict)):
             return
         before = self._known.get(cause or "")

@@ -101,8 +101,15 @@ class SensorMonitor:
         `newest`: the block's last readings, shape (channels,), if it has any.
         """
         news = self._back_after_start(end, newest)
-        if findings.is_calm and not self._faults:
-            return news
+        if not findings.is_calm or self._faults:
+            news += self._found(findings, start, end, blamed)
+        if news:
+            self._mask()
+        return news
+
+    def _found(self, findings: SensorFindings, start: int, end: int, blamed: Mapping[str, float]) -> list[Alarm]:
+        """Begin, keep and end faults by what was found; gives alarms that began or ended."""
+        news: list[Alarm] = []
         for kind, flags in findings.by_kind().items():
             if kind not in self._sensors.alarms or not flags.any():
                 continue
@@ -115,8 +122,6 @@ class SensorMonitor:
             if key[1] != "jump" and end - fault.seen > SETTLED:
                 del self._faults[key]
                 news.append(replace(fault.alarm, until=fault.seen))
-        if news:
-            self._mask()
         return news
 
     def _back_after_start(self, end: int, newest: Array | None) -> list[Alarm]:
@@ -129,7 +134,6 @@ class SensorMonitor:
             if is_jump and abs(newest[key[0]] - fault.before) < CAME_BACK * abs(fault.offset):
                 del self._faults[key]
                 news.append(replace(fault.alarm, until=end))
-                self._mask()
         return news
 
     def _is_wild(self, channel: int) -> bool:
