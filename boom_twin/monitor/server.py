@@ -15,6 +15,7 @@ from .actions import ViewerActions
 from .connections import Connection
 from .data.analyst import Analyst
 from .data.feed import Feed
+from .data.present_posture import ResponseCompiler
 from .data.session_list import SessionList
 from .viewer import SessionChoice, Viewer
 
@@ -46,7 +47,7 @@ class Server:
 
     def __init__(self, feed: Feed, actions: ViewerActions, access: AccessControl, sessions: SessionList | None = None) -> None:
         self._feed, self._actions, self._access = feed, actions, access
-        self._sessions = sessions
+        self._sessions, self._compiler = sessions, ResponseCompiler()
         self._opening: asyncio.Task[None] | None = None
         self._viewers: set[web.WebSocketResponse] = set()
 
@@ -94,10 +95,11 @@ class Server:
 
     async def _run(self, application: web.Application) -> AsyncIterator[None]:
         """Let the feed take what comes, as long as the server runs."""
-        self._analyst = Analyst(self._feed)
+        self._analyst = Analyst(self._feed, self._compiler)
         tasks = [asyncio.create_task(each()) for each in (self._poll, self._track_peaks)]
         tasks[0].add_done_callback(_stop_on_fault)
         yield
+        self._compiler.close()
         for task in tasks:
             task.cancel()
             with suppress(asyncio.CancelledError):
@@ -129,7 +131,7 @@ class Server:
         except BoomTwinError as error:
             self._feed.trouble = str(error)
             return
-        self._actions, self._analyst = self._actions.of(self._feed), Analyst(self._feed)
+        self._actions, self._analyst = self._actions.of(self._feed), Analyst(self._feed, self._compiler)
         for socket in set(self._viewers):
             await socket.close()
 

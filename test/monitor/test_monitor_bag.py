@@ -23,6 +23,7 @@ from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.monitor.data.analyst import Analyst
 from boom_twin.monitor.data.bag_feed import ENOUGH, bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
+from boom_twin.monitor.data.present_posture import ResponseCompiler
 from boom_twin.monitor.data.status import ListedAlarm, Severity, overall
 from boom_twin.monitor.protocol import dump, state
 from boom_twin.offline.replay import replay
@@ -68,7 +69,7 @@ def test_estimates_are_those_of_the_replay_and_the_load_is_told_in_words(feed: F
     times, values = feed.store.tables["estimate"].rows(0, 10**6)
     assert len(values) == len(expected) > 0.99 * len(position)
     assert values == pytest.approx(np.array(expected), rel=1e-5, abs=1e-6)
-    found = asyncio.run(Analyst(feed).load_at(14.0))
+    found = asyncio.run(Analyst(feed, ResponseCompiler()).load_at(14.0))
     before = tip_load(times[times <= 14.0], values[times <= 14.0, -2:].astype(float))
     assert before is not None and found == {"kind": "load", "words": f"load at the tip: {before.text}"}
     assert found["words"].endswith("none above 20 N") and json.loads(dump(found)) == found
@@ -81,7 +82,7 @@ def test_without_an_estimate_there_is_no_table_of_it(tmp_path: Path) -> None:
     write_session(tmp_path / "strokes", stamps, strokes, np.full((100, 4), np.nan), None, {})
     feed = read_all(bag_feed(tmp_path / "strokes", load_scene(), Settings()))
     assert feed.store.tables["displacement"].count == 100 and "estimate" not in feed.store.tables
-    assert asyncio.run(Analyst(feed).load_at(0.5)) is None
+    assert asyncio.run(Analyst(feed, ResponseCompiler()).load_at(0.5)) is None
 
 
 def test_numbers_are_those_of_the_summary(feed: Feed, replayed: Path) -> None:

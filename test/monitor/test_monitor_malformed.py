@@ -23,6 +23,7 @@ from boom_twin.monitor.data import topic_rows as catching
 from boom_twin.monitor.data.analyst import Analyst
 from boom_twin.monitor.data.dropped_messages import LONGEST
 from boom_twin.monitor.data.feed import Feed
+from boom_twin.monitor.data.present_posture import ResponseCompiler
 from boom_twin.monitor.data.spectrum import MOST_POINTS, spacing, spectrogram, spectrum
 from boom_twin.monitor.data.status import MOST_NODES
 from boom_twin.monitor.data.store import Store
@@ -279,7 +280,7 @@ def test_a_burst_of_stamps_costs_neither_memory_nor_work(name: str, monkeypatch:
     bench = Bench()
 
     async def look() -> None:
-        analyst = Analyst(bench.feed)
+        analyst = Analyst(bench.feed, ResponseCompiler())
         for row in range(3000):
             bench.send(Output.TIP_ACCELERATION, vector(Output.TIP_ACCELERATION, row % 7), EPOCH + BURSTS[name](row))
             if row % 500 == 499:

@@ -12,7 +12,7 @@ import numpy as np
 from ...estimation.load_spectrum import tip_load
 from ..protocol import RESPONSE, SPECTROGRAM, SPECTRUM, pack
 from .feed import Feed
-from .present_posture import MOVED, ModeList, ResponseList, TipResponses, compile_beside
+from .present_posture import MOVED, ModeList, ResponseCompiler, ResponseList, TipResponses
 from .spectrum import SEGMENT, STEP, WINDOW, Spectrum, spectrogram, spectrum
 from .topic_rows import ESTIMATE
 
@@ -48,10 +48,12 @@ class Analyst:
     Parameters
     ----------
     feed : Feed
+    compiler : ResponseCompiler
+        Common to all feeds.
     """
 
-    def __init__(self, feed: Feed) -> None:
-        self._feed = feed
+    def __init__(self, feed: Feed, compiler: ResponseCompiler) -> None:
+        self._feed, self._compiler = feed, compiler
         self._modes: ModeList | None = None
         self._responses: ResponseList | None = None
         self._turn, self._response_turn = asyncio.Lock(), asyncio.Lock()
@@ -96,7 +98,7 @@ class Analyst:
             if len(strokes) != len(scene.joints):
                 return UNKNOWN_POSTURE
             if self._responses is None:
-                await compile_beside()
+                await self._compiler.finish()
                 self._responses = ResponseList(scene)
             return await asyncio.to_thread(self._responses.at, strokes)
 

@@ -5,10 +5,11 @@ Worked out anew only where the boom has moved, in a thread beside the server and
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
@@ -25,6 +26,9 @@ from ...scene.schema import Scene
 from ...system.child_process import python_command
 from ...types import Array
 
+if TYPE_CHECKING:
+    import asyncio
+
 MOVED = 0.005
 """m of any stroke after which all is worked out anew."""
 
@@ -37,13 +41,15 @@ class PresentPosture(Generic[Found]):
     def __init__(self) -> None:
         self._at: Array | None = None
         self._found: Found | None = None
+        self._one_at_a_time = threading.Lock()  # a thread goes on when the viewer that waited for it has gone
 
     def at(self, strokes: Sequence[float]) -> Found:
         """What there is at `strokes` (m); the same object as before where the boom has not moved."""
         now = np.asarray(strokes, dtype=np.float64)
-        if self._found is None or self._at is None or np.max(np.abs(now - self._at)) > MOVED:
-            self._found, self._at = self._work_out(now), now
-        return self._found
+        with self._one_at_a_time:
+            if self._found is None or self._at is None or np.max(np.abs(now - self._at)) > MOVED:
+                self._found, self._at = self._work_out(now), now
+            return self._found
 
     def _work_out(self, strokes: Array) -> Found:
         raise NotImplementedError
@@ -116,14 +122,33 @@ class ResponseList(PresentPosture[TipResponses]):
         return TipResponses(names, FREQUENCIES, np.column_stack(columns))
 
 
-async def compile_beside() -> None:
-    """Have a process of its own compile what responses need, if that was never done on this computer.
+class ResponseCompiler:
+    """Has a process of its own compile what responses need, if that was never done on this computer; once, for all viewers.
 
     It takes half a minute, in which a compiler in a thread of the server would leave it little of the interpreter's lock.
+    A viewer that goes away meanwhile does not stop it, or a page that is opened and closed again would never have responses.
     """
+
+    def __init__(self) -> None:
+        self._task: asyncio.Task[None] | None = None
+
+    async def finish(self) -> None:
+        """Return when it is done."""
+        import asyncio  # which a replay, whose report uses this module, has no need of
+
+        self._task = self._task or asyncio.create_task(_compile_beside())
+        await asyncio.shield(self._task)
+
+    def close(self) -> None:
+        """Stop it, if it runs."""
+        if self._task is not None:
+            self._task.cancel()
+
+
+async def _compile_beside() -> None:
     if not could_be_kept(harmonic_response):
         return
-    import asyncio  # which a replay, whose report uses this module, has no need of
+    import asyncio
     from asyncio.subprocess import DEVNULL
 
     process = await asyncio.create_subprocess_exec(*python_command(__name__), stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL)
