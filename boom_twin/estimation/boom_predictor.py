@@ -21,6 +21,8 @@ from ..scene.kinematics import joint_angles_of_strokes, rigid_chain
 from ..scene.schema import Scene
 from ..types import Array, Outline, Prediction
 from .look_ahead import STEPS, Track, new_track
+from .recorded_steps import step_width
+from .stroke_filter import forget_integrals
 
 
 class UndeflectedPredictor:
@@ -187,8 +189,13 @@ class BoomPredictor:
         bank = self._track.bank
         span = float(bank.span[0])
         found = (bank.shares / span, bank.excesses / span) if span else (bank.weights.copy(), np.zeros(len(bank.weights)))
-        bank.span[:], bank.shares[:], bank.excesses[:] = 0.0, 0.0, 0.0
+        forget_integrals(bank)
         return found
+
+    @property
+    def step_width(self) -> int:
+        """Most numbers that a step leaves, see `boom_twin.estimation.recorded_steps`."""
+        return step_width(self.live, self._work, self._track, self._row)
 
     @property
     def is_lost(self) -> bool:

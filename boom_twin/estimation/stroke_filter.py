@@ -149,7 +149,7 @@ def new_filter(strokes: int, nodes: int) -> StrokeFilter:
 @inner
 def start_filter(bank, tuning, y):
     """First node: strokes at rest at y (m), shape (n,)."""
-    bank.usual[0], bank.began[0], bank.span[0] = 0.0, 0, 0.0
+    bank.usual[0], bank.began[0] = 0.0, 0
     for m in range(bank.x.shape[0]):
         for a in range(3):
             for b in range(3):
@@ -157,9 +157,10 @@ def start_filter(bank, tuning, y):
         bank.c[m, 0, 0, 0], bank.c[m, 0, 1, 1], bank.c[m, 0, 2, 2] = tuning.variance, QUIET, QUIET
         for i in range(y.shape[0]):
             bank.x[m, 0, i, 0], bank.x[m, 0, i, 1], bank.x[m, 0, i, 2] = y[i], 0.0, 0.0
-            bank.weights[i, m], bank.shares[i, m] = tuning.prior[m], 0.0
+            bank.weights[i, m] = tuning.prior[m]
     for i in range(y.shape[0]):
-        bank.surprise[i], bank.excess[i], bank.is_lost[i], bank.excesses[i] = 0.0, 0.0, 0, 0.0
+        bank.surprise[i], bank.excess[i], bank.is_lost[i] = 0.0, 0.0, 0
+    forget_integrals(bank)
     combine(bank, 1)
 
 
@@ -295,6 +296,16 @@ def integrate(bank, h):
             bank.shares[i, m] += h * bank.weights[i, m]
         if bank.is_lost[i]:
             bank.excesses[i] += h * max(bank.excess[i], 0.0)
+
+
+@inner
+def forget_integrals(bank):
+    """Begin the integrals over time anew."""
+    bank.span[0] = 0.0
+    for i in range(bank.weights.shape[0]):
+        bank.excesses[i] = 0.0
+        for m in range(bank.x.shape[0]):
+            bank.shares[i, m] = 0.0
 
 
 @inner

@@ -9,6 +9,7 @@ from __future__ import annotations
 import gc
 import json
 import math
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -31,6 +32,7 @@ from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
 from ..estimation.load_spectrum import TipLoad
 from ..health.baseline import Baseline
+from ..kernels.compiled_cache import is_kept
 from ..messages.sample_decoder import stamp_of
 from ..messages.topic_table import Topics
 from ..scene.edit import anew
@@ -46,7 +48,7 @@ from ..twin.events import EVENTS
 from ..types import NANO, Alarm, Array, Change, Report, Stream, channels_of
 from .ground_truth import TipErrors, TipTruth, load_truth
 from .process_pipe import Pipe
-from .reader_process import SampleReader
+from .reader_process import SampleReader, SteppedBoom
 from .recording import Recording, Stretch
 from .refused_strokes import RefusedStrokes
 from .sample_table import RowsInMemory, SampleTable, columns_of
@@ -67,6 +69,10 @@ class ProgressBar(Protocol):
 
 
 Progress = Callable[[int], ProgressBar]
+UPDATE = "boom_twin.twin.update.update"
+"""Name of the kernel that takes long to compile."""
+MANY = 20_000
+"""Messages of a session, below which a process that steps the boom takes longer to start than it saves."""
 GIVEN = "given as a Scene"
 """Source of a scene that came by no file."""
 
@@ -205,10 +211,12 @@ def replay_into(
     namespace: str = "",
     take: Callable[[Stretch], None] | None = None,
     with_bag: bool = True,
+    cores: int | None = None,
 ) -> Replay:
     """As `replay`, into a folder that is being built, for more to be added to it.
 
     With `take`, memory stays the same however long the session is: it is given one `Stretch` after the other, and none is kept.
+    Of so many `cores` (all that this process may use, if not given) it makes use; the result is the same.
     """
     with _processes(building, with_bag) as (reader, writer):
         session, out, settings = scan(Path(bag)), building.folder, settings or settings_of(Path(bag)).settings
@@ -223,15 +231,19 @@ def replay_into(
         taking = None if take is None else _Timed(take)
         recording, other_boom, read = Recording(joints, taking, errors), OtherBoom(), np.zeros(joints, dtype=bool)
         refused = RefusedStrokes(scene, taken.source)
-        ahead = SampleReader(session.path, topics, wanted, joints, window, reader)
+        expected = _expected(session, wanted, window)
+        is_apart = _is_stepped_apart(expected, cores)
+        boom = SteppedBoom(scene, settings, topics.mounts(joints), changes) if is_apart else None
+        ahead = SampleReader(session.path, topics, wanted, joints, window, reader, boom)
         behind = None if writer is None else ReportWriter(writer, session.notes, topics, scene, settings)
         with _unhurried_collector():
             twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline)
+            ahead.recorded_steps = twin.recorded_steps
             ahead.wait_ready()
             if behind is not None:
                 behind.wait_ready()
             samples: Iterator[SampleBlock | Change | None] = iter(ahead)
-            bar = progress(_expected(session, wanted, window)) if progress else None
+            bar = progress(expected) if progress else None
             began = time.perf_counter()
             if not changes:
                 samples = (sample for sample in samples if not isinstance(sample, Change))
@@ -373,6 +385,13 @@ def _processes(building: UnfinishedResult, with_bag: bool) -> Iterator[tuple[Pip
             writer = ReportWriter.started(building.folder / "bag", building.lock)
             ended.callback(writer.stop)
         yield reader, writer
+
+
+def _is_stepped_apart(messages: int, cores: int | None) -> bool:
+    """Whether the boom is stepped in the reader's process: not on one core, nor where both processes would have to compile."""
+    if cores is None:
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return messages >= MANY and cores > 1 and is_kept(UPDATE)
 
 
 def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Baseline | None) -> Twin:

@@ -18,6 +18,7 @@ from ..config.settings import Settings
 from ..estimation.boom_predictor import BoomPredictor, Drawn
 from ..estimation.deviation_modes import DeviationModes
 from ..estimation.look_ahead import Tuning
+from ..estimation.recorded_steps import RecordedSteps
 from ..estimation.sensor_model import Mounting
 from ..estimation.step_choice import StepChoice
 from ..estimation.stroke_filter import filter_tuning
@@ -34,7 +35,7 @@ from .report_rows import ReportRows
 from .run import Run
 from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .stroke_check import FAR
-from .update import AFTER_PAUSE, DONE, LOOK, ODD, REFRESH, measure, update
+from .update import AFTER_PAUSE, DONE, LOOK, ODD, REFRESH, UNRECORDED, measure, update
 
 CAPACITY = 4096  # samples that one call of the compiled update takes at most
 
@@ -105,6 +106,8 @@ class BlockUpdate:
         Of events; ``deflected``, ``not followed`` and ``unmatched`` are counted here.
     shedding : LoadShedding
         Asked what is left out.
+    steps : RecordedSteps
+        Of the boom's steps, whether they are recorded or repeated.
     before : BlockUpdate, optional
         Of the same scene under another load, whose arrays are taken over.
 
@@ -124,9 +127,10 @@ class BlockUpdate:
         judge: HealthMonitor | None,
         counts: Counter[str],
         shedding: LoadShedding,
+        steps: RecordedSteps,
         before: BlockUpdate | None = None,
     ) -> None:
-        self._shedding = shedding
+        self._shedding, self._steps = shedding, steps
         self._boom, self.limits, self._state, self._channels, self._step = boom, limits, state, channels, step
         self._modes, self._judge, self._told_counts = modes, judge, counts
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
@@ -212,7 +216,8 @@ class BlockUpdate:
         boom, twin = self._boom.held, (hold(self._limits), state, self._modes.held)
         if self._code is None:
             one, width = np.zeros(1, np.int64), int(self._widths.max())
-            advance = update.for_types_of(*boom, *twin, one, one, np.zeros((1, width)), 0, False, False, found)
+            of_boom = *boom, *twin, self._steps.held
+            advance = update.for_types_of(*of_boom, one, one, np.zeros((1, width)), 0, False, False, found)
             self._code = advance, measure.for_types_of(*twin, 0, 0, np.zeros(width), False, found)
             self._copy_predictions(found, 0, self._pins, *PredictionRows.room(0, self._joints))
             self._copy_residuals(found, 0, 0, 0, *MeasuredRows.room(0, 1))
@@ -231,14 +236,18 @@ class BlockUpdate:
         row, is_resumed, size = 0, False, len(block.stamps)
         assert run is not None
         (advance, _), (arguments, twin, found) = self._held or self._hold()
+        if self._steps.are_recorded:
+            self._steps.make_room(size, self._boom.step_width)
         while True:
-            reason, row = advance(*arguments, *twin, *block, row, is_resumed, trusted, found)
+            reason, row = advance(*arguments, *twin, self._steps.held, *block, row, is_resumed, trusted, found)
             if is_resumed := reason == REFRESH:
                 interval, boom = run.interval or self._step, self._boom
                 prediction = boom.prediction(run.newest)
                 run.deviations.refresh(prediction, interval, boom.take_filtered(), boom.live, boom.angles)
                 assert run.deviations.noise is not None
                 self._modes.refresh(prediction.strokes, boom.angles, boom.live, run.deviations.noise)
+            elif reason == UNRECORDED:
+                raise RuntimeError(f"the step to the strokes at {block.stamps[row]} ns is not the one that was recorded")
             elif reason != LOOK:
                 return reason, row
             else:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..config.settings import Settings
 from ..errors import BoomTwinError, SolverError, UsageError
+from ..estimation.recorded_steps import RecordedSteps
 from ..health.baseline import Baseline
 from ..health.inference.block_problem import BlockProblem
 from ..health.monitor import warm_up
@@ -72,6 +73,8 @@ class Twin:
         Of the rig's health; None without a baseline.
     steps : StepChoice
         How the boom is stepped, and how far that may be off.
+    recorded_steps : RecordedSteps
+        Takes the boom's steps for another twin, or has them from one.
 
     Notes
     -----
@@ -90,7 +93,7 @@ class Twin:
         self._on_block, scene = on_block, as_scene(scene)
         self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
         self.counts: Counter[str] = Counter()
-        self.shedding = LoadShedding()
+        self.shedding, self.recorded_steps = LoadShedding(), RecordedSteps()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self._channels = channels_of(len(scene.joints))
         self._widths = [len(names) for names in self._channels.values()]
@@ -194,7 +197,7 @@ class Twin:
         self.plan = self._boom.plan
         parts = self._boom, model.limits, self._state, self._channels, self.settings.step, self._modes, self.judge
         self._former = before  # let go of when the next model is made, which may be in a thread of its own
-        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, before)
+        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, self.recorded_steps, before)
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, self.plan.joints)))  # of strokes
 
     def _take_over(self, stamp: int) -> list[str]:

@@ -14,6 +14,7 @@ import numpy as np
 from ..estimation.deviation_readings import take_angles, take_forces, take_imu
 from ..estimation.deviation_step import advance_estimate
 from ..estimation.look_ahead import follow
+from ..estimation.recorded_steps import MODE, OTHER, RECORDING, REPEATING, record_step, repeat_step
 from ..estimation.sensor_model import TURN
 from ..estimation.tip_estimate import write_estimate
 from ..kernels.jit import inner, kernel
@@ -53,16 +54,16 @@ PAUSE = 0.1  # s without strokes, after which
 ALONE = np.int64(0)  # row of a sample that comes alone; typed, because numba compiles once more for every literal
 AFTER_PAUSE = 0.15  # s of strokes come before the remembered boom is stepped over it: they tell how the pause ended
 
-DONE, ODD, REFRESH, LOOK, FAILED = range(5)
+DONE, ODD, REFRESH, LOOK, FAILED, UNRECORDED = range(6)
 """Why `update` returned: all samples taken; the sample is not ordinary; deviations are to be made anew for the sample, which
 was stepped to; the sample is complete and begins a slot, left the model's validity or is not followed; the model failed (see
-`STATUS`)."""
+`STATUS`); the step that was to be repeated is another's."""
 
 
 @kernel
 def update(
-    t, anchor, live, work, tangents, track, bending, out, limits, state, tip, streams, stamps, values, first, resumed, trusted,
-    found,
+    t, anchor, live, work, tangents, track, bending, out, limits, state, tip, steps, streams, stamps, values, first, resumed,
+    trusted, found,
 ):  # fmt: skip
     """Take the samples of a block from row `first` on, as long as they are ordinary.
 
@@ -75,6 +76,8 @@ def update(
         Of a run that has begun.
     tip : DeviationFilter
         See `boom_twin.estimation.tip_estimate`.
+    steps : StepRows
+        Whether steps are recorded, and nothing else is done, or repeated, see `boom_twin.estimation.recorded_steps`.
     streams, stamps, values : ndarray
         See `boom_twin.twin.blocks.SampleBlock`.
     resumed : bool
@@ -103,10 +106,24 @@ def update(
                     return ODD, row
                 note_stamp(state, STROKES, stamp)
             time, tuning = begin_step(limits, state, stamp)
-            state.clock[STATUS] = follow(t, anchor, live, work, tangents, track, tuning, time, state.taken, out)
-            if state.clock[STATUS] != OK:
+            is_drawn = begins_slot(state, stamp)
+            if steps.state[MODE] == REPEATING:
+                status = repeat_step(steps, live, work, track, time, state.taken, is_drawn, out)
+                if status == OTHER:
+                    return UNRECORDED, row
+            else:
+                status = follow(t, anchor, live, work, tangents, track, tuning, time, state.taken, out)
+            is_recorded = steps.state[MODE] == RECORDING
+            if is_recorded:
+                record_step(steps, live, work, track, time, state.taken, is_drawn, status, out)
+            state.clock[STATUS] = status
+            if status != OK:
                 return FAILED, row
             end_step(state, stamp)
+            if is_recorded:
+                keep_strokes(state, stamp)
+                row += 1
+                continue
             if stamp >= state.clock[SEEN] + INTERVAL or track.bank.began[0]:
                 return REFRESH, row
         resumed = False
@@ -189,9 +206,14 @@ def end_step(state, stamp):
         state.pace[USUAL_STEP] += SMOOTHING * (span - state.pace[USUAL_STEP])
     else:
         state.pace[USUAL_STEP] = span
-    slot = stamp // SLOT
-    state.clock[BEGINS_SLOT] = slot != state.clock[IN_SLOT]
-    state.clock[IN_SLOT], state.clock[NEWEST] = slot, stamp
+    state.clock[BEGINS_SLOT] = begins_slot(state, stamp)
+    state.clock[IN_SLOT], state.clock[NEWEST] = stamp // SLOT, stamp
+
+
+@inner
+def begins_slot(state, stamp):
+    """Whether it is the first stamp in a slot."""
+    return stamp // SLOT != state.clock[IN_SLOT]
 
 
 @inner
@@ -212,16 +234,23 @@ def remember(live, bending, out, pins, passes, limits, state, tip, stamp, row, f
     found.counts[0] = k + 1
     off = math.hypot(results.tip[0, 0] - estimates.rigid_tip[0], results.tip[0, 1] - estimates.rigid_tip[1])
     state.clock[IS_DEFLECTED] = off > limits.valid
+    past, at = state.past, keep_strokes(state, stamp)
+    write_expected(limits, state, live, results, estimates, past.values[at], past.sigmas[at])
+    advance_estimate(tip, live, results, estimates, found.moments[k], limits.gravity, stamp)
+
+
+@inner
+def keep_strokes(state, stamp):
+    """Keep the newest strokes with those of the last `SPAN`; gives their row, where the expected readings go."""
     past = state.past
     while past.bounds[COUNT] > 0 and past.stamps[past.bounds[FIRST]] < stamp - SPAN:
         past.bounds[FIRST] = (past.bounds[FIRST] + 1) % KEPT
         past.bounds[COUNT] -= 1
     at = new_row(past)
     past.stamps[at] = stamp
-    for i in range(n):
+    for i in range(state.strokes.shape[0]):
         past.strokes[at, i] = state.strokes[i]
-    write_expected(limits, state, live, results, estimates, past.values[at], past.sigmas[at])
-    advance_estimate(tip, live, results, estimates, found.moments[k], limits.gravity, stamp)
+    return at
 
 
 @inner
