@@ -70,14 +70,23 @@ class DeviationModes:
 
     def begin(self) -> None:
         """A new run: nothing is known of the deviation."""
-        f = self.filter
-        f.status[STARTED:] = 0
-        f.level[:], self._at[:] = f.loads[FIRST_LOAD], math.inf
-        f.before[:], f.spread[:] = 0.0, 0.0
+        self.filter.status[STARTED:] = 0
+        self._at[:] = math.inf
+        self._forget()
         self.expect_noise(1.0, 1.0)
 
+    def _forget(self) -> None:
+        """Know nothing of the deviation from the next strokes on."""
+        f = self.filter
+        f.status[STARTED] = 0
+        f.level[:] = f.loads[FIRST_LOAD]
+        f.before[:], f.spread[:] = 0.0, 0.0
+
     def mask(self, masked: NDArray[np.bool_]) -> None:
-        """Leave out the channels (c,) that are masked."""
+        """Leave out the channels (c,) that are masked; once these are all angles, what they have shown is forgotten."""
+        angles = slice(len(self.filter.slopes))
+        if masked[angles].all() and not self.filter.masked[angles].all():
+            self._forget()
         self.filter.masked[:] = masked
 
     def expect_noise(self, strokes: float, angles: float) -> None:

@@ -1,10 +1,10 @@
 """Monitor a constant lag of a stream's stamps: what is read is that of an earlier time, by as much whatever moves.
 
-Readings that are d late differ from the prediction by -d times its slope. Both are averaged over two periods of the slowest
-vibration, two seconds at least (a triangle of blocks), which takes vibration out: a natural frequency that is 1 % wrong puts
-vibration out of phase as a lag does. Spans of 4 s, each less its mean, give d by least squares, and how it scatters among
-them gives its deviation: whatever else is wrong with the model goes with where the boom is, not with which way it moves, and
-does not agree about d.
+Readings that are d late differ from the prediction by what that has gone in the d before. Both are averaged over two periods
+of the slowest vibration, two seconds at least (a triangle of blocks), which takes vibration out: a natural frequency that is
+1 % wrong puts vibration out of phase as a lag does. Spans of 4 s, each less its mean, give d by least squares (Gauss-Newton,
+for moves do not go on at the same rate for half a second), and how it scatters among them gives its deviation: whatever else
+is wrong with the model goes with where the boom is, not with which way it moves, and does not agree about d.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ FEWEST = 4.0  # spans, by how much they weigh, before anything is told
 FLOOR = 3e-3  # s, deviation of what a lag is taken for, by the model's own
 HASTE = 0.025  # s, by which readings may be ahead of a prediction: it lags where strokes are smoothed in haste
 SURE, GONE = 5.0, 3.0  # deviations from which on it is told, and below which it has ended
+LONGEST = 1.5  # s, lag that is looked for: of a span more is left than is lost at its ends
+ROUNDS, ROUND = 6, 0.25  # of Gauss-Newton, and by how much (s) a lag changes in one at most
 TINY = 1e-300
 
 
@@ -46,6 +48,8 @@ class DelayMonitor:
     Parameters
     ----------
     stream : Stream
+    least : float, optional
+        s, lag that is told.
 
     Attributes
     ----------
@@ -53,8 +57,8 @@ class DelayMonitor:
         While it lasts.
     """
 
-    def __init__(self, stream: Stream) -> None:
-        self._stream = stream
+    def __init__(self, stream: Stream, least: float = 0.0) -> None:
+        self._stream, self._least = stream, least
         self.alarm: Alarm | None = None
         self.begin()
 
@@ -62,7 +66,7 @@ class DelayMonitor:
         """The boom starts from rest; what is known of the lag stays known no longer, an alarm lasts until it is refuted."""
         self._number = 0
         self._blocks: deque[tuple[StreamReadings, NDArray[np.bool_]]] = deque()
-        self._spans: deque[tuple[Array, Array, Array]] = deque(maxlen=KEPT)
+        self._spans: deque[tuple[Array, Array]] = deque(maxlen=KEPT)
 
     def take(
         self,
@@ -105,34 +109,41 @@ class DelayMonitor:
         rows, slopes = self._averaged(lags, half), self._averaged(rates, half)
         for _ in range(SPAN):
             self._blocks.popleft()
-        found = -(rows * slopes).sum(axis=0), (slopes**2).sum(axis=0), (rows**2).sum(axis=0)
-        is_known = np.isfinite(found[0])
-        self._spans.append(tuple(np.where(is_known, each, 0.0) for each in found))  # type: ignore[arg-type]
+        is_known = np.isfinite(rows).all(axis=0) & np.isfinite(slopes).all(axis=0)
+        self._spans.append((np.where(is_known, rows, 0.0), np.where(is_known, slopes, 0.0)))
         return self._judge(end, is_doubted())
 
     @staticmethod
     def _averaged(blocks: list[Array], half: int) -> Array:
-        """Less their mean, shape (SPAN, channels); `half` blocks are half of the triangle."""
+        """Shape (SPAN, channels); `half` blocks are half of the triangle."""
         rows, triangle = np.array(blocks), np.convolve(np.ones(half), np.ones(half)) / half**2
-        smooth = np.column_stack([np.convolve(column, triangle, "valid") for column in rows.T])
-        return np.asarray(smooth - smooth.mean(axis=0))
+        return np.column_stack([np.convolve(column, triangle, "valid") for column in rows.T])
 
     def estimate(self) -> tuple[float, float]:
         """The lag and its deviation, s; infinite while too little has moved."""
-        shared, squares, power = (np.array(each) for each in zip(*self._spans, strict=True))
-        noise = power.sum(axis=0) + TINY
-        by, weight = (shared / noise).sum(axis=1), (squares / noise).sum(axis=1)
-        if weight.sum() ** 2 < FEWEST * (weight**2).sum() or not weight.sum() > 0.0:
+        rows, slopes = (np.array(each) for each in zip(*self._spans, strict=True))
+        lag = 0.0
+        for _ in range(ROUNDS):
+            left, rates = _without_lag(rows, slopes, lag)
+            noise = (left**2).sum(axis=(0, 1)) + TINY
+            by, weight = -(left * rates).sum(axis=1) / noise, (rates**2).sum(axis=1) / noise
+            if not weight.sum() > 0.0:
+                return 0.0, math.inf
+            change = float(by.sum() / weight.sum())
+            lag = min(max(lag + min(max(change, -ROUND), ROUND), -LONGEST), LONGEST)
+        if weight.sum() ** 2 < FEWEST * (weight**2).sum():
             return 0.0, math.inf
-        lag = float(by.sum() / weight.sum())
-        return lag, math.hypot(float(np.sqrt(((by - lag * weight) ** 2).sum()) / weight.sum()), FLOOR)
+        scatter = float(np.sqrt(((by - change * weight) ** 2).sum()) / weight.sum())
+        return lag, math.hypot(scatter, FLOOR)
 
     def _judge(self, end: int, is_doubted: bool) -> list[Alarm]:
         lag, sigma = self.estimate()
         if self.alarm is not None and abs(lag) < GONE * sigma and math.isfinite(sigma):
             ended, self.alarm = replace(self.alarm, until=end), None
             return [ended]
-        if abs(lag) - (HASTE if lag < 0.0 else 0.0) < SURE * sigma or (self.alarm is None and is_doubted):
+        if abs(lag) - (HASTE if lag < 0.0 else 0.0) < SURE * sigma or (
+            self.alarm is None and (is_doubted or abs(lag) < self._least)
+        ):
             return []
         cause = delay_cause(self._stream)
         told = f"{cause} late: {lag:+.3g} +- {sigma:.1g} s" + delay_remedy(self._stream)
@@ -140,6 +151,31 @@ class DelayMonitor:
         alarm = self.alarm or Alarm(self._stream.value, "late", end, None, cause, told, ranked)
         self.alarm = replace(alarm, told=told, ranked=ranked)
         return [self.alarm]
+
+
+def _without_lag(rows: Array, slopes: Array, lag: float) -> tuple[Array, Array]:
+    """What readings are off by beside a lag (s), and the slopes that they were read at; each less its mean in a span.
+
+    Parameters
+    ----------
+    rows, slopes : ndarray, shape (spans, SPAN, channels)
+        By how much readings are off, and the slope of what they should be, of blocks `BLOCK` apart.
+
+    Returns
+    -------
+    two ndarray, shape (spans, k, channels)
+        Of the blocks whose readings are of a time within their span.
+    """
+    steps = 0.5 * BLOCK * (slopes[:, 1:] + slopes[:, :-1])
+    gone = np.concatenate([np.zeros_like(slopes[:, :1]), np.cumsum(steps, axis=1)], axis=1)
+    places = np.arange(SPAN) - lag / BLOCK
+    own = np.flatnonzero((places >= 0.0) & (places <= SPAN - 1.0))
+    before = np.minimum(np.floor(places[own]).astype(int), SPAN - 2)
+    share = (places[own] - before)[:, None]
+    rates = (1.0 - share) * slopes[:, before] + share * slopes[:, before + 1]
+    then = gone[:, before] + share * BLOCK * 0.5 * (slopes[:, before] + rates)
+    left = rows[:, own] + gone[:, own] - then
+    return left - left.mean(axis=1, keepdims=True), rates - rates.mean(axis=1, keepdims=True)
 
 
 def _off(readings: StreamReadings, masked: NDArray[np.bool_]) -> Array:

@@ -47,8 +47,8 @@ CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.alarms)
 """The streams whose single sensors are checked."""
 MEASURED_NOISE = (Stream.STROKES, Stream.ANGLES)
 """Those whose noise is told: what an IMU reads of vibration is not told from noise."""
-DELAYED = (Stream.IMU, Stream.FORCES)
-"""Those whose lag is told by `DelayMonitor`; that of the angles is among the causes of residuals."""
+DELAYED = {Stream.ANGLES: 0.1, Stream.IMU: 0.0, Stream.FORCES: 0.0}
+"""Those whose lag is told by `DelayMonitor`, and from how many s on: a small one of the angles is among the causes of residuals."""
 
 
 class HealthMonitor:
@@ -80,11 +80,12 @@ class HealthMonitor:
         self.residuals = ResidualMonitor(scene, settings, mounts, baseline, self.names, on_block)
         self._ranges = sensor_ranges(scene, mounts)
         self._stated = {stream: settings.variance(kind) for stream, kind in SENSORS.items()}
+        self._late_angles = np.ones(len(self._channels[Stream.ANGLES]), dtype=bool)
         self._trusted = {stream: np.zeros(len(names), dtype=bool) for stream, names in self._channels.items()}
         self._sensors = {
             stream: SensorMonitor(self._channels[stream], SENSORS[stream], stream is not Stream.STROKES) for stream in CHECKED
         }
-        self._delays = {stream: DelayMonitor(stream) for stream in DELAYED}
+        self._delays = {stream: DelayMonitor(stream, least) for stream, least in DELAYED.items()}
         self._mount, self._forces = ImuMount(), ForceReading(self._channels[Stream.FORCES])
         self._angles = AngleReading(scene, mounts)
         self._ended: list[Alarm] = []
@@ -140,12 +141,18 @@ class HealthMonitor:
 
     def _masked(self, stream: Stream) -> NDArray[np.bool_]:
         """The same of one stream; another array once these are others."""
-        masked = self._sensors[stream].masked if stream in self._sensors else self._trusted[stream]
+        masked = self._failing(stream)
+        if stream is Stream.ANGLES and self._delays[stream].alarm is not None:
+            return self._late_angles
         if stream is Stream.FORCES and self._forces.alarms:
             return masked | self._forces.masked
         if stream is Stream.ANGLES and self._angles.is_wrong:
             return masked | self._angles.masked
         return ~masked if stream is Stream.IMU and self._mount.alarm is not None else masked
+
+    def _failing(self, stream: Stream) -> NDArray[np.bool_]:
+        """Which sensors of a stream are known to fail, each by itself."""
+        return self._sensors[stream].masked if stream in self._sensors else self._trusted[stream]
 
     def judge(self, stamp: int, variances: Array, noise: StrokeNoise | None, tip: Callable[[], Array]) -> Health | None:
         """Judge what is complete now that strokes came with `stamp` (ns); None if there is nothing to tell.
@@ -210,7 +217,9 @@ class HealthMonitor:
             angles = readings[Stream.ANGLES]
             news += self._void(self._angles.take(angles, predicted.strokes, BLOCK * NANO, start, block.end), block.end)
             news += self._forces.take(readings[Stream.FORCES], start, block.end)
-            news += self._judge_delays(block, readings)
+            for stream, monitor in self._delays.items():
+                found = self._judge_delay(stream, monitor, block, readings[stream])
+                news += self._void(found, block.end) if stream is Stream.ANGLES else found
         strokes = predictions.measured
         expected = np.full(strokes.shape, np.nan if is_shaken else 0.0)
         news += self._check(Stream.STROKES, block, predictions.stamps, strokes, expected)
@@ -228,16 +237,18 @@ class HealthMonitor:
             self.residuals.begin()
         return news
 
-    def _judge_delays(self, block: Block, readings: dict[Stream, StreamReadings]) -> list[Alarm]:
-        """Look for lags; gives the alarms that began, changed or ended."""
-        news, slowest = list[Alarm](), self._slowest()
-        for stream, monitor in self._delays.items():
-            is_doubted = partial(self._is_doubted, stream, block.end)
-            news += monitor.take(block.number, readings[stream], self._masked(stream), block.end, is_doubted, slowest)
-        return news
+    def _judge_delay(self, stream: Stream, monitor: DelayMonitor, block: Block, readings: StreamReadings) -> list[Alarm]:
+        """Look for a lag of a stream; gives the alarm that began, changed or ended."""
+        is_doubted = partial(self._is_doubted, stream, block.end)
+        return monitor.take(block.number, readings, self._failing(stream), block.end, is_doubted, self._slowest())
 
     def _is_doubted(self, stream: Stream, stamp: int) -> bool:
-        """Whether a load, or a fault that is not its lag, may put the vibration that a stream reads out of step at `stamp`."""
+        """Whether a load, or a fault that is not its lag, may put the vibration that a stream reads out of step at `stamp`.
+
+        No vibration puts angles off by what they go in a tenth of a second.
+        """
+        if stream is Stream.ANGLES:
+            return False
         cause = delay_cause(stream)
         suspects = [{each.cause, *(rank.cause for rank in each.ranked)} for each in self.residuals.alarms]
         return self.residuals.is_shaken(stamp) or any(cause not in each for each in suspects)

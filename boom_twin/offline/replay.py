@@ -71,7 +71,7 @@ class ProgressBar(Protocol):
 Progress = Callable[[int], ProgressBar]
 UPDATE = "boom_twin.twin.update.update"
 """Name of the kernel that takes long to compile."""
-MANY = 20_000
+MANY = 100_000
 """Messages of a session, below which a process that steps the boom takes longer to start than it saves."""
 GIVEN = "given as a Scene"
 """Source of a scene that came by no file."""
@@ -232,7 +232,7 @@ def replay_into(
         recording, other_boom, read = Recording(joints, taking, errors), OtherBoom(), np.zeros(joints, dtype=bool)
         refused = RefusedStrokes(scene, taken.source)
         expected = _expected(session, wanted, window)
-        is_apart = _is_stepped_apart(expected, cores)
+        is_apart = _is_stepped_apart(expected, cores, with_bag)
         boom = SteppedBoom(scene, settings, topics.mounts(joints), changes) if is_apart else None
         ahead = SampleReader(session.path, topics, wanted, joints, window, reader, boom)
         behind = None if writer is None else ReportWriter(writer, session.notes, topics, scene, settings)
@@ -387,11 +387,11 @@ def _processes(building: UnfinishedResult, with_bag: bool) -> Iterator[tuple[Pip
         yield reader, writer
 
 
-def _is_stepped_apart(messages: int, cores: int | None) -> bool:
-    """Whether the boom is stepped in the reader's process: not on one core, nor where both processes would have to compile."""
+def _is_stepped_apart(messages: int, cores: int | None, with_bag: bool) -> bool:
+    """Whether the boom is stepped in the reader's process: where a core is left for it, and nothing is to be compiled twice."""
     if cores is None:
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return messages >= MANY and cores > 1 and is_kept(UPDATE)
+    return messages >= MANY and cores >= (3 if with_bag else 2) and is_kept(UPDATE)
 
 
 def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Baseline | None) -> Twin:

@@ -1,4 +1,4 @@
-"""Lags of the IMU's and the forces' stamps: told with size and deviation, and by no other name."""
+"""Lags of the stamps of angles, IMU and forces: told with size and deviation, and by no other name."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def judged(monitor: DelayMonitor, lag: float, seconds: float, first: int = 0, **
     return news
 
 
-@pytest.mark.parametrize("lag", [0.02, 0.05, 0.15, -0.05])
+@pytest.mark.parametrize("lag", [0.02, 0.05, 0.15, 0.5, 1.0, -0.05, -0.7])
 def test_a_lag_is_told_with_its_size(lag: float) -> None:
     monitor = DelayMonitor(Stream.FORCES)
     assert judged(monitor, lag, 40.0)
@@ -97,10 +97,17 @@ def test_little_evidence_tells_nothing() -> None:
         assert still.take(number, block_of(still, np.ones((2, 2)), np.ones((2, 2)), number), NONE, 0) == []
 
 
-def late(seconds: float, lag: float) -> tuple[Sample, ...]:
-    """The bundled session with the IMU's stamps so late (s)."""
+def test_small_lags_are_left_to_others() -> None:
+    """That of the angles, which residuals tell, with what else may be wrong; from its least on a lag is told."""
+    monitor = DelayMonitor(Stream.ANGLES, least=0.1)
+    assert judged(monitor, 0.05, 60.0) == []
+    assert judged(DelayMonitor(Stream.ANGLES, least=0.1), 0.12, 60.0)
+
+
+def late(seconds: float, lag: float, stream: Stream = Stream.IMU) -> tuple[Sample, ...]:
+    """The bundled session with a stream's stamps so late (s)."""
     moved = [
-        Sample(each.stream, each.stamp + round(lag * 1e9), each.values) if each.stream is Stream.IMU else each
+        Sample(each.stream, each.stamp + round(lag * 1e9), each.values) if each.stream is stream else each
         for each in session(seconds)
     ]
     return tuple(sorted(moved, key=lambda each: each.stamp))
@@ -118,3 +125,23 @@ def test_a_late_imu_is_named_and_nothing_else() -> None:
     assert found.causes() == {"tip_imu.delay"}
     value, sigma = found.twin.judge._delays[Stream.IMU].estimate()
     assert value == pytest.approx(0.05, abs=max(3.0 * sigma, 0.01))
+
+
+@pytest.mark.slow
+def test_angles_half_a_second_late_are_named_and_not_used() -> None:
+    """Their lag is no small one, for which residuals would be its multiple of the rates: these told 0.42 to 0.46 s, each surely.
+
+    Once it is told, the estimate does without them: what they show is of another time, in moves tens of centimetres off.
+    """
+    found = run(late(60.0, 0.5, Stream.ANGLES))
+    lasting = [alarm for _, alarm in found.states() if alarm.cause == "joint_angles.delay" and alarm.channel == "joint_angles"]
+    name, value, sigma, unit = lasting[-1].ranked[0].parts[0]
+    assert (name, unit) == ("late", "s") and value == pytest.approx(0.5, abs=3.0 * sigma) and sigma < 0.01
+    told = min(alarm.since for alarm in lasting)
+    off = [
+        (each.stamp, float(np.hypot(*(each.estimate.tip[:2] - each.prediction.tip_position))))
+        for each in found.reports
+        if each.prediction is not None and each.estimate is not None
+    ]
+    after = max(distance for stamp, distance in off if stamp > told + 2_000_000_000)
+    assert after < 0.02 < max(distance for stamp, distance in off if stamp < told)

@@ -45,20 +45,21 @@ def repeats(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return found
 
 
-def test_one_core_and_two_give_the_same(tmp_path: Path, repeats: list[int]) -> None:
+def test_one_core_and_three_give_the_same(tmp_path: Path, repeats: list[int]) -> None:
     window = TimeWindow(5.0, 10.0)
     alone = replayed(PUMP, tmp_path / "alone", 1, window).summary
     assert not repeats
-    apart = replayed(PUMP, tmp_path / "apart", 2, window).summary
+    apart = replayed(PUMP, tmp_path / "apart", 3, window).summary
     assert sum(repeats) > 500 * alone["samples"] / 2
     assert alone["output_sha256"] is not None
     assert {**alone, **dict.fromkeys(VARYING)} == {**apart, **dict.fromkeys(VARYING)}
 
 
 def test_where_nothing_is_kept_one_process_compiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert replays._is_stepped_apart(100, 2) and not replays._is_stepped_apart(100, 1)
+    assert replays._is_stepped_apart(100, 3, True) and not replays._is_stepped_apart(100, 2, True)
+    assert replays._is_stepped_apart(100, 2, False) and not replays._is_stepped_apart(100, 1, False)
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert not replays._is_stepped_apart(100, 2)
+    assert not replays._is_stepped_apart(100, 3, True)
 
 
 def test_what_the_other_process_refuses_is_told_here(tmp_path: Path) -> None:
@@ -66,7 +67,7 @@ def test_what_the_other_process_refuses_is_told_here(tmp_path: Path) -> None:
     strokes = np.tile(strokes_of_posture(load_scene(), "arch"), (300, 1))
     write_session(tmp_path / "ms", 10**6 + 5 * np.arange(300), strokes, np.full((300, 4), np.nan), None, {})
     told = []
-    for cores in (1, 2):
+    for cores in (1, 3):
         with pytest.raises(UsageError, match="nanoseconds") as refused:
             replayed(tmp_path / "ms", tmp_path / f"out_{cores}", cores, TimeWindow())
         told.append(str(refused.value))
