@@ -48,7 +48,7 @@ CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.alarms)
 MEASURED_NOISE = (Stream.STROKES, Stream.ANGLES)
 """Those whose noise is told: what an IMU reads of vibration is not told from noise."""
 DELAYED = {Stream.ANGLES: 0.1, Stream.IMU: 0.0, Stream.FORCES: 0.0}
-"""Those whose lag is told by `DelayMonitor`, and from how many s on: a small one of the angles is among the causes of residuals."""
+"""Those whose lag `DelayMonitor` tells, and from how many s on: a small one of the angles is among the causes of residuals."""
 
 
 class HealthMonitor:

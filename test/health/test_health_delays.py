@@ -129,7 +129,7 @@ def test_a_late_imu_is_named_and_nothing_else() -> None:
 
 @pytest.mark.slow
 def test_angles_half_a_second_late_are_named_and_not_used() -> None:
-    """Their lag is no small one, for which residuals would be its multiple of the rates: these told 0.42 to 0.46 s, each surely.
+    """Their lag is no small one, with which residuals are that many rates: taken so they told 0.42 to 0.46 s, each surely.
 
     Once it is told, the estimate does without them: what they show is of another time, in moves tens of centimetres off.
     """
