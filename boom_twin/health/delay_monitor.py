@@ -22,8 +22,9 @@ from .stream_readings import StreamReadings
 
 BLOCK, LEAST = 0.1, 10  # s of a block; blocks of half a triangle, at least
 SPAN = 40  # blocks of one estimate
-KEPT = 30  # spans that are looked at, the newest
-FEWEST = 4.0  # spans, by how much they weigh, before anything is told
+FEWEST = 4.0  # motions, of a channel in a span, by how much they weigh, before anything is told
+FEWEST_CLEAR, CLEAR = 2.0, 0.1  # likewise where that share, at most, of what readings are off by is left beside the lag: clear
+NEWEST = (30, 15, 7, 3)  # spans that are looked at: if all show no clear lag, fewer, for it may have come since
 FLOOR = 3e-3  # s, deviation of what a lag is taken for, by the model's own
 HASTE = 0.025  # s, by which readings may be ahead of a prediction: it lags where strokes are smoothed in haste
 SURE, GONE = 5.0, 3.0  # deviations from which on it is told, and below which it has ended
@@ -66,7 +67,7 @@ class DelayMonitor:
         """The boom starts from rest; what is known of the lag stays known no longer, an alarm lasts until it is refuted."""
         self._number = 0
         self._blocks: deque[tuple[StreamReadings, NDArray[np.bool_]]] = deque()
-        self._spans: deque[tuple[Array, Array]] = deque(maxlen=KEPT)
+        self._spans: deque[tuple[Array, Array]] = deque(maxlen=NEWEST[0])
 
     def take(
         self,
@@ -122,19 +123,27 @@ class DelayMonitor:
     def estimate(self) -> tuple[float, float]:
         """The lag and its deviation, s; infinite while too little has moved."""
         rows, slopes = (np.array(each) for each in zip(*self._spans, strict=True))
-        lag = 0.0
+        fits = [self._fit(rows[-count:], slopes[-count:]) for count in NEWEST if count == NEWEST[0] or count < len(rows)]
+        lag, sigma, _ = next((fit for fit in fits if fit[2]), fits[0])
+        return lag, sigma
+
+    @staticmethod
+    def _fit(rows: Array, slopes: Array) -> tuple[float, float, bool]:
+        """The lag by these spans, its deviation, and whether it is clear; see `_without_lag`."""
+        lag, off = 0.0, _without_lag(rows, slopes, 0.0)[0]
         for _ in range(ROUNDS):
             left, rates = _without_lag(rows, slopes, lag)
             noise = (left**2).sum(axis=(0, 1)) + TINY
             by, weight = -(left * rates).sum(axis=1) / noise, (rates**2).sum(axis=1) / noise
             if not weight.sum() > 0.0:
-                return 0.0, math.inf
+                return 0.0, math.inf, False
             change = float(by.sum() / weight.sum())
             lag = min(max(lag + min(max(change, -ROUND), ROUND), -LONGEST), LONGEST)
-        if weight.sum() ** 2 < FEWEST * (weight**2).sum():
-            return 0.0, math.inf
+        is_clear = bool(np.mean(left**2) < CLEAR * np.mean(off**2))
+        if weight.sum() ** 2 < (FEWEST_CLEAR if is_clear else FEWEST) * (weight**2).sum():
+            return 0.0, math.inf, False
         scatter = float(np.sqrt(((by - change * weight) ** 2).sum()) / weight.sum())
-        return lag, math.hypot(scatter, FLOOR)
+        return lag, math.hypot(scatter, FLOOR), is_clear
 
     def _judge(self, end: int, is_doubted: bool) -> list[Alarm]:
         lag, sigma = self.estimate()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Stream
-from boom_twin.health.delay_monitor import FEWEST, DelayMonitor
+from boom_twin.health.delay_monitor import DelayMonitor
 from boom_twin.types import Alarm, Array
 
 from .recorded import run, session
@@ -88,13 +88,21 @@ def test_a_lag_that_is_taken_back_ends() -> None:
 def test_little_evidence_tells_nothing() -> None:
     """Few spans; or blocks with one reading each, which have no slope; or gaps all the time."""
     monitor = DelayMonitor(Stream.IMU)
-    assert judged(monitor, 0.15, 4.0 * (FEWEST - 1.0) + 1.9) == []
+    assert judged(monitor, 0.15, 5.7) == []
     for number in range(0, 2000, 2):
         for count in (3, 1):
             assert monitor.take(number, block_of(monitor, np.full((count, 2), 2.0), np.ones((count, 2)), number), NONE, 0) == []
     still = DelayMonitor(Stream.IMU)
     for number in range(600):
         assert still.take(number, block_of(still, np.ones((2, 2)), np.ones((2, 2)), number), NONE, 0) == []
+
+
+def test_a_lag_that_came_later_is_told_with_its_size() -> None:
+    monitor = DelayMonitor(Stream.FORCES)
+    assert judged(monitor, 0.0, 60.0) == []
+    assert judged(monitor, 0.3, 30.0, first=600)
+    value, sigma = monitor.estimate()
+    assert value == pytest.approx(0.3, abs=3.0 * sigma) and sigma < 0.01
 
 
 def test_small_lags_are_left_to_others() -> None:
