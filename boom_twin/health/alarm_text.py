@@ -33,6 +33,7 @@ CLEAR = 3.0  # deviations of the model's error that tell two causes apart
 LIMIT_OF = "told_from_"  # and a cause: how the figures of `ResidualMonitor.limits` are called
 SI = {"k": "N/m", "EI": "N m^2", "mass": "kg"}  # of parameters of a scene that are judged by their share
 SAYABLE = 9.2  # ln of ten thousand, the largest odds that are told
+RATES_LAST = 1.0  # s, in which a rate may change by as much as it is
 MOVE = 0.15  # of a cylinder's travel, the moves that are thought through
 
 
@@ -208,9 +209,15 @@ class AlarmText:
         for part in cause.parts:
             shapes.setdefault(part.place, part)
         parts = tuple(
-            (self._kind(part), part.value, part.sigma * excess**0.5, self._known[part.place].unit) for part in shapes.values()
+            (self._kind(part), part.value, self._deviation(part, excess), self._known[part.place].unit)
+            for part in shapes.values()
         )
         return Ranked(cause.name, cause.probability, parts)
+
+    def _deviation(self, part: Explanation, excess: float) -> float:
+        """Of a size; a lag is taken for so many times the rates, which change while it lasts."""
+        own = part.sigma * excess**0.5
+        return math.hypot(own, part.value**2 / RATES_LAST) if self._known[part.place].form is Form.DELAY else own
 
     def _kind(self, part: Explanation) -> str:
         """In a word what is the matter."""
