@@ -20,7 +20,6 @@ from boom_twin.messages.report_encoder import ReportEncoder, decode_changes
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.messages.type_store import jazzy
-from boom_twin.offline.reader_process import recorded_changes
 from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene
 from boom_twin.twin.twin import Twin
@@ -86,24 +85,30 @@ def _stamp(msg: Any) -> int:
 
 
 @pytest.fixture(scope="module")
-def expected(recorded: Path, outputs: dict[Output, list[tuple[int, bytes]]]) -> dict[Output, list[tuple[int, bytes]]]:
-    """What intake, twin and outlet make here of the strokes that the node answered, and of all other samples."""
+def expected(
+    bag: Path, recorded: Path, outputs: dict[Output, list[tuple[int, bytes]]]
+) -> dict[Output, list[tuple[int, bytes]]]:
+    """What intake, twin and outlet make here of the strokes that the node answered, and of all other samples.
+
+    As they were sent: on a starved machine the recorder may lose some of them on the way, which come by best effort.
+    """
     answered = {stamp for stamp, _ in outputs[Output.TIP_POSITION]}
     inputs = {topic.absolute: stream for stream, topic in load_topics().inputs.items()}
     scene, settings = load_scene(), load_settings(PARAMETERS)
     twin = Twin(scene, settings, baseline=load_baseline())
     decoder, encoder = SampleDecoder(twin.plan.joints), ReportEncoder(scene, settings)
     made: dict[Output, list[tuple[int, bytes]]] = {key: [] for key in outputs}
-    changes = recorded_changes(scan(recorded), load_topics())
-    session = scan(recorded)
+    changed = load_topics().outputs[Output.CHANGES]
+    asked = [decode_changes(msg) for _, _, msg in read(scan(recorded), {changed.absolute: changed.type})]
+    changes, session = {change.stamp: change for change in asked}, scan(bag)
     sent = {name: stream for name, stream in inputs.items() if (topic := session.find(name)) is not None and topic.count}
-    for name, log, msg in read(session, {name: TYPES[stream] for name, stream in sent.items()}):
+    for name, _, msg in read(session, {name: TYPES[stream] for name, stream in sent.items()}):
         stream, stamp = inputs[name], stamp_of(msg)
         if stream is Stream.STROKES:
             if stamp not in answered:
                 continue
-            for change in changes.due(log, stamp):
-                twin.requests.repeat(change)
+            if stamp in changes:
+                twin.requests.repeat(changes[stamp])
         sample = decoder.put(stream, stamp, msg)
         assert sample is not None
         for key, data in encoder.fill(twin.update(sample)):
