@@ -22,8 +22,11 @@ from .stream_readings import StreamReadings
 
 BLOCK, LEAST = 0.1, 10  # s of a block; blocks of half a triangle, at least
 SPAN = 40  # blocks of one estimate
-FEWEST = 4.0  # motions, of a channel in a span, by how much they weigh, before anything is told
-FEWEST_CLEAR, CLEAR = 2.0, 0.1  # likewise where that share, at most, of what readings are off by is left beside the lag: clear
+FEWEST = 4.0  # spans, by how much they weigh, before anything is told
+FEWEST_CLEAR, CLEAR = (
+    2.0,
+    0.1,
+)  # motions of channels where that share, at most, of what is off is left beside the lag: it is clear
 NEWEST = (30, 15, 7, 3)  # spans that are looked at: if all show no clear lag, fewer, for it may have come since
 FLOOR = 3e-3  # s, deviation of what a lag is taken for, by the model's own
 HASTE = 0.025  # s, by which readings may be ahead of a prediction: it lags where strokes are smoothed in haste
@@ -50,7 +53,7 @@ class DelayMonitor:
     ----------
     stream : Stream
     least : float, optional
-        s, lag that is told.
+        s, lag that is told; with one, only a clear lag is told.
 
     Attributes
     ----------
@@ -123,13 +126,32 @@ class DelayMonitor:
     def estimate(self) -> tuple[float, float]:
         """The lag and its deviation, s; infinite while too little has moved."""
         rows, slopes = (np.array(each) for each in zip(*self._spans, strict=True))
-        fits = [self._fit(rows[-count:], slopes[-count:]) for count in NEWEST if count == NEWEST[0] or count < len(rows)]
-        lag, sigma, _ = next((fit for fit in fits if fit[2]), fits[0])
+        lag, sigma, _ = self._estimate(rows, slopes)
         return lag, sigma
+
+    def _estimate(self, rows: Array, slopes: Array) -> tuple[float, float, bool]:
+        """Lag, deviation, and whether it is clear: all of what is off is that of an earlier time; see `_without_lag`."""
+        for count in NEWEST:
+            if count == NEWEST[0] or count < len(rows):
+                lag, sigma, is_clear = self._fit(rows[-count:], slopes[-count:])
+                if is_clear:
+                    return lag, sigma, True
+        return (*self._small(rows, slopes), False)
+
+    @staticmethod
+    def _small(rows: Array, slopes: Array) -> tuple[float, float]:
+        """A lag that is among other faults, and the noise of a boom at rest: so many times the slopes; and its deviation."""
+        off, rates = _without_lag(rows, slopes, 0.0)
+        noise = (off**2).sum(axis=(0, 1)) + TINY
+        by, weight = -(off * rates / noise).sum(axis=(1, 2)), (rates**2 / noise).sum(axis=(1, 2))
+        if weight.sum() ** 2 < FEWEST * (weight**2).sum() or not weight.sum() > 0.0:
+            return 0.0, math.inf
+        lag = float(by.sum() / weight.sum())
+        return lag, math.hypot(float(np.sqrt(((by - lag * weight) ** 2).sum()) / weight.sum()), FLOOR)
 
     @staticmethod
     def _fit(rows: Array, slopes: Array) -> tuple[float, float, bool]:
-        """The lag by these spans, its deviation, and whether it is clear; see `_without_lag`."""
+        """The lag by these spans, its deviation, and whether it is clear."""
         lag, off = 0.0, _without_lag(rows, slopes, 0.0)[0]
         for _ in range(ROUNDS):
             left, rates = _without_lag(rows, slopes, lag)
@@ -140,18 +162,18 @@ class DelayMonitor:
             change = float(by.sum() / weight.sum())
             lag = min(max(lag + min(max(change, -ROUND), ROUND), -LONGEST), LONGEST)
         is_clear = bool(np.mean(left**2) < CLEAR * np.mean(off**2))
-        if weight.sum() ** 2 < (FEWEST_CLEAR if is_clear else FEWEST) * (weight**2).sum():
+        if not is_clear or weight.sum() ** 2 < FEWEST_CLEAR * (weight**2).sum():
             return 0.0, math.inf, False
         scatter = float(np.sqrt(((by - change * weight) ** 2).sum()) / weight.sum())
-        return lag, math.hypot(scatter, FLOOR), is_clear
+        return lag, math.hypot(scatter, FLOOR), True
 
     def _judge(self, end: int, is_doubted: bool) -> list[Alarm]:
-        lag, sigma = self.estimate()
+        lag, sigma, is_clear = self._estimate(*(np.array(each) for each in zip(*self._spans, strict=True)))
         if self.alarm is not None and abs(lag) < GONE * sigma and math.isfinite(sigma):
             ended, self.alarm = replace(self.alarm, until=end), None
             return [ended]
         if abs(lag) - (HASTE if lag < 0.0 else 0.0) < SURE * sigma or (
-            self.alarm is None and (is_doubted or abs(lag) < self._least)
+            self.alarm is None and (is_doubted or (self._least > 0.0 and not (is_clear and abs(lag) >= self._least)))
         ):
             return []
         cause = delay_cause(self._stream)

@@ -112,6 +112,15 @@ def test_small_lags_are_left_to_others() -> None:
     assert judged(DelayMonitor(Stream.ANGLES, least=0.1), 0.12, 60.0)
 
 
+def test_a_boom_at_rest_has_no_lag() -> None:
+    """What is predicted has noise of its own, which readings differ by: no lag makes that go away."""
+    rng, monitor = np.random.default_rng(8), DelayMonitor(Stream.ANGLES, least=0.1)
+    for number in range(3000):
+        expected = 1.0 + np.cumsum(rng.normal(0.0, 1e-5, (RATE, 2)), axis=0)
+        read = 1.0 + rng.normal(0.0, 2e-4, (RATE, 2))
+        assert monitor.take(number, block_of(monitor, read, expected, number), NONE, number) == []
+
+
 def late(seconds: float, lag: float, stream: Stream = Stream.IMU) -> tuple[Sample, ...]:
     """The bundled session with a stream's stamps so late (s)."""
     moved = [
