@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
@@ -18,6 +17,7 @@ from ..kernels.integrators import GENERALISED_ALPHA
 from ..kernels.tables import OK, SENTENCES, Tables, Work
 from ..kernels.transfer.lane_steps import LaneCourse, run_lanes
 from ..kernels.transfer.time_step import run_each
+from ..system.cores import usable_cores
 from ..types import Array
 from .drive import PASSES, TOLERANCE
 from .equilibrium import settle
@@ -46,7 +46,7 @@ class Batch:
     def __init__(self, plans: Sequence[Plan], cores: int | None = None) -> None:
         _check_structure(plans)
         self.plans = tuple(plans)
-        self.cores = cores or len(os.sched_getaffinity(0))
+        self.cores = cores or usable_cores()
         self._tables = stacked([plan.tables for plan in plans])
         self._states = stacked([plan.state() for plan in plans])
         self._works = [plans[0].work() for _ in range(min(len(plans), SHARES * self.cores))]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from ..errors import BoomTwinError, SolverError, UsageError
 from ..scene.edit import parameter, parameter_names, with_parameters
 from ..scene.schema import Scene
 from ..scene.source import SceneSource, as_scene
+from ..system.cores import usable_cores
 from ..types import Array
 from .simulate import Simulation, simulate
 
@@ -170,7 +170,7 @@ def simulate_samples(
             return f"{', '.join(f'{name} = {value:.6g}' for name, value in mine.items())}: {error}"
         return _kept(found), bool(found.doubts)
 
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(usable_cores()) as pool:
         results = []
         for each in pool.map(follow, range(count)):
             results.append(each)

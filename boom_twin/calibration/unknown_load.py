@@ -15,7 +15,6 @@ Covariances are those of the sums over spans of `SPAN`, so that they hold for er
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
@@ -27,6 +26,7 @@ from ..errors import SolverError
 from ..estimation.load_spectrum import TipLoad, TipLoadFinder
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
+from ..system.cores import usable_cores
 from ..types import NANO, Array
 from .forward_model import CalibrationProblem, ForwardModel, boom_of
 from .least_squares import Fit, Tell, fitted_in_holds
@@ -297,7 +297,7 @@ def _pass(
         return (other.values[:, 0] - values) / (TRIAL * root)
 
     acting = [i for i in booms if i is not None]
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(usable_cores()) as pool:
         for i, slope in zip(acting, pool.map(moved, acting), strict=True):
             white[i] = slope
     return Pass(all_white[:, 0], white, found.loads)

@@ -125,50 +125,21 @@ class DelayMonitor:
 
     def estimate(self) -> tuple[float, float]:
         """The lag and its deviation, s; infinite while too little has moved."""
-        rows, slopes = (np.array(each) for each in zip(*self._spans, strict=True))
-        lag, sigma, _ = self._estimate(rows, slopes)
+        lag, sigma, _ = self._estimate()
         return lag, sigma
 
-    def _estimate(self, rows: Array, slopes: Array) -> tuple[float, float, bool]:
-        """Lag, deviation, and whether it is clear: all of what is off is that of an earlier time; see `_without_lag`."""
+    def _estimate(self) -> tuple[float, float, bool]:
+        """Lag, deviation, and whether it is clear: nearly all that readings are off by is that of an earlier time."""
+        rows, slopes = (np.array(each) for each in zip(*self._spans, strict=True))
         for count in NEWEST:
             if count == NEWEST[0] or count < len(rows):
-                lag, sigma, is_clear = self._fit(rows[-count:], slopes[-count:])
+                lag, sigma, is_clear = _clear_lag(rows[-count:], slopes[-count:])
                 if is_clear:
                     return lag, sigma, True
-        return (*self._small(rows, slopes), False)
-
-    @staticmethod
-    def _small(rows: Array, slopes: Array) -> tuple[float, float]:
-        """A lag that is among other faults, and the noise of a boom at rest: so many times the slopes; and its deviation."""
-        off, rates = _without_lag(rows, slopes, 0.0)
-        noise = (off**2).sum(axis=(0, 1)) + TINY
-        by, weight = -(off * rates / noise).sum(axis=(1, 2)), (rates**2 / noise).sum(axis=(1, 2))
-        if weight.sum() ** 2 < FEWEST * (weight**2).sum() or not weight.sum() > 0.0:
-            return 0.0, math.inf
-        lag = float(by.sum() / weight.sum())
-        return lag, math.hypot(float(np.sqrt(((by - lag * weight) ** 2).sum()) / weight.sum()), FLOOR)
-
-    @staticmethod
-    def _fit(rows: Array, slopes: Array) -> tuple[float, float, bool]:
-        """The lag by these spans, its deviation, and whether it is clear."""
-        lag, off = 0.0, _without_lag(rows, slopes, 0.0)[0]
-        for _ in range(ROUNDS):
-            left, rates = _without_lag(rows, slopes, lag)
-            noise = (left**2).sum(axis=(0, 1)) + TINY
-            by, weight = -(left * rates).sum(axis=1) / noise, (rates**2).sum(axis=1) / noise
-            if not weight.sum() > 0.0:
-                return 0.0, math.inf, False
-            change = float(by.sum() / weight.sum())
-            lag = min(max(lag + min(max(change, -ROUND), ROUND), -LONGEST), LONGEST)
-        is_clear = bool(np.mean(left**2) < CLEAR * np.mean(off**2))
-        if not is_clear or weight.sum() ** 2 < FEWEST_CLEAR * (weight**2).sum():
-            return 0.0, math.inf, False
-        scatter = float(np.sqrt(((by - change * weight) ** 2).sum()) / weight.sum())
-        return lag, math.hypot(scatter, FLOOR), True
+        return (*_small_lag(rows, slopes), False)
 
     def _judge(self, end: int, is_doubted: bool) -> list[Alarm]:
-        lag, sigma, is_clear = self._estimate(*(np.array(each) for each in zip(*self._spans, strict=True)))
+        lag, sigma, is_clear = self._estimate()
         if self.alarm is not None and abs(lag) < GONE * sigma and math.isfinite(sigma):
             ended, self.alarm = replace(self.alarm, until=end), None
             return [ended]
@@ -182,6 +153,47 @@ class DelayMonitor:
         alarm = self.alarm or Alarm(self._stream.value, "late", end, None, cause, told, ranked)
         self.alarm = replace(alarm, told=told, ranked=ranked)
         return [self.alarm]
+
+
+def _clear_lag(rows: Array, slopes: Array) -> tuple[float, float, bool]:
+    """The lag by these spans, its deviation, and whether it is clear; see `_without_lag`."""
+    lag = 0.0
+    off = _without_lag(rows, slopes, lag)[0]
+    for _ in range(ROUNDS):
+        left, rates = _without_lag(rows, slopes, lag)
+        by, weight = _normal_equations(left, rates)
+        if not weight.sum() > 0.0:
+            return 0.0, math.inf, False
+        change = float(by.sum() / weight.sum())
+        lag = min(max(lag + min(max(change, -ROUND), ROUND), -LONGEST), LONGEST)
+    if not np.mean(left**2) < CLEAR * np.mean(off**2) or _are_few(weight, FEWEST_CLEAR):
+        return 0.0, math.inf, False
+    return lag, _deviation(by, weight, change), True
+
+
+def _small_lag(rows: Array, slopes: Array) -> tuple[float, float]:
+    """A lag that is among other faults, and the noise of a boom at rest: so many times the slopes; and its deviation."""
+    by, weight = (each.sum(axis=1) for each in _normal_equations(*_without_lag(rows, slopes, 0.0)))
+    if _are_few(weight, FEWEST):
+        return 0.0, math.inf
+    lag = float(by.sum() / weight.sum())
+    return lag, _deviation(by, weight, lag)
+
+
+def _normal_equations(left: Array, rates: Array) -> tuple[Array, Array]:
+    """Of what is off as so many times minus the rates: right and left side, shape (spans, channels), by the channels' noise."""
+    noise = (left**2).sum(axis=(0, 1)) + TINY
+    return -(left * rates).sum(axis=1) / noise, (rates**2).sum(axis=1) / noise
+
+
+def _are_few(weight: Array, fewest: float) -> bool:
+    """Whether no more than that many count, by how much they weigh."""
+    return not weight.sum() > 0.0 or bool(weight.sum() ** 2 < fewest * (weight**2).sum())
+
+
+def _deviation(by: Array, weight: Array, found: float) -> float:
+    """Of a lag (s), by how it scatters."""
+    return math.hypot(float(np.sqrt(((by - found * weight) ** 2).sum()) / weight.sum()), FLOOR)
 
 
 def _without_lag(rows: Array, slopes: Array, lag: float) -> tuple[Array, Array]:

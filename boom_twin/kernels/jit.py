@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..errors import UsageError
-from .compiled_cache import SUFFIX, KernelCache, cache_folder, fault_of
+from .compiled_cache import SUFFIX, KernelCache, cache_folder, fault_of, is_kept
 
 Fields = TypeVar("Fields")
 
@@ -69,8 +69,8 @@ def _folder() -> Path | None:
 
 def could_be_kept(kernel: Kernel) -> bool:
     """Whether compiled code of `kernel` is kept on this computer, and is not there yet; the first use makes it."""
-    folder, function = cache_folder(), kernel.py_func
-    return fault_of(folder) is None and not any(folder.glob(f"{function.__module__}.{function.__qualname__}-*{SUFFIX}"))
+    name = f"{kernel.py_func.__module__}.{kernel.py_func.__qualname__}"
+    return fault_of(cache_folder()) is None and not is_kept(name)
 
 
 @cache

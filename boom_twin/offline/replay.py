@@ -9,7 +9,6 @@ from __future__ import annotations
 import gc
 import json
 import math
-import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -39,6 +38,7 @@ from ..scene.edit import anew
 from ..scene.schema import Scene
 from ..scene.source import SceneSource, as_scene
 from ..system.atomic_files import write_atomic
+from ..system.cores import usable_cores
 from ..system.received_files import sha256_of
 from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
 from ..system.summary_display import SummaryDisplay, data_frame
@@ -389,9 +389,7 @@ def _processes(building: UnfinishedResult, with_bag: bool) -> Iterator[tuple[Pip
 
 def _is_stepped_apart(messages: int, cores: int | None, with_bag: bool) -> bool:
     """Whether the boom is stepped in the reader's process: where a core is left for it, and nothing is to be compiled twice."""
-    if cores is None:
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return messages >= MANY and cores >= (3 if with_bag else 2) and is_kept(UPDATE)
+    return messages >= MANY and (cores or usable_cores()) >= (3 if with_bag else 2) and is_kept(UPDATE)
 
 
 def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Baseline | None) -> Twin:

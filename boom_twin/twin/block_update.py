@@ -216,8 +216,8 @@ class BlockUpdate:
         boom, twin = self._boom.held, (hold(self._limits), state, self._modes.held)
         if self._code is None:
             one, width = np.zeros(1, np.int64), int(self._widths.max())
-            of_boom = *boom, *twin, self._steps.held
-            advance = update.for_types_of(*of_boom, one, one, np.zeros((1, width)), 0, False, False, found)
+            block = one, one, np.zeros((1, width))
+            advance = update.for_types_of(*boom, *twin, self._steps.held, *block, 0, False, False, found)
             self._code = advance, measure.for_types_of(*twin, 0, 0, np.zeros(width), False, found)
             self._copy_predictions(found, 0, self._pins, *PredictionRows.room(0, self._joints))
             self._copy_residuals(found, 0, 0, 0, *MeasuredRows.room(0, 1))

@@ -106,16 +106,15 @@ def update(
                     return ODD, row
                 note_stamp(state, STROKES, stamp)
             time, tuning = begin_step(limits, state, stamp)
-            is_drawn = begins_slot(state, stamp)
             if steps.state[MODE] == REPEATING:
-                status = repeat_step(steps, live, work, track, time, state.taken, is_drawn, out)
+                status = repeat_step(steps, live, work, track, time, state.taken, state.clock[BEGINS_SLOT], out)
                 if status == OTHER:
                     return UNRECORDED, row
             else:
                 status = follow(t, anchor, live, work, tangents, track, tuning, time, state.taken, out)
             is_recorded = steps.state[MODE] == RECORDING
             if is_recorded:
-                record_step(steps, live, work, track, time, state.taken, is_drawn, status, out)
+                record_step(steps, live, work, track, time, state.taken, state.clock[BEGINS_SLOT], status, out)
             state.clock[STATUS] = status
             if status != OK:
                 return FAILED, row
@@ -189,6 +188,7 @@ def note_stamp(state, stream, stamp):
 @inner
 def begin_step(limits, state, stamp):
     """Time (s since the start) of the strokes in `state`, and the tuning by which the boom is stepped to them."""
+    state.clock[BEGINS_SLOT] = stamp // SLOT != state.clock[IN_SLOT]
     time = (stamp - state.clock[EPOCH]) * NANO
     if time - state.pace[STEPPED] > PAUSE:
         state.pace[PAUSED] = time
@@ -206,14 +206,7 @@ def end_step(state, stamp):
         state.pace[USUAL_STEP] += SMOOTHING * (span - state.pace[USUAL_STEP])
     else:
         state.pace[USUAL_STEP] = span
-    state.clock[BEGINS_SLOT] = begins_slot(state, stamp)
     state.clock[IN_SLOT], state.clock[NEWEST] = stamp // SLOT, stamp
-
-
-@inner
-def begins_slot(state, stamp):
-    """Whether it is the first stamp in a slot."""
-    return stamp // SLOT != state.clock[IN_SLOT]
 
 
 @inner

@@ -11,7 +11,6 @@ from twin.test_update import stream, told
 
 from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
 from boom_twin.errors import UsageError
-from boom_twin.estimation.boom_predictor import BoomPredictor
 from boom_twin.estimation.posture_modes import PostureModes
 from boom_twin.health.baseline import load_baseline
 from boom_twin.offline.reader_process import with_steps
@@ -119,9 +118,7 @@ def test_stamps_of_another_unit_are_refused_with_the_same_words() -> None:
 def test_modes_of_a_posture_need_no_more_of_the_history_than_positions() -> None:
     """Where there is no equilibrium on the grid, its modes are of the boom as it is: of recorded steps, too."""
     scene = load_scene()
-    boom, strokes = BoomPredictor(scene), strokes_of_posture(scene, "arch")
-    boom.start(strokes)
-    twin = Twin(scene)
+    twin, strokes = Twin(scene), strokes_of_posture(scene, "arch")
     for k in range(200):
         twin.update(Sample(Stream.STROKES, 10**18 + 5_000_000 * k, strokes + 1e-2 * np.sin(0.02 * k)))
     live, found = twin._boom.live, []
