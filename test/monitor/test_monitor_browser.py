@@ -512,6 +512,24 @@ def test_the_response_in_this_posture_with_the_measured_spectrum_over_it(page: A
     eventually(of_this_posture)
 
 
+ONE_AFTER_THE_OTHER = """async () => {
+    const now = twin.response.response, scaled = factor => ({ ...now, values: now.values.map(value => factor * value) });
+    twin.connection.emit("response", scaled(2));
+    for (let frame = 0; twin.response.isNew && frame < 300; frame++) await new Promise(requestAnimationFrame);
+    twin.connection.emit("response", scaled(3));
+    return now.values[0];
+}"""
+
+
+def test_a_response_that_comes_right_after_another_was_drawn_is_drawn_too(page: Any) -> None:
+    """In the same frame, while nothing else changes: of a held session the page went on showing the posture before."""
+    page.keyboard.press("7")
+    wait(page, "twin.response.chart && twin.response.chart.plot.data.length === 7", 300_000)
+    page.wait_for_timeout(2500)  # the server's own, of this posture, has come
+    first = page.evaluate(ONE_AFTER_THE_OTHER)
+    wait(page, f"Math.abs(twin.response.chart.plot.data[1][0] / {first} - 3) < 1e-5", 10_000)
+
+
 @pytest.mark.parametrize("size", [(1280, 720), (820, 1180), (1180, 820)])
 @pytest.mark.parametrize("tab", ["1", "2", "3", "4", "5", "6", "7"])
 def test_nothing_is_cut_off_at_the_sides(page: Any, size: tuple[int, int], tab: str) -> None:

@@ -87,11 +87,11 @@ function draw(now) {
   frames++;
   recordDelay();
   if (now - second > 1000) showRate(now);
-  const state = `${open} ${view.version} ${view.isHeld || view.zoom ? "" : connection.lastRows} ${tabs[open]?.isNew}`;
-  if (now < due || state === drawn || document.hidden) return;
+  const state = `${open} ${view.version} ${view.isHeld || view.zoom ? "" : connection.lastRows}`;
+  if (now < due || `${state} ${tabs[open]?.isNew}` === drawn || document.hidden) return;
   const began = performance.now();
   tabs[open]?.draw(open);
-  drawn = state;
+  drawn = `${state} ${tabs[open]?.isNew}`; // as it is now: what comes before the next frame is new again
   due = now + Math.max(pace, IDLE_RATIO * (performance.now() - began));
   shown = view.newest;
 }
