@@ -309,7 +309,7 @@ class ResidualMonitor:
     def _suspicion_from(self, start: int, carried: dict[str, float]) -> Suspicion:
         """Evidence to be collected from `start` (ns) on, see `_suspect`."""
         known = self._regression.mean, self._regression.covariance + self._out_of_step
-        return Suspicion(self._bank, start, *known, self._errors2, self._noise2, self._levels, carried)
+        return Suspicion(self._bank, start, *known, self._errors2, self._noise2, self._levels, self._detuning, carried)
 
     def _look_for_end(self, problem: BlockProblem) -> list[Alarm]:
         """Take one block as evidence that begins anew all the time, and end the alarm or the known fault that it refutes.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -76,19 +77,23 @@ class Suspicion:
         Variance of the model's error in one posture, and factor on the variance of the sensors' noise, while all is well.
     levels : ndarray
         Of the load, N; the first is 0.
+    detuning : float
+        Share by which natural frequencies may be wrong while all is well.
     carried : mapping of str to float
         See `HypothesisTest.explain`.
     """
 
     def __init__(
         self, bank: HypothesisTest, start: int, mean: Array, covariance: Array, errors2: Array, noise2: Array, levels: Array,
-        carried: Mapping[str, float],
+        detuning: float, carried: Mapping[str, float],
     ) -> None:  # fmt: skip
         self._bank, self.start, self.mean, self.covariance = bank, start, mean, covariance
         self._errors2, self._noise2, self._carried = errors2, noise2, carried
-        self._shares = LEVELS[: len(levels)]
+        self._loads = len(levels)
+        self._shares = np.tile(LEVELS[: len(levels)], 2)
+        detunings, levels = np.repeat([DETUNING, detuning], len(levels)), np.tile(levels, 2)
         channels, coefficients = len(errors2), bank.coefficient_count
-        self._filter = InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, DETUNING, levels)
+        self._filter = InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, detunings, levels)
         self.size, self.blocks, self._travel = np.zeros(channels), 0, 0.0
         self._evidence = self._calm = Evidence.none(coefficients, levels.shape)
         self._before = deque([self._evidence], maxlen=RECENT + 1)  # after each of the recent blocks, and before them
@@ -147,12 +152,17 @@ class Suspicion:
         return self._travel
 
     def explain(self) -> Verdict:
-        """Weigh all hypotheses."""
-        return self._explain(self._evidence)
+        """Weigh all hypotheses, whether frequencies may be off as by a fault or only as while all is well: the lesser strength.
+
+        Filters that allow for a fault's frequencies expect too much of vibration of a healthy boom: there, in a gust, a lower
+        level of the load with a fault goes better with it than the right one without.
+        """
+        verdict = self._explain(self._evidence.of_levels(self._loads))
+        return replace(verdict, at_most=self._explain(self._evidence).strength) if verdict.strength > 0.0 else verdict
 
     def explain_calmly(self) -> Verdict:
         """Likewise, but blocks in which the boom vibrates count less: what a cause is named by."""
-        return self._explain(self._calm)
+        return self._explain(self._calm.of_levels(self._loads))
 
     def _explain(self, evidence: Evidence) -> Verdict:
         postures = 1.0 + self._travel / REACH
@@ -163,7 +173,7 @@ class Suspicion:
 
         By the posterior's own covariance: `strength` is ln of how much more probable than none such a fault has to be.
         """
-        healthy = self._evidence.given(self.mean, self.covariance)
+        healthy = self._evidence.of_levels(self._loads).given(self.mean, self.covariance)
         return self._bank.least_told(healthy.matrix[level].diagonal()[: len(self.mean)], strength)
 
     def load(self, level: int) -> tuple[float, float]:
@@ -178,12 +188,12 @@ class Suspicion:
         """How what explains all of the evidence goes with the recent blocks."""
         if not self.is_settled:
             return RecentFit(False, False)
-        recent = self._evidence + self._before[0].weighted(-1.0)
+        recent = (self._evidence + self._before[0].weighted(-1.0)).of_levels(self._loads)
         about, middle = (self.mean, self.covariance), self.span - 0.5 * RECENT * BLOCK * NANO
         if verdict.strength > 0.0:
             logs, squares, changed, moved = self._bank.change(recent, verdict.best, self.span, middle, *about)
             if verdict.best.is_growing and self.blocks > LATELY:
-                lately = self._evidence + self._halfway[0].weighted(-1.0)
+                lately = (self._evidence + self._halfway[0].weighted(-1.0)).of_levels(self._loads)
                 changed = max(changed, self._bank.change(lately, verdict.best, self.span, middle, *about)[2])
         else:
             (logs, squares), changed, moved = self._bank.fit(recent, self._coefficients(None), *about), 0.0, 0.0
@@ -198,8 +208,9 @@ class Suspicion:
         """Whether what explains the evidence would do so under a load of that level, too: then the load makes no difference."""
         if verdict.strength < SURE:
             return False
-        with_fault, _ = self._bank.fit(self._evidence, self._coefficients(verdict.best), self.mean, self.covariance)
-        none, _ = self._bank.fit(self._evidence, self._coefficients(None), self.mean, self.covariance)
+        evidence, about = self._evidence.of_levels(self._loads), (self.mean, self.covariance)
+        with_fault, _ = self._bank.fit(evidence, self._coefficients(verdict.best), *about)
+        none, _ = self._bank.fit(evidence, self._coefficients(None), *about)
         return bool(with_fault[level] - none[level] >= SURE * verdict.excess)
 
     def _coefficients(self, each: Explanation | None) -> Array:
@@ -207,8 +218,9 @@ class Suspicion:
 
     def log_factor(self, each: Explanation) -> float:
         """ln of how much more probable a steady fault of exactly this value is than none."""
-        logs, _ = self._bank.fit(self._evidence, self._bank.coefficients(each, 0.0), self.mean, self.covariance)
-        none, _ = self._bank.fit(self._evidence, self._coefficients(None), self.mean, self.covariance)
+        evidence, about = self._evidence.of_levels(self._loads), (self.mean, self.covariance)
+        logs, _ = self._bank.fit(evidence, self._bank.coefficients(each, 0.0), *about)
+        none, _ = self._bank.fit(evidence, self._coefficients(None), *about)
         return float(logs.max() - none.max())
 
 

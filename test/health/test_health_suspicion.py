@@ -38,7 +38,7 @@ def suspicion_of(
     """Of blocks of two angles, the first of which is off by so much (rad) in each; forces (N) at the tip turn the second."""
     rng, mean = np.random.default_rng(seed), np.zeros(2)
     found = Suspicion(
-        HypothesisTest(KNOWN), 0, mean, np.diag([1e-8, 1e-8]), np.full(2, ERROR**2), np.ones(2), np.array(levels), {}
+        HypothesisTest(KNOWN), 0, mean, np.diag([1e-8, 1e-8]), np.full(2, ERROR**2), np.ones(2), np.array(levels), 0.15, {}
     )
     modes, bent = (STIFF, np.zeros(len(offsets))) if forces is None else (LIMP, 1e-5 * forces)
     for k, (offset, other) in enumerate(zip(offsets, bent, strict=True)):

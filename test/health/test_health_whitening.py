@@ -25,10 +25,12 @@ from boom_twin.health.inference.innovation_filter import (
     REACH,
     REST,
     SHAPE,
+    SHIFTED,
     InnovationFilter,
     ModalStates,
     modes_of,
     oscillation,
+    out_of_step,
     read_modes,
     shaken_by,
 )
@@ -238,12 +240,14 @@ class Source:
         self.noise = covariance_of(np.random.default_rng(8), CHANNELS, 0.7)
         self.kept = math.exp(-(travel + REST * BLOCK) / REACH)
         self.driven = modes.least + shaking * DETUNING**2 * modes.driven
-        self.own = self.noise + np.diag(shaking * SHAPE**2 * DETUNING**2 * modes.shaken)
+        late = out_of_step(modes, np.full((1, 1), DETUNING**2), BLOCK)[0]
+        self.began = modes.rest + shaking * np.diag(late)
+        self.own = self.noise + np.diag(shaking * (SHAPE**2 + SHIFTED**2 * DETUNING**2) * modes.shaken)
 
     def rows(self, count: int) -> np.ndarray:
         """Means of the channels, shape (count, CHANNELS)."""
         draw = self.rng.multivariate_normal
-        eta = draw(np.zeros(len(self.driven)), self.modes.rest)
+        eta = draw(np.zeros(len(self.driven)), self.began)
         error, found = draw(np.zeros(CHANNELS), np.diag(ERRORS2)), []
         for k in range(count):
             eta = self.modes.turn @ eta + draw(np.zeros(len(eta)), self.driven)
@@ -255,7 +259,7 @@ class Source:
     def covariance(self, count: int) -> np.ndarray:
         """Of `rows`, all in one vector: from the variances and what carries over, without a filter."""
         c, shown, turn = CHANNELS, self.modes.shown, self.modes.turn
-        found, spread = np.zeros((count * c, count * c)), self.modes.rest
+        found, spread = np.zeros((count * c, count * c)), self.began
         for k in range(count):
             spread = turn @ spread @ turn.T + self.driven
             carried = spread

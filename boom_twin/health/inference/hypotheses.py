@@ -33,7 +33,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import log
+from math import inf, log
 from typing import NamedTuple
 
 import numpy as np
@@ -103,6 +103,11 @@ class Evidence:
         """Counting `weight` times as much."""
         matrix, vector = weight * self.matrix, weight * self.vector
         return Evidence(matrix, vector, weight * self.squares, weight * self.rows, weight * self.log)
+
+    def of_levels(self, count: int) -> Evidence:
+        """Under the first levels, so many."""
+        matrix, vector, squares, log = (each[:count] for each in (self.matrix, self.vector, self.squares, self.log))
+        return Evidence(matrix, vector, squares, self.rows, log)
 
     def __add__(self, other: Evidence) -> Evidence:
         return Evidence(
@@ -198,12 +203,15 @@ class Verdict:
         best does: pulses and gusts are no Gauss-Markov process, rest suits a low level, a steep flank a high one.
     level : int
         Of the load at the tip, from 0, that goes best with what is most probable of all, no fault among it.
+    at_most : float
+        Bound of `strength` by other evidence.
     """
 
     causes: tuple[Cause, ...]
     excess: float
     none_excess: float
     level: int
+    at_most: float = inf
 
     @property
     def best(self) -> Explanation:
@@ -213,7 +221,7 @@ class Verdict:
     @cached_property
     def strength(self) -> float:
         """ln of how much more probable a fault is than none, with the excess taken into account."""
-        return max(part.log_factor for cause in self.causes for part in cause.parts) / self.excess
+        return min(max(part.log_factor for cause in self.causes for part in cause.parts) / self.excess, self.at_most)
 
 
 class HypothesisTest:

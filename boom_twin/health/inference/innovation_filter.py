@@ -8,8 +8,10 @@ w is white, of the density that
 - lets a vibration of the predicted size lose step with the real one as if its frequency were wrong by the share `detuning`
   within one second: detuning^2 omega^4 A^2 1 s, where A^2 is the mean square of the predicted coordinate.
 
-The shape of a mode is then wrong, too: every channel has a noise of its own, of `SHAPE` detuning times what it reads of that
-vibration. Vibration that nobody predicted, by a load, counts likewise: see `InnovationFilter.vibration`.
+The shape of a mode is wrong, too: every channel has a noise of its own, of `SHAPE` times what it reads of that vibration, for
+stiffness and masses that are within 2 % bend a mode by about as much however well its frequency is met, and of `SHIFTED`
+detuning times that, for what shifts a frequency. What is out of step already where a filter begins is among its state: see
+`out_of_step`. Vibration that nobody predicted, by a load, counts likewise: see `InnovationFilter.vibration`.
 
 And what linkages, masses and bending are a little wrong by: an error of each channel that is another one in every posture, of
 a given deviation, with a correlation exp(-travel / REACH) over the travel of the strokes.
@@ -44,7 +46,7 @@ from .kalman_update import LOAD, FilterWork, filter_block
 HIGHEST = 8.0  # Hz; faster vibration is averaged out within a block
 KEEPS_STEP = 1.0  # s, see above
 LEAST_DAMPING = 2e-4  # of omega, so that every mode has a finite variance
-SHAPE = 0.5  # see above
+SHAPE, SHIFTED = 0.02, 0.5  # see above
 REACH = 0.05  # m of travel
 REST = 1e-3  # m/s of travel that time stands for while the boom rests
 LOAD_TIME, MEAN_TIME = 2.0, 60.0  # s, correlation of the load about its mean, and of that
@@ -172,15 +174,16 @@ class InnovationFilter:
     channels, columns : int
     block : float
         Length of a block, s.
-    detuning : float
-        Share by which natural frequencies may be wrong.
+    detuning : float or ndarray, shape (...)
+        Share by which natural frequencies may be wrong, under each level.
     level : float or ndarray, shape (...)
         Of the unknown load, N. All levels are filtered in the same calls, as a filter of each alone would do to the bit.
     """
 
-    def __init__(self, channels: int, columns: int, block: float, detuning: float, level: float | Array = 0.0) -> None:
-        self._block, self._detuning2, self._channels = block, detuning**2, channels
-        self._levels, self._level2 = np.shape(level), np.ravel(level)[:, None] ** 2
+    def __init__(self, channels: int, columns: int, block: float, detuning: float | Array, level: float | Array = 0.0) -> None:
+        self._block, self._channels, self._levels = block, channels, np.shape(level)
+        self._level2 = np.ravel(level)[:, None] ** 2
+        self._detuning2 = np.broadcast_to(detuning, self._levels).ravel() ** 2
         count, others = len(self._level2), LOAD + channels
         self._x, self._p = np.zeros((count, others, columns)), np.zeros((count, others, others))
         self._stationary = self._level2 * np.array([1.0, 1.0, MEAN**2, MEAN**2])
@@ -214,16 +217,17 @@ class InnovationFilter:
         turn[:size, :size] = modes.turn
         turn[:size, size : size + LOAD] = np.hstack([modes.pushed, modes.pushed])
         turn[size : size + LOAD, size : size + LOAD] = np.diag(self._kept)
-        least[:size, :size], driven[:size, :size] = modes.least, self._detuning2 * modes.driven
+        least[:size, :size], driven[:size, :size] = modes.least, modes.driven
         added = np.zeros((count, states))
         added[:, size : size + LOAD] = (1.0 - self._kept**2) * self._stationary
         if before is None:
             p[:, :size, :size] += _swung(modes, self._level2)
         channels, self._rough = self._channels, ROUGH**2 * at_once
         self._work = FilterWork(
-            turn=turn, least=least, driven=driven, added=added,
+            turn=turn, least=least, driven=driven, detuning2=self._detuning2,
+            shape2=SHAPE**2 + SHIFTED**2 * self._detuning2, added=added,
             shown=np.hstack([modes.shown, modes.lifted, modes.lifted, np.eye(channels)]),
-            shaken=SHAPE**2 * self._detuning2 * modes.shaken, rough=self._rough.copy(), pushed=at_once[:, -2:].sum(axis=1),
+            shaken=modes.shaken, rough=self._rough.copy(), pushed=at_once[:, -2:].sum(axis=1),
             swinging=self._swinging, x=x, p=p, rows=np.zeros(channels, np.int64), own=np.zeros(channels),
             scratch=np.zeros((states, max(states, columns))), root=np.zeros((channels, channels)),
             gain=np.zeros((channels, states)),
@@ -256,6 +260,11 @@ class InnovationFilter:
             Of the channels that were measured, and the probability of the residuals among them.
         """
         kept = 0.0 if self._fresh else math.exp(-(travel + REST * self._block) / REACH)
+        if self._fresh and self._posture is not None:
+            at = np.arange(self._size)
+            self._p[:, at, at] += out_of_step(self._posture, self._detuning2[:, None], self._block) * np.reshape(
+                shaking, (-1, 1)
+            )
         self._fresh = False
         count, calm = len(self._level2), math.exp(-self._block / CALM)
         white, log, lately = np.empty((count, *table.shape)), np.empty(count), np.empty(count)
@@ -287,6 +296,21 @@ class InnovationFilter:
 def _diagonal(values: Array) -> Array:
     """Matrices (..., k, k) with `values` (..., k) on their diagonals."""
     return np.asarray(values[..., None] * np.eye(values.shape[-1]))
+
+
+def out_of_step(modes: ModalStates, detuning2: Array, block: float) -> Array:
+    """Variances (levels, 2 m) of what a start finds out of step of a vibration of a mean square of 1 (m/s^2)^2.
+
+    What white noise of the density above has collected for as long as vibration takes to decay, at most all of the vibration.
+    """
+    omegas2 = (2.0 * math.pi * modes.frequencies) ** 2
+    turns, starts = modes.turn, np.arange(0, len(modes.turn), 2)
+    left = turns[starts, starts] * turns[starts + 1, starts + 1] - turns[starts, starts + 1] * turns[starts + 1, starts]
+    decays, density = -np.log(left) / block, modes.driven.diagonal()[1::2] / block
+    rates = density * np.minimum(detuning2 / (2.0 * decays), 1.0 / (KEEPS_STEP * omegas2))
+    found = np.empty((len(detuning2), len(turns)))
+    found[:, 0::2], found[:, 1::2] = rates / omegas2, rates
+    return found
 
 
 def _swung(modes: ModalStates, level2: Array) -> Array:

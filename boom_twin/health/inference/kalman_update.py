@@ -19,11 +19,12 @@ class FilterWork(NamedTuple):
     """What `filter_block` goes on with; l levels of the load, c channels, s states, the last c the errors of the channels.
 
     turn, least, driven : (s, s) what states become within a block; covariance that stroke noise adds, and that wrong
-    frequencies add for a mean square of the tip's acceleration of 1 (m/s^2)^2.
+    frequencies add for a mean square of the tip's acceleration of 1 (m/s^2)^2 and a detuning of 1.
+    detuning2, shape2 : (l,) squares of the shares by which frequencies, and what the means read of vibration, may be wrong.
     added : (l, s) variances that come with a block; those of the errors of the channels are written.
     shown : (c, s) how the means of the channels read the states.
     shaken, rough, pushed : (c,), (l, c), (l,) variance of the means for a mean square of the tip's acceleration of
-    1 (m/s^2)^2, by the load, and that mean square by it.
+    1 (m/s^2)^2 and shapes that are wrong by all of it, by the load, and that mean square by it.
     swinging : (l,) mean square of the tip's acceleration by vibration that was found, (m/s^2)^2.
     x, p : (l, s, columns), (l, s, s) states and covariance.
     rows, own, scratch, root, gain : (c,), (c,), (s, the larger of s and columns), (c, c), (c, s) scratch.
@@ -32,6 +33,8 @@ class FilterWork(NamedTuple):
     turn: Array
     least: Array
     driven: Array
+    detuning2: Array
+    shape2: Array
     added: Array
     shown: Array
     shaken: Array
@@ -74,8 +77,8 @@ def filter_block(f, table, noise, errors2, shaking, kept, calm, white, log):
         shaken = shaking[k] + f.pushed[k]
         for i in range(channels):
             f.added[k, errors + i] = (1.0 - kept * kept) * errors2[i]
-            f.own[i] = shaken * f.shaken[i] + f.rough[k, i]
-        predict(f.turn, f.least, f.driven, shaken, f.added[k], f.x[k], f.p[k], f.scratch)
+            f.own[i] = f.shape2[k] * shaken * f.shaken[i] + f.rough[k, i]
+        predict(f.turn, f.least, f.driven, f.detuning2[k] * shaken, f.added[k], f.x[k], f.p[k], f.scratch)
         log[k] = correct(f.rows[:measured], table, f.shown, noise, f.own, f.x[k], f.p[k], f.root, f.gain, white[k])
         felt2 = 0.0
         for i in range(channels - 2, channels):
