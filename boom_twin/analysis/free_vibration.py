@@ -28,12 +28,13 @@ LONGEST_STEP = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Vibration:
-    """One mode: frequency (Hz) and damping ratio, with their standard deviations."""
+    """One mode: frequency (Hz) and damping ratio, with their standard deviations; amplitude at first, over all channels."""
 
     frequency: float
     frequency_sigma: float
     damping: float
     damping_sigma: float
+    amplitude: float
 
 
 def free_vibrations(dt: float, values: Array, most_lags: int | None = None) -> list[Vibration]:
@@ -52,11 +53,11 @@ def free_vibrations(dt: float, values: Array, most_lags: int | None = None) -> l
     frequencies, dampings = np.abs(rates) / (2.0 * pi), -rates.real / np.abs(rates)
     kept = (frequencies > LOWEST) & (frequencies < min(HIGHEST, 0.4 / dt)) & (dampings > 0.0) & (dampings < DAMPED)
     rates = rates[kept][np.argsort(frequencies[kept])]
-    times, sigmas = dt * np.arange(float(len(x))), np.zeros((0, 2))
-    if len(rates):
-        step, sigmas = _refined(times, x, rates)
-        rates = rates + np.where(np.abs(step) < LONGEST_STEP * sigmas.max(axis=1), step, 0.0)
-    return [_vibration(rate, sigma) for rate, sigma in zip(rates, sigmas, strict=True)]
+    if not len(rates):
+        return []
+    step, sigmas, amplitudes = _refined(dt * np.arange(float(len(x))), x, rates)
+    rates = rates + np.where(np.abs(step) < LONGEST_STEP * sigmas.max(axis=1), step, 0.0)
+    return [_vibration(*each) for each in zip(rates, sigmas, amplitudes, strict=True)]
 
 
 def is_free(each: Vibration) -> bool:
@@ -64,8 +65,8 @@ def is_free(each: Vibration) -> bool:
     return each.damping > DECAYS * each.damping_sigma
 
 
-def _refined(times: Array, x: Array, rates: np.ndarray) -> tuple[np.ndarray, Array]:
-    """A Gauss-Newton step (1/s) of every rate to least squares (modes,), and deviations of its two parts (modes, 2)."""
+def _refined(times: Array, x: Array, rates: np.ndarray) -> tuple[np.ndarray, Array, Array]:
+    """A Gauss-Newton step (1/s) of every rate to least squares (modes,), deviations of its two parts (modes, 2), amplitudes."""
     waves = np.exp(rates[None, :] * times[:, None])
     linear = np.hstack([waves.real, -waves.imag, np.ones((len(times), 1))])
     amplitudes = np.linalg.lstsq(linear, x, rcond=None)[0]
@@ -81,9 +82,11 @@ def _refined(times: Array, x: Array, rates: np.ndarray) -> tuple[np.ndarray, Arr
     information = np.tensordot(left, left, axes=((0, 2), (0, 2)))
     inverse = np.linalg.pinv(information, hermitian=True)
     step = (inverse @ np.tensordot(left, rest, axes=((0, 2), (0, 1)))).reshape(2, -1)
-    return step[0] + 1j * step[1], np.sqrt(np.maximum(noise * np.diag(inverse), 0.0)).reshape(2, -1).T
+    sigmas = np.sqrt(np.maximum(noise * np.diag(inverse), 0.0)).reshape(2, -1).T
+    return step[0] + 1j * step[1], sigmas, np.linalg.norm(complexes, axis=1)
 
 
-def _vibration(rate: complex, sigmas: Array) -> Vibration:
-    size = abs(rate)
-    return Vibration(float(size) / (2.0 * pi), float(sigmas[1]) / (2.0 * pi), float(-rate.real / size), float(sigmas[0] / size))
+def _vibration(rate: complex, sigmas: Array, amplitude: float) -> Vibration:
+    size, (decay_sigma, turn_sigma) = float(abs(rate)), sigmas.tolist()
+    damping, damping_sigma = float(-rate.real) / size, decay_sigma / size
+    return Vibration(size / (2.0 * pi), turn_sigma / (2.0 * pi), damping, damping_sigma, float(amplitude))

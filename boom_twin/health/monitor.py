@@ -31,6 +31,7 @@ from .inference.block_problem import (
     PredictionRows,
     warm_up_blocks,
 )
+from .inference.evidence_kernels import Faults, fit_faults
 from .inference.hypotheses import Evidence, Regression
 from .inference.innovation_filter import InnovationFilter, ModalStates
 from .inference.normal_distribution import log_normal_below
@@ -276,6 +277,7 @@ class HealthMonitor:
     ) -> BlockMeans:
         """Means of the residuals of every stream that is judged, of the block that begins at `start` (ns)."""
         left, counts, first, imu = np.empty(len(self.names)), np.empty(len(self.names)), 0, readings[Stream.IMU]
+        is_felt = len(imu.rows.stamps) > 0
         for stream in JUDGED:
             self._collect_means(readings[stream].numbers, self._masked(stream), first, left, counts)
             first += len(self._channels[stream])
@@ -287,7 +289,8 @@ class HealthMonitor:
             variances=predicted.variances,
             rates=np.concatenate([predicted.rates, np.where(np.isfinite(imu.rates), imu.rates, 0.0)]),
             shaking=predicted.shaking,
-            motion=(imu if len(imu.rows.stamps) else readings[Stream.ANGLES]).rows,
+            motion=(imu if is_felt else readings[Stream.ANGLES]).rows,
+            is_felt=is_felt,
         )
 
     def _tip_sigmas(self, variances: Array, tip: Array) -> Array:
@@ -313,6 +316,9 @@ def warm_up() -> None:
     _ = regression.has_strayed
     Evidence.none(1, (1,)).with_rows(found.white[None], np.zeros(1)).given(np.zeros(1), np.eye(1))
     log_normal_below(two)
+    place, one = np.zeros(1, np.int64), np.ones(1)
+    faults = Faults(place, one, one > 0.0, one, one, place, place + 1)
+    SameTypes(fit_faults)(faults, np.ones((1, 2, 2)), np.ones((1, 2)), 1.0, np.empty((1, 6, 2)))
     warm_up_blocks()
     SameTypes(follow_heard)(two[0], two[0], two[0], 0.0, two[0])
     SameTypes(collect_means)(np.zeros((6, 2)), np.zeros(2, dtype=bool), 0, two[0], two[0])

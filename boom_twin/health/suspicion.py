@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -89,13 +88,14 @@ class Suspicion:
     ) -> None:  # fmt: skip
         self._bank, self.start, self.mean, self.covariance = bank, start, mean, covariance
         self._errors2, self._noise2, self._carried = errors2, noise2, carried
-        self._loads = len(levels)
+        self._faulty, self._healthy = slice(len(levels)), slice(len(levels), None)  # levels by filters of DETUNING, and not
         self._shares = np.tile(LEVELS[: len(levels)], 2)
         detunings, levels = np.repeat([DETUNING, detuning], len(levels)), np.tile(levels, 2)
         channels, coefficients = len(errors2), bank.coefficient_count
         self._filter = InnovationFilter(channels, 1 + coefficients, BLOCK * NANO, detunings, levels)
         self.size, self.blocks, self._travel = np.zeros(channels), 0, 0.0
-        self._evidence = self._calm = Evidence.none(coefficients, levels.shape)
+        self._evidence = Evidence.none(coefficients, levels.shape)
+        self._calm = self._evidence.of_levels(self._faulty)
         self._before = deque([self._evidence], maxlen=RECENT + 1)  # after each of the recent blocks, and before them
         self._halfway = deque([self._evidence])  # likewise after every so many blocks, from half of them on
 
@@ -120,9 +120,9 @@ class Suspicion:
         self._filter.tune(problem.modes)
         self._filter.roughen(is_shaken * LOAD_BLOCKS * np.outer(LEVER * self._shares, self.size) ** 2)
         shaking = self._filter.vibration(problem.shaking)
-        found = self._filter.step(table, noise, crude, shaking, problem.travel)
-        self._evidence = self._evidence.with_rows(*found)
-        self._calm = self._calm.with_rows(*found, weight)
+        white, log = self._filter.step(table, noise, crude, shaking, problem.travel)
+        self._evidence = self._evidence.with_rows(white, log)
+        self._calm = self._calm.with_rows(white[self._faulty], log[self._faulty], weight)
         self._before.append(self._evidence)
         self.blocks += 1
         if self.blocks % RECENT == 0:
@@ -157,23 +157,23 @@ class Suspicion:
         Filters that allow for a fault's frequencies expect too much of vibration of a healthy boom: there, in a gust, a lower
         level of the load with a fault goes better with it than the right one without.
         """
-        verdict = self._explain(self._evidence.of_levels(self._loads))
-        return replace(verdict, at_most=self._explain(self._evidence).strength) if verdict.strength > 0.0 else verdict
+        of_faults, of_none = (self._evidence.of_levels(levels) for levels in (self._faulty, self._healthy))
+        return self._explain(of_faults, of_none)
 
     def explain_calmly(self) -> Verdict:
         """Likewise, but blocks in which the boom vibrates count less: what a cause is named by."""
-        return self._explain(self._calm.of_levels(self._loads))
+        return self._explain(self._calm, None)
 
-    def _explain(self, evidence: Evidence) -> Verdict:
+    def _explain(self, evidence: Evidence, healthy_too: Evidence | None) -> Verdict:
         postures = 1.0 + self._travel / REACH
-        return self._bank.explain(evidence, self.mean, self.covariance, self.span, self._carried, postures)
+        return self._bank.explain(evidence, self.mean, self.covariance, self.span, self._carried, postures, healthy_too)
 
     def least_told(self, level: int, strength: float) -> Array:
         """Least sizes of steady faults, shape (parameters,), that this evidence would tell under a load of that level.
 
         By the posterior's own covariance: `strength` is ln of how much more probable than none such a fault has to be.
         """
-        healthy = self._evidence.of_levels(self._loads).given(self.mean, self.covariance)
+        healthy = self._evidence.of_levels(self._faulty).given(self.mean, self.covariance)
         return self._bank.least_told(healthy.matrix[level].diagonal()[: len(self.mean)], strength)
 
     def load(self, level: int) -> tuple[float, float]:
@@ -188,12 +188,12 @@ class Suspicion:
         """How what explains all of the evidence goes with the recent blocks."""
         if not self.is_settled:
             return RecentFit(False, False)
-        recent = (self._evidence + self._before[0].weighted(-1.0)).of_levels(self._loads)
+        recent = (self._evidence + self._before[0].weighted(-1.0)).of_levels(self._faulty)
         about, middle = (self.mean, self.covariance), self.span - 0.5 * RECENT * BLOCK * NANO
         if verdict.strength > 0.0:
             logs, squares, changed, moved = self._bank.change(recent, verdict.best, self.span, middle, *about)
             if verdict.best.is_growing and self.blocks > LATELY:
-                lately = (self._evidence + self._halfway[0].weighted(-1.0)).of_levels(self._loads)
+                lately = (self._evidence + self._halfway[0].weighted(-1.0)).of_levels(self._faulty)
                 changed = max(changed, self._bank.change(lately, verdict.best, self.span, middle, *about)[2])
         else:
             (logs, squares), changed, moved = self._bank.fit(recent, self._coefficients(None), *about), 0.0, 0.0
@@ -208,7 +208,7 @@ class Suspicion:
         """Whether what explains the evidence would do so under a load of that level, too: then the load makes no difference."""
         if verdict.strength < SURE:
             return False
-        evidence, about = self._evidence.of_levels(self._loads), (self.mean, self.covariance)
+        evidence, about = self._evidence.of_levels(self._faulty), (self.mean, self.covariance)
         with_fault, _ = self._bank.fit(evidence, self._coefficients(verdict.best), *about)
         none, _ = self._bank.fit(evidence, self._coefficients(None), *about)
         return bool(with_fault[level] - none[level] >= SURE * verdict.excess)
@@ -218,7 +218,7 @@ class Suspicion:
 
     def log_factor(self, each: Explanation) -> float:
         """ln of how much more probable a steady fault of exactly this value is than none."""
-        evidence, about = self._evidence.of_levels(self._loads), (self.mean, self.covariance)
+        evidence, about = self._evidence.of_levels(self._faulty), (self.mean, self.covariance)
         logs, _ = self._bank.fit(evidence, self._bank.coefficients(each, 0.0), *about)
         none, _ = self._bank.fit(evidence, self._coefficients(None), *about)
         return float(logs.max() - none.max())

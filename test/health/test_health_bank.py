@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from health.gaussian import covariance_of, log_density
 from scipy.integrate import quad
 
 from boom_twin.health.inference.fault_catalogue import Form, Parameter
-from boom_twin.health.inference.hypotheses import CRUDE, GROWING_PRIOR, GROWN, Evidence, Explanation, HypothesisTest
+from boom_twin.health.inference.evidence_kernels import GROWING_PRIOR, GROWN
+from boom_twin.health.inference.hypotheses import CRUDE, Evidence, Explanation, HypothesisTest
 
 KNOWN = (
     Parameter("cylinder_1.k", "softer", Form.SCENE, 0, "", 0.02, 0.5, least=0.0),
@@ -157,6 +160,23 @@ def test_probabilities(seed):
     assert sensor.probability == pytest.approx((weights[1] + weights[2]) / sum(weights.values()))
     assert sensor.steady == pytest.approx((steady[1] + steady[2]) / sum(steady.values())), "of faults that do not grow"
     assert verdict.causes[0].name == "joint_2.sensor" and verdict.best.place == 3
+
+
+def test_a_fault_is_as_strong_as_it_is_by_both_filters():
+    """Of a filter that makes all that was measured much more probable; two that tell of two faults tell of none."""
+    one, other, both, none = (Problem(5, each) for each in ({1: 3.0}, {3: 4.0}, {1: 3.0, 3: 4.0}, {}))
+
+    def strength(second: Problem, more: float) -> float:
+        also = second.evidence()
+        better = replace(also, log=one.evidence().log + more)
+        return BANK.explain(one.evidence(), one.mean, one.covariance, SPAN, {}, 1.0, better).strength
+
+    alone = one.verdict().strength
+    assert alone > 20.0 and other.verdict().strength > 20.0
+    assert strength(none, -200.0) == pytest.approx(alone), "one that hardly explains what was measured says nothing"
+    assert strength(one, 200.0) == pytest.approx(alone)
+    assert strength(both, 200.0) > 10.0, "what both tell is left"
+    assert max(strength(none, 200.0), strength(other, 200.0)) < 5.0
 
 
 def test_odds_that_many_postures_bear_out_count_for_more():

@@ -116,7 +116,7 @@ def test_scales_are_of_what_is_read(made):
     model = LinearModel(scene, Settings(), (None,) * n, known)
     moved = strokes + 0.009
     none, rows = np.zeros(n + 2), MeasuredRows(np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros((0, 2)))
-    table = model._table(BlockMeans(0, none, none, moved, np.zeros(n), none, 0.0, rows), signature)
+    table = model._table(BlockMeans(0, none, none, moved, np.zeros(n), none, 0.0, rows, False), signature)
     here, there = (statics(scene, where, modes=1).joints for where in (strokes, moved))
     for column, each in enumerate(known):
         if each.form is Form.ANGLE_SCALE:

@@ -86,7 +86,7 @@ def verdict_of(
     for i, (name, (share, alone)) in enumerate(shares.items()):
         part = Explanation(places[name], 0, strength, 0.4, 0.02, rate, 0.01 * rate)
         causes.append(Cause(name, share, (part,), alone, others if i else steady))
-    return Verdict(tuple(causes), excess, 1.0, 0)
+    return Verdict(tuple(causes), excess, 1.0, 0, strength / excess)
 
 
 def test_what_fits_rules_out_other_causes():

@@ -199,6 +199,8 @@ class BlockMeans(NamedTuple):
         Mean square of the predicted tip acceleration, (m/s^2)^2.
     motion : MeasuredRows
         Readings of the sensor that shows vibration best: the IMU, or without it the angles.
+    is_felt : bool
+        Whether that is the IMU.
     """
 
     start: int
@@ -209,6 +211,7 @@ class BlockMeans(NamedTuple):
     rates: Array
     shaking: float
     motion: MeasuredRows
+    is_felt: bool
 
 
 class BlockProblem(NamedTuple):
@@ -266,7 +269,7 @@ class LinearModel:
     def __init__(
         self, scene: Scene, settings: Settings, mounts: tuple[Mount | None, ...], known: tuple[Parameter, ...]
     ) -> None:
-        n = len(scene.joints)
+        n, self._reach = len(scene.joints), scene.reach
         self.signatures = Signatures(scene, known, mounts)
         self._sensor2 = np.array([settings.variance(sensor_kind(name)) for name in judged_channels(n)])
         late = [(1 + i, *self._channels_of(each.index, n)) for i, each in enumerate(known) if each.form is Form.DELAY]
@@ -291,12 +294,12 @@ class LinearModel:
         self._modes: ModalStates | None = None
         self._before: Array | None = None
         self._shaking = 0.0
-        self._holds = HoldCollector()
+        self._holds = HoldCollector(self._reach)
         self._in_work: deque[HoldInWork] = deque()
 
     def take(self, block: BlockMeans, noise: StrokeNoise) -> BlockProblem | None:
         """One block; None while there is no equilibrium to linearise about."""
-        held = self._holds.take(block.start, block.left, block.strokes, block.motion[:2], BLOCK)
+        held = self._holds.take(block.start, block.left, block.strokes, block.motion[:2], block.is_felt, BLOCK)
         if held is not None and (begun := self.signatures.hold(held)) is not None:
             self._in_work.append(begun)
         hold = self._hold()

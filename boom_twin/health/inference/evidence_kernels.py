@@ -1,12 +1,20 @@
-"""What `boom_twin.health.inference.hypotheses` does with evidence, compiled: adding blocks, integrating parameters out."""
+"""What `boom_twin.health.inference.hypotheses` does with evidence, compiled: adding blocks, integrating out, fitting faults."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ...kernels.jit import inner, kernel
+from ...types import Array
+from .normal_distribution import log_below
 
 TINY = 1e-14  # share of a variance: what is left of it below that is none
+GROWING_PRIOR, GROWN = 1e-4, 10.0  # weight of a fault that grows; time (s) in which it grows to its size
+EARLY = 0.25  # share of the span at which growth has its least value, too; a line through growth from halfway on has 0 there
 
 
 @kernel
@@ -144,3 +152,93 @@ def eliminate(spread, across, j, rank):
             spread[i, b] -= by * spread[j, b]
         for c in range(across.shape[1]):
             across[i, c] -= by * across[j, c]
+
+
+class Faults(NamedTuple):
+    """What `fit_faults` has to know of f faults, g of which may grow.
+
+    Attributes
+    ----------
+    places, usual2 : ndarray, shape (f,)
+        Of their parameters; variance of what they usually are.
+    is_boundless : ndarray of bool, shape (f,)
+        Whether they may be of any size, that is the least of what they usually are.
+    least, none_sided : ndarray, shape (f,)
+        Least values; ln of the probability that what they usually are is above them.
+    grows, rates : ndarray, shape (g,)
+        Which of them may grow, and the places of their rates.
+    """
+
+    places: NDArray[np.int64]
+    usual2: Array
+    is_boundless: NDArray[np.bool_]
+    least: Array
+    none_sided: Array
+    grows: NDArray[np.int64]
+    rates: NDArray[np.int64]
+
+
+@kernel
+def fit_faults(f, matrix, vector, span, found):
+    """Explain evidence by each of f faults that is as large all the time, then by each of g that grows; l levels of the load.
+
+    What grows has its least value early on, too, and what has no least value had the same sign then: nothing grows through 0.
+    Else an onset within the evidence is a line through 0 for a sensor, but not for a spring.
+
+    Parameters
+    ----------
+    f : Faults
+    matrix, vector : ndarray, shape (l, c, c), (l, c)
+        L' and l', see `boom_twin.health.inference.hypotheses`.
+    span : float
+        Time (s) that the evidence has taken.
+    found : ndarray, shape (l, 6, f + g)
+        Written: log factor, squares that are explained, value and its deviation at the end, rate (1/s) and its deviation.
+    """
+    count = f.places.shape[0]
+    for level in range(vector.shape[0]):
+        for a in range(count):
+            fit_steady(f, a, matrix[level], vector[level], found[level, :, a])
+        for b in range(f.grows.shape[0]):
+            fit_growing(f, b, matrix[level], vector[level], span, found[level, :, count + b])
+
+
+@inner
+def fit_steady(f, a, matrix, vector, found):
+    """Explain evidence of one level by fault `a`, as large all the time; see `fit_faults`."""
+    known, by, usual2 = matrix[f.places[a], f.places[a]], vector[f.places[a]], f.usual2[a]
+    if f.is_boundless[a] and known > 0.0:
+        usual2 = max(usual2, (by / known) * (by / known) - 1.0 / known)
+    spread = usual2 / (1.0 + usual2 * known)
+    value, sigma = spread * by, math.sqrt(spread)
+    found[0] = 0.5 * by * value - 0.5 * math.log1p(usual2 * known) + sided(f, a, value, sigma)
+    found[1], found[2], found[3], found[4], found[5] = by * value, value, sigma, 0.0, 0.0
+
+
+@inner
+def fit_growing(f, b, matrix, vector, span, found):
+    """Explain evidence of one level by fault number `b` of those that may grow; see `fit_faults`."""
+    a, rate = f.grows[b], f.rates[b]
+    place, size2 = f.places[a], f.usual2[a]
+    rate2, across = size2 / GROWN**2, size2 / GROWN
+    own, other = 1.0 + size2 * matrix[place, place], 1.0 + rate2 * matrix[rate, rate]
+    both = across * matrix[place, rate]
+    det = own * other - both * both
+    first2, mixed, second2 = size2 * other / det, -across * both / det, rate2 * own / det  # covariance of value and rate
+    first = first2 * vector[place] + mixed * vector[rate]
+    second = mixed * vector[place] + second2 * vector[rate]
+    explained, early = vector[place] * first + vector[rate] * second, EARLY * span
+    value, sigma = first + span * second, math.sqrt(first2 + 2.0 * span * mixed + span * span * second2)
+    once, once_sigma = first + early * second, math.sqrt(first2 + 2.0 * early * mixed + early * early * second2)
+    if math.isinf(f.least[a]):
+        lessened = log_below(math.copysign(1.0, value) * once / once_sigma) + math.log(2.0)
+    else:
+        lessened = min(sided(f, a, value, sigma), sided(f, a, once, once_sigma))
+    found[0] = 0.5 * explained - 0.5 * math.log(det) + lessened + math.log(GROWING_PRIOR)
+    found[1], found[2], found[3], found[4], found[5] = explained, value, sigma, second, math.sqrt(second2)
+
+
+@inner
+def sided(f, a, value, sigma):
+    """What it adds to the log factor that fault `a` has a least value."""
+    return log_below((value - f.least[a]) / sigma) - f.none_sided[a]

@@ -6,6 +6,7 @@ posture, which stiffness and masses change, but no sensor does.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,7 @@ PART = 1.0  # s, over which means are compared, to see how calm a hold is
 KEPT_UP = 0.8  # of its power that a vibration still has in the second half, if something keeps it up
 COLOURED = 3.0  # times the power of white noise that is left, from which on something else than free vibration is in it
 HEARD = 4.0  # times the power of noise, below which nothing is told of that
+SECOND_ORDER, MOVED = 5.0, 0.4  # 1/rad, and of a resolution: see `_with_second_order`
 
 _largest_step = SameTypes(largest_step)
 
@@ -83,20 +85,28 @@ class HoldProblem(NamedTuple):
 
 
 class HoldCollector:
-    """Collects blocks while the boom stands still."""
+    """Collects blocks while the boom stands still.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    reach : float
+        Of the boom, m.
+    """
+
+    def __init__(self, reach: float) -> None:
+        self._reach = reach
         self._begin()
 
     def _begin(self) -> None:
         self._strokes: list[Array] = []
         self._left: list[Array] = []
         self._motion: list[tuple[NDArray[np.int64], Array]] = []
+        self._is_felt = False
         self._starts: list[int] = []
 
     def take(
-        self, start: int, left: Array, strokes: Array, motion: tuple[NDArray[np.int64], Array], block: int
-    ) -> StillReadings | None:
+        self, start: int, left: Array, strokes: Array, motion: tuple[NDArray[np.int64], Array], is_felt: bool, block: int
+    ) -> StillReadings | None:  # fmt: skip
         """One block of `block` ns; gives the hold that it ends, if that was long enough.
 
         Parameters
@@ -107,9 +117,11 @@ class HoldCollector:
             Means of the residuals; strokes, m.
         motion : tuple
             Stamps (k,) in ns and readings (k, any) of what shows vibration best.
+        is_felt : bool
+            Whether that is the IMU, m/s^2; else it is angles, rad.
         """
         is_next = bool(self._starts) and start - self._starts[-1] < 3 * block
-        is_next = is_next and motion[1].shape[1] == self._motion[-1][1].shape[1]  # of the same sensor
+        is_next = is_next and is_felt == self._is_felt
         is_still = is_next and _largest_step(strokes, self._strokes[-1]) < PACE
         found = None
         if self._starts and (not is_still or (start - self._starts[0]) * NANO >= LONGEST):
@@ -119,6 +131,7 @@ class HoldCollector:
         self._strokes.append(strokes)
         self._left.append(left)
         self._motion.append(motion)
+        self._is_felt = is_felt
         return found
 
     def _finished(self, block: int) -> StillReadings | None:
@@ -133,9 +146,37 @@ class HoldCollector:
         is_shaken = not _is_explained(dt, thin, vibrations) or _is_kept_up(thin)
         part = 1 if is_shaken else max(1, round(PART / (block * NANO)))
         left, unrest = _mean_at_rest(np.array(self._left), part, is_shaken)
-        sure = tuple(each for each in vibrations if is_free(each) and each.frequency_sigma < SURE * each.frequency)
-        found = () if is_shaken else sure
+        clear = [] if is_shaken else [each for each in vibrations if is_free(each) and _is_sure(each)]
+        found = tuple(each for each in _with_second_order(clear, span, self._reach if self._is_felt else None) if _is_sure(each))
         return StillReadings(self._starts[0], self._starts[-1] + block, strokes, left, unrest, found)
+
+
+def _is_sure(each: Vibration) -> bool:
+    return each.frequency_sigma < SURE * each.frequency
+
+
+def _with_second_order(vibrations: list[Vibration], span: float, reach: float | None) -> list[Vibration]:
+    """The vibrations of a hold of `span` (s), their frequencies as unsure as vibrations of second order make them.
+
+    A boom that swings far is no linear system: two of its vibrations, or one with itself, give more, at the sum and the
+    difference of their frequencies, of `SECOND_ORDER` times the product of their amplitudes (rad; of accelerations at the end
+    of a boom of `reach` (m), by the frequency). In fast moves of booms in Exudyn that factor is 1 to 10. What is nearer to
+    another than the span resolves is not told from it: it moves its frequency by `MOVED` of the resolution times the ratio of
+    amplitudes, and may be all of what was taken for it.
+    """
+    if len(vibrations) == 0:
+        return []
+    frequencies, amplitudes = (np.array(each) for each in zip(*((v.frequency, v.amplitude) for v in vibrations), strict=True))
+    turns = amplitudes if reach is None else amplitudes / ((2.0 * np.pi * frequencies) ** 2 * reach)
+    first, second = np.triu_indices(len(vibrations))
+    sizes = SECOND_ORDER * turns[first] * amplitudes[second]
+    moved = np.zeros(len(vibrations))
+    for sign in (1.0, -1.0):
+        forced = np.abs(frequencies[first] + sign * frequencies[second])
+        moved += (np.abs(forced - frequencies[:, None]) < 1.0 / span) @ sizes
+    moved *= MOVED / span / amplitudes
+    sigmas = np.hypot([each.frequency_sigma for each in vibrations], moved).tolist()
+    return [replace(each, frequency_sigma=sigma) for each, sigma in zip(vibrations, sigmas, strict=True)]
 
 
 def _is_kept_up(values: Array) -> bool:

@@ -32,8 +32,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from math import inf, log
+from math import log
 from typing import NamedTuple
 
 import numpy as np
@@ -41,7 +40,7 @@ from numpy.typing import NDArray
 
 from ...kernels.jit import SameTypes
 from ...types import Array
-from .evidence_kernels import add_rows, integrate_out
+from .evidence_kernels import GROWN, Faults, add_rows, fit_faults, integrate_out
 from .fault_catalogue import Form, Parameter, variances
 from .kalman_update import correct, has_strayed
 from .normal_distribution import log_normal_below
@@ -49,8 +48,6 @@ from .normal_distribution import log_normal_below
 STEADY, GROWING = 0, 1
 BOUNDLESS = (Form.ANGLE, Form.STROKE, Form.IMU)  # of sensors whose zero may be off by any amount
 LASTING = (Form.DELAY, Form.SCALE, Form.ANGLE_SCALE)  # lags and scales do not grow
-GROWING_PRIOR, GROWN = 1e-4, 10.0  # weight of that shape; time (s) in which a fault grows to its size
-EARLY = 0.25  # share of the span at which growth has its least value, too; a line through growth from halfway on has 0 there
 CRUDE = 0.001  # see above
 AS_WELL = 12.0  # ln by which a level of the load may be less probable than the best and still explain the evidence
 
@@ -104,9 +101,9 @@ class Evidence:
         matrix, vector = weight * self.matrix, weight * self.vector
         return Evidence(matrix, vector, weight * self.squares, weight * self.rows, weight * self.log)
 
-    def of_levels(self, count: int) -> Evidence:
-        """Under the first levels, so many."""
-        matrix, vector, squares, log = (each[:count] for each in (self.matrix, self.vector, self.squares, self.log))
+    def of_levels(self, levels: slice) -> Evidence:
+        """Under some of the levels."""
+        matrix, vector, squares, log = (each[levels] for each in (self.matrix, self.vector, self.squares, self.log))
         return Evidence(matrix, vector, squares, self.rows, log)
 
     def __add__(self, other: Evidence) -> Evidence:
@@ -203,25 +200,20 @@ class Verdict:
         best does: pulses and gusts are no Gauss-Markov process, rest suits a low level, a steep flank a high one.
     level : int
         Of the load at the tip, from 0, that goes best with what is most probable of all, no fault among it.
-    at_most : float
-        Bound of `strength` by other evidence.
+    strength : float
+        ln of how much more probable a fault is than none, with the excess taken into account, by all filters.
     """
 
     causes: tuple[Cause, ...]
     excess: float
     none_excess: float
     level: int
-    at_most: float = inf
+    strength: float
 
     @property
     def best(self) -> Explanation:
         """Of the most probable cause."""
         return self.causes[0].parts[0]
-
-    @cached_property
-    def strength(self) -> float:
-        """ln of how much more probable a fault is than none, with the excess taken into account."""
-        return min(max(part.log_factor for cause in self.causes for part in cause.parts) / self.excess, self.at_most)
 
 
 class HypothesisTest:
@@ -242,17 +234,21 @@ class HypothesisTest:
         self.known = known
         self._places = np.array([i for i, each in enumerate(known) if each.faulty > 0.0])
         may_grow = np.array([known[i].form not in LASTING for i in self._places])
-        self.growing, self._grows = self._places[may_grow], np.flatnonzero(may_grow)
+        self.growing = self._places[may_grow]
         self.coefficient_count = len(known) + len(self.growing)
         self._rate_of = {int(place): len(known) + k for k, place in enumerate(self.growing)}
         self._faulty = variances(known, "faulty")[self._places]
-        self._least = np.array([known[i].least for i in self._places])
-        self._none_sided = log_normal_below(-self._least / np.sqrt(self._faulty))
+        least = np.array([known[i].least for i in self._places])
+        self._faults = Faults(
+            self._places, self._faulty, np.array([known[i].form in BOUNDLESS for i in self._places]), least,
+            log_normal_below(-least / np.sqrt(self._faulty)), np.flatnonzero(may_grow),
+            len(known) + np.arange(len(self.growing)),
+        )  # fmt: skip
+        self._fit_faults = SameTypes(fit_faults)
         self._explained = np.concatenate([self._places, self.growing])  # by both shapes: what follows is of these
         self._priors = np.log([known[i].prior for i in self._explained])
         self._names = tuple(dict.fromkeys(known[i].cause for i in self._places))
         self._group = [self._names.index(known[i].cause) for i in self._explained]
-        self._is_boundless = np.array([known[i].form in BOUNDLESS for i in self._places])
 
     def explain(
         self,
@@ -262,6 +258,7 @@ class HypothesisTest:
         span: float,
         carried: Mapping[str, float],
         postures: float = 1.0,
+        healthy_too: Evidence | None = None,
     ) -> Verdict:
         """Weigh all faults.
 
@@ -277,6 +274,8 @@ class HypothesisTest:
             ln of how probable causes were before this evidence; 0 for others.
         postures : float
             In how many the evidence was collected.
+        healthy_too : Evidence, optional
+            Of the same rows by filters to which the boom is as a healthy one: each fault is as strong as by both at most.
 
         Returns
         -------
@@ -284,13 +283,14 @@ class HypothesisTest:
             How well each fault explains the evidence, and how large it would be.
         """
         healthy = evidence.given(mean, covariance)
-        logs = healthy.log
-        fits = np.concatenate([self._steady(healthy), self._growing(healthy, span)], axis=2)
-        # fits: (levels, numbers, explanations)
-        factors = fits[:, 0] + (logs - logs.max())[:, None]
-        squares = healthy.squares[:, None] - fits[:, 1]
-        best = np.unravel_index(int(np.argmax(factors)), factors.shape)
-        excess = max(1.0, float(squares[best]) / max(healthy.rows, 1.0))
+        logs, fits = healthy.log, self._fits(healthy, span)
+        factors, best, excess = self._weighed(logs, healthy.squares, healthy.rows, fits)
+        strengths = factors.max(axis=0) / excess
+        if healthy_too is not None and strengths.max() > 0.0:
+            also = healthy_too.given(mean, covariance)
+            both = np.concatenate([logs, also.log]), np.concatenate([healthy.squares, also.squares])
+            by_both, _, excess_of_both = self._weighed(*both, healthy.rows, np.concatenate([fits, self._fits(also, span)]))
+            strengths = np.minimum(strengths, by_both.max(axis=0) / excess_of_both)
         priors = self._priors.copy()
         seen = (healthy.matrix.diagonal(axis1=-2, axis2=-1)[:, self._explained] > 0.0).any(axis=0)
         priors[~seen] = -np.inf if seen.any() else 0.0  # what shows in no reading, say an IMU that is not there
@@ -309,7 +309,21 @@ class HypothesisTest:
         steady = np.zeros_like(alone)
         steady[: len(self._places)] = np.exp(constant - constant.max()).sum(axis=0)
         causes = self._grouped(found, *(each / each.sum() for each in (shares, alone, steady)))
-        return Verdict(causes, excess, none_excess, int(best[0]) if is_faulty else none)
+        return Verdict(causes, excess, none_excess, int(best[0]) if is_faulty else none, float(strengths.max()))
+
+    def _fits(self, healthy: Evidence, span: float) -> Array:
+        """How well every explanation goes with evidence; shape (levels, 6, explanations), see `fit_faults`."""
+        found = np.empty((len(healthy.log), 6, len(self._explained)))
+        self._fit_faults(self._faults, healthy.matrix, healthy.vector, span, found)
+        return found
+
+    @staticmethod
+    def _weighed(logs: Array, squares: Array, rows: float, fits: Array) -> tuple[Array, tuple[np.intp, ...], float]:
+        """Log factors over no fault (levels, explanations), each with the load that suits it; the largest's place, its excess."""
+        factors = fits[:, 0] + (logs - logs.max())[:, None]
+        best = np.unravel_index(int(np.argmax(factors)), factors.shape)
+        left = float(squares[best[0]] - fits[best[0], 1, best[1]])
+        return factors, best, max(1.0, left / max(rows, 1.0))
 
     def least_told(self, information: Array, strength: float) -> Array:
         """Sizes (parameters,) of steady faults whose expected log factor is `strength`, by their information (parameters,).
@@ -321,45 +335,6 @@ class HypothesisTest:
         wanted = 2.0 * strength + np.log1p(self._faulty * known)
         found[self._places] = np.sqrt(wanted / spread) / np.maximum(known, 1e-300)
         return found
-
-    def _steady(self, healthy: Evidence) -> Array:
-        """Log factor, squares that are explained, value, deviation, and no rate, of every place; shape (levels, 6, places)."""
-        matrix, vector = healthy.matrix.diagonal(axis1=-2, axis2=-1)[..., self._places], healthy.vector[..., self._places]
-        known = np.maximum(matrix, 1e-300)
-        usual = np.where(self._is_boundless, np.maximum(self._faulty, (vector / known) ** 2 - 1.0 / known), self._faulty)
-        spread = usual / (1.0 + usual * matrix)
-        values, sigmas = spread * vector, np.sqrt(spread)
-        factors = 0.5 * vector * values - 0.5 * np.log1p(usual * matrix) + self._sided(values, sigmas, slice(None))
-        none = np.zeros_like(values)
-        return np.stack([factors, vector * values, values, sigmas, none, none], axis=-2)
-
-    def _growing(self, healthy: Evidence, span: float) -> Array:
-        """Likewise of faults that grow; values are those at the end of `span` (s); least values hold there, and early on.
-
-        What has no least value has had the same sign early on: nothing grows through 0. Else an onset within the evidence is
-        a line through 0 for a sensor, but not for a spring.
-        """
-        count, grows = len(self.known), self._grows
-        pairs = np.stack([self.growing, count + np.arange(len(grows))], axis=1)
-        vector = healthy.vector[..., pairs]
-        prior = np.sqrt(self._faulty[grows, None] * np.array([1.0, GROWN**-2]))
-        matrix = healthy.matrix[..., pairs[:, :, None], pairs[:, None, :]]
-        scaled = np.eye(2) + prior[:, :, None] * matrix * prior[:, None, :]
-        spread = prior[:, :, None] * np.linalg.inv(scaled) * prior[:, None, :]
-        found = (spread @ vector[..., None])[..., 0]
-        explained = (vector * found).sum(axis=-1)
-        now, early = np.array([1.0, span]), np.array([1.0, EARLY * span])
-        values, sigmas = found @ now, np.sqrt(spread @ now @ now)
-        once, once_sigmas = found @ early, np.sqrt(spread @ early @ early)
-        sided = np.minimum(self._sided(values, sigmas, grows), self._sided(once, once_sigmas, grows))
-        of_one_sign = log_normal_below(np.sign(values) * once / once_sigmas) + log(2.0)
-        sided = np.where(np.isinf(self._least[grows]), of_one_sign, sided)
-        factors = 0.5 * explained - 0.5 * np.log(np.linalg.det(scaled)) + sided + log(GROWING_PRIOR)
-        return np.stack([factors, explained, values, sigmas, found[..., 1], np.sqrt(spread[..., 1, 1])], axis=-2)
-
-    def _sided(self, values: Array, sigmas: Array, at: NDArray[np.intp] | slice) -> Array:
-        """What it adds to the log factor that faults, `at` some of the places, have a least value."""
-        return log_normal_below((values - self._least[at]) / sigmas) - self._none_sided[at]
 
     def _grouped(self, found: list[Explanation], shares: Array, alone: Array, steady: Array) -> tuple[Cause, ...]:
         groups: dict[int, list[int]] = {}

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ...kernels.jit import SameTypes, kernel
+from ...kernels.jit import SameTypes, inner, kernel
 from ...types import Array
 
 FAR = -30.0
@@ -27,16 +27,19 @@ def log_normal_below(values: Array) -> Array:
 def write_logs(values: Array, found: Array) -> None:
     """Write the same of values (k,)."""
     for i in range(values.shape[0]):
-        tail = 0.5 * math.erfc(abs(values[i] * math.sqrt(0.5)))
-        if values[i] < FAR:
-            over2 = 1.0 / (values[i] * values[i])
-            series = 1.0 - over2 * (1.0 - 3.0 * over2 * (1.0 - 5.0 * over2 * (1.0 - 7.0 * over2)))
-            log_size = math.log(-values[i] * math.sqrt(2.0 * math.pi))
-            found[i] = -0.5 * values[i] * values[i] - log_size + math.log(series)
-        elif values[i] < 0.0:
-            found[i] = math.log(tail)
-        else:
-            found[i] = math.log1p(-tail)
+        found[i] = log_below(values[i])
+
+
+@inner
+def log_below(value: float) -> float:
+    """The same of one value."""
+    tail = 0.5 * math.erfc(abs(value * math.sqrt(0.5)))
+    if value < FAR:
+        over2 = 1.0 / (value * value)
+        series = 1.0 - over2 * (1.0 - 3.0 * over2 * (1.0 - 5.0 * over2 * (1.0 - 7.0 * over2)))
+        log_size = math.log(-value * math.sqrt(2.0 * math.pi))
+        return -0.5 * value * value - log_size + math.log(series)
+    return math.log(tail) if value < 0.0 else math.log1p(-tail)
 
 
 _write_logs = SameTypes(write_logs)

@@ -44,7 +44,7 @@ def holds_of(signatures: Signatures, number: int, modes: int) -> list[HoldProble
         if signatures.at(at) is None:
             return []
         own = natural_frequencies(boom.plan, boom.state, boom.work, 5, 1e-6)[:modes]
-        vibrations = tuple(Vibration(f, SHARE * f, 0.01, 1e-3) for f in own.tolist())
+        vibrations = tuple(Vibration(f, SHARE * f, 0.01, 1e-3, 0.0) for f in own.tolist())
         start = k * 25_000_000_000
         work = signatures.hold(StillReadings(start, start + 20_000_000_000, at.copy(), np.zeros(6), UNREST, vibrations))
         assert work is not None
