@@ -9,8 +9,8 @@ import pytest
 from health.gaussian import covariance_of, log_density
 from scipy.integrate import quad
 
-from boom_twin.health.inference.fault_catalogue import Form, Parameter
 from boom_twin.health.inference.evidence_kernels import GROWING_PRIOR, GROWN
+from boom_twin.health.inference.fault_catalogue import Form, Parameter
 from boom_twin.health.inference.hypotheses import CRUDE, Evidence, Explanation, HypothesisTest
 
 KNOWN = (

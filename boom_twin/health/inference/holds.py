@@ -147,8 +147,8 @@ class HoldCollector:
         part = 1 if is_shaken else max(1, round(PART / (block * NANO)))
         left, unrest = _mean_at_rest(np.array(self._left), part, is_shaken)
         clear = [] if is_shaken else [each for each in vibrations if is_free(each) and _is_sure(each)]
-        found = tuple(each for each in _with_second_order(clear, span, self._reach if self._is_felt else None) if _is_sure(each))
-        return StillReadings(self._starts[0], self._starts[-1] + block, strokes, left, unrest, found)
+        sure = filter(_is_sure, _with_second_order(clear, span, self._reach if self._is_felt else None))
+        return StillReadings(self._starts[0], self._starts[-1] + block, strokes, left, unrest, tuple(sure))
 
 
 def _is_sure(each: Vibration) -> bool:
@@ -164,7 +164,7 @@ def _with_second_order(vibrations: list[Vibration], span: float, reach: float | 
     another than the span resolves is not told from it: it moves its frequency by `MOVED` of the resolution times the ratio of
     amplitudes, and may be all of what was taken for it.
     """
-    if len(vibrations) == 0:
+    if not vibrations:
         return []
     frequencies, amplitudes = (np.array(each) for each in zip(*((v.frequency, v.amplitude) for v in vibrations), strict=True))
     turns = amplitudes if reach is None else amplitudes / ((2.0 * np.pi * frequencies) ** 2 * reach)

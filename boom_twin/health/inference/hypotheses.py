@@ -32,11 +32,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import log
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...kernels.jit import SameTypes
 from ...types import Array
@@ -319,7 +317,7 @@ class HypothesisTest:
 
     @staticmethod
     def _weighed(logs: Array, squares: Array, rows: float, fits: Array) -> tuple[Array, tuple[np.intp, ...], float]:
-        """Log factors over no fault (levels, explanations), each with the load that suits it; the largest's place, its excess."""
+        """Log factors over no fault under the load that suits that (levels, explanations); the largest's place, its excess."""
         factors = fits[:, 0] + (logs - logs.max())[:, None]
         best = np.unravel_index(int(np.argmax(factors)), factors.shape)
         left = float(squares[best[0]] - fits[best[0], 1, best[1]])
