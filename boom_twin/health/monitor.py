@@ -17,7 +17,7 @@ from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
 from .angle_reading import AngleReading
 from .baseline import JUDGED, Baseline, judged_channels
-from .delay_monitor import DelayMonitor, delay_cause
+from .delay_monitor import DelayMonitor, delay_cause, normal_equations
 from .detection import Detector
 from .force_reading import ForceReading
 from .imu_mount import ImuMount
@@ -314,6 +314,7 @@ def warm_up() -> None:
     Evidence.none(1, (1,)).with_rows(found.white[None], np.zeros(1)).given(np.zeros(1), np.eye(1))
     log_normal_below(two)
     warm_up_blocks()
+    normal_equations(two[None], two[None], 0.0)
     SameTypes(follow_heard)(two[0], two[0], two[0], 0.0, two[0])
     SameTypes(collect_means)(np.zeros((6, 2)), np.zeros(2, dtype=bool), 0, two[0], two[0])
     Detector(2, BLOCK * NANO, 1e-6).take(np.zeros(2))
