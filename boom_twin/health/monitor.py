@@ -302,7 +302,7 @@ class HealthMonitor:
 def warm_up() -> None:
     """Compile the kernels that judge a rig, on made-up readings of two channels."""
     none, two = np.zeros((0, 0)), np.zeros((2, 2))
-    SensorCheck(1.0, 0.0, two[0], two[0], 0.0).look(np.arange(2.0), two, two, 2.0)
+    SensorCheck(1.0, 0.0, two[0], two[0], 0.0).look(np.arange(2.0), two + 100.0, two, 2.0)
     PredictionMeans.of(PredictionRows(np.arange(2), two, two, two, two, two))
     StreamSurvey(1.0, 2).take(MeasuredRows(np.arange(2), two, two), np.zeros(2, dtype=bool), 1.0)
     whitening = InnovationFilter(2, 2, BLOCK * NANO, 0.0)
