@@ -47,7 +47,7 @@ def lag_equations(rows, slopes, lag, scratch, noise, by, weight):
             place = t - lag / BLOCK
             if not 0.0 <= place <= span - 1.0:
                 continue
-            before = min(int(math.floor(place)), span - 2)
+            before = min(math.floor(place), span - 2)
             share = place - before
             for i in range(channels):
                 rate = (1.0 - share) * slopes[s, before, i] + share * slopes[s, before + 1, i]

@@ -207,7 +207,7 @@ class HealthMonitor:
         readings, span = dict[Stream, StreamReadings](), BLOCK * NANO if is_followed else 0.0
         for stream, survey in self._surveys.items():
             readings[stream] = survey.take(block.readings(stream), self._masked(stream), span)
-        is_shaken = any([each.is_bent for each in readings.values()])
+        is_shaken = any(each.is_bent for each in readings.values())
         for stream, each in readings.items():
             if stream in CHECKED:
                 stamps, raw, left = each.rows

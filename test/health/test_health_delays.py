@@ -137,7 +137,8 @@ def test_normal_equations_of_a_lag_are_those_of_numpy(lag: float) -> None:
     noise = (left**2).sum(axis=(0, 1))
     by, weight, left2 = normal_equations(rows, slopes, lag)
     assert by == pytest.approx(-(left * rates).sum(axis=1) / noise, rel=1e-9, abs=1e-12)
-    assert weight == pytest.approx((rates**2).sum(axis=1) / noise, rel=1e-9) and left2 == pytest.approx((left**2).mean(), rel=1e-9)
+    assert weight == pytest.approx((rates**2).sum(axis=1) / noise, rel=1e-9)
+    assert left2 == pytest.approx((left**2).mean(), rel=1e-9)
 
 
 def late(seconds: float, lag: float, stream: Stream = Stream.IMU) -> tuple[Sample, ...]:
