@@ -125,7 +125,7 @@ class DeviationModes:
         noise : StrokeNoise
             As it is now.
         """
-        if float(np.max(np.abs(strokes - self._at))) > POSTURE_STEP:
+        if float(np.abs(strokes - self._at).max()) > POSTURE_STEP:
             self._make(strokes, angles, live)
         f, known = self.filter, min(len(noise.modes), int(self.filter.status[COUNT]))
         f.density[:] = 0.0
