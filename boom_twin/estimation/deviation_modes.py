@@ -61,6 +61,7 @@ class DeviationModes:
         self._angle_variance = settings.angle_variance
         self._weight = weight_of(scene)
         self._motions: list[Array] = []
+        self._masked: NDArray[np.bool_] | None = None
         self._at = np.full(plan.joints, math.inf)
 
     @cached_property
@@ -83,7 +84,13 @@ class DeviationModes:
         f.before[:], f.spread[:] = 0.0, 0.0
 
     def mask(self, masked: NDArray[np.bool_]) -> None:
-        """Leave out the channels (c,) that are masked; once these are all angles, what they have shown is forgotten."""
+        """Leave out the channels (c,) that are masked; once these are all angles, what they have shown is forgotten.
+
+        The same array is of the same channels.
+        """
+        if masked is self._masked:
+            return
+        self._masked = masked
         angles = slice(len(self.filter.slopes))
         if masked[angles].all() and not self.filter.masked[angles].all():
             self._forget()
@@ -118,7 +125,7 @@ class DeviationModes:
         noise : StrokeNoise
             As it is now.
         """
-        if float(np.max(np.abs(strokes - self._at))) > POSTURE_STEP:
+        if float(np.abs(strokes - self._at).max()) > POSTURE_STEP:
             self._make(strokes, angles, live)
         f, known = self.filter, min(len(noise.modes), int(self.filter.status[COUNT]))
         f.density[:] = 0.0

@@ -1,7 +1,7 @@
 """Record the steps that a boom takes, and repeat them in another twin of it, in place of solving its equations again.
 
 Nearly half of what a twin does is to step its boom, which depends on the strokes alone and on nothing that is made of a step
-afterwards: expected readings, residuals, estimate, health. So a replay steps the boom in one process and does the rest in
+afterwards: expected readings, residuals, estimate, health. So a replay steps the boom in one thread and does the rest in
 another. Both take the same strokes and come to the same steps in the same order; what a step leaves is written as so many
 numbers, bit for bit, and with it the time and the strokes that it was taken for, which are compared when it is repeated.
 """

@@ -101,7 +101,8 @@ class Reading:
     def of(self, state: State) -> Array:
         """Of an equilibrium."""
         self._look(state)
-        x, y, angle = state.frames[-1, [FRAME_X, FRAME_Y, FRAME_ANGLE]].tolist()
+        end = state.frames[-1].tolist()
+        x, y, angle = end[FRAME_X], end[FRAME_Y], end[FRAME_ANGLE]
         c, s = math.cos(angle), math.sin(angle)
         found, (gx, gy) = np.empty(self._plan.joints + 4), self._gravity
         found[:-4] = self._mounting.expected(self._row[self._at.joints], state)

@@ -17,10 +17,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.jit import SameTypes
 from ..types import Alarm, Array, Ranked, Stream
+from .lag_equations import BLOCK, lag_equations
+from .sensor_survey import COUNTS, OFF, RATES
 from .stream_readings import StreamReadings
 
-BLOCK, LEAST = 0.1, 10  # s of a block; blocks of half a triangle, at least
+LEAST = 10  # blocks of half a triangle, at least
 SPAN = 40  # blocks of one estimate
 FEWEST = 4.0  # spans, by how much they weigh, before anything is told
 FEWEST_CLEAR, CLEAR = (
@@ -33,7 +36,8 @@ HASTE = 0.025  # s, by which readings may be ahead of a prediction: it lags wher
 SURE, GONE = 5.0, 3.0  # deviations from which on it is told, and below which it has ended
 LONGEST = 1.5  # s, lag that is looked for: of a span more is left than is lost at its ends
 ROUNDS, ROUND = 6, 0.25  # of Gauss-Newton, and by how much (s) a lag changes in one at most
-TINY = 1e-300
+
+_lag_equations = SameTypes(lag_equations)
 
 
 def delay_cause(stream: Stream) -> str:
@@ -109,8 +113,10 @@ class DelayMonitor:
         if len(self._blocks) < SPAN + 2 * (half - 1):
             return []
         newest = list(self._blocks)[-(SPAN + 2 * (half - 1)) :]
-        lags, rates = [_off(*block) for block in newest], [each.rates for each, _ in newest]
-        rows, slopes = self._averaged(lags, half), self._averaged(rates, half)
+        numbers, left_out = np.array([each.numbers for each, _ in newest]), np.array([masked for _, masked in newest])
+        left_out |= numbers[:, COUNTS] < np.array([[len(each.rows.stamps)] for each, _ in newest])
+        off = np.where(left_out, np.nan, numbers[:, OFF])
+        rows, slopes = self._averaged(off, half), self._averaged(numbers[:, RATES], half)
         for _ in range(SPAN):
             self._blocks.popleft()
         is_known = np.isfinite(rows).all(axis=0) & np.isfinite(slopes).all(axis=0)
@@ -118,10 +124,10 @@ class DelayMonitor:
         return self._judge(end, is_doubted())
 
     @staticmethod
-    def _averaged(blocks: list[Array], half: int) -> Array:
-        """Shape (SPAN, channels); `half` blocks are half of the triangle."""
-        rows, triangle = np.array(blocks), np.convolve(np.ones(half), np.ones(half)) / half**2
-        return np.column_stack([np.convolve(column, triangle, "valid") for column in rows.T])
+    def _averaged(blocks: Array, half: int) -> Array:
+        """Of numbers of blocks (.., channels), shape (SPAN, channels); `half` blocks are half of the triangle."""
+        triangle = np.convolve(np.ones(half), np.ones(half)) / half**2
+        return np.column_stack([np.convolve(column, triangle, "valid") for column in blocks.T])
 
     def estimate(self) -> tuple[float, float]:
         """The lag and its deviation, s; infinite while too little has moved."""
@@ -156,34 +162,34 @@ class DelayMonitor:
 
 
 def _clear_lag(rows: Array, slopes: Array) -> tuple[float, float, bool]:
-    """The lag by these spans, its deviation, and whether it is clear; see `_without_lag`."""
-    lag = 0.0
-    off = _without_lag(rows, slopes, lag)[0]
-    for _ in range(ROUNDS):
-        left, rates = _without_lag(rows, slopes, lag)
-        by, weight = _normal_equations(left, rates)
+    """The lag by these spans, its deviation, and whether it is clear."""
+    lag, off2 = 0.0, math.nan
+    for number in range(ROUNDS):
+        by, weight, left2 = normal_equations(rows, slopes, lag)
+        off2 = left2 if number == 0 else off2
         if not weight.sum() > 0.0:
             return 0.0, math.inf, False
         change = float(by.sum() / weight.sum())
         lag = min(max(lag + min(max(change, -ROUND), ROUND), -LONGEST), LONGEST)
-    if not np.mean(left**2) < CLEAR * np.mean(off**2) or _are_few(weight, FEWEST_CLEAR):
+    if not left2 < CLEAR * off2 or _are_few(weight, FEWEST_CLEAR):
         return 0.0, math.inf, False
     return lag, _deviation(by, weight, change), True
 
 
 def _small_lag(rows: Array, slopes: Array) -> tuple[float, float]:
     """A lag that is among other faults, and the noise of a boom at rest: so many times the slopes; and its deviation."""
-    by, weight = (each.sum(axis=1) for each in _normal_equations(*_without_lag(rows, slopes, 0.0)))
+    by, weight = (each.sum(axis=1) for each in normal_equations(rows, slopes, 0.0)[:2])
     if _are_few(weight, FEWEST):
         return 0.0, math.inf
     lag = float(by.sum() / weight.sum())
     return lag, _deviation(by, weight, lag)
 
 
-def _normal_equations(left: Array, rates: Array) -> tuple[Array, Array]:
-    """Of what is off as so many times minus the rates: right and left side, shape (spans, channels), by the channels' noise."""
-    noise = (left**2).sum(axis=(0, 1)) + TINY
-    return -(left * rates).sum(axis=1) / noise, (rates**2).sum(axis=1) / noise
+def normal_equations(rows: Array, slopes: Array, lag: float) -> tuple[Array, Array, float]:
+    """Right and left side for a change of a lag, shape (spans, channels), and the mean square that is left beside the lag."""
+    spans, span, channels = rows.shape
+    by, weight = np.empty((2, spans, channels))
+    return by, weight, _lag_equations(rows, slopes, lag, np.empty((3, span, channels)), np.empty(channels), by, weight)
 
 
 def _are_few(weight: Array, fewest: float) -> bool:
@@ -194,33 +200,3 @@ def _are_few(weight: Array, fewest: float) -> bool:
 def _deviation(by: Array, weight: Array, found: float) -> float:
     """Of a lag (s), by how it scatters."""
     return math.hypot(float(np.sqrt(((by - found * weight) ** 2).sum()) / weight.sum()), FLOOR)
-
-
-def _without_lag(rows: Array, slopes: Array, lag: float) -> tuple[Array, Array]:
-    """What readings are off by beside a lag (s), and the slopes that they were read at; each less its mean in a span.
-
-    Parameters
-    ----------
-    rows, slopes : ndarray, shape (spans, SPAN, channels)
-        By how much readings are off, and the slope of what they should be, of blocks `BLOCK` apart.
-
-    Returns
-    -------
-    two ndarray, shape (spans, k, channels)
-        Of the blocks whose readings are of a time within their span.
-    """
-    steps = 0.5 * BLOCK * (slopes[:, 1:] + slopes[:, :-1])
-    gone = np.concatenate([np.zeros_like(slopes[:, :1]), np.cumsum(steps, axis=1)], axis=1)
-    places = np.arange(SPAN) - lag / BLOCK
-    own = np.flatnonzero((places >= 0.0) & (places <= SPAN - 1.0))
-    before = np.minimum(np.floor(places[own]).astype(int), SPAN - 2)
-    share = (places[own] - before)[:, None]
-    rates = (1.0 - share) * slopes[:, before] + share * slopes[:, before + 1]
-    then = gone[:, before] + share * BLOCK * 0.5 * (slopes[:, before] + rates)
-    left = rows[:, own] + gone[:, own] - then
-    return left - left.mean(axis=1, keepdims=True), rates - rates.mean(axis=1, keepdims=True)
-
-
-def _off(readings: StreamReadings, masked: NDArray[np.bool_]) -> Array:
-    """By how much readings are off in the mean, shape (channels,); NaN where one is missing, or masked."""
-    return np.where((readings.counts < len(readings.rows.stamps)) | masked, np.nan, readings.off)

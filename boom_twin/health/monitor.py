@@ -17,7 +17,7 @@ from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
 from .angle_reading import AngleReading
 from .baseline import JUDGED, Baseline, judged_channels
-from .delay_monitor import DelayMonitor, delay_cause
+from .delay_monitor import DelayMonitor, delay_cause, normal_equations
 from .detection import Detector
 from .force_reading import ForceReading
 from .imu_mount import ImuMount
@@ -80,6 +80,7 @@ class HealthMonitor:
         self.names = judged_channels(len(scene.joints))
         self.residuals = ResidualMonitor(scene, settings, mounts, baseline, self.names, on_block)
         self._ranges = sensor_ranges(scene, mounts)
+        self._uncertain = UNCERTAIN * settings.stroke_variance
         self._stated = {stream: settings.variance(kind) for stream, kind in SENSORS.items()}
         self._late_angles = np.ones(len(self._channels[Stream.ANGLES]), dtype=bool)
         self._trusted = {stream: np.zeros(len(names), dtype=bool) for stream, names in self._channels.items()}
@@ -203,7 +204,7 @@ class HealthMonitor:
     def _judge(self, block: Block) -> list[Alarm]:
         start, predictions, news = block.number * BLOCK, block.predictions(), []
         predicted = PredictionMeans.of(predictions)
-        is_followed = predicted.largest < UNCERTAIN * self._settings.stroke_variance
+        is_followed = predicted.largest < self._uncertain
         readings, span = dict[Stream, StreamReadings](), BLOCK * NANO if is_followed else 0.0
         for stream, survey in self._surveys.items():
             readings[stream] = survey.take(block.readings(stream), self._masked(stream), span)
@@ -222,9 +223,9 @@ class HealthMonitor:
                 found = self._judge_delay(stream, monitor, block, readings[stream])
                 news += self._void(found, block.end) if stream is Stream.ANGLES else found
         strokes = predictions.measured
-        expected = np.full(strokes.shape, np.nan if is_shaken else 0.0)
+        expected = np.full(strokes.shape, np.nan) if is_shaken else np.zeros(strokes.shape)
         news += self._check(Stream.STROKES, block, predictions.stamps, strokes, expected)
-        if self._sensors[Stream.STROKES].masked.any() or self._angles.has_wrong_strokes or self._noise is None:
+        if self._sensors[Stream.STROKES].is_any_masked or self._angles.has_wrong_strokes or self._noise is None:
             news += self.residuals.close(start)
             self.residuals.begin()
             return news
@@ -276,18 +277,19 @@ class HealthMonitor:
         self, start: int, predictions: PredictionRows, predicted: PredictionMeans, readings: dict[Stream, StreamReadings]
     ) -> BlockMeans:
         """Means of the residuals of every stream that is judged, of the block that begins at `start` (ns)."""
-        left, counts, first, imu = np.empty(len(self.names)), np.empty(len(self.names)), 0, readings[Stream.IMU]
+        (left, counts, rates), first, imu = np.empty((3, len(self.names))), 0, readings[Stream.IMU]
         is_felt = len(imu.rows.stamps) > 0
         for stream in JUDGED:
-            self._collect_means(readings[stream].numbers, self._masked(stream), first, left, counts)
+            self._collect_means(readings[stream].numbers, self._masked(stream), first, left, counts, rates)
             first += len(self._channels[stream])
+        rates[: len(predicted.rates)] = predicted.rates  # of the joints: those of a prediction are there without readings
         return BlockMeans(
             start=start,
             left=left,
             counts=counts,
             strokes=predictions.strokes[len(predictions.stamps) // 2],
             variances=predicted.variances,
-            rates=np.concatenate([predicted.rates, np.where(np.isfinite(imu.rates), imu.rates, 0.0)]),
+            rates=rates,
             shaking=predicted.shaking,
             motion=(imu if is_felt else readings[Stream.ANGLES]).rows,
             is_felt=is_felt,
@@ -305,7 +307,7 @@ class HealthMonitor:
 def warm_up() -> None:
     """Compile the kernels that judge a rig, on made-up readings of two channels."""
     none, two = np.zeros((0, 0)), np.zeros((2, 2))
-    SensorCheck(1.0, 0.0, two[0], two[0], 0.0).look(np.arange(2.0), two, two, 2.0)
+    SensorCheck(1.0, 0.0, two[0], two[0], 0.0).look(np.arange(2.0), two + 100.0, two, 2.0)
     PredictionMeans.of(PredictionRows(np.arange(2), two, two, two, two, two))
     StreamSurvey(1.0, 2).take(MeasuredRows(np.arange(2), two, two), np.zeros(2, dtype=bool), 1.0)
     whitening = InnovationFilter(2, 2, BLOCK * NANO, 0.0)
@@ -320,6 +322,7 @@ def warm_up() -> None:
     faults = Faults(place, one, one > 0.0, one, one, place, place + 1)
     SameTypes(fit_faults)(faults, np.ones((1, 2, 2)), np.ones((1, 2)), 1.0, np.empty((1, 6, 2)))
     warm_up_blocks()
+    normal_equations(two[None], two[None], 0.0)
     SameTypes(follow_heard)(two[0], two[0], two[0], 0.0, two[0])
-    SameTypes(collect_means)(np.zeros((6, 2)), np.zeros(2, dtype=bool), 0, two[0], two[0])
+    SameTypes(collect_means)(np.zeros((6, 2)), np.zeros(2, dtype=bool), 0, two[0], two[0], two[0])
     Detector(2, BLOCK * NANO, 1e-6).take(np.zeros(2))

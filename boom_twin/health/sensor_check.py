@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ..kernels.jit import SameTypes, hold
 from ..scene.schema import Scene
 from ..types import Array, Mount, Stream, channels_of
+from .sensor_findings import NOISY as IS_NOISY
+from .sensor_findings import OUTSIDE, SILENT, SPIKE, SPIKES, STUCK, find
 from .sensor_survey import FIRST, LASTING, NOISE, ROOM, CheckWork, survey
 
 
@@ -50,20 +52,15 @@ Flags = NDArray[np.bool_]
 
 GIVE = math.radians(5.0)
 """What an encoder may read beyond ``range_deg``, which is of the rigid boom: at its end a joint sags and swings on."""
-SPIKE = 8.0  # deviations of the noise by which a reading leaves both of its neighbours
-JUMP = 10.0  # likewise, by which readings change at once and for good
 NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; time (s) over which it is taken
 SWIFT = 0.1  # m/s^2, acceleration of a cylinder that is no noise of its sensor
 USUAL_WINDOW = 10.0  # s over which the noise that is usual is told
 NOISE_OVER = "noise_over_"  # and the name of a setting: how its figures are called
 MISSTATED = 1.5  # times the noise that is stated, from which on what is usual is worth a warning
-QUIET = 0.3  # of the noise that is stated: a channel with less gives clean readings, whose repetition means nothing
-REPEATS_FOR = 0.4  # s, at least, of one reading again and again
 REPEATS = (3, 1_000_000)  # times, at least and at most, that a reading has to repeat
 FALSE_ALARM = 1e-12  # probability, for each reading, that a live sensor repeats for so long
 SILENT_FOR = 0.5  # s; readings that lie farther apart are no neighbours: neither jumps nor spikes show across such a gap
 MISSING = 0.1  # share of the readings
-ENOUGH, MEDIAN2 = 6, 0.4549  # second differences whose median tells noise; that of the square of a standard normal value
 
 
 def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, tuple[Array, Array]]:
@@ -153,7 +150,7 @@ class SensorCheck:
             outside=np.zeros(count),
         )
         self._held = hold(self._known)
-        self._survey = SameTypes(survey)
+        self._survey, self._find, self._column = SameTypes(survey), SameTypes(find), np.zeros(rows)
         none, unknown = np.zeros(count, dtype=bool), np.full(count, np.nan)
         self._calm = SensorFindings(none, none, none, np.zeros(count), none, none, unknown, is_calm=True)
 
@@ -192,83 +189,25 @@ class SensorCheck:
         known = self._known
         if rows > len(known.times):
             times, raw, left = (np.resize(each, (2 * rows, *each.shape[1:])) for each in (known.times, known.raw, known.left))
-            self._known = known._replace(times=times, raw=raw, left=left)
+            self._known, self._column = known._replace(times=times, raw=raw, left=left), np.zeros(2 * rows)
             self._held = hold(self._known)
 
     def _findings(self, largest: float, rows: int, now: float) -> SensorFindings:
         """What is found in so many readings, whose largest step is `largest`."""
-        known, count = self._known, len(self._known.power)
-        times, raw, left = (column[: 3 + rows] for column in (known.times, known.raw, known.left))
-        spikes, jumped = np.zeros(count, dtype=bool), np.zeros(count)
-        if largest > SPIKE * self._sigma:
-            steps = np.where((np.diff(times) > SILENT_FOR)[:, None], np.nan, np.diff(left, axis=0))
-            noise = np.sqrt(np.fmax(np.fmax(known.power, self._sigma**2), _usual_bend2(left)))
-            spikes, jumped = self._spikes(steps, noise), self._jumps(times, raw, left, steps, noise)
-        interval = (times[-1] - times[2]) / rows
+        known = self._known
+        interval = (known.times[2 + rows] - known.times[2]) / rows
         is_motion = self._fastest > 0.0 and SWIFT * interval**2 > NOISY * self._sigma  # what bends readings so much
-        is_known = now - known.lately[FIRST] > NOISY_WINDOW and not is_motion  # how noisy the sensors are
-        loud = NOISY**2 * min(known.lately[NOISE], NOISY**2 * self._sigma**2)  # a judgement takes at most that for usual
+        is_known = bool(now - known.lately[FIRST] > NOISY_WINDOW and not is_motion)  # how noisy the sensors are
+        flags, jumped = np.empty((5, len(known.power)), dtype=bool), np.empty(len(known.power))
+        if not self._find(self._held, largest, now, is_known, self._fastest, self._column, flags, jumped):
+            return self._calm
         return SensorFindings(
-            stuck=self._stuck(float(times[-1])),
-            noisy=is_known & (known.power > loud),
-            spikes=spikes & is_known,
-            jumped=jumped,
-            silent=(now - known.heard > SILENT_FOR) | (known.missing > MISSING),
-            outside=known.outside > 0.5 * rows,
-            level=left[-1].copy(),
+            flags[STUCK], flags[IS_NOISY], flags[SPIKES], jumped, flags[SILENT], flags[OUTSIDE], known.left[2 + rows].copy()
         )
 
     def _nothing(self, count: int, now: float) -> SensorFindings:
         none, silent = np.zeros(count, dtype=bool), now - self._known.heard > SILENT_FOR
         return SensorFindings(none, none, none, np.zeros(count), silent, none, np.full(count, np.nan))
-
-    def _spikes(self, steps: Array, noise: Array) -> Flags:
-        """A reading that leaves both neighbours the same way, while these agree; `steps` from each to the next.
-
-        The noise (channels,) is that which is measured: a sensor that has twice as much as stated gives no spikes by that.
-        """
-        with np.errstate(invalid="ignore"):
-            out, back = steps[:-1], -steps[1:]
-            lone = (np.minimum(np.abs(out), np.abs(back)) > SPIKE * noise) & (out * back > 0.0)
-            lone &= np.abs(out - back) < 0.5 * np.minimum(np.abs(out), np.abs(back))
-        return np.asarray(lone.any(axis=0))
-
-    def _stuck(self, newest: float) -> Flags:
-        """One reading again and again until `newest` (s), while others of the stream are alive with noise."""
-        live = self._known.power > (QUIET * self._sigma) ** 2
-        if len(live) < 2 or not live.any():
-            return np.zeros(len(live), dtype=bool)
-        return np.asarray((self._known.run >= self._patience) & (newest - self._known.since >= REPEATS_FOR))
-
-    def _jumps(self, times: Array, raw: Array, left: Array, steps: Array, noise: Array) -> Array:
-        """How far readings changed from one to the next, for good, while the model did not; 0 where they did not.
-
-        `steps` are those of `left` from each reading to the next, NaN across a gap.
-        """
-        with np.errstate(invalid="ignore"):
-            step, measured = steps[1:-1], raw[2:-1] - raw[1:-2]
-            lasting = 0.5 * (left[2:-1] + left[3:]) - 0.5 * (left[:-3] + left[1:-2])
-            least = np.maximum(JUMP * noise, self._fastest * (times[2:-1] - times[1:-2])[:, None])
-            sudden = (np.abs(measured) > least) & (np.abs(step) > least) & (np.abs(lasting) > 0.7 * np.abs(step))
-            calm = np.maximum(np.abs(left[3:] - left[2:-1]), np.abs(left[1:-2] - left[:-3]))
-            sudden &= calm < 0.3 * np.abs(step)
-        return np.where(sudden.any(axis=0), np.where(sudden, step, 0.0).sum(axis=0), 0.0)
-
-
-def bends2(values: Array) -> Array:
-    """Squares of second differences of neighbours, shape (k - 2, ..); their mean is the variance of white noise."""
-    return np.asarray((values[2:] - 2.0 * values[1:-1] + values[:-2]) ** 2 / 6.0)
-
-
-def _usual_bend2(left: Array) -> Array:
-    """Variance (channels,) of the noise of readings (k, channels) by the median of their second differences.
-
-    It does not wait for the noise to be measured, as a mean over time does, and one spike leaves it as it is.
-    """
-    sorted2 = np.sort(bends2(left), axis=0)  # NaN last
-    known = np.isfinite(sorted2).sum(axis=0)
-    middle = np.take_along_axis(sorted2, np.maximum((known - 1) // 2, 0)[None], axis=0)[0]
-    return np.asarray(np.where(known >= ENOUGH, middle / MEDIAN2, 0.0))
 
 
 def repeats(sigma: float, resolution: float) -> int:

@@ -63,13 +63,14 @@ class SensorMonitor:
     ----------
     masked : ndarray of bool, shape (channels,)
         Channels that are not to be trusted; another array once these are others.
+    is_any_masked : bool
     """
 
     def __init__(self, names: tuple[str, ...], kind: SensorKind, is_predicted: bool = True) -> None:
         self._names, self._sensors, self._is_predicted = names, kind, is_predicted
         self._faults: dict[tuple[int, str], _Fault] = {}
         self._none: Flags = np.zeros(len(names), dtype=bool)
-        self.masked, self._is_anew = self._none, False
+        self.masked, self.is_any_masked, self._is_anew = self._none, False, False
 
     def begin(self) -> None:
         """The boom starts from rest: what jumped may have come back unseen."""
@@ -85,6 +86,7 @@ class SensorMonitor:
         self.masked = self._none.copy()
         for channel, kind in self._faults:
             self.masked[channel] |= kind != "spikes"
+        self.is_any_masked = bool(self.masked.any())
 
     def take(
         self,

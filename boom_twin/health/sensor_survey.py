@@ -320,8 +320,8 @@ def follow_heard(slow, values, counts, share, off):
 
 
 @kernel
-def collect_means(numbers, masked, first, left, counts):
-    """Write the means of a stream's readings without outliers, and of how many each is worth, from channel `first` on.
+def collect_means(numbers, masked, first, left, counts, rates):
+    """Write the means of a stream's readings without outliers, of how many each is worth, and rates, from channel `first` on.
 
     Parameters
     ----------
@@ -329,12 +329,13 @@ def collect_means(numbers, masked, first, left, counts):
         See `boom_twin.health.stream_readings.StreamReadings`.
     masked : ndarray of bool, shape (channels,)
         Channels that are not to be trusted: NaN is written.
-    left, counts : ndarray
-        Of all streams.
+    left, counts, rates : ndarray
+        Of all streams; a rate of 0 where there is none.
     """
     for i in range(masked.shape[0]):
         left[first + i] = math.nan if masked[i] else numbers[NEAR, i]
         counts[first + i] = numbers[EVENED, i]
+        rates[first + i] = numbers[RATES, i] if math.isfinite(numbers[RATES, i]) else 0.0
 
 
 @kernel

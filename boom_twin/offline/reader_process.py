@@ -1,18 +1,13 @@
-"""Reader process of a replay: reads a session, decodes its messages to samples and recorded changes, and steps the boom.
-
-To step the boom is half of a replay's work and needs the strokes alone; where there are cores for it, it is done here, and the
-twin at the other end of the pipe repeats the steps, see `boom_twin.estimation.recorded_steps`.
-"""
+"""Reader process of a replay: reads a session and decodes its messages to samples and recorded changes."""
 
 from __future__ import annotations
 
 import pickle
 import sys
 from collections import Counter, deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from itertools import chain, repeat
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -24,15 +19,9 @@ from ..messages.message_block import MessageBlock
 from ..messages.report_encoder import decode_changes
 from ..messages.topic_table import Output, Topics
 from ..messages.type_store import jazzy
-from ..twin.blocks import CODES, SampleBlock, samples_in
-from ..types import SENSORS, Array, Change, Mount, Sample, Stream
+from ..twin.blocks import SampleBlock, samples_in
+from ..types import SENSORS, Change, Sample, Stream
 from .process_pipe import END, Pipe, post, say_ready
-
-if TYPE_CHECKING:  # a process that steps no boom needs none of the model's modules
-    from ..config.settings import Settings
-    from ..estimation.recorded_steps import RecordedSteps
-    from ..scene.schema import Scene
-    from ..twin.twin import Twin
 
 NEAR = 2_000_000_000
 """Nanoseconds, of log time and of stamps, within which a change and its stroke sample are looked for.
@@ -97,15 +86,6 @@ MOST = 1200
 """Messages that are decoded at once, at most."""
 
 
-class SteppedBoom(NamedTuple):
-    """The boom that is stepped in the reader's process: as for `Twin`, and whether changes are repeated."""
-
-    scene: Scene
-    settings: Settings
-    mounts: Sequence[Mount | None]
-    changes: bool
-
-
 class SampleReader:
     """The samples of a session, many at a time; iterate once.
 
@@ -123,13 +103,9 @@ class SampleReader:
         The part of the session that is read.
     process : Pipe, optional
         From `started`, where it was begun before all of this was known.
-    boom : SteppedBoom, optional
-        Is stepped along the strokes in the process; `recorded_steps` must be set then.
 
     Attributes
     ----------
-    recorded_steps : RecordedSteps or None
-        Of the twin that all samples and changes are given to as they come, which repeats the steps.
     oddities : Counter
         Of the decoder, once the iteration has ended.
     """
@@ -142,12 +118,10 @@ class SampleReader:
         joints: int,
         window: TimeWindow = WHOLE,
         process: Pipe | None = None,
-        boom: SteppedBoom | None = None,
     ) -> None:
         self._pipe = process or self.started()
-        self._pipe.send(((path, topics, wanted, joints, window), boom))
+        self._pipe.send((path, topics, wanted, joints, window))
         self._joints = joints
-        self.recorded_steps: RecordedSteps | None = None
         self.oddities: Counter[str] = Counter()
 
     @staticmethod
@@ -169,9 +143,6 @@ class SampleReader:
                 self.oddities = item
             elif isinstance(item, int):
                 yield from repeat(None, item)
-            elif isinstance(item, np.ndarray):
-                assert self.recorded_steps is not None
-                self.recorded_steps.repeat(item)
             else:
                 yield item
         self._pipe.finish()
@@ -247,45 +218,17 @@ def _batch(found: list[DecodedBlock]) -> Iterator[SampleBlock | int]:
         yield without
 
 
-def with_steps(items: Iterable[Item], twin: Twin, changes: bool) -> Iterator[Item | Array]:
-    """What goes up the pipe, and before each block the steps of the boom along its strokes; see `SteppedBoom` for `changes`.
-
-    Where the twin refuses a sample, so will the one at the other end, which tells why: no more steps are given then.
-    """
-    twin.recorded_steps.record()
-    is_refused = False
-    for item in items:
-        if not is_refused and isinstance(item, SampleBlock | Change):
-            try:
-                if isinstance(item, SampleBlock):
-                    strokes = item.streams == CODES[Stream.STROKES]
-                    twin.update_block(SampleBlock(*(column[strokes] for column in item)))
-                elif changes:
-                    twin.requests.repeat(item)
-            except BoomTwinError:
-                is_refused = True
-            if len(steps := twin.recorded_steps.taken()):
-                yield steps
-        yield item
-
-
-def _ready_items(task: tuple[Path, Topics, list[str], int, TimeWindow], boom: SteppedBoom | None) -> Iterator[Item | Array]:
+def _ready_items(task: tuple[Path, Topics, list[str], int, TimeWindow]) -> Iterator[Item]:
     """What goes up the pipe, all that needs time at first done."""
     for kind in SENSORS.values():
         jazzy().get_msgdef(kind.message)  # compiles its decoder
-    if boom is None:
-        return items_of(*task)
-    from ..twin.twin import Twin
-
-    twin = Twin(boom.scene, boom.settings, boom.mounts)
-    twin.warm_up()
-    return with_steps(items_of(*task), twin, boom.changes)
+    return items_of(*task)
 
 
 def main() -> int:
     """Send the samples of a session up the pipe; exit code 1 with the reason on stderr if it cannot be read."""
     try:
-        items = _ready_items(*pickle.load(sys.stdin.buffer))
+        items = _ready_items(pickle.load(sys.stdin.buffer))
         say_ready()
         for item in items:
             post([item])

@@ -1,7 +1,7 @@
 """Replay: run the twin over a recorded session, message by message as the node would.
 
-The first and the last of them run in processes of their own (`boom_twin.offline.reader_process`,
-`boom_twin.offline.writer_process`).
+Reading and writing run in processes of their own (`boom_twin.offline.reader_process`, `boom_twin.offline.writer_process`), and
+of a long session the boom is stepped in a thread (`boom_twin.offline.stepping_thread`).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -31,7 +31,6 @@ from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
 from ..estimation.load_spectrum import TipLoad
 from ..health.baseline import Baseline
-from ..kernels.compiled_cache import is_kept
 from ..messages.sample_decoder import stamp_of
 from ..messages.topic_table import Topics
 from ..scene.edit import anew
@@ -48,10 +47,11 @@ from ..twin.events import EVENTS
 from ..types import NANO, Alarm, Array, Change, Report, Stream, channels_of
 from .ground_truth import TipErrors, TipTruth, load_truth
 from .process_pipe import Pipe
-from .reader_process import SampleReader, SteppedBoom
+from .reader_process import SampleReader
 from .recording import Recording, Stretch
 from .refused_strokes import RefusedStrokes
 from .sample_table import RowsInMemory, SampleTable, columns_of
+from .stepping_thread import stepped_ahead
 from .writer_process import ReportWriter
 
 if TYPE_CHECKING:
@@ -69,10 +69,8 @@ class ProgressBar(Protocol):
 
 
 Progress = Callable[[int], ProgressBar]
-UPDATE = "boom_twin.twin.update.update"
-"""Name of the kernel that takes long to compile."""
-MANY = 100_000
-"""Messages of a session, below which a process that steps the boom takes longer to start than it saves."""
+MANY = 20_000
+"""Messages of a session, below which another twin, to step the boom in a thread, takes longer to make than it saves."""
 GIVEN = "given as a Scene"
 """Source of a scene that came by no file."""
 
@@ -232,13 +230,11 @@ def replay_into(
         recording, other_boom, read = Recording(joints, taking, errors), OtherBoom(), np.zeros(joints, dtype=bool)
         refused = RefusedStrokes(scene, taken.source)
         expected = _expected(session, wanted, window)
-        is_apart = _is_stepped_apart(expected, cores, with_bag)
-        boom = SteppedBoom(scene, settings, topics.mounts(joints), changes) if is_apart else None
-        ahead = SampleReader(session.path, topics, wanted, joints, window, reader, boom)
+        ahead = SampleReader(session.path, topics, wanted, joints, window, reader)
         behind = None if writer is None else ReportWriter(writer, session.notes, topics, scene, settings)
-        with _unhurried_collector():
+        with _unhurried_collector(), ExitStack() as ended:
             twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline)
-            ahead.recorded_steps = twin.recorded_steps
+            stepping = _stepping_twin(twin) if expected >= MANY and (cores or usable_cores()) > 1 else None
             ahead.wait_ready()
             if behind is not None:
                 behind.wait_ready()
@@ -247,6 +243,8 @@ def replay_into(
             began = time.perf_counter()
             if not changes:
                 samples = (sample for sample in samples if not isinstance(sample, Change))
+            if stepping is not None:
+                samples = ended.enter_context(closing(stepped_ahead(samples, twin, stepping)))
             for step in drive_blocks(twin, samples):
                 if bar is not None:
                     bar.update(1 if step is None else len(step[0].stamps))
@@ -387,11 +385,6 @@ def _processes(building: UnfinishedResult, with_bag: bool) -> Iterator[tuple[Pip
         yield reader, writer
 
 
-def _is_stepped_apart(messages: int, cores: int | None, with_bag: bool) -> bool:
-    """Whether the boom is stepped in the reader's process: where a core is left for it, and nothing is to be compiled twice."""
-    return messages >= MANY and (cores or usable_cores()) >= (3 if with_bag else 2) and is_kept(UPDATE)
-
-
 def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Baseline | None) -> Twin:
     """A twin with its compiled model; its modules are imported here, while the other processes start."""
     from ..twin.twin import Twin
@@ -399,6 +392,11 @@ def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Base
     twin = Twin(scene, settings, topics.mounts(len(scene.joints)), baseline)
     twin.warm_up()
     return twin
+
+
+def _stepping_twin(twin: Twin) -> Twin:
+    """One of the same boom and settings, without health."""
+    return type(twin)(twin.scene, twin.settings, twin.mounts)
 
 
 @contextmanager

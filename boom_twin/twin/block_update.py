@@ -29,7 +29,7 @@ from ..kernels.result_row import PIN
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, Array, Health, Mount, Outline, Report, Stream, channels_of
 from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
-from .health_rows import copy_predictions, copy_residuals
+from .health_rows import copy_predictions, copy_residuals, count_residuals
 from .load_shedding import LoadShedding
 from .report_rows import ReportRows
 from .run import Run
@@ -137,6 +137,7 @@ class BlockUpdate:
         self._widths, compiled = limits.channels, boom.compiled
         self._measured = [(code, int(width)) for code, width in enumerate(self._widths) if code]
         self._copy_predictions, self._copy_residuals = SameTypes(copy_predictions), SameTypes(copy_residuals)
+        self._count_residuals, self._of_stream = SameTypes(count_residuals), np.zeros(len(STREAMS), np.int64)
         sizes = self._joints, len(compiled.row), len(compiled.bending), limits.channels
         self._found: UpdateOutput = new_output(2 * CAPACITY, *sizes) if before is None else before._found
         self._found.counts[:] = 0
@@ -221,6 +222,7 @@ class BlockUpdate:
             self._code = advance, measure.for_types_of(*twin, 0, 0, np.zeros(width), False, found)
             self._copy_predictions(found, 0, self._pins, *PredictionRows.room(0, self._joints))
             self._copy_residuals(found, 0, 0, 0, *MeasuredRows.room(0, 1))
+            self._count_residuals(found, 0, 0, self._of_stream)
         self._held = self._code, (boom, twin, found)
         return self._held
 
@@ -327,10 +329,13 @@ class BlockUpdate:
             self._copy_predictions(held, predicted, self._pins, *followed)
             self._judge.predicted(followed)
         if counts[1] > compared:
+            self._count_residuals(held, compared, counts[1], self._of_stream)
+            of_stream = self._of_stream.tolist()
             for code, width in self._measured:
-                rows = MeasuredRows.room(counts[1] - compared, width)
-                if count := self._copy_residuals(held, compared, counts[1], code, *rows):
-                    self._judge.measured(STREAMS[code], rows.first(count))
+                if of_stream[code]:
+                    rows = MeasuredRows.room(of_stream[code], width)
+                    self._copy_residuals(held, compared, counts[1], code, *rows)
+                    self._judge.measured(STREAMS[code], rows)
 
     def _residuals(self) -> ResidualBlock:
         found, own = self._found, slice(self._begin[1], int(self._found.counts[1]))

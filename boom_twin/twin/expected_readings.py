@@ -134,7 +134,7 @@ class Deviations:
             Joint angles of the rigid boom, rad.
         """
         self._state.clock[SEEN] = prediction.stamp
-        moved = float(np.max(np.abs(prediction.strokes - self._at))) > POSTURE_STEP
+        moved = float(np.abs(prediction.strokes - self._at).max()) > POSTURE_STEP
         spectrum = self._spectrum(interval, *filtered)
         if self.noise is None or moved or abs(interval - self._interval) > INTERVAL_STEP * interval:
             posture = self._postures.at(prediction.strokes, angles, live)

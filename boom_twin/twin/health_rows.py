@@ -28,8 +28,16 @@ def copy_predictions(found, first, pins, stamps, measured, strokes, variances, j
 
 
 @kernel
+def count_residuals(found, first, last, counts):
+    """Write how many residuals of each stream are from row `first` to `last` - 1, see `boom_twin.twin.blocks.CODES`."""
+    counts[:] = 0
+    for k in range(first, last):
+        counts[found.residual_streams[k]] += 1
+
+
+@kernel
 def copy_residuals(found, first, last, stream, stamps, raw, left):
-    """Copy the residuals of one stream from row `first` to `last` - 1; gives how many there are.
+    """Copy the residuals of one stream from row `first` to `last` - 1.
 
     Parameters
     ----------
@@ -37,7 +45,7 @@ def copy_residuals(found, first, last, stream, stamps, raw, left):
     stream : int
         By `boom_twin.twin.blocks.CODES`.
     stamps, raw, left : ndarray
-        Written, with room for all rows; see `boom_twin.health.inference.block_problem.MeasuredRows`.
+        Written, with room for all of them; see `boom_twin.health.inference.block_problem.MeasuredRows`.
     """
     count = 0
     for k in range(first, last):
@@ -46,4 +54,3 @@ def copy_residuals(found, first, last, stream, stamps, raw, left):
             for i in range(raw.shape[1]):
                 raw[count, i], left[count, i] = found.raw[k, i], found.values[k, i]
             count += 1
-    return count

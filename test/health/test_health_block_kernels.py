@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from boom_twin.health.inference.block_problem import BLOCK, MeasuredRows, PredictionRows
-from boom_twin.health.sensor_check import SensorCheck, SensorFindings, bends2
+from boom_twin.health.sensor_check import NOISY_WINDOW, SensorCheck
 from boom_twin.health.stream_readings import PredictionMeans, StreamReadings, StreamSurvey
 from boom_twin.types import NANO, Array
+
+from .numpy_findings import bends2, findings_of
 
 SIGMA = 2.0
 
@@ -85,37 +87,40 @@ def test_motion_bends_readings_smoothly_and_noise_does_not() -> None:
     assert not taken(np.zeros((0, 4)), np.zeros((0, 4)))[1].is_bent
 
 
-class Careful(SensorCheck):
-    """Never takes the short way of a block in which nothing is found."""
-
-    def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
-        super().look(stamps, raw, expected, now)
-        known = self._known
-        largest = float(np.nanmax(np.abs(np.diff(known.left[: 3 + len(stamps)], axis=0)), initial=0.0))
-        return self._findings(largest, len(stamps), now)
-
-
-def test_a_block_without_findings_is_told_as_the_long_way_tells_it() -> None:
-    """Readings that are noisy, repeated, missing, out of range or have spikes, some of them just within the limits."""
-    given = SIGMA, 0.0, np.full(2, -90.0), np.full(2, 90.0), 0.0
-    rng, check, careful, calm = np.random.default_rng(5), SensorCheck(*given), Careful(*given), 0
-    for block in range(400):
+@pytest.mark.parametrize("fastest", [0.0, 2000.0])
+def test_what_is_found_in_a_block_is_what_numpy_finds(fastest: float) -> None:
+    """Readings that are noisy, repeated, missing, out of range, have spikes or jump, some of them just within the limits."""
+    check, rng = SensorCheck(SIGMA, 0.0, np.full(2, -90.0), np.full(2, 90.0), fastest), np.random.default_rng(5)
+    calm, told, level = 0, set[str](), np.zeros(2)
+    for block in range(600):
         rows = 50 if block % 17 == 0 else 20
         times = 0.1 * block + 0.005 * np.arange(float(rows))
-        raw = rng.normal(0.0, SIGMA, (rows, 2)) * rng.choice([1.0, 2.4, 2.6], 2)
+        raw = level + rng.normal(0.0, SIGMA, (rows, 2)) * rng.choice([1.0, 2.4, 2.6], 2)
         if block % 7 == 0:
             raw[5:, rng.integers(2)] = raw[4, 0]
+        if 310 <= block < 320:
+            raw[:, 0] = 7.0
+        if 400 <= block < 430:
+            raw[:, 1] *= 8.0
         if block % 11 == 0:
             raw[rng.integers(20), 1] += rng.choice([7.0, 8.5, 30.0, 100.0]) * SIGMA
         if block % 13 == 0:
             raw[:12, 0] = np.nan
-        found, wanted = (each.look(times, raw, np.zeros_like(raw), times[-1] + 0.005) for each in (check, careful))
-        assert {kind: flags.tolist() for kind, flags in found.by_kind().items()} == {
-            kind: flags.tolist() for kind, flags in wanted.by_kind().items()
-        }
-        assert found.jumped.tolist() == wanted.jumped.tolist() and not wanted.is_calm
+        if block % 19 == 0:
+            step = rng.choice([9.0, 11.0, 25.0]) * rng.choice([-SIGMA, SIGMA], 2)
+            raw[rng.integers(rows) :] += step
+            level = 0.5 * level + step
+        now = times[-1] + 0.005 + (0.6 if block % 23 == 0 else 0.0)
+        found = check.look(times, raw, np.zeros_like(raw), now)
+        with np.errstate(invalid="ignore"):
+            wanted = findings_of(check._known, rows, now, block > NOISY_WINDOW / 0.1, fastest)
+        jumped = wanted.pop("jump")
+        assert found.jumped.tolist() == jumped
+        assert {kind: flags.tolist() for kind, flags in found.by_kind().items() if kind != "jump"} == wanted
+        assert found.is_calm is not any(map(any, (*wanted.values(), jumped)))
         calm += found.is_calm
-    assert 50 < calm < 380 and check.noise == careful.noise
+        told |= {kind for kind, flags in wanted.items() if any(flags)} | ({"jump"} if any(jumped) else set())
+    assert 50 < calm < 580 and told == {"stuck", "noise", "spikes", "jump", "dropout", "range"}
 
 
 def test_predictions_of_a_block_are_averaged() -> None:

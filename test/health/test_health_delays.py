@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Stream
-from boom_twin.health.delay_monitor import DelayMonitor
+from boom_twin.health.delay_monitor import DelayMonitor, normal_equations
 from boom_twin.types import Alarm, Array
 
 from .recorded import run, session
@@ -119,6 +119,26 @@ def test_a_boom_at_rest_has_no_lag() -> None:
         expected = 1.0 + np.cumsum(rng.normal(0.0, 1e-5, (RATE, 2)), axis=0)
         read = 1.0 + rng.normal(0.0, 2e-4, (RATE, 2))
         assert monitor.take(number, block_of(monitor, read, expected, number), NONE, number) == []
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.02, 0.1, -0.13, 1.5, -1.5])
+def test_normal_equations_of_a_lag_are_those_of_numpy(lag: float) -> None:
+    """What has gone since is the integral of slopes that are linear between the blocks; least squares with free offsets."""
+    rng = np.random.default_rng(5)
+    rows, slopes = rng.normal(size=(2, 7, 40, 3))
+    times = BLOCK * np.arange(40)
+    gone = np.cumsum(np.concatenate([np.zeros((7, 1, 3)), 0.5 * BLOCK * (slopes[:, 1:] + slopes[:, :-1])], axis=1), axis=1)
+    own = np.flatnonzero((times - lag > -1e-9) & (times - lag < times[-1] + 1e-9))
+    at = np.minimum(((times[own] - lag) / BLOCK + 1e-9).astype(int), 38)
+    since = (times[own] - lag - times[at])[:, None]
+    rates = slopes[:, at] + since / BLOCK * (slopes[:, at + 1] - slopes[:, at])
+    left = rows[:, own] + gone[:, own] - gone[:, at] - since * 0.5 * (slopes[:, at] + rates)
+    left, rates = left - left.mean(axis=1, keepdims=True), rates - rates.mean(axis=1, keepdims=True)
+    noise = (left**2).sum(axis=(0, 1))
+    by, weight, left2 = normal_equations(rows, slopes, lag)
+    assert by == pytest.approx(-(left * rates).sum(axis=1) / noise, rel=1e-9, abs=1e-12)
+    assert weight == pytest.approx((rates**2).sum(axis=1) / noise, rel=1e-9)
+    assert left2 == pytest.approx((left**2).mean(), rel=1e-9)
 
 
 def late(seconds: float, lag: float, stream: Stream = Stream.IMU) -> tuple[Sample, ...]:

@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ONCE = [1] * 14
+ONCE = [1] * 17
 """Each kernel is compiled for one set of types."""
 SESSION = Path(__file__).parents[2] / "bags" / "pump_session"
 CODE = """
@@ -16,10 +16,12 @@ from boom_twin.bag.reader import scan
 from boom_twin.bag.session_model import baseline_of, mapping_of, scene_of
 from boom_twin.health.inference.block_kernels import first_and_last, largest_step, write_table
 from boom_twin.health.inference.kalman_update import correct, filter_block, has_strayed
+from boom_twin.health.lag_equations import lag_equations
+from boom_twin.health.sensor_findings import find
 from boom_twin.health.sensor_survey import collect_means, summarise, survey
 from boom_twin.offline.reader_process import items_of
 from boom_twin.twin.blocks import ReportBlock, SampleBlock
-from boom_twin.twin.health_rows import copy_predictions, copy_residuals
+from boom_twin.twin.health_rows import copy_predictions, copy_residuals, count_residuals
 from boom_twin.twin.twin import Twin
 from boom_twin.twin.update import measure, update, write_residual
 
@@ -29,6 +31,7 @@ twin = Twin(scene, baseline=baseline_of(path, None).baseline)
 twin.warm_up()
 kernels = filter_block, correct, survey, summarise, update, measure, write_residual
 kernels += first_and_last, largest_step, write_table, has_strayed, collect_means, copy_predictions, copy_residuals
+kernels += lag_equations, find, count_residuals
 ready = [len(kernel.dispatcher.signatures) for kernel in kernels]
 session = scan(path)
 wanted = [name for name in topics.heard if (found := session.find(name)) is not None and found.count]

@@ -13,7 +13,7 @@ from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
 from boom_twin.errors import UsageError
 from boom_twin.estimation.posture_modes import PostureModes
 from boom_twin.health.baseline import load_baseline
-from boom_twin.offline.reader_process import with_steps
+from boom_twin.offline.stepping_thread import stepped_ahead
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 from boom_twin.twin.blocks import ReportBlock, SampleBlock, block_of
 from boom_twin.types import Change
@@ -34,14 +34,10 @@ def reports_of(twin: Twin, items: Items) -> list[Report]:
 
 
 def repeated(twin: Twin, items: Items) -> Iterator[SampleBlock | Change]:
-    """The items, of which `twin` repeats the steps; through `with_steps` as in a replay."""
-    other = Twin(twin.scene, twin.settings, twin.mounts)
-    for item in with_steps(items, other, True):
-        if isinstance(item, np.ndarray):
-            twin.recorded_steps.repeat(item.copy())
-        else:
-            assert isinstance(item, SampleBlock | Change)
-            yield item
+    """The items, of which `twin` repeats the steps; in a thread as in a replay."""
+    for item in stepped_ahead(items, twin, Twin(twin.scene, twin.settings, twin.mounts)):
+        assert item is not None
+        yield item
 
 
 def blocks(samples: list[Sample], rng: np.random.Generator, changes: float = 0.0) -> Iterator[SampleBlock | Change]:

@@ -1,0 +1,124 @@
+"""What is found in a block of readings of single sensors, compiled: stuck, noisy, spikes, silence, out of range, jumps."""
+
+from __future__ import annotations
+
+import math
+
+from ..kernels.jit import inner, kernel
+from .sensor_survey import GAP, LACK, LEAP, LOUD, LOUDEST_USUAL, NOISE, PATIENCE, ROWS, STATED, bend2
+
+STUCK, NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of the flags that `find` writes
+SPIKE = 8.0  # deviations of the noise by which a reading leaves both of its neighbours
+JUMP = 10.0  # likewise, by which readings change at once and for good
+QUIET = 0.3  # of the noise that is stated: a channel with less gives clean readings, whose repetition means nothing
+REPEATS_FOR = 0.4  # s, at least, of one reading again and again
+ENOUGH, MEDIAN2 = 6, 0.4549  # second differences whose median tells noise; that of the square of a standard normal value
+
+
+@kernel
+def find(sensors, largest, now, is_known, fastest, column, flags, jumped):
+    """Write what is found in the block that `boom_twin.health.sensor_survey.survey` took; gives whether there is anything.
+
+    Parameters
+    ----------
+    sensors : CheckWork
+    largest : float
+        Change of `left` from one reading to the next, see `survey`.
+    now : float
+        End of the block, s.
+    is_known : bool
+        Whether it is known how noisy the sensors are.
+    fastest : float
+        What the quantity may change by, per s: more is a jump of the sensor. 0 where a jump is judged by the noise alone.
+    column : ndarray
+        Scratch, as long as the block.
+    flags : ndarray of bool, shape (5, channels)
+        Written, see `STUCK`.
+    jumped : ndarray, shape (channels,)
+        Written: how far readings changed from one to the next, for good, while the model did not; 0 where they did not.
+    """
+    limits, power, count = sensors.limits, sensors.power, 3 + int(sensors.lately[ROWS])
+    loud = limits[LOUD] * min(sensors.lately[NOISE], limits[LOUDEST_USUAL])
+    live, newest, found = is_any_live(sensors), sensors.times[count - 1], False
+    for i in range(power.shape[0]):
+        is_spiky, jumped[i] = False, 0.0
+        if largest > limits[LEAP]:
+            noise = noise_of(sensors, count, i, column)
+            is_spiky, jumped[i] = has_spikes(sensors, count, i, SPIKE * noise), jump(sensors, count, i, JUMP * noise, fastest)
+        flags[STUCK, i] = live and sensors.run[i] >= limits[PATIENCE] and newest - sensors.since[i] >= REPEATS_FOR
+        flags[NOISY, i] = is_known and power[i] > loud
+        flags[SPIKES, i] = is_known and is_spiky
+        flags[SILENT, i] = now - sensors.heard[i] > limits[GAP] or sensors.missing[i] > limits[LACK]
+        flags[OUTSIDE, i] = sensors.outside[i] > 0.5 * (count - 3)
+        found = found or jumped[i] != 0.0
+        for kind in range(5):
+            found = found or flags[kind, i]
+    return found
+
+
+@inner
+def is_any_live(sensors):
+    """Whether a channel of several is alive with noise."""
+    power, least = sensors.power, QUIET * math.sqrt(sensors.limits[STATED])
+    live = False
+    for i in range(power.shape[0] if power.shape[0] > 1 else 0):
+        live = live or power[i] > least * least
+    return live
+
+
+@inner
+def noise_of(sensors, count, i, column):
+    """Noise of channel i: as measured over time, or by the median of the second differences of the readings, and as stated.
+
+    That median does not wait for the noise to be measured, as a mean over time does, and one spike leaves it as it is. A sensor
+    that has twice the stated noise gives no spikes by that.
+    """
+    variance, size = sensors.limits[STATED], 0
+    if sensors.power[i] > variance:
+        variance = sensors.power[i]
+    for t in range(2, count):
+        value = bend2(sensors.left, t, i)
+        if math.isfinite(value):
+            at = size
+            while at > 0 and column[at - 1] > value:
+                column[at] = column[at - 1]
+                at -= 1
+            column[at] = value
+            size += 1
+    if size >= ENOUGH:
+        variance = max(variance, column[(size - 1) // 2] / MEDIAN2)
+    return math.sqrt(variance)
+
+
+@inner
+def step(sensors, t, i):
+    """Change of what is left to reading t of channel i from the one before; NaN across a gap."""
+    if sensors.times[t] - sensors.times[t - 1] > sensors.limits[GAP]:
+        return math.nan
+    return sensors.left[t, i] - sensors.left[t - 1, i]
+
+
+@inner
+def has_spikes(sensors, count, i, least):
+    """Whether a reading of channel i leaves both neighbours the same way by more than `least`, while these agree."""
+    for t in range(1, count - 1):
+        out, back = step(sensors, t, i), -step(sensors, t + 1, i)
+        if out * back > 0.0 and abs(out) > least and abs(back) > least and abs(out - back) < 0.5 * min(abs(out), abs(back)):
+            return True
+    return False
+
+
+@inner
+def jump(sensors, count, i, least, fastest):
+    """How far readings of channel i changed at once by more than `least` and more than `fastest` allows, for good."""
+    raw, left, times, total = sensors.raw, sensors.left, sensors.times, 0.0
+    for t in range(2, count - 1):
+        change = step(sensors, t, i)
+        most = max(least, fastest * (times[t] - times[t - 1]))
+        if not (abs(change) > most and abs(raw[t, i] - raw[t - 1, i]) > most):
+            continue
+        lasting = 0.5 * (left[t, i] + left[t + 1, i]) - 0.5 * (left[t - 2, i] + left[t - 1, i])
+        before, after = abs(left[t - 1, i] - left[t - 2, i]), abs(left[t + 1, i] - left[t, i])
+        if abs(lasting) > 0.7 * abs(change) and before < 0.3 * abs(change) and after < 0.3 * abs(change):
+            total += change
+    return total
