@@ -4,7 +4,7 @@ The samples of all channels are stacked into Hankel matrices; what is shifted by
 by exp(lambda dt) per mode (ERA: Juang and Pappa 1985, doi 10.2514/3.20031). Amplitudes follow by least squares, and a step of
 Gauss and Newton takes the rates there, too: without it errors are larger than the covariance of least squares. How sure a
 frequency is, is told by that covariance of all parameters, for white noise as large as what the modes leave; near a frequency
-at which they leave more than elsewhere, as where a vibration was missed or two were taken for one, for as much as they do there.
+where they leave more than elsewhere, since a vibration was missed or two were taken for one, as large as it is there.
 """
 
 from __future__ import annotations

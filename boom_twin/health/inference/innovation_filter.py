@@ -18,8 +18,8 @@ a given deviation, with a correlation exp(-travel / REACH) over the travel of th
 
 A third one is a force at the tip that the model does not know, by a pump or the wind: a Gauss-Markov process of a given level
 (N, standard deviation of each component) and correlation time `LOAD_TIME`, about a mean that is not known either, as a pump's
-thrust has one, of `MEAN` times that level: along x, which is horizontal, four times, as the mean drag of a wind is to that of its
-gusts where these are an eighth of its speed. It drives the modes as it drives the boom; modes above `HIGHEST` follow it at once.
+thrust has one, of `MEAN` times that level: four times along x, which is horizontal, as the mean drag of a wind is to that of
+gusts of an eighth of its speed. It drives the modes as it drives the boom; modes above `HIGHEST` follow it at once.
 How large the level is nobody knows: filters with several levels run side by side, and how probable each makes what was measured
 tells.
 
