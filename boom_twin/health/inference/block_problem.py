@@ -78,10 +78,6 @@ class MeasuredRows(NamedTuple):
         raw, left = np.empty((2, rows, channels))
         return cls(np.empty(rows, np.int64), raw, left)
 
-    def first(self, count: int) -> MeasuredRows:
-        """So many of them."""
-        return MeasuredRows(self.stamps[:count], self.raw[:count], self.left[:count])
-
 
 Rows = TypeVar("Rows", PredictionRows, MeasuredRows)
 
