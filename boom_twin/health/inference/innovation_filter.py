@@ -18,8 +18,7 @@ a given deviation, with a correlation exp(-travel / REACH) over the travel of th
 
 A third one is a force at the tip that the model does not know, by a pump or the wind: a Gauss-Markov process of a given level
 (N, standard deviation of each component) and correlation time `LOAD_TIME`, about a mean that is not known either, as a pump's
-thrust has one, of `MEAN` times that level: four times along x, which is horizontal, as the mean drag of a wind is to that of
-gusts of an eighth of its speed. It drives the modes as it drives the boom; modes above `HIGHEST` follow it at once.
+thrust has one, of `MEAN` times that level. It drives the modes as it drives the boom; modes above `HIGHEST` follow it at once.
 How large the level is nobody knows: filters with several levels run side by side, and how probable each makes what was measured
 tells.
 
@@ -52,7 +51,7 @@ REACH = 0.05  # m of travel
 REST = 1e-3  # m/s of travel that time stands for while the boom rests
 LOAD_TIME, MEAN_TIME = 2.0, 60.0  # s, correlation of the load about its mean, and of that
 ROUGH = 0.5  # share of what the load adds to readings at once by which they may be off: it changes within a block
-MEAN = (4.0, 1.0)  # see above
+MEAN = 1.0  # see above
 CALM = 2.0  # s, over which vibration that was found is remembered
 BOTH = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])  # what of these is the whole load
 
@@ -187,7 +186,7 @@ class InnovationFilter:
         self._detuning2 = np.broadcast_to(detuning, self._levels).ravel() ** 2
         count, others = len(self._level2), LOAD + channels
         self._x, self._p = np.zeros((count, others, columns)), np.zeros((count, others, others))
-        self._stationary = self._level2 * np.square([1.0, 1.0, *MEAN])
+        self._stationary = self._level2 * np.array([1.0, 1.0, MEAN**2, MEAN**2])
         self._p[:, :LOAD, :LOAD] = _diagonal(self._stationary)
         self._kept = np.exp(-block / np.array([LOAD_TIME, LOAD_TIME, MEAN_TIME, MEAN_TIME]))
         self._fresh, self._size = True, 0
@@ -222,7 +221,7 @@ class InnovationFilter:
         added = np.zeros((count, states))
         added[:, size : size + LOAD] = (1.0 - self._kept**2) * self._stationary
         if before is None:
-            _begin(p, modes, self._level2, self._stationary[:, 2:])
+            p[:, :size, :size] += _swung(modes, self._level2)
         channels, self._rough = self._channels, ROUGH**2 * at_once
         self._work = FilterWork(
             turn=turn, least=least, driven=driven, detuning2=self._detuning2,
@@ -314,18 +313,11 @@ def out_of_step(modes: ModalStates, detuning2: Array, block: float) -> Array:
     return found
 
 
-def _begin(p: Array, modes: ModalStates, level2: Array, mean2: Array) -> None:
-    """Add to the covariances p what loads of levels (l, 1), and their means (l, 2), have brought about before the start.
-
-    Vibration is as large as the load's change would bend the boom at rest; its mean has done so, and long since.
-    """
-    size = len(modes.turn)
-    if not size:
-        return
-    still = np.linalg.solve(np.eye(size) - modes.turn, modes.pushed)
-    spread = level2 * (still**2).sum(axis=1)
-    spread[:, 1::2] = spread[:, 0::2] * (2.0 * math.pi * modes.frequencies) ** 2
-    across, means = still * mean2[:, None, :], slice(size + LOAD - 2, size + LOAD)
-    p[:, :size, :size] += _diagonal(spread) + across @ still.T
-    p[:, :size, means] += across
-    p[:, means, :size] += across.mT
+def _swung(modes: ModalStates, level2: Array) -> Array:
+    """Covariance (..., 2 m, 2 m) of the modes' coordinates that loads of levels (..., 1) brought about before the start."""
+    turn, pushed = modes.turn, modes.pushed
+    still = np.linalg.solve(np.eye(len(turn)) - turn, pushed) if len(turn) else pushed
+    omegas = 2.0 * math.pi * np.repeat(modes.frequencies, 2)
+    spread = (1.0 + MEAN**2) * level2 * (still**2).sum(axis=1)
+    spread[..., 1::2] = spread[..., 0::2] * omegas[0::2] ** 2
+    return _diagonal(spread)
