@@ -14,7 +14,6 @@ from ..errors import SolverError, UsageError
 from ..kernels.elements.linkage import link_angles
 from ..kernels.elements.pin_contact import APPROACH, CLOSED, DAMPER, FORCE, NEAR, SEAT_X, SEAT_Y, SLOWEST, SPRING, penetration
 from ..kernels.integrators import REST, X, prepare
-from ..kernels.jit import SameTypes
 from ..kernels.tables import OK, Z_LINK_L, Z_LINK_R, Z_SECTION, State, Work
 from ..kernels.transfer.clearance_pins import axis_of
 from ..kernels.transfer.time_step import ANEW, advance
@@ -26,8 +25,6 @@ from ..types import Array
 from .modal import Mode, constraints, natural_modes, negative_pivots
 
 CLAMP = 1e12  # N/m, a pin that is as good as ideal
-
-_advance = SameTypes(advance)
 
 
 def clamp_pins(state: State) -> None:
@@ -317,8 +314,10 @@ def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> b
     """Solve for equilibrium under `load` times gravity from the present guess; whether there is a stable one."""
     loaded = replace(plan, tables=plan.tables._replace(gravity=load * plan.tables.gravity))
     scheme, still = prepare(REST, 0.0, 0.0, work.weights), np.zeros(plan.joints)
-    state.history[X, plan.tables.parts.history + 2] = 0.0  # angles of barrels and rods within half a turn, whatever was tried
-    status, _, _ = _advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW)
+    for cylinder in plan.tables.cylinders:  # angles of barrels and rods within half a turn, whatever was tried
+        own = slice(cylinder.first_part, cylinder.first_part + cylinder.parts)
+        state.history[X, plan.tables.parts.history[own] + 2] = 0.0
+    status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW)
     return bool(status == OK and is_stable(loaded, state, work))
 
 

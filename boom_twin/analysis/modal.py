@@ -29,7 +29,6 @@ import numpy as np
 
 from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError
-from ..kernels.jit import SameTypes
 from ..kernels.tables import OK, SENTENCES, State, Work
 from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.natural_frequency import (
@@ -47,9 +46,6 @@ SHIFT = 1e-6  # relative distance from the frequency at which a mode is iterated
 LOAD = 1e-9  # m, displacement whose inertia forces load the boom for that
 ABSURD = "Look for values in the scene that are too large or too small by many orders of magnitude."
 NUDGE = 1e-6  # rad, for the derivative of positions by unknowns
-
-_place, _count_below, _bisect_frequency = SameTypes(place), SameTypes(count_below), SameTypes(bisect_frequency)
-_inertia_response, _position_change = SameTypes(inertia_response), SameTypes(position_change)
 
 
 @dataclass(frozen=True)
@@ -88,7 +84,7 @@ class _AtRest:
     """A boom in equilibrium, as `boom_twin.kernels.transfer.natural_frequency` takes it, with scratch."""
 
     def __init__(self, plan: Plan, state: State, work: Work) -> None:
-        _place(plan.tables, state, work)
+        place(plan.tables, state, work)
         position, inner = work.position.copy(), work.condensed.blocks.shape[1]
         still = np.zeros_like(position)
         self._boom = plan.tables, state, work, position, drive_at_rest(plan, state, work), still
@@ -96,8 +92,8 @@ class _AtRest:
 
     def count_below(self, omega: float) -> int:
         """Natural frequencies below `omega` (rad/s), plus forces among the unknowns."""
-        _place(*self._boom[:3])
-        _, count = _checked(*_count_below(*self._boom, omega, self._scratch))
+        place(*self._boom[:3])
+        _, count = _checked(*count_below(*self._boom, omega, self._scratch))
         return count
 
     def lowest(self, count: int, width: float, highest: float, known: Sequence[float] = ()) -> Iterator[float]:
@@ -117,7 +113,7 @@ class _AtRest:
 
         `near` is what it is known to be about; 0 if it is not.
         """
-        omega, _ = _checked(*_bisect_frequency(*self._boom, base, number, low, near, width, self._scratch))
+        omega, _ = _checked(*bisect_frequency(*self._boom, base, number, low, near, width, self._scratch))
         return omega
 
     def those_near(self, numbers: Sequence[int], near: Sequence[float], width: float) -> Iterator[float]:
@@ -133,7 +129,7 @@ class _AtRest:
         state lacks to equilibrium cancels.
         """
         found = np.zeros_like(self._boom[1].z)
-        _inertia_response(*self._boom, omega, load, LOAD, self._hat, found)
+        inertia_response(*self._boom, omega, load, LOAD, self._hat, found)
         return found
 
 
@@ -188,7 +184,7 @@ class ModeSeries:
             for omega in self._boom.lowest(count, self._width, highest, tuple(self._omegas)):
                 self._modes.append(_mode(*parts, self._boom, omega, self._modes))
                 self._omegas.append(omega)
-            _place(self._plan.tables, self._state, self._work)
+            place(self._plan.tables, self._state, self._work)
             below = len(self._omegas)
         return tuple(self._modes[: min(count, below)])
 
@@ -196,14 +192,14 @@ class ModeSeries:
 def natural_frequencies(plan: Plan, state: State, work: Work, count: int, width: float) -> Array:
     """The lowest `count` natural frequencies (Hz) alone, or all if there are fewer; see `natural_modes`."""
     found = np.array(list(_AtRest(plan, state, work).lowest(count, width, HIGHEST)))
-    _place(plan.tables, state, work)
+    place(plan.tables, state, work)
     return found / (2.0 * math.pi)
 
 
 def frequencies_near(plan: Plan, state: State, work: Work, numbers: Sequence[int], near: Array, width: float) -> Array:
     """Natural frequencies (Hz) by number, from 0 and ascending, where it is known what they are about: `near` (Hz)."""
     found = np.array(list(_AtRest(plan, state, work).those_near(numbers, (2.0 * math.pi * near).tolist(), width)))
-    _place(plan.tables, state, work)
+    place(plan.tables, state, work)
     return found / (2.0 * math.pi)
 
 
@@ -216,7 +212,7 @@ def _mode(plan: Plan, state: State, work: Work, boom: _AtRest, omega: float, low
         for mode in lower:
             motion = motion - mode.motion * ((plan.masses * motion) @ mode.motion)
         increments, motion = boom.response(omega * (1.0 - SHIFT), motion), np.zeros_like(motion)
-        _position_change(plan.tables, state, work, state.z.copy(), increments, _nudge(plan, increments), motion)
+        position_change(plan.tables, state, work, state.z.copy(), increments, _nudge(plan, increments), motion)
         size = math.sqrt(float(plan.masses @ motion**2))
         if not 0.0 < size < math.inf:
             raise SolverError(f"the mode at {omega / (2.0 * math.pi):.6g} Hz cannot be computed. {ABSURD}")
@@ -235,10 +231,10 @@ def along(plan: Plan, state: State, work: Work, increments: Array, read: Callabl
     size, sides = _nudge(plan, increments), []
     for sign in (1.0, -1.0):
         state.z[:] = z + sign * size * increments
-        _place(plan.tables, state, work)
+        place(plan.tables, state, work)
         sides.append(read())
     state.z[:] = z
-    _place(plan.tables, state, work)
+    place(plan.tables, state, work)
     return np.asarray((sides[0] - sides[1]) / (2.0 * size))
 
 

@@ -10,15 +10,12 @@ import numpy as np
 
 from ..kernels.elements import pin_contact as contact
 from ..kernels.elements.beam import LOCAL_ROWS, TURN_ROWS
-from ..kernels.elements.cylinder import write_compliances
+from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.integrators import DEPTH, new_weights
-from ..kernels.jit import SameTypes
 from ..kernels.result_row import Results, results_of, row_width
 from ..kernels.tables import CORRECTIONS, RECORDS, SLOTS, Condensed, State, Tables, Tangents, Work
 from ..kernels.transfer.time_step import observe
 from ..types import Array
-
-_observe, _write_compliances = SameTypes(observe), SameTypes(write_compliances)
 
 
 @dataclass
@@ -101,9 +98,9 @@ class Plan:
 
     def compliances_and_lags(self, drives: Array) -> tuple[Array, Array]:
         """1/k (m/N; 0 if incompressible) and d/k (s) of the cylinders with their `drives` so long (m); all of shape (n,)."""
-        compliances, lags = np.empty((2, self.joints))
-        _write_compliances(self.tables.cylinders, self.tables.oils, np.ascontiguousarray(drives), compliances, lags)
-        return compliances, lags
+        t = self.tables
+        found = [compliance_and_lag(row, t.oils, drive) for row, drive in zip(t.cylinders, drives, strict=True)]
+        return np.array([compliance for compliance, _ in found]), np.array([lag for _, lag in found])
 
     def state(self, depth: int = DEPTH) -> State:
         """A fresh state, all zero; `depth` rows of history."""
@@ -167,7 +164,7 @@ def width_of(plan: Plan) -> int:
 def first_row(plan: Plan, state: State) -> Array:
     """The instant in `state` as a row of results."""
     row = np.zeros(width_of(plan))
-    _observe(plan.tables, state, row)
+    observe(plan.tables, state, row)
     return row
 
 

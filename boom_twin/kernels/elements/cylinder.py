@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from ..jit import inner, kernel
+from ..jit import inner
 
 BARREL, ROD = 0, 1  # what a part belongs to
 
@@ -79,13 +79,6 @@ def compliance_and_lag(row, oils, drive):
     oil = oils[row.oil]
     compliance = oil_compliance(oil, drive - row.closed_length)
     return compliance, oil.damping * compliance
-
-
-@kernel
-def write_compliances(rows, oils, drives, compliances, lags):
-    """Write 1/k (m/N) and tau (s) of n cylinders whose drives are so long (m); shape (n,) each."""
-    for i in range(drives.shape[0]):
-        compliances[i], lags[i] = compliance_and_lag(rows[i], oils, drives[i])
 
 
 @inner
