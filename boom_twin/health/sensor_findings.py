@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .sensor_survey import GAP, LACK, LEAP, LOUD, LOUDEST_USUAL, NOISE, PATIENCE, ROWS, STATED, bend2
+from .sensor_survey import GAP, LACK, LEAP, PATIENCE, ROWS, STATED, bend2, loud, sorted_in
 
 STUCK, NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of the flags that `find` writes
 SPIKE = 8.0  # deviations of the noise by which a reading leaves both of its neighbours
@@ -38,7 +38,6 @@ def find(sensors, largest, now, is_known, fastest, column, flags, jumped):
         Written: how far readings changed from one to the next, for good, while the model did not; 0 where they did not.
     """
     limits, power, count = sensors.limits, sensors.power, 3 + int(sensors.lately[ROWS])
-    loud = limits[LOUD] * min(sensors.lately[NOISE], limits[LOUDEST_USUAL])
     live, newest, found = is_any_live(sensors), sensors.times[count - 1], False
     for i in range(power.shape[0]):
         is_spiky, jumped[i] = False, 0.0
@@ -46,7 +45,7 @@ def find(sensors, largest, now, is_known, fastest, column, flags, jumped):
             noise = noise_of(sensors, count, i, column)
             is_spiky, jumped[i] = has_spikes(sensors, count, i, SPIKE * noise), jump(sensors, count, i, JUMP * noise, fastest)
         flags[STUCK, i] = live and sensors.run[i] >= limits[PATIENCE] and newest - sensors.since[i] >= REPEATS_FOR
-        flags[NOISY, i] = is_known and power[i] > loud
+        flags[NOISY, i] = is_known and power[i] > loud(sensors)
         flags[SPIKES, i] = is_known and is_spiky
         flags[SILENT, i] = now - sensors.heard[i] > limits[GAP] or sensors.missing[i] > limits[LACK]
         flags[OUTSIDE, i] = sensors.outside[i] > 0.5 * (count - 3)
@@ -77,14 +76,7 @@ def noise_of(sensors, count, i, column):
     if sensors.power[i] > variance:
         variance = sensors.power[i]
     for t in range(2, count):
-        value = bend2(sensors.left, t, i)
-        if math.isfinite(value):
-            at = size
-            while at > 0 and column[at - 1] > value:
-                column[at] = column[at - 1]
-                at -= 1
-            column[at] = value
-            size += 1
+        size = sorted_in(column, size, bend2(sensors.left, t, i))
     if size >= ENOUGH:
         variance = max(variance, column[(size - 1) // 2] / MEDIAN2)
     return math.sqrt(variance)

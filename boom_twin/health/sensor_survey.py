@@ -112,8 +112,13 @@ def survey(sensors, stamps, raw, expected, now):
     lately[NOISE] = usual_power(sensors.power, limits[STATED])
     lately[LASTING] += min(1.0, span / limits[LONG_WINDOW]) * (lately[NOISE] - lately[LASTING])
     is_live = is_whole and now - stamps[rows - 1] <= limits[GAP] and lack <= limits[LACK] and longest < limits[PATIENCE]
-    loud = limits[LOUD] * min(lately[NOISE], limits[LOUDEST_USUAL])
-    return is_live and most <= 0.5 * rows and largest <= limits[LEAP] and loudest <= loud, largest
+    return is_live and most <= 0.5 * rows and largest <= limits[LEAP] and loudest <= loud(sensors), largest
+
+
+@inner
+def loud(sensors):
+    """Variance of the noise above which a channel is noisy."""
+    return sensors.limits[LOUD] * min(sensors.lately[NOISE], sensors.limits[LOUDEST_USUAL])
 
 
 @inner
@@ -252,18 +257,24 @@ def summarise(work, stamps, raw, left, masked, share):
 
 
 @inner
+def sorted_in(column, size, value):
+    """Sort a value into the first `size` of a column, which are in order, if it is finite; gives how many they are then."""
+    if not math.isfinite(value):
+        return size
+    at = size
+    while at > 0 and column[at - 1] > value:
+        column[at] = column[at - 1]
+        at -= 1
+    column[at] = value
+    return size + 1
+
+
+@inner
 def mean_of_near(work, left, i):
     """Mean of those `left` of channel i that are not far from the median, and how many these are; NaN and 0 of none."""
     column, size = work.column, 0
     for t in range(left.shape[0]):
-        value = left[t, i]
-        if math.isfinite(value):
-            at = size
-            while at > 0 and column[at - 1] > value:
-                column[at] = column[at - 1]
-                at -= 1
-            column[at] = value
-            size += 1
+        size = sorted_in(column, size, left[t, i])
     total, near = 0.0, 0
     for t in range(left.shape[0]):
         if size > 0 and abs(left[t, i] - column[size // 2]) <= work.limits[FAR]:
