@@ -53,7 +53,7 @@ Flags = NDArray[np.bool_]
 GIVE = math.radians(5.0)
 """What an encoder may read beyond ``range_deg``, which is of the rigid boom: at its end a joint sags and swings on."""
 NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; time (s) over which it is taken
-SWIFT = 0.1  # m/s^2, acceleration of a cylinder that is no noise of its sensor
+JERK = 3.0  # m/s^3 of a cylinder in haste, which is no noise of its sensor: 0.2 m in 1.6 s
 USUAL_WINDOW = 10.0  # s over which the noise that is usual is told
 NOISE_OVER = "noise_over_"  # and the name of a setting: how its figures are called
 MISSTATED = 1.5  # times the noise that is stated, from which on what is usual is worth a warning
@@ -196,7 +196,7 @@ class SensorCheck:
         """What is found in so many readings, whose largest step is `largest`."""
         known = self._known
         interval = (known.times[2 + rows] - known.times[2]) / rows
-        is_motion = self._fastest > 0.0 and SWIFT * interval**2 > NOISY * self._sigma  # what bends readings so much
+        is_motion = self._fastest > 0.0 and JERK * interval**3 > NOISY * self._sigma  # what bends readings so much
         is_known = bool(now - known.lately[FIRST] > NOISY_WINDOW and not is_motion)  # how noisy the sensors are
         flags, jumped = np.empty((5, len(known.power)), dtype=bool), np.empty(len(known.power))
         if not self._find(self._held, largest, now, is_known, self._fastest, self._column, flags, jumped):

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .sensor_survey import GAP, LACK, LEAP, PATIENCE, ROWS, STATED, bend2, loud, sorted_in
+from .sensor_survey import GAP, LACK, LEAP, PATIENCE, ROWS, STATED, loud, rough2, sorted_in
 
 STUCK, NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of the flags that `find` writes
 SPIKE = 8.0  # deviations of the noise by which a reading leaves both of its neighbours
 JUMP = 10.0  # likewise, by which readings change at once and for good
 QUIET = 0.3  # of the noise that is stated: a channel with less gives clean readings, whose repetition means nothing
 REPEATS_FOR = 0.4  # s, at least, of one reading again and again
-ENOUGH, MEDIAN2 = 6, 0.4549  # second differences whose median tells noise; that of the square of a standard normal value
+ENOUGH, MEDIAN2 = 6, 0.4549  # third differences whose median tells noise; that of the square of a standard normal value
 
 
 @kernel
@@ -67,7 +67,7 @@ def is_any_live(sensors):
 
 @inner
 def noise_of(sensors, count, i, column):
-    """Noise of channel i: as measured over time, or by the median of the second differences of the readings, and as stated.
+    """Noise of channel i: as measured over time, or by the median of the third differences of the readings, and as stated.
 
     That median does not wait for the noise to be measured, as a mean over time does, and one spike leaves it as it is. A sensor
     that has twice the stated noise gives no spikes by that.
@@ -75,8 +75,8 @@ def noise_of(sensors, count, i, column):
     variance, size = sensors.limits[STATED], 0
     if sensors.power[i] > variance:
         variance = sensors.power[i]
-    for t in range(2, count):
-        size = sorted_in(column, size, bend2(sensors.left, t, i))
+    for t in range(3, count):
+        size = sorted_in(column, size, rough2(sensors.left, t, i))
     if size >= ENOUGH:
         variance = max(variance, column[(size - 1) // 2] / MEDIAN2)
     return math.sqrt(variance)

@@ -56,7 +56,7 @@ class CheckWork(NamedTuple):
     measured, less what the model has.
     low, high : (channels,) the range of the sensors.
     heard : (channels,) time of the newest reading, s; NaN before the first.
-    power, run, since, missing, outside : (channels,) variance of the noise, by second differences; times that the newest
+    power, run, since, missing, outside : (channels,) variance of the noise, by third differences; times that the newest
     reading was repeated, and since when (s); share of readings that are missing; readings of the newest block out of range.
     """
 
@@ -80,6 +80,14 @@ def bend2(values, t, i):
     """Square of the second difference at row t of channel i; its mean is the variance of white noise."""
     bend = values[t, i] - 2.0 * values[t - 1, i] + values[t - 2, i]
     return bend * bend / 6.0
+
+
+@inner
+def rough2(values, t, i):
+    """Square of the third difference likewise: of a swing at w rad/s, 0.3 (w dt)^2 times what second differences have of it."""
+    step = values[t - 1, i] - values[t - 2, i]
+    third = (values[t, i] - values[t - 1, i] - step) - (step - (values[t - 2, i] - values[t - 3, i]))
+    return third * third / 20.0
 
 
 @kernel
@@ -176,9 +184,9 @@ def go_on(sensors, stamps, raw, expected, share):
                 largest = step
             if t < 3:
                 continue
-            bent = bend2(left, t, i)
-            if not math.isnan(bent):
-                total += min(bent, cut)
+            rough = rough2(left, t, i)
+            if not math.isnan(rough):
+                total += min(rough, cut)
                 known += 1
             if math.isnan(all_raw[t, i]):
                 lacking += 1
@@ -306,11 +314,9 @@ def is_bent(work, raw, masked):
         for t in range(2, count):
             power += bend2(raw, t, i)
         for t in range(3, count):
-            step = raw[t - 1, i] - raw[t - 2, i]
-            third = (raw[t, i] - raw[t - 1, i] - step) - (step - (raw[t - 2, i] - raw[t - 3, i]))
-            rougher += third * third
+            rougher += rough2(raw, t, i)
         is_quick = power > work.limits[BENT] * work.limits[VARIANCE] * (count - 2)
-        if is_quick and rougher / 20.0 < work.limits[WHITE] * power and not masked[i]:
+        if is_quick and rougher < work.limits[WHITE] * power and not masked[i]:
             found = True
     return found
 

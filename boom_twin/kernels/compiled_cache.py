@@ -160,11 +160,14 @@ class KernelCache:
         return loaded
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
-        """Keep a compiled kernel; a full disk or a folder that went away is no reason to stop."""
-        if compiled.lifted or compiled.library.has_dynamic_globals:
+        """Keep a compiled kernel; a full disk or a folder that went away is no reason to stop.
+
+        Neither is machine code that is not at hand: LLVM hands it over in a callback, where the exception of a signal is lost.
+        """
+        library = compiled.library
+        if compiled.lifted or library.has_dynamic_globals or library._compiled_object is None:
             return
         with suppress(OSError):
-            library = compiled.library
             kept = pickle.dumps((_symbols(library), library.callee, library.calls, self._dumps(self._reduce(compiled))))
             write_checked(self._path(signature, compiled.codegen), kept)
 

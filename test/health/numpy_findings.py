@@ -13,7 +13,12 @@ from boom_twin.types import Array
 
 def bends2(values: Array) -> Array:
     """Squares of second differences of neighbours, shape (k - 2, ..); their mean is the variance of white noise."""
-    return np.asarray((values[2:] - 2.0 * values[1:-1] + values[:-2]) ** 2 / 6.0)
+    return np.asarray(np.diff(values, 2, axis=0) ** 2 / 6.0)
+
+
+def rough2(values: Array) -> Array:
+    """Likewise of third differences, shape (k - 3, ..)."""
+    return np.asarray(np.diff(values, 3, axis=0) ** 2 / 20.0)
 
 
 def findings_of(known: Any, rows: int, now: float, is_known: bool, fastest: float) -> dict[str, list[float]]:
@@ -21,7 +26,7 @@ def findings_of(known: Any, rows: int, now: float, is_known: bool, fastest: floa
     times, raw, left = (column[: 3 + rows] for column in (known.times, known.raw, known.left))
     steps = np.where((np.diff(times) > known.limits[GAP])[:, None], np.nan, np.diff(left, axis=0))
     stated2 = known.limits[STATED]
-    noise = np.sqrt(np.fmax(np.fmax(known.power, stated2), usual_bend2(left)))
+    noise = np.sqrt(np.fmax(np.fmax(known.power, stated2), usual_rough2(left)))
     live = known.power > QUIET**2 * stated2
     repeated = (known.run >= known.limits[PATIENCE]) & (times[-1] - known.since >= REPEATS_FOR)
     found = {
@@ -35,11 +40,11 @@ def findings_of(known: Any, rows: int, now: float, is_known: bool, fastest: floa
     return {kind: each.tolist() for kind, each in found.items()}
 
 
-def usual_bend2(left: Array) -> Array:
-    """Variance (channels,) of the noise of readings (k, channels) by the median of their second differences."""
-    bent = bends2(left)
-    known = np.isfinite(bent).sum(axis=0)
-    middle = np.sort(bent, axis=0)[np.maximum((known - 1) // 2, 0), np.arange(bent.shape[1])]
+def usual_rough2(left: Array) -> Array:
+    """Variance (channels,) of the noise of readings (k, channels) by the median of their third differences."""
+    rough = rough2(left)
+    known = np.isfinite(rough).sum(axis=0)
+    middle = np.sort(rough, axis=0)[np.maximum((known - 1) // 2, 0), np.arange(rough.shape[1])]
     return np.asarray(np.where(known >= ENOUGH, middle / MEDIAN2, 0.0))
 
 

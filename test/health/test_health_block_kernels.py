@@ -10,7 +10,7 @@ from boom_twin.health.sensor_check import NOISY_WINDOW, SensorCheck
 from boom_twin.health.stream_readings import PredictionMeans, StreamReadings, StreamSurvey
 from boom_twin.types import NANO, Array
 
-from .numpy_findings import bends2, findings_of
+from .numpy_findings import bends2, findings_of, rough2
 
 SIGMA = 2.0
 
@@ -78,7 +78,7 @@ def test_motion_bends_readings_smoothly_and_noise_does_not() -> None:
         raw = readings(seed) + 8.0 * SIGMA * np.sin(2.0 * np.pi * frequency * times + np.arange(4.0))
         masked = np.arange(4) == seed % 5
         trusted = raw[:, ~masked]
-        power, rougher = bends2(trusted).sum(axis=0), (np.diff(trusted, n=3, axis=0) ** 2).sum(axis=0) / 20.0
+        power, rougher = bends2(trusted).sum(axis=0), rough2(trusted).sum(axis=0)
         wanted = bool(((power > 3.0 * SIGMA**2 * 18) & (rougher < 0.75 * power)).any())
         assert taken(raw, raw, masked)[1].is_bent is wanted
         told.append(wanted)

@@ -110,6 +110,25 @@ def test_motion_at_a_slow_rate_is_no_noise():
         assert not found.noisy.any() and not found.spikes.any()
 
 
+def test_haste_is_no_noise_at_fifty_hertz_and_noise_is():
+    """A cylinder that goes 0.2 m in 1.6 s and back, again and again, while the others stand still."""
+    rng, sigma = np.random.default_rng(8), 2e-5
+    check = SensorCheck(sigma, 5e-6, LOW, HIGH, 0.5)
+
+    def look(block, scale):
+        stamps = 0.1 * block + 0.02 * np.arange(5)
+        share = np.abs((stamps / 1.6 + 1.0) % 2.0 - 1.0)
+        moving = 0.2 * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+        readings = np.column_stack([moving, *([np.full(5, 0.3)] * 3)]) + rng.normal(0.0, scale * sigma, (5, 4))
+        return check.look(stamps, readings, np.zeros((5, 4)), stamps[-1] + 0.02)
+
+    for block in range(400):
+        found = look(block, 1.0)
+        assert not found.noisy.any() and not found.spikes.any()
+    found = [look(block, np.array([4.0, 1.0, 1.0, 1.0])) for block in range(400, 440)]
+    assert all(each.noisy.tolist() == [True, False, False, False] for each in found[-20:])
+
+
 def test_a_little_more_noise_is_not_noisy():
     quiet = started(4)
     assert quiet.found(200, change=lambda times, raw: raw + quiet.rng.normal(0.0, SIGMA, raw.shape)) == {}

@@ -67,6 +67,19 @@ def test_what_one_process_compiled_another_loads(tmp_path: Path) -> None:
     assert {path.suffix for path in folder.iterdir()} == {".kernel"}
 
 
+LOST = """
+from numba.core.codegen import JITCodeLibrary
+JITCodeLibrary._object_compiled_hook = classmethod(lambda cls, module, data: None)
+"""
+
+
+def test_machine_code_whose_handing_over_was_interrupted_is_used_and_not_kept(tmp_path: Path) -> None:
+    """A signal that comes while LLVM hands it over raises there, in a callback of C, where every exception is lost."""
+    done = run(tmp_path / "cache", before=LOST)
+    assert told(done) == "(4.0, 4.0) loaded 0" and "Traceback" not in done.stderr
+    assert list((tmp_path / "cache").glob("*/*")) == []
+
+
 def test_a_loaded_kernel_can_be_called_by_one_that_is_compiled(tmp_path: Path) -> None:
     run(tmp_path / "cache")
     assert told(run(tmp_path / "cache", after=CALLER)).splitlines() == ["(4.0, 4.0) loaded 2", "11.0"]

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from made_once import MadeOnce
 
+from boom_twin.analysis.equilibrium import statics
 from boom_twin.bag.session_files import write_session
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.ros.isolation import Isolation
@@ -207,7 +208,7 @@ def remote(domain: None) -> Iterator[Remote]:
 
 @pytest.fixture(scope="session")
 def motion(made_once: MadeOnce) -> dict[str, Any]:
-    """Two cylinders of the default boom move; stamps (ns), strokes (m), joints (rad), imu (m/s^2). Made up."""
+    """Two cylinders of the default boom move; stamps (ns), strokes (m), joints (rad), imu (m/s^2, made up)."""
     return made_once.value("ros_motion", two_cylinders_move)
 
 
@@ -218,7 +219,10 @@ def two_cylinders_move() -> dict[str, Any]:
     strokes = np.tile(strokes_of_posture(scene, "arch"), (len(time_s), 1))
     strokes[:, 0] += 0.02 * (1.0 - np.cos(1.5 * time_s))
     strokes[:, 2] += 0.01 * (1.0 - np.cos(2.0 * time_s))
-    joints = np.array([joint_angles_of_strokes(scene, row) for row in strokes])
+    few = np.arange(0, len(time_s), 20)  # slow enough for equilibria, and for sag to be interpolated
+    at_rest = np.array([statics(scene, strokes[k], modes=0).joints - joint_angles_of_strokes(scene, strokes[k]) for k in few])
+    sag = np.column_stack([np.interp(time_s, time_s[few], column) for column in at_rest.T])
+    joints = np.array([joint_angles_of_strokes(scene, row) for row in strokes]) + sag
     return {
         "stamps_ns": stamps,
         "strokes": strokes + random.normal(0.0, 2e-5, strokes.shape),
