@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .sensor_survey import GAP, LACK, LEAP, PATIENCE, ROWS, STATED, loud, rough2, sorted_in
+from .sensor_survey import GAP, LACK, LEAP, PATIENCE, ROWS, STATED, loud, noise2_at, sorted_in
 
 STUCK, NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of the flags that `find` writes
 SPIKE = 8.0  # deviations of the noise by which a reading leaves both of its neighbours
@@ -76,7 +76,7 @@ def noise_of(sensors, count, i, column):
     if sensors.power[i] > variance:
         variance = sensors.power[i]
     for t in range(3, count):
-        size = sorted_in(column, size, rough2(sensors.left, t, i))
+        size = sorted_in(column, size, noise2_at(sensors.times, sensors.left, t, i))
     if size >= ENOUGH:
         variance = max(variance, column[(size - 1) // 2] / MEDIAN2)
     return math.sqrt(variance)

@@ -56,7 +56,7 @@ class CheckWork(NamedTuple):
     measured, less what the model has.
     low, high : (channels,) the range of the sensors.
     heard : (channels,) time of the newest reading, s; NaN before the first.
-    power, run, since, missing, outside : (channels,) variance of the noise, by third differences; times that the newest
+    power, run, since, missing, outside : (channels,) variance of the noise, see `noise2_at`; times that the newest
     reading was repeated, and since when (s); share of readings that are missing; readings of the newest block out of range.
     """
 
@@ -88,6 +88,24 @@ def rough2(values, t, i):
     step = values[t - 1, i] - values[t - 2, i]
     third = (values[t, i] - values[t - 1, i] - step) - (step - (values[t - 2, i] - values[t - 3, i]))
     return third * third / 20.0
+
+
+@inner
+def noise2_at(times, values, t, i):
+    """Variance of white noise by row t of channel i and the three before it, where the values may move as a parabola.
+
+    The less of what third differences say and of what divided ones do, in the Newton form: stamps that are uneven are either
+    those of when readings were taken, or of readings that were taken evenly and came so.
+    """
+    a, b, c = times[t - 2] - times[t - 3], times[t - 1] - times[t - 2], times[t] - times[t - 1]
+    even = rough2(values, t, i)
+    if not (a > 0.0 and b > 0.0 and c > 0.0):
+        return even
+    first, second = -1.0 / (a * (a + b) * (a + b + c)), 1.0 / (a * b * (b + c))
+    third, fourth = -1.0 / ((a + b) * b * c), 1.0 / ((a + b + c) * (b + c) * c)
+    divided = first * (values[t - 3, i] - values[t, i]) + second * (values[t - 2, i] - values[t, i])
+    divided += third * (values[t - 1, i] - values[t, i])
+    return min(even, divided * divided / (first * first + second * second + third * third + fourth * fourth))
 
 
 @kernel
@@ -184,9 +202,9 @@ def go_on(sensors, stamps, raw, expected, share):
                 largest = step
             if t < 3:
                 continue
-            rough = rough2(left, t, i)
-            if not math.isnan(rough):
-                total += min(rough, cut)
+            noise2 = noise2_at(times, left, t, i)
+            if not math.isnan(noise2):
+                total += min(noise2, cut)
                 known += 1
             if math.isnan(all_raw[t, i]):
                 lacking += 1

@@ -21,12 +21,22 @@ def rough2(values: Array) -> Array:
     return np.asarray(np.diff(values, 3, axis=0) ** 2 / 20.0)
 
 
+def noise2(times: Array, values: Array) -> Array:
+    """The less of `rough2` and of what is off a parabola through the times, by least squares; shape (k - 3, ..)."""
+    found = np.empty((len(times) - 3, values.shape[1]))
+    for t in range(len(found)):
+        powers = np.vander((times[t : t + 4] - times[t + 3]) / (times[t + 3] - times[t]), 3)
+        normal = np.linalg.qr(powers, mode="complete")[0][:, 3]
+        found[t] = (normal @ values[t : t + 4]) ** 2
+    return np.fmin(rough2(values), found)
+
+
 def findings_of(known: Any, rows: int, now: float, is_known: bool, fastest: float) -> dict[str, list[float]]:
     """By kind of finding, of every channel, in a block of so many `rows`; of a jump how far."""
     times, raw, left = (column[: 3 + rows] for column in (known.times, known.raw, known.left))
     steps = np.where((np.diff(times) > known.limits[GAP])[:, None], np.nan, np.diff(left, axis=0))
     stated2 = known.limits[STATED]
-    noise = np.sqrt(np.fmax(np.fmax(known.power, stated2), usual_rough2(left)))
+    noise = np.sqrt(np.fmax(np.fmax(known.power, stated2), usual_noise2(times, left)))
     live = known.power > QUIET**2 * stated2
     repeated = (known.run >= known.limits[PATIENCE]) & (times[-1] - known.since >= REPEATS_FOR)
     found = {
@@ -40,11 +50,11 @@ def findings_of(known: Any, rows: int, now: float, is_known: bool, fastest: floa
     return {kind: each.tolist() for kind, each in found.items()}
 
 
-def usual_rough2(left: Array) -> Array:
-    """Variance (channels,) of the noise of readings (k, channels) by the median of their third differences."""
-    rough = rough2(left)
-    known = np.isfinite(rough).sum(axis=0)
-    middle = np.sort(rough, axis=0)[np.maximum((known - 1) // 2, 0), np.arange(rough.shape[1])]
+def usual_noise2(times: Array, left: Array) -> Array:
+    """Variance (channels,) of the noise of readings (k, channels) by the median of `noise2`."""
+    each = noise2(times, left)
+    known = np.isfinite(each).sum(axis=0)
+    middle = np.sort(each, axis=0)[np.maximum((known - 1) // 2, 0), np.arange(each.shape[1])]
     return np.asarray(np.where(known >= ENOUGH, middle / MEDIAN2, 0.0))
 
 

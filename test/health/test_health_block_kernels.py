@@ -95,6 +95,8 @@ def test_what_is_found_in_a_block_is_what_numpy_finds(fastest: float) -> None:
     for block in range(600):
         rows = 50 if block % 17 == 0 else 20
         times = 0.1 * block + 0.005 * np.arange(float(rows))
+        if block % 3 == 0:
+            times += rng.uniform(-0.002, 0.002, rows)
         raw = level + rng.normal(0.0, SIGMA, (rows, 2)) * rng.choice([1.0, 2.4, 2.6], 2)
         if block % 7 == 0:
             raw[5:, rng.integers(2)] = raw[4, 0]
