@@ -27,6 +27,7 @@ PART = 1.0  # s, over which means are compared, to see how calm a hold is
 KEPT_UP = 0.8  # of its power that a vibration still has in the second half, if something keeps it up
 COLOURED = 3.0  # times the power of white noise that is left, from which on something else than free vibration is in it
 HEARD = 4.0  # times the power of noise, below which nothing is told of that
+FADED = 0.5  # of its own decay by which a vibration has to be less than in the part before of the same hold
 SECOND_ORDER, MOVED = 5.0, 0.4  # 1/rad, and of a resolution: see `_with_second_order`
 
 _largest_step = SameTypes(largest_step)
@@ -95,6 +96,7 @@ class HoldCollector:
 
     def __init__(self, reach: float) -> None:
         self._reach = reach
+        self._before: tuple[int, list[Vibration]] | None = None  # start and vibrations of what this goes on with
         self._begin()
 
     def _begin(self) -> None:
@@ -126,6 +128,8 @@ class HoldCollector:
         found = None
         if self._starts and (not is_still or (start - self._starts[0]) * NANO >= LONGEST):
             found = self._finished(block)
+            if not is_still:
+                self._before = None
             self._begin()
         self._starts.append(start)
         self._strokes.append(strokes)
@@ -146,9 +150,23 @@ class HoldCollector:
         is_shaken = not _is_explained(dt, thin, vibrations) or _is_kept_up(thin)
         part = 1 if is_shaken else max(1, round(PART / (block * NANO)))
         left, unrest = _mean_at_rest(np.array(self._left), part, is_shaken)
-        clear = [] if is_shaken else [each for each in vibrations if is_free(each) and _is_sure(each)]
+        clear = [] if is_shaken else [each for each in vibrations if is_free(each) and _is_sure(each) and self._fades(each)]
+        self._before = self._starts[0], vibrations
         sure = filter(_is_sure, _with_second_order(clear, span, self._reach if self._is_felt else None))
         return StillReadings(self._starts[0], self._starts[-1] + block, strokes, left, unrest, tuple(sure))
+
+    def _fades(self, vibration: Vibration) -> bool:
+        """Whether a vibration has become less since the part of the same hold before, as its own decay says; True without one.
+
+        A line, as of an engine, whose neighbours are not told from it, or whose noise comes again and again, may seem damped.
+        """
+        if self._before is None:
+            return True
+        start, vibrations = self._before
+        time = (self._starts[0] - start) * NANO
+        wanted = FADED * 2.0 * np.pi * vibration.frequency * vibration.damping * time
+        earlier = [each.amplitude for each in vibrations if abs(each.frequency - vibration.frequency) < 1.0 / time]
+        return not earlier or bool(np.log(max(earlier) / vibration.amplitude) > wanted)
 
 
 def _is_sure(each: Vibration) -> bool:
