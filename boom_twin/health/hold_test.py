@@ -9,7 +9,7 @@ the holds on; those before tell what this rig is like while all is well.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -105,24 +105,40 @@ class HoldTest:
         was_far = before is not None and before.tip >= FAR and before.verdict.strength >= DOUBTED
         return replace(best, is_far=was_far and best.tip >= FAR and best.verdict.strength >= LIKELY)
 
+    def is_of_one_frequency(self, found: HoldVerdict, mean: Array, covariance: Array) -> bool:
+        """Whether no fault is more probable than none by e^`LIKELY` without a certain frequency of a certain hold.
+
+        Two vibrations that were taken for one, or one of second order that was taken for a mode, put a single one off by 5 %.
+        """
+        return any(each.strength < LIKELY for each in self._verdicts_without(found, self._frequencies(), mean, covariance))
+
     def is_borne_out(self, found: HoldVerdict, mean: Array, covariance: Array) -> bool:
         """Whether the most probable cause stays that, by e^`LIKELY`, whichever single frequency or single hold is left out.
 
         A wind that was not noticed makes one as wrong as a fault does, and mean and frequencies of a hold together. So does a
         fault that begins within a hold.
         """
-        first, name = sum(hold.start < found.since for hold in self._holds), found.verdict.causes[0].name
-        rows, hold_of = self._rows()
-        frequencies = np.flatnonzero(rows >= len(self._errors2))
-        parts = [*np.eye(len(rows), dtype=bool)[frequencies], *(hold_of == np.arange(len(self._holds))[:, None])]
+        hold_of = self._rows()[1]
+        if len(self._holds) == 1:
+            return False
+        parts = [*self._frequencies(), *(hold_of == np.arange(len(self._holds))[:, None])]
+        name = found.verdict.causes[0].name
+        verdicts = self._verdicts_without(found, parts, mean, covariance)
+        return all(each.causes[0].name == name and each.strength >= LIKELY for each in verdicts)
+
+    def _frequencies(self) -> list[NDArray[np.bool_]]:
+        """Of every frequency its row among those of all holds."""
+        rows = self._rows()[0]
+        return list(np.eye(len(rows), dtype=bool)[rows >= len(self._errors2)])
+
+    def _verdicts_without(
+        self, found: HoldVerdict, parts: Sequence[NDArray[np.bool_]], mean: Array, covariance: Array
+    ) -> Iterator[Verdict]:
+        """What all holds say of faults that are there since then, without each of these parts of their rows."""
+        first = sum(hold.start < found.since for hold in self._holds)
         for left_out in parts:
-            if left_out.all():
-                return False
             white, log, numbers = self._whitened(left_out)
-            verdict = self._explained(white, numbers >= first, log, mean, covariance)
-            if verdict.causes[0].name != name or verdict.strength < LIKELY:
-                return False
-        return True
+            yield self._explained(white, numbers >= first, log, mean, covariance)
 
     def change(self, place: int, by: float, mean: Array, covariance: Array) -> float:
         """ln of how much more probable it is that a parameter has changed by exactly `by`, from any hold on, than not."""

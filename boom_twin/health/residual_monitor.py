@@ -222,6 +222,8 @@ class ResidualMonitor:
                 return self._end_known(each, hold.end)
         is_load = self._weight(found.verdict.best) < LOAD_MEANS * self._load_lately(hold.end)
         is_sure = found.verdict.strength >= HELD
+        if is_sure and self._hold_alarm is None and not is_load:
+            is_sure = not self._hold_test.is_of_one_frequency(found, *about)
         is_far = found.is_far and (math.isinf(self._weight(found.verdict.best)) or len(hold.modes) > 0)  # no mean of a load
         if self._hold_alarm is None and (not (is_sure or is_far) or is_load):
             return []

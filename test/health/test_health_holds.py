@@ -269,9 +269,36 @@ def is_borne_out(holds: list[HoldProblem]) -> bool:
 def test_a_cause_that_a_single_frequency_says_is_not_borne_out() -> None:
     """A wind that nobody noticed makes one as low as a softer section does."""
     healthy = drawn(np.random.default_rng(6), 0.0)
-    odd = healthy[2]._replace(frequencies=healthy[2].frequencies - np.array([[0.06, 0.0, 0.0, 0.0]]))
-    assert not is_borne_out([*healthy[:2], odd])
+    assert not is_borne_out([*healthy[:2], with_odd_frequency(healthy[2])])
     assert is_borne_out(drawn(np.random.default_rng(6), 0.43))
+
+
+def with_odd_frequency(hold: HoldProblem) -> HoldProblem:
+    """One that is 6 % too low."""
+    return hold._replace(frequencies=hold.frequencies - np.array([[0.06, 0.0, 0.0, 0.0]]))
+
+
+def test_what_a_single_frequency_says_is_no_alarm() -> None:
+    """Sums of frequencies near a natural one, or two vibrations taken for one, put it off; a softer section does to all."""
+    healthy, softer = (drawn(np.random.default_rng(6), each) for each in (0.0, 0.43))
+    for holds_of, is_of_one in (([*healthy[:2], with_odd_frequency(healthy[2]), *healthy[3:]], True), (softer, False)):
+        test = HoldTest(HypothesisTest(KNOWN), ERRORS**2, FREQUENCY_ERROR)
+        found = [test.take(hold, MEAN, COVARIANCE) for hold in holds_of]
+        assert max(each.verdict.strength for each in found) > 10.0
+        assert test.is_of_one_frequency(found[-1], MEAN, COVARIANCE) is is_of_one
+
+
+def test_holds_raise_no_alarm_by_a_single_frequency() -> None:
+    hold = drawn(np.random.default_rng(1), 0.0)[0]
+    place = next(i for i, each in enumerate(parameters(load_scene())) if each.cause == "section_1.EI")
+    for is_of_one in (True, False):
+        monitor = Twin(load_scene(), baseline=Baseline()).judge.residuals
+        best = Cause("section_1.EI", 1.0, (Explanation(place, 0, 30.0, 0.4, 0.05),), 1.0, 1.0)
+        found = HoldVerdict(hold.start, Verdict((best,), 1.0, 1.0, 0, 30.0), 0.007)
+        monitor._hold_test.take = lambda *_, found=found: found
+        monitor._hold_test.is_borne_out = lambda *_: False
+        monitor._hold_test.is_of_one_frequency = lambda *_, found=is_of_one: found
+        assert len(monitor._judge_hold(hold)) == (0 if is_of_one else 1)
 
 
 def test_a_cause_that_a_single_hold_says_is_not_borne_out() -> None:
@@ -358,6 +385,7 @@ def test_a_weight_that_may_be_the_mean_of_a_load_is_no_alarm_of_holds() -> None:
         found = HoldVerdict(hold.start, Verdict((best,), 1.0, 1.0, 0, 30.0), 0.007)
         monitor._hold_test.take = lambda *_, found=found: found
         monitor._hold_test.is_borne_out = lambda *_: True
+        monitor._hold_test.is_of_one_frequency = lambda *_: False
         monitor._shaken[level] = hold.end
         assert len(monitor._judge_hold(hold)) == alarms, (weight, level)
 
