@@ -148,7 +148,7 @@ def main(args: Namespace) -> None:
                 print(path, flush=True)
             return
         for rig in () if args.own_rigs else range(1, RIGS):
-            run._learn(rig, folder, args.out)
+            run.learn(rig, folder, args.out)
         kept, rows = args.out / f"{name}s{'_held_out' if args.held_out else ''}.jsonl", []
         with kept.open("w") as file:
             for row in pool.imap(partial(judge, out=args.out), wanted):
