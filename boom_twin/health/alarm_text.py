@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..scene.schema import Scene
-from ..types import NANO, Alarm, Array, Ranked
+from ..types import NANO, Alarm, Array, Ranked, Stream
 from .baseline import JUDGED, judged_channels
 from .delay_monitor import delay_remedy
 from .inference.fault_catalogue import Form, Parameter, physical
@@ -170,9 +170,11 @@ class AlarmText:
         named on a calm boom, a drift as long as it is as fast as it was; under a load where it is surer, or the cause the same
         if nothing grows: then the name does not depend on the shape. Under a load that hides most of a fault the onset is not
         seen, nor the shape, and of a wrong one the neighbour makes up better for a while: so a name takes one that is plainly
-        there, or that leads for longer and while the boom moves.
+        there, or that leads for longer and while the boom moves. Vibration that a load makes is out of step with what is
+        predicted, for that knows none: under one it is no lag of what feels little else.
         """
-        best, borne_out = whole.causes[0], calm.causes[0]
+        best, borne_out, first = whole.causes[0], calm.causes[0], self._known[whole.best.place]
+        is_out_of_step = not is_calm and first.form is Form.DELAY and tuple(JUDGED)[first.index] is Stream.IMU
         is_growing = whole.best.is_growing or calm.best.is_growing
         is_drift = calm.best.is_growing and self._known[calm.best.place].form in DRIFTING
         is_lasting = self._grows_still(alarm, calm, span) or not is_drift
@@ -183,7 +185,7 @@ class AlarmText:
         leads = leads and min(borne_out.probability, borne_out.alone) >= BORNE_OUT and is_told_apart
         shares = {cause.name: cause.probability for cause in whole.causes}
         is_held = alarm.cause not in (None, best.name) and shares[alarm.cause or ""] > REFUTED
-        if not (leads and has_shape and max(whole.excess, calm.excess) <= FITS) or is_held:
+        if is_out_of_step or not (leads and has_shape and max(whole.excess, calm.excess) <= FITS) or is_held:
             self._leading = "", stamp, travel
             return False
         if not alarm.told or self._leading[0] != best.name:
