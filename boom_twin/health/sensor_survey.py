@@ -94,8 +94,8 @@ def rough2(values, t, i):
 def noise2_at(times, values, t, i):
     """Variance of white noise by row t of channel i and the three before it, where the values may move as a parabola.
 
-    The less of what third differences say and of what divided ones do, in the Newton form: stamps that are uneven are either
-    those of when readings were taken, or of readings that were taken evenly and came so.
+    The less of what third differences say and of what Newton's divided ones do: stamps that are uneven are either those of when
+    readings were taken, or of readings that were taken evenly and came so.
     """
     a, b, c = times[t - 2] - times[t - 3], times[t - 1] - times[t - 2], times[t] - times[t - 1]
     even = rough2(values, t, i)

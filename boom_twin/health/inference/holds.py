@@ -96,7 +96,7 @@ class HoldCollector:
 
     def __init__(self, reach: float) -> None:
         self._reach = reach
-        self._before: tuple[int, list[Vibration]] | None = None  # start and vibrations of what this goes on with
+        self._before: tuple[int, Array] | None = None  # start, frequencies and amplitudes of what this goes on with
         self._begin()
 
     def _begin(self) -> None:
@@ -151,7 +151,7 @@ class HoldCollector:
         part = 1 if is_shaken else max(1, round(PART / (block * NANO)))
         left, unrest = _mean_at_rest(np.array(self._left), part, is_shaken)
         clear = [] if is_shaken else [each for each in vibrations if is_free(each) and _is_sure(each) and self._fades(each)]
-        self._before = self._starts[0], vibrations
+        self._before = self._starts[0], np.array([(each.frequency, each.amplitude) for each in vibrations]).reshape(-1, 2).T
         sure = filter(_is_sure, _with_second_order(clear, span, self._reach if self._is_felt else None))
         return StillReadings(self._starts[0], self._starts[-1] + block, strokes, left, unrest, tuple(sure))
 
@@ -162,11 +162,11 @@ class HoldCollector:
         """
         if self._before is None:
             return True
-        start, vibrations = self._before
+        start, (frequencies, amplitudes) = self._before
         time = (self._starts[0] - start) * NANO
         wanted = FADED * 2.0 * np.pi * vibration.frequency * vibration.damping * time
-        earlier = [each.amplitude for each in vibrations if abs(each.frequency - vibration.frequency) < 1.0 / time]
-        return not earlier or bool(np.log(max(earlier) / vibration.amplitude) > wanted)
+        earlier = amplitudes[np.abs(frequencies - vibration.frequency) < 1.0 / time].max(initial=0.0)
+        return earlier == 0.0 or bool(np.log(earlier / vibration.amplitude) > wanted)
 
 
 def _is_sure(each: Vibration) -> bool:
