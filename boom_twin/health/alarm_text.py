@@ -12,7 +12,7 @@ import numpy as np
 from ..scene.schema import Scene
 from ..types import NANO, Alarm, Array, Ranked, Stream
 from .baseline import JUDGED, judged_channels
-from .delay_monitor import delay_remedy
+from .delay_monitor import delay_cause, delay_remedy
 from .inference.fault_catalogue import Form, Parameter, physical
 from .inference.holds import HoldProblem
 from .inference.hypotheses import Cause, Explanation, Verdict
@@ -173,8 +173,8 @@ class AlarmText:
         there, or that leads for longer and while the boom moves. Vibration that a load makes is out of step with what is
         predicted, for that knows none: under one it is no lag of what feels little else.
         """
-        best, borne_out, first = whole.causes[0], calm.causes[0], self._known[whole.best.place]
-        is_out_of_step = not is_calm and first.form is Form.DELAY and tuple(JUDGED)[first.index] is Stream.IMU
+        best, borne_out = whole.causes[0], calm.causes[0]
+        is_out_of_step = not is_calm and best.name == delay_cause(Stream.IMU)
         is_growing = whole.best.is_growing or calm.best.is_growing
         is_drift = calm.best.is_growing and self._known[calm.best.place].form in DRIFTING
         is_lasting = self._grows_still(alarm, calm, span) or not is_drift

@@ -118,12 +118,11 @@ class HoldTest:
         A wind that was not noticed makes one as wrong as a fault does, and mean and frequencies of a hold together. So does a
         fault that begins within a hold.
         """
-        hold_of = self._rows()[1]
         if len(self._holds) == 1:
             return False
-        parts = [*self._frequencies(), *(hold_of == np.arange(len(self._holds))[:, None])]
+        each_hold = self._rows()[1] == np.arange(len(self._holds))[:, None]
         name = found.verdict.causes[0].name
-        verdicts = self._verdicts_without(found, parts, mean, covariance)
+        verdicts = self._verdicts_without(found, [*self._frequencies(), *each_hold], mean, covariance)
         return all(each.causes[0].name == name and each.strength >= LIKELY for each in verdicts)
 
     def _frequencies(self) -> list[NDArray[np.bool_]]:

@@ -220,9 +220,9 @@ def two_cylinders_move() -> dict[str, Any]:
     strokes[:, 0] += 0.02 * (1.0 - np.cos(1.5 * time_s))
     strokes[:, 2] += 0.01 * (1.0 - np.cos(2.0 * time_s))
     few = np.arange(0, len(time_s), 20)  # slow enough for equilibria, and for sag to be interpolated
-    at_rest = np.array([statics(scene, strokes[k], modes=0).joints - joint_angles_of_strokes(scene, strokes[k]) for k in few])
-    sag = np.column_stack([np.interp(time_s, time_s[few], column) for column in at_rest.T])
-    joints = np.array([joint_angles_of_strokes(scene, row) for row in strokes]) + sag
+    rigid = np.array([joint_angles_of_strokes(scene, row) for row in strokes])
+    at_rest = np.array([statics(scene, strokes[k], modes=0).joints - rigid[k] for k in few])
+    joints = rigid + np.column_stack([np.interp(time_s, time_s[few], column) for column in at_rest.T])
     return {
         "stamps_ns": stamps,
         "strokes": strokes + random.normal(0.0, 2e-5, strokes.shape),
