@@ -1,0 +1,242 @@
+"""Step of the filters on cylinder lengths, and what it gives: prediction, expected readings, estimate of the tip."""
+
+from __future__ import annotations
+
+import math
+
+from ..estimation.sensor_model import specific_force
+from ..estimation.tip_estimate import ACCELERATION, ACCELERATION_COVARIANCE, FORCE, FORCE_VARIANCE, TIP_COVARIANCE
+from ..estimation.tip_estimate import TIP as TIP_AT
+from ..kernels.elements.linkage import angle_of_length
+from ..kernels.integrators import X
+from ..kernels.jit import inner, kernel
+from ..kernels.result_row import estimates_in, results_in
+from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, OK
+from ..kernels.transfer.forward_kinematics import place
+from .models import (
+    ESTIMATE,
+    PREDICTION,
+    FED,
+    FED_STAMP,
+    PATIENCE,
+    acceleration_row,
+    about_rest,
+    angle_row,
+    column_row,
+    covariance_of,
+    drive_place,
+    follow_prediction,
+    force_place,
+    length_row,
+    rate_row,
+    read,
+    specific_force_row,
+    all_states,
+    step_models,
+    variance_of,
+    zero_place,
+)
+from .posture import WIDEST, linearise
+
+SHAKEN_TIME = 0.5  # s, over which the mean square of the tip's acceleration is taken
+ANGLE_STEP = 0.01  # rad that a joint turns by before the boom is linearised anew
+
+
+@kernel
+def step_lengths(t, boom, live, work, p, f, h, stamp, y, gravity, out):
+    """Take lengths and write the prediction.
+
+    Parameters
+    ----------
+    t, boom, live, work : Tables, State, State, Work
+        `boom` is at rest at the posture; `live` becomes the boom as predicted.
+    p, f : Posture, Filters
+    h : float
+        Time since the lengths before, s; 0 for the first.
+    stamp : int
+        ns.
+    y : ndarray, shape (n,)
+        Lengths of the cylinders less their closed lengths, m; NaN where missing.
+    gravity : ndarray, shape (2,)
+        m/s^2.
+    out : ndarray, shape (prediction_width,)
+        Results and estimates, see `kernels.result_row`.
+
+    Returns
+    -------
+    int
+        Status, see `kernels.tables`.
+    """
+    n, drive = p.drives.shape[0], drive_place(p)
+    turned = 0.0
+    for i in range(n):
+        turned = max(turned, abs((f.mean[PREDICTION, drive + i] - p.drives[i]) * p.slope[i]))
+    if turned > ANGLE_STEP:
+        status = linearise(t, boom, work, p, f.mean[PREDICTION, drive : drive + n], True)
+        if status != OK:
+            return status
+    if f.status[FED] == 1 and stamp - f.status[FED_STAMP] > PATIENCE:
+        f.status[FED] = 0
+    step_models(p, f, h, y)
+    place_live(t, boom, live, work, p, f)
+    write_prediction(t, live, p, f, h, gravity, out)
+    return OK
+
+
+@inner
+def place_live(t, boom, live, work, p, f):
+    """Bring `live` to the mean of the prediction."""
+    n, m, load, drive = p.drives.shape[0], p.count[0], force_place(p), drive_place(p)
+    for i in range(live.z.shape[0]):
+        live.z[i] = p.rest[i]
+    for a in range(2):
+        add_column(p, live.z, a, f.mean[PREDICTION, load + a] + f.mean[PREDICTION, load + 2 + a])
+    for i in range(n):
+        add_column(p, live.z, 2 + i, f.mean[PREDICTION, drive + i] - p.drives[i])
+    for j in range(m):
+        add_column(p, live.z, 2 + n + j, f.mean[PREDICTION, j])
+    for i in range(live.history.shape[1]):
+        live.history[X, i] = boom.history[X, i]
+    for i in range(n):
+        live.drives[0, i], live.drives[1, i] = p.closed[i] + f.mean[PREDICTION, drive + i], f.mean[PREDICTION, drive + n + i]
+    place(t, live, work)
+
+
+@inner
+def add_column(p, z, k, size):
+    """Add `size` times column `k` of the posture to the unknowns."""
+    for i in range(z.shape[0]):
+        z[i] += size * p.columns[k, i]
+
+
+@inner
+def write_prediction(t, live, p, f, h, gravity, out):
+    """Write results and estimates; see `kernels.result_row`."""
+    n, size, pins = p.drives.shape[0], zero_place(p), t.clearances.shape[0]
+    found, estimates = results_in(out, n, pins), estimates_in(out, n, pins)
+    last = live.frames.shape[0] - 1
+    for i in range(n):
+        root = p.roots[i]
+        found.joints[i] = live.frames[root, FRAME_ANGLE] - live.frames[root - 1, FRAME_ANGLE]
+        f.pulls[i] = found.cylinder_forces[i] = live.z[t.cylinders[i].z]
+        length_row(p, i, f.row)
+        estimates.strokes[i] = p.drives[i] + p.compliance[i] * p.pulled[i] + about_rest(p, f.row, f.mean[PREDICTION], size)
+        estimates.variances[i] = variance_of(f.row, f.spread[PREDICTION], size)
+    for k in range(pins):
+        row = t.clearances[k]
+        found.pins[k, 0], found.pins[k, 1] = live.z[row.z], live.z[row.z + 1]
+        found.pins[k, 2], found.pins[k, 3] = 0.0, 1.0
+    found.tip[0, 0], found.tip[0, 1] = live.frames[last, FRAME_X], live.frames[last, FRAME_Y]
+    found.tip[0, 2] = live.frames[last, FRAME_ANGLE]
+    write_bend(live, p, f, found.tip[2])
+    for a in range(3):
+        rate_row(p, a, f.row)
+        found.tip[1, a] = read(f.row, f.mean[PREDICTION], size)
+        acceleration_row(p, a, f.row)
+        found.tip[2, a] += read(f.row, f.mean[PREDICTION], size)
+    angle = found.tip[0, 2]
+    f.felt[0], f.felt[1] = specific_force(
+        found.tip[2, 0] - gravity[0], found.tip[2, 1] - gravity[1], math.cos(angle), math.sin(angle)
+    )
+    size2 = found.tip[2, 0] * found.tip[2, 0] + found.tip[2, 1] * found.tip[2, 1]
+    f.shaking[0] += min(h / SHAKEN_TIME, 1.0) * (size2 - f.shaking[0])
+    estimates.rigid_tip[0], estimates.rigid_tip[1] = rigid_tip(t, p, estimates.strokes)
+
+
+@inner
+def write_bend(live, p, f, found):
+    """Write the acceleration (x, y, angle) that the tip's curved way needs at constant rates of drives and modes.
+
+    With the turning rate w_i of the chord r_i of section i, and what w_i changes by the geometry of the linkages, a_i,
+    the tip has sum_i (a_i e_z x r_i - w_i^2 r_i).
+    """
+    n, m, drive, change = p.drives.shape[0], p.count[0], drive_place(p), 0.0
+    found[0], found[1], found[2] = 0.0, 0.0, 0.0
+    for i in range(n):
+        rate, v = 0.0, f.mean[PREDICTION, drive + n + i]
+        for k in range(n):
+            rate += p.readings[2 + k, n + 3 + i] * f.mean[PREDICTION, drive + n + k]
+        for j in range(m):
+            rate += p.readings[2 + n + j, n + 3 + i] * f.mean[PREDICTION, m + j]
+        change += p.curvature[i] * v * v
+        one, other = live.frames[p.roots[i]], live.frames[p.roots[i + 1]]
+        x, y = other[FRAME_X] - one[FRAME_X], other[FRAME_Y] - one[FRAME_Y]
+        found[0] -= rate * rate * x + change * y
+        found[1] += change * x - rate * rate * y
+    found[2] = change
+
+
+@inner
+def rigid_tip(t, p, lengths):
+    """Return the tip (m) of rigid sections on rigid cylinders of these lengths; one out of reach leaves its joint."""
+    x, y, heading = t.joints[0].x, t.joints[0].y, 0.0
+    for i in range(p.angles.shape[0]):
+        angle = angle_of_length(t.linkages[i], p.closed[i] + lengths[i], p.angles[i], -WIDEST, WIDEST)
+        heading += angle if math.isfinite(angle) else p.angles[i]
+        x += p.lengths[i] * math.cos(heading)
+        y += p.lengths[i] * math.sin(heading)
+    return x, y
+
+
+@inner
+def write_expected_readings(p, f, live, results, inclination, first, values, sigmas):
+    """Write what all sensors should read of the newest prediction, and the deviations of reading less that.
+
+    Parameters
+    ----------
+    results : Results
+        Of the prediction.
+    inclination : float
+        Of the base, rad.
+    first : ndarray of int
+        First channel of each stream.
+    values, sigmas : ndarray, shape (measured channels,)
+        Angles (rad), then the tip IMU's x and z (m/s^2), then the cylinders' forces (N).
+    """
+    n, size = p.drives.shape[0], zero_place(p)
+    for i in range(n):
+        values[i] = live.frames[p.frames[i], FRAME_ANGLE] + inclination if p.absolute[i] else results.joints[i]
+        angle_row(p, i, f.row)
+        sigmas[i] = math.sqrt(f.noise.angle2 + variance_of(f.row, f.spread[PREDICTION], size))
+    at, angle = n, results.tip[0, 2]
+    for axis in range(2):
+        values[at + axis] = f.felt[axis]
+        specific_force_row(p, f, axis, math.cos(angle), math.sin(angle), f.row)
+        sigmas[at + axis] = math.sqrt(f.noise.acceleration2 + variance_of(f.row, f.spread[PREDICTION], size))
+    for i in range(n):
+        values[at + 2 + i] = results.cylinder_forces[i]
+        column_row(p, p.forces, i, 1.0, f.row)
+        sigmas[at + 2 + i] = math.sqrt(f.noise.force2 + variance_of(f.row, f.spread[PREDICTION], size))
+
+
+@inner
+def write_tip_estimate(p, f, results, out):
+    """Write the estimate beside the newest prediction; see `boom_twin.estimation.tip_estimate.WIDTH`."""
+    n, size, every, load = p.drives.shape[0], zero_place(p), all_states(p), force_place(p)
+    if f.status[FED] == 0:
+        follow_prediction(p, f)
+    for a in range(3):
+        column_row(p, p.readings, n + a, 1.0, f.rows[a])
+        acceleration_row(p, a, f.rows[3 + a])
+        out[TIP_AT + a] = results.tip[0, a] + difference(f, f.rows[a], size)
+        out[ACCELERATION + a] = results.tip[2, a] + difference(f, f.rows[3 + a], size)
+    at = 0
+    for a in range(3):
+        for b in range(a, 3):
+            out[TIP_COVARIANCE + at] = covariance_of(f.rows[a], f.rows[b], f.spread[ESTIMATE], every)
+            out[ACCELERATION_COVARIANCE + at] = covariance_of(f.rows[3 + a], f.rows[3 + b], f.spread[ESTIMATE], every)
+            at += 1
+    covariance = f.spread[ESTIMATE]
+    for a in range(2):
+        fast, slow = load + a, load + 2 + a
+        out[FORCE + a] = f.mean[ESTIMATE, fast] + f.mean[ESTIMATE, slow]
+        out[FORCE_VARIANCE + a] = covariance[fast, fast] + 2.0 * covariance[fast, slow] + covariance[slow, slow]
+
+
+@inner
+def difference(f, row, size):
+    """Return the reading of a row by the estimate less that by the prediction."""
+    total = 0.0
+    for k in range(size):
+        total += row[k] * (f.mean[ESTIMATE, k] - f.mean[PREDICTION, k])
+    return total
