@@ -284,9 +284,7 @@ def spring_free(plan: Plan, lengths: Array, forces: Array) -> Array:
         before, drives = drives, lengths - plan.compliances_and_lags(plan.closed_lengths + drives)[0] * forces
         if np.abs(drives - before).max() < CLOSE:
             return drives
-    raise SolverError(f"no drives for cylinder forces of {numbers(forces)} N: the oil gives too much. Check bulk_modulus and bore.")
-
-
+    raise SolverError(f"no drives for cylinder forces of {numbers(forces)} N: the oil gives too much. Check bulk_modulus.")
 
 
 def travel_words(i: int, most: float) -> str:

@@ -12,7 +12,6 @@ from ....types import Array
 from .module import exudyn, items
 from .system import Boom, Station
 
-
 _FORCE = {"distance": exudyn.OutputVariableType.Force, "referenceLength": exudyn.OutputVariableType.ForceLocal}
 """Output that is the cylinder force, by the name of the connector's length parameter."""
 
