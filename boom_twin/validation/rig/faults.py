@@ -86,10 +86,11 @@ _SIZES = {
     "missing": "share of the messages",
 }
 """What a size is, by kind, and by cause where that differs."""
-CAUSES = (
-    "cylinder_i.k, section_i.EI, tip.payload, line_fill, cylinder_i.rod.clearance, cylinder_i.drive, joint_i.sensor, "
-    "cylinder_i.sensor, cylinder_force_i.sensor, joint_angles.delay, joint_angles.dropout, cylinder_strokes.dropout"
-)
+
+
+def _words(form: str, number: str) -> str:
+    """Return the cause of a form of `_CAUSES` as it is told to people, with `number` for the cylinder, joint or section."""
+    return form.replace(r"([1-9]\d*)", number).replace("\\", "").replace("(?:", "(")
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +113,8 @@ class RigFault:
     def __post_init__(self) -> None:
         kinds = next((kinds for form, kinds in _CAUSES.items() if re.fullmatch(form, self.cause)), None)
         if kinds is None:
-            raise UsageError(f"fault {self.cause}: not a cause. Give one of {CAUSES}, with i from 1.")
+            causes = ", ".join(_words(form, "i") for form in _CAUSES)
+            raise UsageError(f"fault {self.cause}: not a cause. Give one of {causes}, with i from 1 and (a|b) for a or b.")
         if self.kind not in kinds:
             raise UsageError(f"fault {self.cause}:{self.kind}: not a kind of this cause. Give one of {', '.join(kinds)}.")
         bound = kinds[self.kind]
@@ -242,7 +244,7 @@ def listing() -> list[str]:
     """All causes, kinds, and what their sizes are, a line each."""
     lines = [f"{'cause':41} {'kind':9} size"]
     for form, kinds in _CAUSES.items():
-        cause = form.replace(r"([1-9]\d*)", "I").replace("\\", "").replace("(?:", "(")
+        cause = _words(form, "I")
         for kind, bound in kinds.items():
             unit = _SIZES.get(kind) or _SIZES[f"{kind} {cause}"]
             lines.append(f"{cause:41} {kind:9} {unit}{f'; {bound}' if bound else ''}")
