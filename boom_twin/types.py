@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
+from enum import Enum, StrEnum
 from math import pi
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -42,6 +42,13 @@ class Stream(Enum):
     FORCES = "cylinder_forces"
 
     __hash__ = object.__hash__  # members are single; Enum's own is a Python function, called for every look-up
+
+
+class StrokeReading(StrEnum):
+    """What the stroke transducers of a session read: the cylinder with its oil compressed, or as if the oil were unloaded."""
+
+    LENGTH = "length"
+    DRIVE = "drive"
 
 
 G = 9.80665

@@ -231,6 +231,30 @@ def _side(axes: Any, joint: JointPins, told: str, up: float) -> None:
     name(axes, joint.pivot + np.array([-0.45, -up * 0.35]), told, (0, 0), ORANGE)
 
 
+def lengths_figure(scene: Scene, path: Path) -> None:
+    """Cylinder 1 with unloaded oil, and pressed together: its drive and its length, the compression a hundred times as large."""
+    closed, drive, pressed = scene.joints[0].cylinder.closed_length, 0.45, 0.17
+    told = ((0.75, drive, "unloaded oil, F = 0"), (0.0, drive - pressed, "oil compressed, F < 0"))
+    with sheet(path, "Length and drive", [((-0.3, 2.05), (-0.34, 1.1))], 5.2) as (axes,):
+        for y, stroke, words in told:
+            barrel, end, rod = np.array([0.0, y]), np.array([closed, y]), np.array([closed + stroke, y])
+            draw_cylinder(axes, barrel, rod, closed, 0.13)
+            for pin in (barrel, rod):
+                draw_pin(axes, pin, 9.0)
+            dimension(axes, barrel, end, "closed_length", -0.22)
+            name(axes, np.array([0.05, y + 0.17]), words, (1, 0))
+            if stroke == drive:
+                dimension(axes, end, rod, "drive", -0.22)
+                continue
+            dimension(axes, end, rod, "length", -0.22, ORANGE)
+            dimension(axes, rod, rod + [pressed, 0.0], "F / k", 0.22, GREEN, 1.7)
+            for pin, far in ((barrel, -0.27), (rod, 0.27)):
+                arrow = {"arrowstyle": "-|>", "color": BLUE, "linewidth": 2.2, "shrinkB": 6, "mutation_scale": 20}
+                axes.annotate("", tuple(pin), (pin[0] + far, y), arrowprops=arrow, zorder=11)
+            name(axes, np.array([rod[0] + 0.29, y]), "F", (2, 0), BLUE)
+        axes.plot([closed + drive] * 2, [0.0, 0.75], color=GREY, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1)
+
+
 def response_figures(out: Path) -> None:
     """Frequency response, steady state and resonance map of the default scene, by the command itself."""
     for given, made, name in (
@@ -252,6 +276,7 @@ def main() -> None:
     boom_picture(scene, statics(scene, posture="arch"), out / "boom.png", title, "surrogate parameters")
     section_figure(scene, out / "symbols_section.png")
     joint_a_figure(scene, out / "symbols_joint_a.png")
+    lengths_figure(scene, out / "lengths_and_drives.png")
     for i, degrees in ((1, -42.0), (2, -42.0), (3, -42.0)):
         assert np.isfinite(stroke_curve(scene, i, np.radians([degrees]))).all()
         six_bar_figure(scene, i, float(np.radians(degrees)), out / f"symbols_b{i}.png")

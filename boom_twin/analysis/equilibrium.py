@@ -17,6 +17,7 @@ from ..kernels.integrators import REST, X, prepare
 from ..kernels.tables import OK, Z_LINK_L, Z_LINK_R, Z_SECTION, State, Work
 from ..kernels.transfer.clearance_pins import axis_of
 from ..kernels.transfer.time_step import ANEW, advance
+from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton, strokes_of_posture
 from ..scene.schema import Scene
 from ..scene.source import SceneSource, as_scene
@@ -116,6 +117,7 @@ def motion_beyond_validity(scene: Scene, strokes: Array, tip: Array, angles: Arr
 
 TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
 PASSES = 60
+CLOSE = 1e-13  # m, change of a drive in the last pass
 LONGEST_INCREMENT = 0.1  # rad in one pass
 FIRST_LOAD, LEAST_LOAD = 0.05, 1e-3  # of gravity: first step where the full load at once fails, and the smallest that is tried
 LEAST_SHARE = 1e-3  # of the clearances, likewise
@@ -127,8 +129,8 @@ class Equilibrium(SummaryDisplay):
 
     Attributes
     ----------
-    strokes : ndarray, shape (n,)
-        m.
+    strokes, lengths : ndarray, shape (n,)
+        Drives, and lengths of the cylinders pin to pin less `closed_length`, m: they differ by what the oil gives.
     tip_rigid, tip : ndarray, shape (2,)
         Tip of the undeformed and of the deflected boom, m.
     joints : ndarray, shape (n,)
@@ -144,6 +146,7 @@ class Equilibrium(SummaryDisplay):
     """
 
     strokes: Array
+    lengths: Array
     tip_rigid: Array
     tip: Array
     joints: Array
@@ -169,20 +172,26 @@ class Equilibrium(SummaryDisplay):
 
 
 def statics(
-    scene: SceneSource = None, strokes: ArrayLike | str | None = None, posture: str | None = None, modes: int = 6
+    scene: SceneSource = None,
+    strokes: ArrayLike | str | None = None,
+    posture: str | None = None,
+    modes: int = 6,
+    lengths: ArrayLike | None = None,
 ) -> Equilibrium:
-    """Equilibrium under gravity at absolute `strokes` (m), shape (n,), or at a named `posture` of the scene.
+    """Find the equilibrium under gravity at given drives, at given cylinder lengths, or in a posture of the scene.
 
     Parameters
     ----------
     scene : Scene, path or mapping
         The boom, of n sections: a `Scene`, a scene file, a dict with its keys; None: the default scene.
     strokes : array_like, shape (n,), or str, optional
-        Absolute strokes, m; or the name of a posture.
+        Absolute strokes of the drives, m; or the name of a posture.
     posture : str, optional
-        A posture of the scene; just one of strokes and posture is given.
+        A posture of the scene; just one of strokes, posture and lengths is given.
     modes : int
         How many natural frequencies are looked for, the lowest first.
+    lengths : array_like, shape (n,), optional
+        What stroke transducers read of the boom at rest, m: pin to pin less `closed_length`, with the oil compressed.
 
     Returns
     -------
@@ -192,17 +201,25 @@ def statics(
     Raises
     ------
     UsageError
-        Unknown posture, strokes outside the cylinders, not exactly one of strokes and posture.
+        Unknown posture, strokes or lengths outside the cylinders, not exactly one of strokes, posture and lengths.
     SolverError
         No stable equilibrium was found.
     """
     scene = as_scene(scene)
-    strokes, angles = strokes_and_angles(scene, strokes, posture)
+    if lengths is None:
+        strokes, angles = strokes_and_angles(scene, strokes, posture)
+    elif strokes is None and posture is None:
+        lengths = checked_strokes(scene, np.asarray(lengths, dtype=float), "length")
+        angles = joint_angles_of_strokes(scene, lengths, name="length")
+        strokes = drives_at_rest(scene, lengths, angles)
+    else:
+        raise UsageError("give one of strokes, posture and lengths, not two.")
     plan, state, work = rest_at(scene, strokes, angles)
     found = taken_apart(plan, first_row(plan, state))
     undeformed, tip = skeleton(scene, angles).pivots[-1], state.frames[-1, :2].copy()
     return Equilibrium(
         strokes=strokes,
+        lengths=found.lengths,
         tip_rigid=undeformed,
         tip=tip,
         joints=found.joints,
@@ -233,17 +250,41 @@ def strokes_and_angles(scene: Scene, strokes: ArrayLike | str | None, posture: s
     return found, joint_angles_of_strokes(scene, found)
 
 
-def checked_strokes(scene: Scene, strokes: Array) -> Array:
-    """`strokes` as an array, shape (n,); UsageError unless there is one for every cylinder, within its travel."""
+def checked_strokes(scene: Scene, strokes: Array, name: str = "stroke") -> Array:
+    """Return `strokes` as an array, shape (n,); UsageError, by `name`, unless each cylinder has one within its travel."""
     values = np.asarray(strokes, dtype=float)
     n = len(scene.joints)
     if values.shape != (n,):
-        raise UsageError(f"strokes = {values.size} values: the scene has {n} cylinders. Give {n} values in m.")
+        raise UsageError(f"{name}s = {values.size} values: the scene has {n} cylinders. Give {n} values in m.")
     for i, value in enumerate(values):
         most = scene.joints[i].cylinder.max_stroke
         if not 0.0 <= value <= most:
-            raise UsageError(f"stroke_{i + 1} = {value:g} m: {travel_words(i, most)}")
+            raise UsageError(f"{name}_{i + 1} = {value:g} m: {travel_words(i, most)}")
     return values
+
+
+def drives_at_rest(scene: Scene, lengths: Array, angles: Array) -> Array:
+    """Return the drives (m), shape (n,), of the boom that rests with these cylinder `lengths` (m) next to joint `angles` (rad).
+
+    A cylinder at rest is a strut, whatever its oil. So the boom without oil springs gives the forces, and these the springs'
+    extension.
+    """
+    struts, state, _ = rest_at(with_rigid_cylinders(scene), lengths, angles)
+    return spring_free(compile_scene(scene), lengths, taken_apart(struts, first_row(struts, state)).cylinder_forces)
+
+
+def spring_free(plan: Plan, lengths: Array, forces: Array) -> Array:
+    """Return the drives (m), shape (n,), of cylinders that are `lengths` (m) long at rest under `forces` (N).
+
+    The compliance of `oil` is that at the drive. A pass leaves the share of the error that the oil's pressure is of its bulk
+    modulus, a few percent.
+    """
+    drives = lengths
+    for _ in range(PASSES):
+        before, drives = drives, lengths - plan.compliances_and_lags(plan.closed_lengths + drives)[0] * forces
+        if np.abs(drives - before).max() < CLOSE:
+            return drives
+    raise SolverError(f"no drives for cylinder forces of {numbers(forces)} N: the oil gives too much. Check bulk_modulus.")
 
 
 def travel_words(i: int, most: float) -> str:

@@ -10,15 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiler.compile import compile_scene
+from ..compiler.plan import Plan
 from ..errors import SolverError, UsageError
 from ..kernels.tables import OK, SENTENCES
+from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..scene.source import SceneSource, as_scene
 from ..system.summary_display import SummaryDisplay, data_frame, numbers
 from ..types import Array
 from .drive import DriveCourse, Run
-from .equilibrium import motion_beyond_validity, rest_at, travel_words
+from .equilibrium import motion_beyond_validity, rest_at, spring_free, travel_words
 from .error_estimate import EstimatedError, ringing, row_errors, step_errors, too_fast, warnings_of
 from .initial_state import InitialState, started, state_now
 
@@ -35,8 +38,8 @@ class Simulation(SummaryDisplay):
     ----------
     times : ndarray, shape (m,)
         s.
-    strokes, joints, cylinder_forces : ndarray, shape (m, n)
-        m; rad; N (tension positive).
+    strokes, lengths, joints, cylinder_forces : ndarray, shape (m, n)
+        Drives, and lengths of the cylinders pin to pin less `closed_length`, m; rad; N (tension positive).
     tip, tip_velocity, tip_acceleration : ndarray, shape (m, 3)
         x, y, orientation of the last head, in m and rad, and their rates.
     passes : float
@@ -63,6 +66,7 @@ class Simulation(SummaryDisplay):
 
     times: Array
     strokes: Array
+    lengths: Array
     joints: Array
     cylinder_forces: Array
     tip: Array
@@ -101,7 +105,7 @@ class Simulation(SummaryDisplay):
         for k, name in enumerate(self.pin_names):
             for j, quantity in enumerate(("dx_m", "dy_m", "force_N", "contact")):
                 columns[f"{name.replace('.', '_')}_{quantity}"] = self.pins[:, k, j]
-        return columns
+        return columns | {f"length_{i + 1}_m": self.lengths[:, i] for i in range(n)}
 
     def to_frame(self) -> Any:
         """`columns` as a ``pandas.DataFrame``; UsageError if pandas is not installed."""
@@ -120,14 +124,18 @@ class Simulation(SummaryDisplay):
 def simulate(
     scene: SceneSource,
     times: Array,
-    strokes: Array,
+    strokes: Array | None = None,
     dt: float = 1e-3,
     angles: Array | None = None,
     rho: float = RHO,
     estimate_errors: bool = True,
     start: InitialState | None = None,
+    lengths: Array | None = None,
 ) -> Simulation:
-    """Start at rest in the equilibrium of the first row, or from a given state, and follow the strokes.
+    """Start at rest in the equilibrium of the first row, or from a given state, and follow the drives or the lengths.
+
+    Lengths are constraints: the boom moves as with incompressible cylinders. Their forces give the oil springs' extension, and
+    that the drives.
 
     Parameters
     ----------
@@ -135,8 +143,8 @@ def simulate(
         The boom, of n sections; as for `boom_twin.statics`.
     times : ndarray, shape (m,)
         s, increasing, any spacing.
-    strokes : ndarray, shape (m, n)
-        Absolute strokes, m. Between rows they follow a monotone cubic (PCHIP): C1, no overshoot.
+    strokes : ndarray, shape (m, n), optional
+        Absolute strokes of the drives, m. Between rows they follow a monotone cubic (PCHIP): C1, no overshoot.
     dt : float
         Longest step, s; steps end on the rows.
     angles : ndarray, shape (n,), optional
@@ -148,6 +156,8 @@ def simulate(
         seven times as long as stepping once.
     start : InitialState, optional
         Where the boom is and how it moves at the first row, instead of at rest: `boom_twin.undeflected`, or `Simulation.end`.
+    lengths : ndarray, shape (m, n), optional
+        Lengths of the cylinders less `closed_length`, m, instead of `strokes`; what stroke transducers read.
 
     Returns
     -------
@@ -158,12 +168,17 @@ def simulate(
     ------
     UsageError
         Rows that do not increase, values that are not finite or out of the cylinders' travel, dt not positive; a state of
-        another boom, or one that leaves loops open.
+        another boom, or one that leaves loops open; not exactly one of strokes and lengths.
     SolverError
         No equilibrium at the first row, or a step that failed; says when.
     """
     scene = as_scene(scene)
-    course = course_of(scene, times, strokes, dt, angles, rho, start)
+    if lengths is None and strokes is not None:
+        course = course_of(scene, times, strokes, dt, angles, rho, start)
+    elif lengths is not None and strokes is None:
+        course = course_of(with_rigid_cylinders(scene), times, lengths, dt, angles, rho, start, "length")
+    else:
+        raise UsageError("give either strokes or lengths, not both and not neither.")
     times, strokes, plan = course.times, course.strokes, course.plan
     own = course.stepped(np.arange(len(times)), dt)
     if own.status != OK:
@@ -174,8 +189,10 @@ def simulate(
         *_doubts(times, dt, own, by_steps, by_rows),
         *motion_beyond_validity(scene, strokes, tip[:, 0, :2], angles),
     )
+    if lengths is not None:
+        strokes = drives_of(compile_scene(scene), times, own.rows.lengths, own.rows.cylinder_forces)
     return Simulation(
-        times, strokes, own.rows.joints, own.rows.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
+        times, strokes, own.rows.lengths, own.rows.joints, own.rows.cylinder_forces, tip[:, 0], tip[:, 1], tip[:, 2],
         own.passes, abs(1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * own.jolt,
         by_steps, by_rows, doubts, plan.pins, own.rows.pins, own.lost, state_now(plan, own.end),
     )  # fmt: skip
@@ -189,15 +206,36 @@ def course_of(
     angles: Array | None = None,
     rho: float = RHO,
     start: InitialState | None = None,
+    name: str = "stroke",
 ) -> DriveCourse:
-    """What `simulate` steps through: the drive, checked, and the boom at its first row; arguments and errors as there."""
-    times, strokes = _checked(scene, times, strokes, dt)
+    """What `simulate` steps through: the drive, checked, and the boom at its first row; arguments and errors as there.
+
+    Errors call the strokes by `name`.
+    """
+    times, strokes = _checked(scene, times, strokes, dt, name)
     plan, begin, work = (
-        rest_at(scene, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles))
+        rest_at(scene, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles, name=name))
         if start is None
         else started(scene, start, times, strokes)
     )
     return DriveCourse(plan, begin, work, times, strokes, rho)
+
+
+def drives_of(plan: Plan, times: Array, lengths: Array, forces: Array) -> Array:
+    """Return the drives (m), shape (m, n), of cylinders with these lengths (m) and forces (N) at `times` (s), at rest at first.
+
+    The extension x of an oil spring follows d x' + k x = F. The solution is exact for forces that are linear from row to row.
+    """
+    drives = [spring_free(plan, lengths[0], forces[0])]
+    for span, now, before, after in zip(np.diff(times), lengths[1:], forces, forces[1:], strict=False):
+        extension = lengths[len(drives) - 1] - drives[-1]
+        compliance, lag = plan.compliances_and_lags(plan.closed_lengths + now - extension)
+        with np.errstate(divide="ignore"):
+            kept = np.exp(-span / lag)
+        start, end = compliance * before, compliance * after
+        lead = (end - start) / span * lag
+        drives.append(now - (end - lead + (extension - start + lead) * kept))
+    return np.array(drives)
 
 
 def _doubts(
@@ -213,17 +251,17 @@ def _doubts(
     yield from too_fast(times, own.rates)
 
 
-def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Array, Array]:
+def _checked(scene: Scene, times: Array, strokes: Array, dt: float, name: str) -> tuple[Array, Array]:
     times, strokes = np.asarray(times, dtype=float), np.asarray(strokes, dtype=float)
     n = len(scene.joints)
     if not (math.isfinite(dt) and dt > 0.0):
         raise UsageError(f"dt = {dt!r} s: must be positive. Take 0.001.")
     if times.ndim != 1 or strokes.shape != (len(times), n) or len(times) < 1:
-        raise UsageError(f"strokes = array of shape {strokes.shape}: give one row per time and {n} columns.")
+        raise UsageError(f"{name}s = array of shape {strokes.shape}: give one row per time and {n} columns.")
     if not (np.isfinite(times).all() and np.isfinite(strokes).all()):
         row, column = np.argwhere(~np.isfinite(np.column_stack([times, strokes])))[0].tolist()
-        name = f"stroke_{column}_m" if column else "t_s"
-        raise UsageError(f"row {row + 1} of the drive, {name}: not finite. Give a number in every column.")
+        where = f"{name}_{column}_m" if column else "t_s"
+        raise UsageError(f"row {row + 1} of the drive, {where}: not finite. Give a number in every column.")
     if np.any(np.diff(times) <= 0.0):
         row = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
         raise UsageError(f"t_s = {times[row + 1]:g} s in row {row + 2} of the drive: not after row {row + 1}. Sort the rows.")
@@ -242,5 +280,5 @@ def _checked(scene: Scene, times: Array, strokes: Array, dt: float) -> tuple[Arr
     beyond = np.argwhere((strokes < 0.0) | (strokes > most))
     if len(beyond):
         row, i = beyond[0]
-        raise UsageError(f"stroke_{i + 1} = {strokes[row, i]:g} m in row {row + 1} of the drive: {travel_words(i, most[i])}")
+        raise UsageError(f"{name}_{i + 1} = {strokes[row, i]:g} m in row {row + 1} of the drive: {travel_words(i, most[i])}")
     return times, strokes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,11 +15,13 @@ from ..messages.topic_table import Topics
 from ..scene.load import DEFAULT_NAME, default_text, examine_text
 from ..scene.schema import Scene
 from ..scene.yaml_reader import read_text
-from .session_sheet import KeptText, kept, kept_parameters, sha256
+from ..types import Stream, StrokeReading
+from .session_sheet import KeptText, kept, kept_parameters, rig_version, sha256
 
 DEFAULT_BASELINE = "default baseline"
 DEFAULT_MAPPING = "default mapping"
 DEFAULT_PARAMETERS = "default parameters"
+LENGTHS_SINCE = 0, 2  # version from which the virtual rig's transducers read lengths
 
 
 @dataclass(frozen=True)
@@ -200,3 +203,37 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
         except ValueError as error:
             raise BagError(f"{own.source}: not YAML ({error}). Give the mapping by --mapping.") from None
     return Mapped(found.topics.in_namespace(namespace), found.source) if namespace.strip("/") else found
+
+
+@dataclass(frozen=True, slots=True)
+class SessionStrokes:
+    """What the stroke transducers of a session read, and what says so."""
+
+    reading: StrokeReading
+    source: str
+
+
+def strokes_of(session: Path | None, mapped: Mapped) -> SessionStrokes:
+    """Return what the stroke transducers of a session read, or of a running rig if that is None.
+
+    The mapping's ``reads`` is taken first, then ``strokes`` of ``session.yaml``. Who says nothing has lengths, but the virtual
+    rig gave drives before version 0.2.
+
+    Raises
+    ------
+    BagError
+        ``session.yaml`` cannot be read, or says something else there.
+    """
+    if told := mapped.topics.inputs[Stream.STROKES].reads:
+        return SessionStrokes(told, f"{mapped.source}, inputs.cylinder_strokes.reads")
+    if session is not None and (own := kept(session, "strokes", "--mapping")):
+        try:
+            return SessionStrokes(StrokeReading(own.text), own.source)
+        except ValueError:
+            bound = f"it must be {' or '.join(StrokeReading)}"
+            raise BagError(f"{own.source}: {own.text[:60]!r}: {bound}. Give reads in a mapping by --mapping.") from None
+    version = rig_version(session) if session is not None else ""
+    made = re.match(r"(\d{1,9})\.(\d{1,9})", version)
+    if made and (int(made[1]), int(made[2])) < LENGTHS_SINCE:
+        return SessionStrokes(StrokeReading.DRIVE, f"made by the virtual rig of version {version}")
+    return SessionStrokes(StrokeReading.LENGTH, "nothing else is said")

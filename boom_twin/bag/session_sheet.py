@@ -17,9 +17,11 @@ from ..errors import BagError
 from ..system.atomic_files import write_atomic
 from ..system.received_files import holds_file
 from ..system.result_folder import UNFINISHED, is_unfinished
+from ..types import StrokeReading
 from .block_yaml import dump
 
 FILE_NAME = "session.yaml"
+RIG_ORIGIN = "synthetic session of a virtual rig (Exudyn), surrogate parameters"
 _HEAD = "# What this session was made with. scene_sha256 is of the text under scene (UTF-8).\n"
 
 
@@ -38,6 +40,8 @@ class SessionSheet:
         Type by topic that is to be recorded; None where it was not known at the start.
     note, origin : str or None
         Of the operator.
+    strokes : StrokeReading or None
+        What the stroke transducers read, where whoever makes the session knows it.
     twin : dict of str to object
         The parameters of the running twin; empty as long as there is none.
     started : datetime or None
@@ -54,6 +58,7 @@ class SessionSheet:
     twin: Mapping[str, object] = field(default_factory=dict)
     started: datetime | None = None
     baseline: str | None = None
+    strokes: StrokeReading | None = None
 
     def write(self, directory: Path, counts: Sequence[Mapping[str, str | int | None]] | None = None) -> None:
         """Write ``session.yaml`` beside the bag, all of it or nothing.
@@ -76,6 +81,7 @@ class SessionSheet:
             **end,
             "origin": self.origin,
             "note": self.note,
+            "strokes": self.strokes and self.strokes.value,
             "topics": dict(self.topics),
             "twin": dict(self.twin),
             "scene_sha256": sha256(self.scene) if self.scene else None,
@@ -170,6 +176,12 @@ def kept_origin(session: Path) -> dict[str, str]:
     except BagError:
         return {}  # a note is not worth a refusal: whoever needs the sheet's scene or mapping is told
     return {"origin": found.text} if found else {}
+
+
+def rig_version(session: Path) -> str:
+    """Return the version of this package whose virtual rig made a session; empty if another made it, or that is not known."""
+    path = sheet_path(session)
+    return str(_value(path, "boom_twin", "")) if _value(path, "origin", "") == RIG_ORIGIN else ""
 
 
 def sha256(text: str) -> str:

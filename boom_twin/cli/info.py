@@ -13,7 +13,7 @@ from .main import add_json, add_session_scene, open_session_scene, print_result
 
 if TYPE_CHECKING:
     from ..bag.inspect import BagInfo, Tally
-    from ..bag.session_model import Mapped, SessionScene
+    from ..bag.session_model import Mapped, SessionScene, SessionStrokes
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -28,16 +28,17 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Read the session once and tell."""
     from ..bag.inspect import inspect
-    from ..bag.session_model import mapping_of
+    from ..bag.session_model import mapping_of, strokes_of
 
     info = inspect(Path(args.bag), window_of(args))
     scene = open_session_scene(args.bag, args.scene)
-    told = as_json(info, scene, mapping_of(info.session.path, args.mapping))
+    mapped = mapping_of(info.session.path, args.mapping)
+    told = as_json(info, scene, mapped, strokes_of(info.session.path, mapped))
     print_result(args.json, told, as_text(info, scene, told))
     return 0
 
 
-def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped) -> dict[str, Any]:
+def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: SessionStrokes) -> dict[str, Any]:
     """All that is known; lists have one entry for each of ``topics``."""
     from ..bag.advice import missing, names_extra, names_missing, remarks
 
@@ -78,6 +79,8 @@ def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped) -> dict[str, Any
         "names_extra": names_extra(info, topics, joints),
         "scene": scene.source,
         "mapping": mapped.source,
+        "strokes": strokes.reading,
+        "strokes_source": strokes.source,
         "scene_sha256": scene.sha256,
         "missing_for_replay": missing(info, topics, joints, scene.source),
         "remarks": remarks(info, topics),
@@ -111,6 +114,7 @@ def as_text(info: BagInfo, scene: SessionScene, told: dict[str, Any]) -> list[st
         f"made by    {told['origin'] or 'origin not noted'} ({made})",
         f"scene      {told['scene']}, sha256 {told['scene_sha256'][:12]}.., {len(scene.scene.sections)} sections",
         f"mapping    {told['mapping']}",
+        f"strokes    are {told['strokes']}s of the cylinders ({told['strokes_source']})",
         f"lasts      {told['duration_s']:.3f} s, {told['messages']} messages{_part(info, told)}",
         "",
         *_table(info),

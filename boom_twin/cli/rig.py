@@ -9,11 +9,11 @@ from typing import NoReturn
 
 from .. import __version__
 from ..errors import UsageError
+from ..types import StrokeReading
 from .arguments import positive
 from .main import add_scene, tell
 
 SENSORS = ("angles", "imu", "forces")
-ORIGIN = "synthetic session of a virtual rig (Exudyn), surrogate parameters"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -75,7 +75,7 @@ def run(args: Namespace) -> int:
     """Simulate, sample, write."""
     from ..bag.session_files import write_session
     from ..bag.session_model import scene_from
-    from ..bag.session_sheet import SessionSheet
+    from ..bag.session_sheet import RIG_ORIGIN, SessionSheet
     from ..offline.ground_truth import FILE_NAME
     from ..system.result_folder import RIG, result_folder
     from ..validation.rig import BUNDLED_DURATION, Sensors, bundled, faults, faulty_boom, loads, noise_free, random_programme
@@ -97,7 +97,8 @@ def run(args: Namespace) -> int:
     loads.check(pushing, duration)
     load = loads.tip_load(scene, pushing, duration, args.seed) if pushing else None
     programme = random_programme(scene, args.random, duration, args.seed) if args.random else bundled(scene)
-    notes = {"origin": ORIGIN, "noise": "none" if args.clean else "standard", "seed": str(args.seed)}
+    drive = faults.drifting(programme, wrong)
+    notes = {"origin": RIG_ORIGIN, "noise": "none" if args.clean else "standard", "seed": str(args.seed)}
     if args.wrong:
         notes["wrong"] = f"k, d, EI and masses off by {args.wrong:g}, rig seed {args.rig_seed}"
     if wrong:
@@ -110,13 +111,14 @@ def run(args: Namespace) -> int:
         notes["forces"] = f"noise {sensors.force_sigma:g} N, resolution {sensors.force_resolution:g} N"
     with result_folder(out, RIG, [Path(args.scene)] if args.scene else []) as building:
         print(f"simulating {duration:g} s, about as long as that ..", file=sys.stderr)
-        session = record_session(boom, programme, duration, sensors, args.seed, load=load, changes=changes)
+        session = record_session(boom, drive, duration, sensors, args.seed, load=load, changes=changes)
         session = faults.spoil(session, wrong, args.seed)
         readings = {"angles": session.joints, "imu": session.imu, "forces": session.forces}
         joints, imu, forces = (values if name in recorded else None for name, values in readings.items())
         write_session(building.folder, session.stamps, session.strokes, joints, imu, notes, session.angle_stamps, forces)
         # not the boom that was simulated: what a twin is to assume
-        SessionSheet(__version__, assumed.text, origin=ORIGIN).write(building.folder)
+        sheet = SessionSheet(__version__, assumed.text, origin=RIG_ORIGIN, strokes=StrokeReading.LENGTH)
+        sheet.write(building.folder)
         session.save_truth(building.folder / FILE_NAME)
     print(out)
     return 0

@@ -1,9 +1,10 @@
-"""``boom_twin simulate``: the boom's answer to a stroke history."""
+"""``boom_twin simulate``: the boom's answer to a history of drives or of cylinder lengths."""
 
 from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,8 +37,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser)
     told = "the posture that the first row must be in; else it may be any"
     parser.add_argument("--posture", metavar="NAME", help=told)
-    parser.add_argument("--drive", required=True, metavar="IN.csv", help="t_s,stroke_1_m,.. (absolute strokes)")
-    parser.add_argument("--out", required=True, metavar="OUT.csv", help="results, one row per row of the drive")
+    followed = parser.add_mutually_exclusive_group(required=True)
+    followed.add_argument("--drive", metavar="IN.csv", help="t_s,stroke_1_m,.. (absolute strokes of the drives)")
+    lengths = "t_s,length_1_m,.. or, as in a session, stroke_1_m,..: cylinder lengths, as transducers read them"
+    followed.add_argument("--lengths", metavar="IN.csv", help=lengths)
+    parser.add_argument("--out", required=True, metavar="OUT.csv", help="results, one row per row of IN.csv")
     parser.add_argument("--dt", type=float, default=1e-3, metavar="S", help="longest step, s (default 0.001)")
     add_json(parser)
     quick = "step once and say nothing of errors: four to seven times as fast"
@@ -72,25 +76,30 @@ def run(args: Namespace) -> int:
     from ..analysis.momentum_balance import momentum_balance
     from ..analysis.simulate import RHO, course_of, simulate
     from ..compiler.compile import compile_scene
+    from ..scene.edit import with_rigid_cylinders
 
     scene = open_scene(args.scene)
     _check_sampling(args)
     if args.orbits and not compile_scene(scene).pins:
         raise UsageError("--orbits: the scene has no pin with clearance. `boom_twin scene --clearance` prints one that has.")
-    sources = [Path(path) for path in (args.drive, args.scene) if path is not None]
+    sources = _sources(args)
     check_target(Path(args.out), sources, _is_earlier)
     for picture_or_state in filter(None, (args.orbits, args.save_state)):
         check_new(Path(picture_or_state), sources)
     _check_targets({"--out": args.out, "--orbits": args.orbits, "--save-state": args.save_state})
-    times, strokes = read_drive(Path(args.drive), len(scene.joints))
-    for oddity in odd_in_drive(times, strokes):
-        print(f"boom_twin simulate: warning: {args.drive}: {oddity}", file=sys.stderr)
-    angles = None if args.posture is None else _angles_near(scene, args.posture, strokes[0])
+    times, strokes, stem = read_history(sources[0], len(scene.joints), ("length", "stroke") if args.lengths else ("stroke",))
+    for oddity in odd_in_drive(times, strokes, stem):
+        print(f"boom_twin simulate: warning: {sources[0]}: {oddity}", file=sys.stderr)
+    angles = None if args.posture is None else _angles_near(scene, args.posture, strokes[0], bool(args.lengths))
     if args.samples is not None:
         return _sample(args, scene, times, strokes, angles)
-    start = _start(args, scene, strokes[0], angles)
+    moving = with_rigid_cylinders(scene) if args.lengths else scene
+    start = _start(args, moving, strokes[0], angles)
     rho = RHO if args.rho is None else args.rho
-    result = simulate(scene, times, strokes, args.dt, angles, rho, not args.no_error_estimate, start)
+    followed = {"lengths" if args.lengths else "strokes": strokes}
+    result = simulate(
+        scene, times, dt=args.dt, angles=angles, rho=rho, estimate_errors=not args.no_error_estimate, start=start, **followed
+    )
     for doubt in result.doubts:
         print(f"boom_twin simulate: warning: {doubt}.", file=sys.stderr)
     write_atomic(Path(args.out), columns_text(result.columns()))
@@ -98,12 +107,17 @@ def run(args: Namespace) -> int:
         write_state(Path(args.save_state), result.end)
     balances = None
     if args.check:
-        course = course_of(scene, times, strokes, args.dt, angles, rho, start)
+        course = course_of(moving, times, strokes, args.dt, angles, rho, start)
         balances = energy_balance(course, args.dt), momentum_balance(course, args.dt)
     print_result(args.json, as_json(result, args.out, balances), as_text(result, args.out, args.start, balances))
     if args.orbits:
         _draw_orbits(args, scene, result)
     return 0
+
+
+def _sources(args: Namespace) -> list[Path]:
+    """Return the files that are read: the history first, then the scene if one is given."""
+    return [Path(path) for path in (args.drive, args.lengths, args.scene) if path is not None]
 
 
 def _check_targets(targets: dict[str, str | None]) -> None:
@@ -125,6 +139,8 @@ def _check_sampling(args: Namespace) -> None:
     for option, is_given in single.items():
         if is_given:
             raise UsageError(f"{option}: is of one motion, --samples of many. Leave one of them out.")
+    if args.lengths:
+        raise UsageError(f"--lengths {args.lengths}: --samples draws booms that follow drives. Give --drive instead.")
 
 
 def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles: Array | None) -> int:
@@ -134,7 +150,7 @@ def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles:
 
     out = Path(args.out)
     table = out.with_name(f"{out.stem}_samples.csv")
-    check_new(table, [Path(path) for path in (args.drive, args.scene) if path is not None])
+    check_new(table, _sources(args))
     progress = progress_of(args.samples, "samples", "simulate")
     deviations = dict(map(_deviation, args.vary or ()))
     found = simulate_samples(scene, times, strokes, deviations, args.samples, args.seed, args.dt, angles, progress.update)
@@ -229,7 +245,7 @@ def _draw_orbits(args: Namespace, scene: Scene, result: Simulation) -> None:
 
     gaps = compile_scene(scene).tables.clearances.gap
     orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)
-    orbits_picture(Path(args.orbits), f"{Path(args.drive).name}: journals in their bushes", orbits)
+    orbits_picture(Path(args.orbits), f"{_sources(args)[0].name}: journals in their bushes", orbits)
 
 
 def _is_earlier(start: bytes) -> bool:
@@ -239,8 +255,10 @@ def _is_earlier(start: bytes) -> bool:
     return names[0] == "t_s" and not is_replay and any(name.startswith("tip_x_m") for name in names)
 
 
-def read_drive(path: Path, n: int) -> tuple[Array, Array]:
-    """Times (m,) in s and strokes (m, n) in m of a CSV file with the header t_s,stroke_1_m,.. .
+def read_history(path: Path, n: int, stems: Sequence[str]) -> tuple[Array, Array, str]:
+    """Return times (m,) in s, strokes or lengths (m, n) in m of a CSV file, and the stem of their columns: ``stroke_1_m``, .. .
+
+    The first of `stems` that the header has is taken.
 
     Raises
     ------
@@ -248,13 +266,14 @@ def read_drive(path: Path, n: int) -> tuple[Array, Array]:
         The file cannot be read, has another header, no rows, or a value that is not a number; says where.
     """
     table = read_csv(path, UsageError)
-    strokes = [f"stroke_{i + 1}_m" for i in range(n)]
-    table.require(["t_s", *strokes])
-    return np.array(table.column("t_s")), np.column_stack([table.column(name) for name in strokes])
+    stem = next((stem for stem in stems if f"{stem}_1_m" in table.names), stems[0])
+    names = [f"{stem}_{i + 1}_m" for i in range(n)]
+    table.require(["t_s", *names])
+    return np.array(table.column("t_s")), np.column_stack([table.column(name) for name in names]), stem
 
 
-def odd_in_drive(times: Array, strokes: Array) -> list[str]:
-    """What is odd in a drive, and likely meant otherwise: times in ms, strokes that jump; with the place and the remedy."""
+def odd_in_drive(times: Array, strokes: Array, stem: str = "stroke") -> list[str]:
+    """Return what is odd and likely meant otherwise, with place and remedy: times in ms, strokes that jump."""
     steps, found = np.diff(times), []
     if not len(steps) or not (steps > 0.0).all():
         return []  # `simulate` refuses it
@@ -267,22 +286,25 @@ def odd_in_drive(times: Array, strokes: Array) -> list[str]:
     row, i = np.unravel_index(np.argmax(speeds), speeds.shape)
     if speeds[row, i] > FASTEST:
         found.append(
-            f"line {row + 3}: stroke_{i + 1}_m goes {strokes[row, i]:g} to {strokes[row + 1, i]:g} within {steps[row]:g} s, "
+            f"line {row + 3}: {stem}_{i + 1}_m goes {strokes[row, i]:g} to {strokes[row + 1, i]:g} within {steps[row]:g} s, "
             f"{speeds[row, i]:.3g} m/s; cylinders of booms go at less than 0.3 m/s. Check the value and the times."
         )
     return found
 
 
-def _angles_near(scene: Scene, posture: str, first: Array) -> Array:
-    """Joint angles of the posture, if the first row has its strokes."""
+def _angles_near(scene: Scene, posture: str, first: Array, are_lengths: bool) -> Array:
+    """Return the joint angles of the posture; UsageError unless the first row has its drives."""
+    from ..analysis.equilibrium import drives_at_rest
     from ..scene.kinematics import posture_angles, strokes_of_posture
 
-    expected = strokes_of_posture(scene, posture)
-    off = np.abs(expected - first)
+    expected, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)
+    drives = drives_at_rest(scene, first, angles) if are_lengths else first
+    off = np.abs(expected - drives)
     if not np.max(off) <= FAR:
         i = int(np.argmax(off))
+        at_rest = " at rest" if are_lengths else ""
         raise UsageError(
-            f"stroke_{i + 1}_m = {first[i]:.6g} in the first row: posture {posture} has {expected[i]:.6g}, and they may "
-            f"differ by {FAR:g} m. Start the drive in the posture, or name another."
+            f"stroke_{i + 1}_m = {drives[i]:.6g} in the first row{at_rest}: posture {posture} has {expected[i]:.6g}, and they "
+            f"may differ by {FAR:g} m. Start in the posture, or name another."
         )
-    return posture_angles(scene, posture)
+    return angles

@@ -18,7 +18,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser)
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument("--posture", metavar="NAME", help="a posture of the scene")
-    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes, m")
+    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes of the drives, m")
+    read = "cylinder lengths less closed_length, m: what stroke transducers read of the boom at rest"
+    where.add_argument("--lengths", type=numbers, metavar="L1,..,LN", help=read)
     add_json(parser)
 
 
@@ -35,7 +37,7 @@ def run(args: Namespace) -> int:
     from ..analysis.equilibrium import statics
 
     scene = open_scene(args.scene)
-    found = statics(scene, strokes=args.strokes, posture=args.posture)
+    found = statics(scene, strokes=args.strokes, posture=args.posture, lengths=args.lengths)
     for doubt in found.doubts:
         print(f"boom_twin statics: warning: {doubt}.", file=sys.stderr)
     print_result(args.json, as_json(found), as_text(found))
@@ -46,6 +48,7 @@ def as_json(found: Equilibrium) -> dict[str, object]:
     """The keys of a result; `warnings` only where there are any."""
     told: dict[str, object] = {
         "stroke_m": found.strokes,
+        "length_m": found.lengths,
         "tip_rigid_m": found.tip_rigid,
         "tip_m": found.tip,
         "joint_rad": found.joints,
@@ -62,10 +65,10 @@ def as_text(found: Equilibrium) -> list[str]:
         f"tip            x {x:.4f} m, y {y:.4f} m",
         f"deflection     x {1e3 * dx:+.1f} mm, y {1e3 * dy:+.1f} mm against rigid sections and cylinders",
         "",
-        "joint   stroke m   angle deg   cylinder force kN",
+        "joint    drive m    length m   angle deg   cylinder force kN",
     ]
     for i in range(len(found.strokes)):
         angle, force = math.degrees(found.joints[i]), 1e-3 * found.cylinder_forces[i]
-        lines.append(f"{i + 1:5d} {found.strokes[i]:10.4f} {angle:11.3f} {force:+19.3f}")
+        lines.append(f"{i + 1:5d} {found.strokes[i]:10.4f} {found.lengths[i]:11.4f} {angle:11.3f} {force:+19.3f}")
     frequencies = ", ".join(f"{value:.3f}" for value in found.frequencies) or "none: nothing in this model can vibrate"
     return [*lines, "", f"natural frequencies Hz   {frequencies}"]

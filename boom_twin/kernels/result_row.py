@@ -23,8 +23,8 @@ class Results(NamedTuple):
 
     Attributes
     ----------
-    joints, cylinder_forces : ndarray, shape (.., n)
-        rad, N.
+    joints, cylinder_forces, lengths : ndarray, shape (.., n)
+        rad; N; m, of the cylinders pin to pin less `closed_length`.
     tip : ndarray, shape (.., 3, 3)
         Position, velocity, acceleration; of x, y (m) and orientation (rad).
     pins : ndarray, shape (.., k, 4)
@@ -33,6 +33,7 @@ class Results(NamedTuple):
 
     joints: Array
     cylinder_forces: Array
+    lengths: Array
     tip: Array
     pins: Array
 
@@ -52,17 +53,18 @@ class Estimates(NamedTuple):
 @inner
 def row_width(joints, pins):
     """Numbers of one instant."""
-    return 2 * joints + TIP + PIN * pins
+    return 3 * joints + TIP + PIN * pins
 
 
 @inner
 def results_in(row, joints, pins):
     """The `Results` in a row, shape (row_width or more,), as views of it."""
-    tip = 2 * joints
+    tip = 3 * joints
     journals = tip + TIP
     return Results(
         row[:joints],
-        row[joints:tip],
+        row[joints : 2 * joints],
+        row[2 * joints : tip],
         row[tip:journals].reshape((3, 3)),
         row[journals : journals + PIN * pins].reshape((pins, PIN)),
     )
@@ -85,6 +87,7 @@ class Places(NamedTuple):
 
     joints: slice
     cylinder_forces: slice
+    lengths: slice
     tip: slice
     pins: slice
     strokes: slice
@@ -94,7 +97,7 @@ class Places(NamedTuple):
 
 def places_in(joints: int, pins: int) -> Places:
     """The `Places` of a boom."""
-    sizes = (joints, joints, TIP, PIN * pins, joints, joints, 2)
+    sizes = (joints, joints, joints, TIP, PIN * pins, joints, joints, 2)
     return Places(*(slice(end - size, end) for size, end in zip(sizes, accumulate(sizes), strict=True)))
 
 
@@ -102,4 +105,4 @@ def results_of(rows: Array, joints: int, pins: int) -> Results:
     """The `Results` of rows, shape (.., row_width), with the same leading axes."""
     at, lead = places_in(joints, pins), rows.shape[:-1]
     tip, journals = rows[..., at.tip].reshape(*lead, 3, 3), rows[..., at.pins].reshape(*lead, pins, PIN)
-    return Results(rows[..., at.joints], rows[..., at.cylinder_forces], tip, journals)
+    return Results(rows[..., at.joints], rows[..., at.cylinder_forces], rows[..., at.lengths], tip, journals)

@@ -36,6 +36,7 @@ _REMEDIES = {
     "absolute": "Give root or head, where on its section the inclinometer sits; leave it out for an encoder.",
     "depth": "Give a number of messages.",
     "delay": "Give the seconds by which the stamps come after the readings.",
+    "reads": "Give length for a transducer in or on the cylinder; drive only for sessions of a simulated boom.",
     "frame": "Give the name of a frame without a leading slash: base_link.",
 }
 _SEE = "See the comments in msg_config/topics.yaml."
@@ -77,7 +78,7 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
     topics: Topics | None = None
     try:
         topics = Topics.model_validate(values)
-        faults += [*_name_faults(topics), *_delay_faults(topics)]
+        faults += [*_name_faults(topics), *_input_faults(topics)]
     except ValidationError as error:
         faults += [_fault(detail) for detail in error.errors(include_url=False)]
     if joints is not None:
@@ -175,8 +176,11 @@ def _name_faults(topics: Topics) -> Iterator[Fault]:
             yield Fault(f"{place}.name", topic.name, f"{first} has this name too", "Give each its own name.")
 
 
-def _delay_faults(topics: Topics) -> Iterator[Fault]:
-    """A delay of the strokes, whose stamps are those of all outputs."""
+def _input_faults(topics: Topics) -> Iterator[Fault]:
+    """Yield a delay of the strokes, whose stamps are those of all outputs, and ``reads`` of another input."""
+    for stream, topic in topics.inputs.items():
+        if topic.reads is not None and stream is not Stream.STROKES:
+            yield Fault(f"inputs.{stream.value}.reads", topic.reads.value, "only cylinder_strokes has it", "Remove the key.")
     if delay := topics.inputs[Stream.STROKES].delay:
         bound = "every output has the stamp of a stroke sample, so the other streams' delays count against it"
         yield Fault("inputs.cylinder_strokes.delay", delay, bound, f"Give the others {-delay:g} instead.")

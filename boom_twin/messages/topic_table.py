@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
-from ..types import NUMBER, SECOND, SENSORS, Mount, Stream, channels_of, sensor_kind
+from ..types import NUMBER, SECOND, SENSORS, Mount, Stream, StrokeReading, channels_of, sensor_kind
 
 AXES = ("x", "y", "z")
 
@@ -157,9 +157,14 @@ class Topic(_Entry):
 
 
 class InputTopic(Topic):
-    """One topic of readings; ``delay``: by how much its stamps are later than the readings, s."""
+    """One topic of readings.
+
+    ``delay``: by how much its stamps are later than the readings, s. ``reads``, of strokes: what transducers read, if that is
+    said.
+    """
 
     delay: Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)] = 0.0
+    reads: StrokeReading | None = None
 
 
 class EventTopic(Topic):

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..bag.joint_names import refuse_other_names
 from ..bag.reader import Session, read, scan
-from ..bag.session_model import SessionScene, baseline_of, mapping_of, scene_of, settings_of
+from ..bag.session_model import SessionScene, baseline_of, mapping_of, scene_of, settings_of, strokes_of
 from ..bag.session_sheet import SessionSheet
 from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME
@@ -221,7 +221,7 @@ def replay_into(
         taken = scene_for(session.path, scene)
         scene, joints = taken.scene, len(taken.scene.joints)
         mapped = mapping_of(session.path, Path(mapping) if mapping else None, joints, namespace)
-        topics, wanted = mapped.topics, _wanted(session, mapped.topics)
+        topics, wanted, strokes = mapped.topics, _wanted(session, mapped.topics), strokes_of(session.path, mapped)
         refuse_other_names(session, topics, joints, taken.source)
         usual = baseline_of(session.path, Path(baseline) if baseline else None) if health else None
         truth = _truth_in(window, session, topics, wanted)
@@ -288,6 +288,8 @@ def replay_into(
             "scene_sha256": taken.sha256,
             "baseline": None if usual is None else usual.source,
             "mapping": mapped.source,
+            "strokes": strokes.reading,
+            "strokes_source": strokes.source,
         }
         if window != WHOLE:
             summary |= {"window_start_s": window.start, "window_duration_s": window.duration}

@@ -81,6 +81,13 @@ def with_parameters(scene: Scene, values: Mapping[str, float]) -> Scene:
     return scene
 
 
+def with_rigid_cylinders(scene: Scene) -> Scene:
+    """Return the scene without oil springs: each cylinder is a strut whose length is prescribed."""
+    none = dict.fromkeys(("k", "oil", "d"))
+    struts = [joint.model_copy(update={"cylinder": joint.cylinder.model_copy(update=none)}) for joint in scene.joints]
+    return scene.model_copy(update={"joints": tuple(struts)})
+
+
 def section_mass(section: Section) -> float:
     """Mass (kg) of root, beam and head."""
     beam = 0.0 if section.beam is None or section.rho_A is None else section.rho_A * (section.beam[1] - section.beam[0])

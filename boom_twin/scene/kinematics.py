@@ -99,8 +99,10 @@ def strokes_of_posture(scene: Scene, name: str) -> Array:
     return np.array([stroke_curve(scene, i, relative[i : i + 1])[0] for i in range(len(scene.joints))])
 
 
-def joint_angles_of_strokes(scene: Scene, strokes: Array, near: Array | None = None, samples: int = 181) -> Array:
-    """Relative angles (rad), shape (n,), of the undeformed boom at absolute `strokes` (m).
+def joint_angles_of_strokes(
+    scene: Scene, strokes: Array, near: Array | None = None, samples: int = 181, name: str = "stroke"
+) -> Array:
+    """Return relative angles (rad), shape (n,), of the undeformed boom at absolute `strokes` (m), called by `name` in errors.
 
     Where a stroke belongs to two angles, the one next to `near` (rad), shape (n,), if given.
 
@@ -119,8 +121,8 @@ def joint_angles_of_strokes(scene: Scene, strokes: Array, near: Array | None = N
     for i in np.flatnonzero(~np.isfinite(angles)).tolist():
         curve = stroke_curve(scene, i, np.linspace(ranges[i, 0], ranges[i, 1], samples))
         raise UsageError(
-            f"stroke_{i + 1} = {float(strokes[i]):.6g} m: joint {i + 1} reaches {np.nanmin(curve):.6g} to "
-            f"{np.nanmax(curve):.6g} m in its range_deg {scene.joints[i].range_deg}. Give a stroke inside."
+            f"{name}_{i + 1} = {float(strokes[i]):.6g} m: joint {i + 1} reaches {np.nanmin(curve):.6g} to "
+            f"{np.nanmax(curve):.6g} m in its range_deg {scene.joints[i].range_deg}. Give a {name} inside."
         )
     return angles
 

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from boom_twin.bag.block_yaml import dump
-from boom_twin.bag.session_model import DEFAULT_MAPPING, mapping_of
-from boom_twin.bag.session_sheet import FILE_NAME, SessionSheet
+from boom_twin.bag.session_model import DEFAULT_MAPPING, mapping_of, strokes_of
+from boom_twin.bag.session_sheet import FILE_NAME, RIG_ORIGIN, SessionSheet
 from boom_twin.errors import BagError, UsageError
 from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.topic_table import DEFAULT_FILE, load_topics
-from boom_twin.types import Stream
+from boom_twin.types import Stream, StrokeReading
 
 EXAMPLE = """
 inputs:
@@ -162,6 +162,66 @@ def test_a_session_is_read_as_it_was_recorded(tmp_path: Path, write: Any) -> Non
     assert mapping_of(tmp_path / "elsewhere").source == DEFAULT_MAPPING
     (bag / FILE_NAME).write_text("note: of an older version\n")
     assert mapping_of(bag).source == DEFAULT_MAPPING
+
+
+RIG = f"origin: {RIG_ORIGIN}\n"
+
+
+@pytest.mark.parametrize(
+    ("sheet", "reading"),
+    [
+        (None, "length"),
+        ("note: no more\n", "length"),
+        ("boom_twin: 0.1.0\n", "length"),
+        ("boom_twin: 0.1.0\norigin: a rig in Graz\n", "length"),
+        (f"boom_twin: 0.1.0\n{RIG}", "drive"),
+        (f"boom_twin: 0.1\n{RIG}", "drive"),
+        (f"boom_twin: 0.1.7.dev3\n{RIG}", "drive"),
+        (f"boom_twin: 0.1.0\n{RIG}strokes: length\n", "length"),
+        (f"boom_twin: 0.2.0\n{RIG}", "length"),
+        (f"boom_twin: 0.10.0\n{RIG}", "length"),
+        (f"boom_twin: 1.0.0\n{RIG}", "length"),
+        (f"boom_twin: newest\n{RIG}", "length"),
+        ("strokes: drive\n", "drive"),
+    ],
+)
+def test_a_session_says_what_its_transducers_read(tmp_path: Path, write: Any, sheet: str | None, reading: str) -> None:
+    if sheet is not None:
+        (tmp_path / FILE_NAME).write_text(sheet)
+    found = strokes_of(tmp_path, mapping_of(tmp_path))
+    assert found.reading == StrokeReading(reading) and found.source
+    for other in StrokeReading:
+        given = mapping_of(tmp_path, write(f"inputs: {{cylinder_strokes: {{reads: {other}}}}}"))
+        assert strokes_of(tmp_path, given).reading is other
+        assert strokes_of(None, given).reading is other and "cylinder_strokes.reads" in strokes_of(None, given).source
+    assert strokes_of(None, mapping_of(tmp_path)).reading is StrokeReading.LENGTH
+
+
+def test_a_recorded_mapping_says_it_too(tmp_path: Path) -> None:
+    bag = recorded(tmp_path / "bag", "inputs: {cylinder_strokes: {reads: drive}}")
+    assert strokes_of(bag, mapping_of(bag)).reading is StrokeReading.DRIVE
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            "inputs: {cylinder_strokes: {reads: chord}}",
+            "strokes.reads = 'chord': it must be 'length' or 'drive'",
+        ),
+        ("inputs: {joint_angles: {reads: length}}", "inputs.joint_angles.reads = 'length': only cylinder_strokes has it"),
+    ],
+)
+def test_what_transducers_cannot_read_is_told(write: Any, text: str, told: str) -> None:
+    with pytest.raises(UsageError) as error:
+        load_mapping(write(text), 4)
+    assert told in str(error.value)
+
+
+def test_a_session_cannot_say_anything_else(tmp_path: Path) -> None:
+    (tmp_path / FILE_NAME).write_text("strokes: lengths\n")
+    with pytest.raises(BagError, match=r"strokes: 'lengths': it must be length or drive\. Give reads in a mapping"):
+        strokes_of(tmp_path, mapping_of(tmp_path))
 
 
 @pytest.mark.parametrize("mapping", ["sensors: {joint_1: {sign: 2}}", "sensors: [", "a: b: c"])

@@ -21,6 +21,7 @@ from boom_twin.cli.main import main
 from boom_twin.offline.ground_truth import load_truth
 from boom_twin.scene.load import default_text
 
+BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 SECTION = {"length": 3.0, "root": {"mass": 40.0, "com": [1.4, 0.1], "inertia": 30.0}, "rod_pin": [0.60, -0.12]}
 CYLINDER = {"k": 2.0e6, "closed_length": 1.08, "max_stroke": 0.79}
 
@@ -65,6 +66,24 @@ def test_faulty_sessions_replay(scene: Path, tmp_path: Path) -> None:
     assert faulty["samples"] == healthy["samples"]
     assert healthy["joint_residual_rms_rad"][0] < 3e-4
     assert faulty["joint_residual_rms_rad"][0] == pytest.approx(0.01 * np.sqrt(2 / 3), rel=0.2)
+
+
+def test_sessions_of_lengths_and_of_drives_are_told(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = made(scene, tmp_path / "bag", "--fault", "cylinder_1.drive:drift:0.002@1")
+    assert YAML(typ="safe").load((bag / "session.yaml").read_text())["strokes"] == "length"
+    drives = tmp_path / "drives.yaml"
+    drives.write_text("inputs: {cylinder_strokes: {reads: drive}}\n")
+    for session, more, reading in ((bag, [], "length"), (bag, ["--mapping", str(drives)], "drive"), (BUNDLED, [], "drive")):
+        capsys.readouterr()
+        assert main(["info", str(session), *more, "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["strokes"] == reading
+        assert main(["info", str(session), *more]) == 0
+        assert f"strokes    are {reading}s of the cylinders (" in capsys.readouterr().out
+    assert replayed(scene, bag)["strokes"] == "length"
+    truth = np.genfromtxt(bag / "truth.csv.gz", delimiter=",", names=True)
+    assert truth["drive_1_m"][-1] - truth["drive_1_m"][0] == pytest.approx(0.002 * (truth["t_s"][-1] - 1.0), abs=1e-6)
+    extension = truth["cylinder_force_1_N"] / CYLINDER["k"]
+    assert truth["length_1_m"] - truth["drive_1_m"] == pytest.approx(extension, abs=2e-7)
 
 
 def test_wrong_boom(scene: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from boom_twin.cli.main import main
 from boom_twin.cli.simulate import odd_in_drive
 from boom_twin.errors import UsageError
 from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.scene.pump_pulses import ease
 
 TIMES = np.arange(0.0, 2.0, 0.01)
 STROKES = strokes_of_posture(load_scene(), "arch") + 0.01 * np.sin(np.pi * TIMES)[:, None]
@@ -71,3 +73,62 @@ def test_numerical_damping_is_an_option_as_a_ringing_motion_is_told_to_take(tmp_
     assert tables[0] == tables[1] != tables[2]
     with pytest.raises(SystemExit):
         main(["simulate", "--drive", str(drive), "--out", str(tmp_path / "out.csv"), "--rho", "1.1"])
+
+
+def columns(path: Path) -> dict[str, np.ndarray]:
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    return {name: table[name] for name in table.dtype.names}
+
+
+def written(path: Path, stem: str, rows: np.ndarray) -> str:
+    names = ",".join(f"{stem}_{i + 1}_m" for i in range(rows.shape[1]))
+    np.savetxt(
+        path, np.column_stack([TIMES[: len(rows)], rows]), fmt="%.12g", delimiter=",", header=f"t_s,{names}", comments=""
+    )
+    return str(path)
+
+
+def test_the_lengths_of_a_result_give_the_same_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """They are its last columns; under the names of a session they are lengths too."""
+    out, again = tmp_path / "out.csv", tmp_path / "again.csv"
+    command = ["simulate", "--posture", "arch", "--no-error-estimate"]
+    drive = STROKES[0] + 0.01 * ease(TIMES[:120])[:, None]
+    assert main([*command, "--drive", written(tmp_path / "drive.csv", "stroke", drive), "--out", str(out)]) == 0
+    moved = columns(out)
+    lengths = [f"length_{i}_m" for i in range(1, 5)]
+    assert list(moved)[-4:] == lengths and list(moved)[1] == "stroke_1_m"
+    session = written(tmp_path / "session.csv", "stroke", np.column_stack([moved[name] for name in lengths]))
+    for given in (str(out), session):
+        assert main([*command, "--lengths", given, "--out", str(again)]) == 0
+        for name, values in columns(again).items():
+            off = {"_N": 200.0, "s2": 0.4}.get(name[-2:], 2e-5)  # rows of 10 ms, between which lengths are a cubic
+            assert values == pytest.approx(moved[name], abs=off), name
+    written(tmp_path / "late.csv", "length", STROKES[:5])
+    capsys.readouterr()
+    assert main([*command, "--lengths", str(tmp_path / "late.csv"), "--out", str(again)]) == 1
+    assert "in the first row at rest: posture arch has" in capsys.readouterr().err
+
+
+def test_lengths_are_of_one_motion_and_need_their_columns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given, out = written(tmp_path / "in.csv", "length", STROKES[:3]), str(tmp_path / "out.csv")
+    assert main(["simulate", "--lengths", given, "--out", out, "--samples", "3", "--vary", "cylinder_1.k=0.1"]) == 1
+    assert "--samples draws booms that follow drives" in capsys.readouterr().err
+    assert main(["simulate", "--lengths", written(tmp_path / "in.csv", "long", STROKES[:3]), "--out", out]) == 1
+    assert "no column length_1_m, length_2_m" in capsys.readouterr().err
+    for both in (["--lengths", given, "--drive", given], []):
+        with pytest.raises(SystemExit) as end:
+            main(["simulate", *both, "--out", out])
+        assert end.value.code == 2
+
+
+def test_statics_tells_lengths_beside_drives(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["statics", "--posture", "arch", "--json"]) == 0
+    at_drives = json.loads(capsys.readouterr().out)
+    lengths = ",".join(map(repr, at_drives["length_m"]))
+    assert main(["statics", f"--lengths={lengths}", "--json"]) == 0
+    at_lengths = json.loads(capsys.readouterr().out)
+    assert at_lengths.keys() == at_drives.keys()
+    for key in ("stroke_m", "length_m", "tip_m", "joint_rad", "frequencies_Hz"):
+        assert at_lengths[key] == pytest.approx(at_drives[key], rel=1e-9), key
+    assert main(["statics", f"--lengths={lengths}"]) == 0
+    assert "drive m    length m" in capsys.readouterr().out

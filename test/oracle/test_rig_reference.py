@@ -1,4 +1,4 @@
-"""The virtual rig against the reference numbers of the default scene."""
+"""The virtual rig against the reference numbers of the default scene, and its cylinder lengths against the package's model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import pytest
 
 pytest.importorskip("exudyn")
 
+import boom_twin
 from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.validation.rig import Move, Programme, simulate, statics
 
 REFERENCE = Path(__file__).parents[1] / "data" / "reference"
@@ -42,3 +44,20 @@ def test_arch_move(step):
     for i in range(1, 5):
         assert rms(f"joint_{i}_rad") < 1e-6
         assert rms(f"cylinder_force_{i}_N") < 5.0
+
+
+def test_lengths_of_the_rig_hold_and_move_the_model_as_its_drives_do():
+    first = strokes_of_posture(load_scene(), "arch")
+    programme = Programme(tuple(first), (Move(0, 0.1, 0.8, first[0] + 0.03), Move(2, 0.2, 0.9, first[2] - 0.02)))
+    rows = simulate(load_scene(), programme, 1.5, elements=12)
+    lengths, drives, forces = (
+        np.column_stack([rows[name.format(i)] for i in range(1, 5)])
+        for name in ("length_{}_m", "stroke_{}_m", "cylinder_force_{}_N")
+    )
+    at_rest = boom_twin.statics(lengths=lengths[0])
+    assert at_rest.strokes == pytest.approx(first, abs=1e-7)
+    assert at_rest.tip == pytest.approx([rows["tip_x_m"][0], rows["tip_y_m"][0]], abs=2e-4)
+    moved = boom_twin.simulate(None, rows["t_s"], lengths=lengths, estimate_errors=False)
+    assert np.abs(moved.tip[:, :2] - np.column_stack([rows["tip_x_m"], rows["tip_y_m"]])).max() < 5e-4
+    assert np.abs(moved.strokes - drives).max() < 1e-5, "where the oil gives 1.2 to 8 mm"
+    assert np.abs(moved.cylinder_forces - forces).max() < 1e-3 * np.abs(forces).max()

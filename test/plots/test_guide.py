@@ -128,5 +128,5 @@ def test_the_pictures_of_the_guide_are_drawn(tmp_path: Path) -> None:
     drawn = {path.name for path in tmp_path.glob("*.png")}
     symbols = {f"symbols_{part}.png" for part in ("b1", "b2", "b3", "joint_a", "section", "side")}
     responses = {"response.png", "response_steady_state.png", "response_map.png"}
-    assert drawn == {"boom.png", "z_fold_arch.png", *symbols, *responses}
+    assert drawn == {"boom.png", "z_fold_arch.png", "lengths_and_drives.png", *symbols, *responses}
     assert all((DOCS / name).is_file() for name in drawn)

@@ -227,7 +227,9 @@ def observe_boom(t, state, out):
             found.joints[at] = state.z[t.joints[row].z + Z_SECTION] - state.frames[k, FRAME_ANGLE]
             at += 1
     for i in range(n):
-        found.cylinder_forces[i] = state.z[t.cylinders[i].z]
+        cylinder = t.cylinders[i]
+        found.cylinder_forces[i] = state.z[cylinder.z]
+        found.lengths[i] = state.history[X, cylinder.history] - cylinder.closed_length
     for j in range(3):
         found.tip[0, j], found.tip[1, j] = state.history[X, t.tip + j], state.history[V, t.tip + j]
         found.tip[2, j] = state.history[A, t.tip + j]

@@ -10,6 +10,7 @@ cause                           kind       size
 ``line_fill``                   more,      kg/m, gained or lost
 ..                              less
 ``cylinder_i.rod.clearance``    play       radial clearance of the rod pin, m
+``cylinder_i.drive``            drift      m/s by which the drive creeps out, by a leak
 ``joint_i.sensor``              bias       rad (of a ``cylinder_i.sensor``: m, of a ``cylinder_force_i.sensor``: N)
 (``cylinder_i.sensor``,         drift      rad/s (m/s, N/s)
 ``cylinder_force_i.sensor``)    scale      share by which it reads too much
@@ -21,8 +22,9 @@ cause                           kind       size
 ``joint_angles.dropout``        missing    share of messages that are not there (``cylinder_strokes.dropout`` too)
 ==============================  =========  ======================================================================
 
-The first five are physical: they are in the boom that is simulated, see `faulty_boom`. The others are
-of sensors, and act on readings that are rounded already, as a fault behind the sensor does. Each begins at its onset, grows
+Faults down to the clearance are physical: they are in the boom that is simulated, see `faulty_boom`. One of a drive is in the
+motion that the boom follows, and what has leaked by its end stays. The others are of sensors, and act on readings that are
+rounded already, as a fault behind the sensor does. Each begins at its onset, grows
 linearly to its size over its ramp, and goes over as long a time from its end on; a pin has its play from the start.
 """
 
@@ -39,6 +41,7 @@ from ...errors import UsageError
 from ...scene.edit import parameter, section_mass
 from ...scene.schema import Scene
 from ...types import SECOND, Array
+from .exudyn.solve import Drive
 from .session import RigSession
 
 _ANY, _MORE, _FACTOR = "finite and not 0", "above 0", "above 1"
@@ -60,6 +63,7 @@ _CAUSES: dict[str, dict[str, str | None]] = {
     r"tip\.payload": {"more": _MORE, "less": _MORE},
     r"line_fill": {"more": _MORE, "less": _MORE},
     r"cylinder_([1-9]\d*)\.rod\.clearance": {"play": _PLAY},
+    r"cylinder_([1-9]\d*)\.drive": {"drift": _ANY},
     r"(?:joint|cylinder|cylinder_force)_([1-9]\d*)\.sensor": _SENSOR,
     r"joint_angles\.delay": {"late": _MORE},
     r"(?:joint_angles|cylinder_strokes)\.dropout": {"missing": _SHARE},
@@ -72,7 +76,7 @@ _SIZES = {
     "less line_fill": "kg/m, at most what the scene has",
     "play": "radial clearance of the rod pin, m",
     "bias": "rad, m or N; at most 1 rad, the travel, 1e6 N",
-    "drift": "the same in a second",
+    "drift": "rad, m or N in a second",
     "scale": "share by which it reads too much, at most 1",
     "stuck": "none: it repeats the last reading before the onset",
     "noisy": "factor on the noise, at most 1000",
@@ -82,10 +86,11 @@ _SIZES = {
     "missing": "share of the messages",
 }
 """What a size is, by kind, and by cause where that differs."""
-CAUSES = (
-    "cylinder_i.k, section_i.EI, tip.payload, line_fill, cylinder_i.rod.clearance, joint_i.sensor, cylinder_i.sensor, "
-    "cylinder_force_i.sensor, joint_angles.delay, joint_angles.dropout, cylinder_strokes.dropout"
-)
+
+
+def _words(form: str, number: str) -> str:
+    """Return the cause of a form of `_CAUSES` as it is told to people, with `number` for the cylinder, joint or section."""
+    return form.replace(r"([1-9]\d*)", number).replace("\\", "").replace("(?:", "(")
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +113,8 @@ class RigFault:
     def __post_init__(self) -> None:
         kinds = next((kinds for form, kinds in _CAUSES.items() if re.fullmatch(form, self.cause)), None)
         if kinds is None:
-            raise UsageError(f"fault {self.cause}: not a cause. Give one of {CAUSES}, with i from 1.")
+            causes = ", ".join(_words(form, "i") for form in _CAUSES)
+            raise UsageError(f"fault {self.cause}: not a cause. Give one of {causes}, with i from 1 and (a|b) for a or b.")
         if self.kind not in kinds:
             raise UsageError(f"fault {self.cause}:{self.kind}: not a kind of this cause. Give one of {', '.join(kinds)}.")
         bound = kinds[self.kind]
@@ -151,6 +157,11 @@ class RigFault:
     def is_physical(self) -> bool:
         """Whether it is of the boom, not of a sensor."""
         return self.kind in _PHYSICAL
+
+    @property
+    def is_of_drive(self) -> bool:
+        """Return True if the drive moves by it, and the boom with the drive."""
+        return self.cause.endswith(".drive")
 
     @property
     def is_constant(self) -> bool:
@@ -198,7 +209,7 @@ def check(faults: Sequence[RigFault], scene: Scene, duration: float) -> None:
             raise UsageError(f"fault {fault}: the boom has joints, cylinders and sections 1 to {parts}. Give one of them.")
         if fault.onset >= duration:
             raise UsageError(f"fault {fault}: begins at {fault.onset:g} s, must be before the end at {duration:g} s.")
-        most = largest_size(fault, scene)
+        most = largest_size(fault, scene, duration)
         if abs(fault.size) > most:
             raise UsageError(
                 f"fault {fault}: size = {fault.size:g}, must be at most {most:.4g} on this boom. Give it in SI units."
@@ -210,8 +221,13 @@ _MOST = {"late": 10.0, "noisy": 1000.0, "scale": 1.0}
 MOST_ANGLE, MOST_FORCE = 1.0, 1e6  # rad, N; bias, spikes, and drift in a second
 
 
-def largest_size(fault: RigFault, scene: Scene) -> float:
-    """How large a fault may be on a boom, in its unit: loads as heavy as the boom, readings within what a sensor can tell."""
+def largest_size(fault: RigFault, scene: Scene, duration: float) -> float:
+    """Return how large a fault may be on a boom within `duration` (s), in its unit.
+
+    Loads are at most as heavy as the boom, readings within what a sensor can tell, leaks within the cylinder's travel.
+    """
+    if fault.is_of_drive:
+        return scene.joints[fault.number - 1].cylinder.max_stroke / (min(fault.end, duration) - fault.onset)
     if fault.kind == "more":
         mass = sum(map(section_mass, scene.sections))
         return mass if fault.cause == "tip.payload" else mass / scene.reach
@@ -228,11 +244,24 @@ def listing() -> list[str]:
     """All causes, kinds, and what their sizes are, a line each."""
     lines = [f"{'cause':41} {'kind':9} size"]
     for form, kinds in _CAUSES.items():
-        cause = form.replace(r"([1-9]\d*)", "I").replace("\\", "").replace("(?:", "(")
+        cause = _words(form, "I")
         for kind, bound in kinds.items():
             unit = _SIZES.get(kind) or _SIZES[f"{kind} {cause}"]
             lines.append(f"{cause:41} {kind:9} {unit}{f'; {bound}' if bound else ''}")
     return [*lines, "", f"I is 1, 2, ..; (a|b) is a or b. Write --fault {FORM}, times in s."]
+
+
+def drifting(programme: Drive, faults: Sequence[RigFault]) -> Drive:
+    """Return `programme` with the drift of every drive that has a fault among `faults`; it stays when the fault ends."""
+
+    def drive(times: Array) -> tuple[Array, Array]:
+        strokes, rates = programme(times)
+        for fault in (fault for fault in faults if fault.is_of_drive):
+            strokes[:, fault.number - 1] += fault.size * (np.clip(times, fault.onset, fault.end) - fault.onset)
+            rates[:, fault.number - 1] += fault.size * fault.share(times)
+        return strokes, rates
+
+    return drive
 
 
 SPIKE_SHARE = 0.02  # of the readings
@@ -246,7 +275,7 @@ def spoil(session: RigSession, faults: Sequence[RigFault], seed: int) -> RigSess
     seed : int
         Of spikes and dropouts; each fault draws from a stream of its own.
     """
-    sensed = [fault for fault in faults if not fault.is_physical]
+    sensed = [fault for fault in faults if not fault.is_physical and not fault.is_of_drive]
     for fault, rng in zip(sensed, np.random.default_rng([seed, 1]).spawn(len(sensed)), strict=True):
         session = _with_one(session, fault, rng)
     return session

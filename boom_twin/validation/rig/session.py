@@ -18,9 +18,8 @@ from scipy.interpolate import CubicSpline
 from ...scene.schema import Scene
 from ...system.atomic_files import write_atomic
 from ...types import SECOND, Array
-from .exudyn.solve import Change, TipLoad, simulate
+from .exudyn.solve import Change, Drive, TipLoad, simulate
 from .exudyn.system import gravity_in_base
-from .motion import Programme
 from .sensors import Sensors, read, sampling_stamps, specific_force
 
 EPOCH = 1_700_000_000 * SECOND
@@ -36,15 +35,15 @@ class RigSession:
     stamps, angle_stamps : ndarray of int64, shape (m,)
         Nanoseconds; those of the joint angles are the same unless they come late.
     strokes, joints : ndarray, shape (m, n)
-        As the transducers read them; m, rad.
+        Cylinder lengths pin to pin less `closed_length`, m, and joint angles, rad, as transducers read them.
     imu : ndarray, shape (m, 2)
         Specific force at the tip along its x and z; m/s^2.
     forces : ndarray, shape (m, n)
         Of the cylinders, positive in tension; N.
     truth : dict of ndarray
-        ``t`` (m,) s after the start; ``strokes`` (m, n) m; ``joints`` (m, n) rad; ``forces`` (m, n) N; ``tip``,
-        ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle`` (m,) rad; where there is one, the external force at the tip ``load``
-        (m, 2) N.
+        ``t`` (m,) s after the start; ``strokes`` (the lengths), ``drives`` (m, n) m; ``joints`` (m, n) rad; ``forces``
+        (m, n) N; ``tip``, ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle`` (m,) rad; where there is one, the external force at the
+        tip ``load`` (m, 2) N.
     """
 
     stamps: NDArray[np.int64]
@@ -76,7 +75,8 @@ class RigSession:
             ("tip_ax_m_s2", 4, truth["tip_acc"][:, 0]),
             ("tip_ay_m_s2", 4, truth["tip_acc"][:, 1]),
             ("tip_angle_rad", 7, truth["tip_angle"]),
-            *((f"stroke_{i + 1}_m", 7, truth["strokes"][:, i]) for i in number),
+            *((f"length_{i + 1}_m", 7, truth["strokes"][:, i]) for i in number),
+            *((f"drive_{i + 1}_m", 7, truth["drives"][:, i]) for i in number),
             *((f"joint_{i + 1}_rad", 7, truth["joints"][:, i]) for i in number),
             *((f"cylinder_force_{i + 1}_N", 1, truth["forces"][:, i]) for i in number),
             *load,
@@ -84,12 +84,13 @@ class RigSession:
 
 
 def motion_columns(rows: dict[str, Array]) -> dict[str, Array]:
-    """The columns of a simulation stacked into the arrays of a session's truth, without its strokes."""
+    """Stack the columns of a simulation into the arrays of a session's truth, without its drives."""
     number = range(1, 1 + sum(name.startswith("stroke_") for name in rows))
     return {
         "tip": np.column_stack([rows["tip_x_m"], rows["tip_y_m"]]),
         "tip_acc": np.column_stack([rows["tip_ax_m_s2"], rows["tip_ay_m_s2"]]),
         "tip_angle": rows["tip_angle_rad"],
+        "strokes": np.column_stack([rows[f"length_{i}_m"] for i in number]),
         "joints": np.column_stack([rows[f"joint_{i}_rad"] for i in number]),
         "forces": np.column_stack([rows[f"cylinder_force_{i}_N"] for i in number]),
     }
@@ -97,7 +98,7 @@ def motion_columns(rows: dict[str, Array]) -> dict[str, Array]:
 
 def observe(
     scene: Scene,
-    programme: Programme,
+    drive: Drive,
     rows: dict[str, Array],
     sensors: Sensors,
     seed: int,
@@ -108,7 +109,7 @@ def observe(
     Parameters
     ----------
     rows : dict of ndarray
-        What `simulate` gave for this programme and this load.
+        What `simulate` gave for this drive and this load.
 
     Returns
     -------
@@ -119,7 +120,7 @@ def observe(
     stamps = sampling_stamps(sensors, float(rows["t_s"][-1]), EPOCH, clock)
     times = (stamps - EPOCH) / SECOND
     truth = {name: CubicSpline(rows["t_s"], values)(times) for name, values in motion_columns(rows).items()}
-    truth |= {"t": times, "strokes": programme(times)[0]} | ({} if load is None else {"load": load(times)})
+    truth |= {"t": times, "drives": drive(times)[0]} | ({} if load is None else {"load": load(times)})
     force = specific_force(truth["tip_acc"], truth["tip_angle"], gravity_in_base(scene))
     return RigSession(
         stamps,
@@ -134,7 +135,7 @@ def observe(
 
 def record(
     scene: Scene,
-    programme: Programme,
+    drive: Drive,
     duration: float,
     sensors: Sensors | None = None,
     seed: int = 0,
@@ -143,6 +144,6 @@ def record(
     load: TipLoad | None = None,
     changes: Sequence[Change] = (),
 ) -> RigSession:
-    """Simulate a programme for `duration` (s) under a load, while the boom changes, and sample it."""
-    rows = simulate(scene, programme, duration, step, 2 * step, elements, load, changes)
-    return observe(scene, programme, rows, sensors or Sensors(), seed, load)
+    """Simulate the boom for `duration` (s) under a load, while it changes, and sample it."""
+    rows = simulate(scene, drive, duration, step, 2 * step, elements, load, changes)
+    return observe(scene, drive, rows, sensors or Sensors(), seed, load)

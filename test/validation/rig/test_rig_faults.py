@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 pytest.importorskip("exudyn")
 
 from boom_twin.errors import UsageError
 from boom_twin.scene import load_scene
-from boom_twin.validation.rig.faults import RigFault, check, parse
+from boom_twin.validation.rig import Move, Programme
+from boom_twin.validation.rig.faults import RigFault, check, drifting, parse
 
 
 @pytest.mark.parametrize(
@@ -22,6 +24,7 @@ from boom_twin.validation.rig.faults import RigFault, check, parse
         ("cylinder_2.k:softer:0.4@20+5", RigFault("cylinder_2.k", "softer", 0.4, 20.0, 5.0)),
         ("tip.payload:more:20@0+2..40", RigFault("tip.payload", "more", 20.0, 0.0, 2.0, 40.0)),
         ("section_3.EI:softer:0.4@0..40", RigFault("section_3.EI", "softer", 0.4, end=40.0)),
+        ("cylinder_2.drive:drift:-0.0001@5..20", RigFault("cylinder_2.drive", "drift", -1e-4, 5.0, end=20.0)),
         ("cylinder_force_2.sensor:bias:500", RigFault("cylinder_force_2.sensor", "bias", 500.0)),
     ],
 )
@@ -47,6 +50,7 @@ def test_text_and_back(text, fault):
         ("joint_1.sensor:drift:1@5+2", "drift does not come on over a time. Leave out \\+2"),
         ("cylinder_1.rod.clearance:play:0.0005@5", "play from the start to the end. Leave out what follows @"),
         ("joint_1.sensor:bias:1@-1", "onset = -1 s, must be finite and at least 0"),
+        ("cylinder_1.drive:bias:0.01", "cylinder_1.drive:bias: not a kind of this cause. Give one of drift"),
         ("cylinder_1.rod.clearance:play:0.2", "must be above 0 and below 0.005 m"),
     ],
 )
@@ -62,5 +66,18 @@ def test_refused_of_a_scene():
         check([parse("cylinder_5.k:softer:0.1")], scene, 60.0)
     with pytest.raises(UsageError, match=r"cylinder_1\.k changes by another fault too"):
         check([parse("cylinder_1.k:softer:0.1@5"), parse("cylinder_1.k:softer:0.2@9")], scene, 60.0)
+    with pytest.raises(UsageError, match=r"size = 0\.05, must be at most 0\.042 on this boom"):
+        check([parse("cylinder_2.drive:drift:0.05@50")], scene, 60.0)
     with pytest.raises(UsageError, match="begins at 60 s, must be before the end at 60 s"):
         check([parse("joint_4.sensor:bias:1@60")], scene, 60.0)
+
+
+def test_a_leak_moves_the_drive_and_stays():
+    programme = Programme((0.2, 0.3), (Move(0, 1.0, 2.0, 0.25),))
+    times = np.linspace(0.0, 9.0, 91)
+    leak = parse("cylinder_2.drive:drift:0.001@2..5")
+    strokes, rates = drifting(programme, [leak, parse("cylinder_1.sensor:drift:0.001")])(times)
+    still, pace = programme(times)
+    assert np.array_equal(strokes[:, 0], still[:, 0]) and np.array_equal(rates[:, 0], pace[:, 0])
+    assert strokes[:, 1] == pytest.approx(np.interp(times, [2.0, 5.0], [0.3, 0.303]), abs=1e-15)
+    assert np.array_equal(rates[:, 1], np.where((times >= 2.0) & (times < 5.0), 0.001, 0.0))

@@ -53,6 +53,11 @@ def test_nothing_else_changes(healthy, owner, kind):
     assert not np.array_equal(read, was)
 
 
+def test_a_leak_is_no_fault_of_a_sensor(healthy):
+    """It is in the strokes already, which the boom has followed."""
+    assert spoil(healthy, [parse("cylinder_2.drive:drift:0.001@1")], 1) is healthy
+
+
 def test_bias_drift_and_scale(healthy):
     since = healthy.truth["t"][healthy.truth["t"] >= ONSET] - ONSET
     _, read, was = spoilt(healthy, "joint_1.sensor:bias:0.01")

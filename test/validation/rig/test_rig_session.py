@@ -28,11 +28,26 @@ def test_noise_free_session_is_the_truth(motion):
     session = observe(scene, MOVE, rows, noise_free(), seed=1)
     assert session.joints.shape == (200, 1)
     assert np.array_equal(session.joints, session.truth["joints"])
-    assert session.strokes == pytest.approx(MOVE((session.stamps - EPOCH) * 1e-9)[0], abs=1e-12)
+    assert session.truth["drives"] == pytest.approx(MOVE((session.stamps - EPOCH) * 1e-9)[0], abs=1e-12)
+    assert np.array_equal(session.strokes, session.truth["strokes"])
     angle = session.truth["joints"][:, 0]
     assert session.truth["tip"] == pytest.approx(3.0 * np.column_stack([np.cos(angle), np.sin(angle)]), abs=1e-8)
     resting = session.imu[session.truth["t"] < 0.2]
     assert np.hypot(*resting.T) == pytest.approx(9.81, abs=1e-3)
+
+
+def test_transducers_read_lengths_with_the_oil_compressed(motion):
+    """The closed form of the slider crank, and the law of the oil spring and its damper."""
+    scene, rows = motion
+    session = observe(scene, MOVE, rows, noise_free(), seed=1)
+    pin, rod = np.subtract(scene.base.cylinder_pin, scene.base.pivot), scene.sections[0].rod_pin
+    cylinder, angle = scene.joints[0].cylinder, session.truth["joints"]
+    x, y = rod[0] * np.cos(angle) - rod[1] * np.sin(angle) - pin[0], rod[0] * np.sin(angle) + rod[1] * np.cos(angle) - pin[1]
+    assert session.strokes == pytest.approx(np.hypot(x, y) - cylinder.closed_length, abs=1e-9)
+    extension = session.strokes - session.truth["drives"]
+    damping = (cylinder.d or 0.0) * np.gradient(extension[:, 0], session.truth["t"])[:, None]
+    assert cylinder.k * extension + damping == pytest.approx(session.truth["forces"], abs=2.0)
+    assert np.abs(extension).min() > 1e-5
 
 
 def test_stamps_do_not_depend_on_noise_but_on_the_seed(motion):
@@ -54,4 +69,6 @@ def test_truth_file_repeats_and_reads_back(motion, tmp_path):
     assert EPOCH + np.rint(table["t_s"] * 1e9).astype(np.int64) == pytest.approx(session.stamps, abs=0)
     assert table["tip_y_m"] == pytest.approx(session.truth["tip"][:, 1], abs=6e-7)
     assert table["joint_1_rad"] == pytest.approx(session.truth["joints"][:, 0], abs=6e-8)
+    assert table["length_1_m"] == pytest.approx(session.truth["strokes"][:, 0], abs=6e-8)
+    assert table["drive_1_m"] == pytest.approx(session.truth["drives"][:, 0], abs=6e-8)
     assert table["cylinder_force_1_N"] == pytest.approx(session.truth["forces"][:, 0], abs=0.06)

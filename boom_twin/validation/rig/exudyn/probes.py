@@ -12,6 +12,9 @@ from ....types import Array
 from .module import exudyn, items
 from .system import Boom, Station
 
+_FORCE = {"distance": exudyn.OutputVariableType.Force, "referenceLength": exudyn.OutputVariableType.ForceLocal}
+"""Output that is the cylinder force, by the name of the connector's length parameter."""
+
 
 @dataclass(frozen=True, slots=True)
 class Probes:
@@ -22,6 +25,7 @@ class Probes:
     roots: tuple[int, ...]
     heads: tuple[int, ...]
     forces: tuple[int, ...]
+    lengths: tuple[int, ...]
     pins: tuple[tuple[int, int], ...]  # places of hole and journal of every pin with play
 
 
@@ -36,7 +40,8 @@ def attach(boom: Boom) -> Probes:
         ),
         roots=tuple(_on_node(boom, section.root, kind.Coordinates) for section in boom.sections),
         heads=tuple(_on_node(boom, section.head, kind.Coordinates) for section in boom.sections),
-        forces=tuple(_on_drive(boom, drive, name) for drive, name in boom.drives),
+        forces=tuple(_on_drive(boom, drive, _FORCE[name]) for drive, name in boom.drives),
+        lengths=tuple(_on_drive(boom, drive, kind.Distance) for drive, _ in boom.drives),
         pins=tuple((_on_marker(boom, bush.sides[0]), _on_marker(boom, bush.sides[1])) for bush in boom.bushes),
     )
 
@@ -48,12 +53,13 @@ def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
     -------
     dict
         ``t`` (m,) s; ``tip``, ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle``, ``tip_rate``, ``tip_rate_dot`` (m,) rad,
-        rad/s, rad/s^2; ``joints`` (m, n) rad; ``forces`` (m, n) N, positive in tension; ``pins`` (m, k, 2) m, offsets of
-        the journals that have play.
+        rad/s, rad/s^2; ``joints`` (m, n) rad; ``forces`` (m, n) N, positive in tension; ``lengths`` (m, n) m, pin to pin,
+        less the closed length; ``pins`` (m, k, 2) m, offsets of the journals that have play.
     """
     data = partial(_data, boom, at_rest=at_rest)
     roots = np.column_stack([_angle(data(p), s.root) for p, s in zip(probes.roots, boom.sections, strict=True)])
     heads = np.column_stack([_angle(data(p), s.head) for p, s in zip(probes.heads, boom.sections, strict=True)])
+    cylinders = [joint.cylinder for joint in boom.scene.joints]
     before = np.column_stack([np.zeros(len(heads)), heads[:, :-1]])
     return {
         "t": data(probes.tip[0])[:, 0],
@@ -64,6 +70,7 @@ def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
         "tip_rate_dot": data(probes.head[1])[:, 3],
         "joints": roots - before,
         "forces": np.column_stack([_force(boom, i, p, at_rest) for i, p in enumerate(probes.forces)]),
+        "lengths": np.column_stack([data(p)[:, 1] - c.closed_length for p, c in zip(probes.lengths, cylinders, strict=True)]),
         "pins": np.array([data(journal)[:, 1:3] - data(hole)[:, 1:3] for hole, journal in probes.pins])
         .reshape(len(probes.pins), len(heads), 2)
         .swapaxes(0, 1),
@@ -107,8 +114,7 @@ def _on_marker(boom: Boom, marker: int) -> int:
     return int(boom.system.AddSensor(items.SensorMarker(markerNumber=marker, **_inside(place))))
 
 
-def _on_drive(boom: Boom, drive: int, name: str) -> int:
-    kind = exudyn.OutputVariableType.Force if name == "distance" else exudyn.OutputVariableType.ForceLocal
+def _on_drive(boom: Boom, drive: int, kind: Any) -> int:
     return int(boom.system.AddSensor(items.SensorObject(objectNumber=drive, **_inside(kind))))
 
 

@@ -147,8 +147,8 @@ def simulate(
     dict
         The columns of a simulation (``t_s``, ``stroke_1_m``, .., ``joint_1_rad``, .., ``tip_x_m``, ``tip_y_m``,
         ``tip_ax_m_s2``, ``tip_ay_m_s2``, ``cylinder_force_1_N``, ..), then ``tip_angle_rad``,
-        ``tip_angular_velocity_rad_s``, ``tip_angular_acceleration_rad_s2``, and of pins with play the journals' offsets,
-        ``cylinder_1_rod_dx_m``, ``cylinder_1_rod_dy_m``, ..; each of shape (rows,).
+        ``tip_angular_velocity_rad_s``, ``tip_angular_acceleration_rad_s2``, ``length_1_m``, .., and of pins with play the
+        journals' offsets, ``cylinder_1_rod_dx_m``, ``cylinder_1_rod_dy_m``, ..; each of shape (rows,).
     """
     first = drive(np.zeros(1))[0][0]
     return move(at_rest(scene, first, elements), drive, t_end, step, output_step, None, load, changes)[0]
@@ -242,5 +242,6 @@ def _columns(found: dict[str, Array], strokes: Array, times: Array, pins: Sequen
         "tip_angle_rad": found["tip_angle"],
         "tip_angular_velocity_rad_s": found["tip_rate"],
         "tip_angular_acceleration_rad_s2": found["tip_rate_dot"],
+        **{f"length_{i}_m": found["lengths"][:, i - 1] for i in number},
         **{f"{pin}_d{axis}_m": found["pins"][:, k, j] for k, pin in enumerate(pins) for j, axis in enumerate("xy")},
     }

@@ -1,0 +1,119 @@
+"""Cylinder lengths, as transducers read them, in place of drives: the boom at rest and in motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oracle import booms
+
+from boom_twin import load_scene, simulate, statics
+from boom_twin.errors import SolverError, UsageError
+from boom_twin.scene.edit import with_rigid_cylinders
+from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.scene.oil_spring import stiffness
+from boom_twin.validation.rig import Move, Programme
+
+OIL = {"bore": 0.1, "rod": 0.07, "bulk_modulus": 1.2e9, "cap_line": 1e-3, "rod_line": 8e-4}
+
+
+def with_oil():
+    spec = booms.document()
+    for joint in spec["joints"][1:3]:
+        del joint["cylinder"]["k"]
+        joint["cylinder"]["oil"] = dict(OIL)
+    return booms.scene_of(spec)
+
+
+SCENES = {"default": load_scene, "oil": with_oil, **{f"random {i}": lambda i=i: booms.random_boom(i) for i in (1, 3, 4)}}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_boom_at_rest_is_held_by_lengths_as_by_struts(name):
+    scene = SCENES[name]()
+    at_drives = statics(scene, posture=next(reversed(scene.postures)))
+    found, struts = statics(scene, lengths=at_drives.lengths), statics(with_rigid_cylinders(scene), at_drives.lengths)
+    assert found.strokes == pytest.approx(at_drives.strokes, abs=1e-12)
+    assert found.lengths == pytest.approx(at_drives.lengths, abs=1e-12)
+    assert found.tip == pytest.approx(struts.tip, abs=1e-9) and found.joints == pytest.approx(struts.joints, abs=1e-10)
+    assert found.cylinder_forces == pytest.approx(struts.cylinder_forces, rel=1e-9)
+    assert found.frequencies == pytest.approx(at_drives.frequencies, rel=1e-9), "about the boom with its oil springs"
+    for joint, length, drive, force in zip(scene.joints, found.lengths, found.strokes, found.cylinder_forces, strict=True):
+        assert length == pytest.approx(drive + force / stiffness(joint.cylinder, drive), abs=1e-12)
+
+
+def test_the_rigid_tip_is_where_straight_sections_have_it_at_these_lengths():
+    found = statics(lengths=statics(None, "arch").lengths)
+    rigid = statics(with_rigid_cylinders(load_scene()), found.lengths).tip_rigid
+    assert found.tip_rigid == pytest.approx(rigid, abs=1e-12)
+    assert np.hypot(*(found.tip - found.tip_rigid)) < 0.8 * np.hypot(*(found.tip - statics(None, found.strokes).tip_rigid))
+
+
+def test_an_incompressible_cylinder_is_as_long_as_its_drive():
+    scene = with_rigid_cylinders(load_scene())
+    strokes = strokes_of_posture(scene, "high")
+    found = statics(scene, lengths=strokes)
+    assert np.array_equal(found.strokes, strokes) and found.lengths == pytest.approx(strokes, abs=1e-13)
+    times = np.linspace(0.0, 0.2, 21)
+    rows = Programme(tuple(strokes), (Move(0, 0.0, 0.2, strokes[0] + 0.001),))(times)[0]
+    by_lengths, by_drives = (simulate(scene, times, estimate_errors=False, **{key: rows}) for key in ("lengths", "strokes"))
+    assert np.array_equal(by_lengths.tip, by_drives.tip) and by_lengths.strokes == pytest.approx(rows, abs=1e-12)
+
+
+@pytest.mark.parametrize("make", [load_scene, with_oil])
+def test_a_motion_of_drives_gives_the_lengths_that_give_these_drives(make):
+    scene, times = make(), np.linspace(0.0, 1.0, 1001)
+    first = strokes_of_posture(scene, "arch")
+    drives = Programme(tuple(first), (Move(0, 0.1, 0.6, first[0] + 0.02), Move(2, 0.2, 0.7, first[2] - 0.01)))(times)[0]
+    moved = simulate(scene, times, drives, estimate_errors=False)
+    again = simulate(scene, times, lengths=moved.lengths, estimate_errors=False)
+    assert again.lengths == pytest.approx(moved.lengths, abs=1e-10)
+    assert again.tip[:, 0] == pytest.approx(moved.tip[:, 0], abs=2e-7)
+    assert again.cylinder_forces == pytest.approx(moved.cylinder_forces, abs=5.0)
+    assert again.strokes == pytest.approx(drives, abs=1e-6), "a tenth of what 30 N compress of the softest oil"
+
+
+def test_coarse_rows_give_the_drives_of_forces_that_are_linear_between_them():
+    """A ramp of force: the extension of the oil spring lags by d / k."""
+    from boom_twin.analysis.simulate import drives_of
+    from boom_twin.compiler.compile import compile_scene
+
+    scene, times = load_scene(), np.array([0.0, 0.01, 0.05, 2.0])
+    k, d = (np.array([getattr(joint.cylinder, key) for joint in scene.joints]) for key in ("k", "d"))
+    lengths, forces = np.full((4, 4), 0.2), np.outer(times, [1e4, 2e4, -1e4, 1e3])
+    extension = (times[:, None] - d / k * (1.0 - np.exp(-times[:, None] * k / d))) * forces[-1] / times[-1] / k
+    assert lengths - drives_of(compile_scene(scene), times, lengths, forces) == pytest.approx(extension, rel=1e-9, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"lengths": [0.6, 0.1, 0.2]}, "lengths = 3 values: the scene has 4 cylinders. Give 4 values in m."),
+        ({"lengths": [0.9, 0.1, 0.2, 0.1]}, "length_1 = 0.9 m: cylinder 1 travels 0 to 0.79 m"),
+        ({"lengths": [0.6, np.nan, 0.2, 0.1]}, "length_2 = nan m: cylinder 2 travels"),
+        ({"lengths": [0.6, 0.1, 0.2, 0.0]}, "Give a length inside."),
+        ({"lengths": [0.6, 0.1, 0.2, 0.1], "posture": "arch"}, "give one of strokes, posture and lengths"),
+        ({"lengths": [0.6, 0.1, 0.2, 0.1], "strokes": "arch"}, "give one of strokes, posture and lengths"),
+    ],
+)
+def test_what_lengths_cannot_be(given, told):
+    with pytest.raises(UsageError) as error:
+        statics(None, **given)
+    assert told in str(error.value) and "stroke_" not in str(error.value)
+
+
+def test_oil_that_gives_more_than_there_is_has_no_drive():
+    spec = booms.document()
+    del spec["joints"][1]["cylinder"]["k"]
+    spec["joints"][1]["cylinder"]["oil"] = OIL | {"bore": 0.08, "cap_line": 1e-4, "bulk_modulus": 1e7}
+    with pytest.raises(SolverError, match=r"no drives for cylinder forces of .* bulk_modulus"):
+        statics(booms.scene_of(spec), lengths=[0.6, 0.1, 0.2, 0.1])
+
+
+def test_a_motion_follows_strokes_or_lengths():
+    rows = np.tile(strokes_of_posture(load_scene(), "arch"), (2, 1))
+    for given in ({}, {"strokes": rows, "lengths": rows}):
+        with pytest.raises(UsageError, match="give either strokes or lengths"):
+            simulate(None, np.array([0.0, 0.1]), **given)
+    rows[1, 3] = 2.0
+    with pytest.raises(UsageError, match=r"length_4 = 2 m in row 2 of the drive: cylinder 4 travels"):
+        simulate(None, np.array([0.0, 0.1]), lengths=rows)
