@@ -26,10 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.jit import by_reference, inner, kernel
-from ..types import Array
+from ..types import Array, Stream
 from .posture import Posture
 
 VALVES, OPEN, BURST, ALL_VALVES, ALL_OPEN = range(5)  # models: three of the prediction, two of the estimate
+ANGLES, IMU = list(Stream).index(Stream.ANGLES), list(Stream).index(Stream.IMU)  # of `take_sensor`
 PREDICTION, ESTIMATE = range(2)  # mixtures of these
 STARTED, FED, FED_STAMP = range(3)  # of `status`
 
@@ -80,7 +81,8 @@ class Filters(NamedTuple):
     status : (3,) whether it has begun, whether the estimate has readings of its own, stamp of the newest of these.
     masked : (c,) measured channels that are not to be used. noise : variances.
     places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
-    felt : (2,) specific force predicted at the tip, m/s^2. shaking : (1,) mean square of its acceleration, m^2/s^4. pulls : (n,) predicted forces, N. The others are scratch.
+    felt : (2,) specific force predicted at the tip, m/s^2. shaking : (1,) mean square of its acceleration, m^2/s^4.
+    angle : (1,) of the tip, rad. strokes : (n, 3) predicted lengths (m), their rates and accelerations. pulls : (n,) predicted forces, N. The others are scratch.
     """
 
     x: Array
@@ -111,6 +113,8 @@ class Filters(NamedTuple):
     likely: Array
     switch: Array
     shaking: Array
+    angle: Array
+    strokes: Array
 
 
 def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> Filters:
@@ -123,7 +127,7 @@ def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> F
         places=np.zeros((states, 6 + n), np.int64), weights=np.zeros((states, 6 + n)), counts=np.zeros(states, np.int64),
         variances=np.zeros(states), felt=np.zeros(2), pulls=np.zeros(n), half=np.zeros((states, states)),
         turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)), mixed_p=np.zeros((3, states, states)),
-        row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((8, states)), likely=np.zeros(5), switch=np.zeros((3, 3)), shaking=np.zeros(1),
+        row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((8, states)), likely=np.zeros(5), switch=np.zeros((3, 3)), shaking=np.zeros(1), angle=np.zeros(1), strokes=np.zeros((n, 3)),
     )  # fmt: skip
 
 
@@ -702,15 +706,13 @@ def specific_force_row(p, f, axis, c, s, row):
 
 
 @kernel
-def take_sensor(p, f, angle, stream, first, residuals, stamp, newest):
+def take_sensor(p, f, stream, first, residuals, stamp, newest):
     """Take residuals of one sample against the prediction into the estimate.
 
     Parameters
     ----------
-    angle : float
-        Predicted angle of the tip, rad.
     stream : int
-        0 angles (rad), 1 IMU (m/s^2), 2 forces (N).
+        By `boom_twin.twin.blocks.CODES`: angles (rad), IMU (m/s^2) or forces (N).
     first : int
         First of its channels among the measured ones.
     residuals : ndarray, shape (k,)
@@ -719,22 +721,22 @@ def take_sensor(p, f, angle, stream, first, residuals, stamp, newest):
         Of the sample, and of the newest lengths, ns.
     """
     n, zero, age = p.drives.shape[0], zero_place(p), (newest - stamp) * 1e-9
-    channels = 2 if stream == 1 else n
+    channels = 2 if stream == IMU else n
     usable = False
     for i in range(channels):
         usable |= math.isfinite(residuals[i]) and not f.masked[first + i]
     if not usable or age > OLDEST:
         return
     f.status[FED], f.status[FED_STAMP] = 1, newest
-    c, s = math.cos(angle), math.sin(angle)
+    c, s = math.cos(f.angle[0]), math.sin(f.angle[0])
     f.likely[ALL_VALVES] = f.likely[ALL_OPEN] = 0.0
     for i in range(channels):
         if f.masked[first + i]:
             continue
-        if stream == 0:
+        if stream == ANGLES:
             angle_row(p, i, f.row)
             take_reading(p, f, residuals[i], zero + 2 + i, f.noise.angle2, age)
-        elif stream == 1:
+        elif stream == IMU:
             specific_force_row(p, f, i, c, s, f.row)
             inexact2 = INEXACT * INEXACT * f.shaking[0]
             take_reading(p, f, residuals[i], zero + i, f.noise.acceleration2 + inexact2, age)

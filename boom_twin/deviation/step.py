@@ -122,6 +122,9 @@ def write_prediction(t, live, p, f, h, gravity, out):
         length_row(p, i, f.row)
         estimates.strokes[i] = p.drives[i] + p.compliance[i] * p.pulled[i] + about_rest(p, f.row, f.mean[PREDICTION], size)
         estimates.variances[i] = variance_of(f.row, f.spread[PREDICTION], size)
+        found.lengths[i] = f.strokes[i, 0] = estimates.strokes[i]
+        f.strokes[i, 1] = length_rate(p, f, i)
+        f.strokes[i, 2] = f.mean[PREDICTION, drive_place(p) + 2 * n + i]
     for k in range(pins):
         row = t.clearances[k]
         found.pins[k, 0], found.pins[k, 1] = live.z[row.z], live.z[row.z + 1]
@@ -134,13 +137,25 @@ def write_prediction(t, live, p, f, h, gravity, out):
         found.tip[1, a] = read(f.row, f.mean[PREDICTION], size)
         acceleration_row(p, a, f.row)
         found.tip[2, a] += read(f.row, f.mean[PREDICTION], size)
-    angle = found.tip[0, 2]
+    angle = f.angle[0] = found.tip[0, 2]
     f.felt[0], f.felt[1] = specific_force(
         found.tip[2, 0] - gravity[0], found.tip[2, 1] - gravity[1], math.cos(angle), math.sin(angle)
     )
     size2 = found.tip[2, 0] * found.tip[2, 0] + found.tip[2, 1] * found.tip[2, 1]
     f.shaking[0] += min(h / SHAKEN_TIME, 1.0) * (size2 - f.shaking[0])
     estimates.rigid_tip[0], estimates.rigid_tip[1] = rigid_tip(t, p, estimates.strokes)
+
+
+@inner
+def length_rate(p, f, i):
+    """Return the rate of the length of cylinder `i`, m/s: of the drives, and of the oil's extension."""
+    n, m, drive = p.drives.shape[0], p.count[0], drive_place(p)
+    rate = f.mean[PREDICTION, drive + n + i]
+    for k in range(n):
+        rate += p.compliance[i] * p.forces[2 + k, i] * f.mean[PREDICTION, drive + n + k]
+    for j in range(m):
+        rate += p.compliance[i] * p.forces[2 + n + j, i] * f.mean[PREDICTION, m + j]
+    return rate
 
 
 @inner
@@ -179,7 +194,7 @@ def rigid_tip(t, p, lengths):
 
 
 @inner
-def write_expected_readings(p, f, live, results, inclination, first, values, sigmas):
+def write_expected_readings(p, f, live, results, inclination, values, sigmas):
     """Write what all sensors should read of the newest prediction, and the deviations of reading less that.
 
     Parameters
@@ -188,8 +203,6 @@ def write_expected_readings(p, f, live, results, inclination, first, values, sig
         Of the prediction.
     inclination : float
         Of the base, rad.
-    first : ndarray of int
-        First channel of each stream.
     values, sigmas : ndarray, shape (measured channels,)
         Angles (rad), then the tip IMU's x and z (m/s^2), then the cylinders' forces (N).
     """

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..analysis.equilibrium import SHARE
 from ..compiler.plan import Plan
 from ..config.settings import Settings
+from ..deviation.predictor import LengthPredictor
 from ..estimation.boom_predictor import BoomPredictor, Drawn
 from ..estimation.deviation_modes import DeviationModes
 from ..estimation.look_ahead import Tuning
@@ -29,6 +30,7 @@ from ..kernels.result_row import PIN
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, Array, Health, Mount, Outline, Report, Stream, channels_of
 from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
+from .expected_readings import Deviations
 from .health_rows import copy_predictions, copy_residuals, count_residuals
 from .load_shedding import LoadShedding
 from .report_rows import ReportRows
@@ -36,6 +38,7 @@ from .run import Run
 from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .stroke_check import FAR
 from .update import AFTER_PAUSE, DONE, LOOK, ODD, REFRESH, UNRECORDED, measure, update
+from .update_lengths import measure_beside_lengths, update_lengths
 
 CAPACITY = 4096  # samples that one call of the compiled update takes at most
 
@@ -123,7 +126,7 @@ class BlockUpdate:
         state: TwinState,
         channels: Mapping[Stream, tuple[str, ...]],
         step: float,
-        modes: DeviationModes,
+        modes: DeviationModes | LengthPredictor,
         judge: HealthMonitor | None,
         counts: Counter[str],
         shedding: LoadShedding,
@@ -201,8 +204,8 @@ class BlockUpdate:
         """
         self.judge()
         self.make_room()
-        (_, measure_one), (_, twin, found) = self._held or self._hold()
-        is_taken = measure_one(*twin, code, stamp, values, trusted, found)
+        (_, measure_one), (_, beside, found) = self._held or self._hold()
+        is_taken = measure_one(*beside, code, stamp, values, trusted, found)
         self._count_unmatched()
         return DONE if is_taken else ODD
 
@@ -214,16 +217,25 @@ class BlockUpdate:
     def _hold(self) -> _Held:
         """Look up the compiled code, and write once what it takes with every call; another load needs little of that anew."""
         self._kept = state, found = self._kept or (hold(self._state), hold(self._found))
-        boom, twin = self._boom.held, (hold(self._limits), state, self._modes.held)
+        limits, (one, width) = hold(self._limits), (np.zeros(1, np.int64), int(self._widths.max()))
+        block = one, one, np.zeros((1, width))
+        kernels: tuple[Any, Any]
+        if isinstance(self._boom, LengthPredictor):
+            kernels = update_lengths, measure_beside_lengths
+            together = *self._boom.held, limits, state
+            beside = *self._boom.filters_held, limits, state
+            more = *block, 0, False, found
+        else:
+            kernels, beside = (update, measure), (limits, state, self._modes.held)
+            together = *self._boom.held, *beside, self._steps.held
+            more = *block, 0, False, False, found
         if self._code is None:
-            one, width = np.zeros(1, np.int64), int(self._widths.max())
-            block = one, one, np.zeros((1, width))
-            advance = update.for_types_of(*boom, *twin, self._steps.held, *block, 0, False, False, found)
-            self._code = advance, measure.for_types_of(*twin, 0, 0, np.zeros(width), False, found)
+            advance = kernels[0].for_types_of(*together, *more)
+            self._code = advance, kernels[1].for_types_of(*beside, 0, 0, np.zeros(width), False, found)
             self._copy_predictions(found, 0, self._pins, *PredictionRows.room(0, self._joints))
             self._copy_residuals(found, 0, 0, 0, *MeasuredRows.room(0, 1))
             self._count_residuals(found, 0, 0, self._of_stream)
-        self._held = self._code, (boom, twin, found)
+        self._held = self._code, (together, beside, found)
         return self._held
 
     def make_room(self) -> None:
@@ -237,13 +249,17 @@ class BlockUpdate:
     def _advance_strokes(self, run: Run | None, block: SampleBlock, trusted: bool) -> tuple[int, int]:
         row, is_resumed, size = 0, False, len(block.stamps)
         assert run is not None
-        (advance, _), (arguments, twin, found) = self._held or self._hold()
+        (advance, _), (arguments, _, found) = self._held or self._hold()
+        resumed: tuple[bool, ...] = ()
         if self._steps.are_recorded:
             self._steps.make_room(size, self._boom.step_width)
         while True:
-            reason, row = advance(*arguments, *twin, self._steps.held, *block, row, is_resumed, trusted, found)
-            if is_resumed := reason == REFRESH:
+            if isinstance(self._modes, DeviationModes):
+                resumed = (is_resumed,)
+            reason, row = advance(*arguments, *block, row, *resumed, trusted, found)
+            if (is_resumed := reason == REFRESH) and isinstance(self._modes, DeviationModes):
                 interval, boom = run.interval or self._step, self._boom
+                assert isinstance(run.deviations, Deviations)
                 prediction = boom.prediction(run.newest)
                 run.deviations.refresh(prediction, interval, boom.take_filtered(), boom.live, boom.angles)
                 assert run.deviations.noise is not None
@@ -295,11 +311,16 @@ class BlockUpdate:
         self._tell_health(run.newest // SLOT * SLOT)
         health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, partial(self._tip_deviation, run))
         self._modes.mask(self._judge.masked)
+        if isinstance(self._modes, LengthPredictor):
+            return health and replace(health, tip_sigmas=self._modes.tip_sigmas)
         self._modes.expect_noise(*self._judge.noise)
         return health
 
     def _tip_deviation(self, run: Run) -> Array:
         """Of the predicted tip, m, shape (2,): by vibration that the model cannot know of, and as the estimate shows it."""
+        if not isinstance(self._modes, DeviationModes):
+            return self._modes.tip_sigmas
+        assert isinstance(run.deviations, Deviations)
         return np.asarray(np.sqrt(run.deviations.tip**2 + self._modes.tip_variances))
 
     def _take_judgement(self, row: int) -> None:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ..deviation.predictor import LengthPredictor
 from ..types import Array
 from .expected_readings import Deviations
 from .state import EPOCH, IN_SLOT, NEWEST, USUAL_STEP, TwinState
@@ -16,7 +17,7 @@ from .update import matched
 class Run:
     """What the twin knows since the boom was last taken to be at rest, beside `TwinState`."""
 
-    def __init__(self, state: TwinState, deviations: Deviations, stamp: int, is_again: bool) -> None:
+    def __init__(self, state: TwinState, deviations: Deviations | LengthPredictor, stamp: int, is_again: bool) -> None:
         self.deviations, self.is_again, self._state = deviations, is_again, state
         self.plausible = StrokeCheck(state.clock)
         self.is_predicted = False

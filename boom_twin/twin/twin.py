@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..config.settings import Settings
+from ..deviation.predictor import LengthPredictor
 from ..errors import BoomTwinError, SolverError, UsageError
 from ..estimation.recorded_steps import RecordedSteps
 from ..health.baseline import Baseline
@@ -18,7 +19,7 @@ from ..health.monitor import warm_up
 from ..kernels.tables import SENTENCES
 from ..scene.kinematics import stroke_curve
 from ..scene.source import SceneSource, as_scene
-from ..types import LIMIT, NANO, Array, Change, Health, Mount, Report, Sample, Stream, channels_of
+from ..types import LIMIT, NANO, Array, Change, Health, Mount, Report, Sample, Stream, StrokeReading, channels_of
 from .adjustments import Requests, ResidualBuffer, SensorZeros
 from .block_update import CAPACITY, BlockUpdate, limits_of
 from .blocks import CODES, STREAMS, ReportBlock, SampleBlock
@@ -57,6 +58,9 @@ class Twin:
         What model and sensors are off by while all is well. With it the rig's health is judged, see `Report.health`.
     on_block : callable, optional
         Is told every linear problem that health is judged by; a baseline is learnt from them.
+    reads : StrokeReading
+        What the stroke transducers read: the lengths of the cylinders, oil compressed, or, of sessions that were made before
+        version 0.2.0, their drives.
 
     Attributes
     ----------
@@ -89,8 +93,9 @@ class Twin:
         mounts: Sequence[Mount | None] = (),
         baseline: Baseline | None = None,
         on_block: Callable[[BlockProblem], object] | None = None,
+        reads: StrokeReading = StrokeReading.LENGTH,
     ) -> None:
-        self._on_block, scene = on_block, as_scene(scene)
+        self._on_block, scene, self.reads = on_block, as_scene(scene), reads
         self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
         self.counts: Counter[str] = Counter()
         self.shedding, self.recorded_steps = LoadShedding(), RecordedSteps()
@@ -186,13 +191,14 @@ class Twin:
             The load cannot be.
         """
         self._former: BlockUpdate | None = None
-        found = loaded_model(self.scene, settings, self.mounts, self.baseline, self._on_block)
+        found = loaded_model(self.scene, settings, self.mounts, self.baseline, self._on_block, self.reads)
         if self._state.clock[NEWEST] != NONE:
-            found.modes.postures.prepare(self._state.strokes.copy())  # where the boom will be, or near
+            found.prepare(self._state.strokes.copy())  # where the boom will be, or near
         return found
 
     def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
         """Go on with this model, which is of the present load, after that of `before`."""
+        self._model = model
         self._boom, self.judge, self._modes, self.steps = model.boom, model.judge, model.modes, model.steps
         self.plan = self._boom.plan
         parts = self._boom, model.limits, self._state, self._channels, self.settings.step, self._modes, self.judge
@@ -241,7 +247,7 @@ class Twin:
 
     def warm_up(self) -> None:
         """Compile every kernel, with a twin of the same boom that is thrown away."""
-        other = Twin(self.scene, self.settings)
+        other = Twin(self.scene, self.settings, reads=self.reads)
         middle = np.radians([sum(joint.range_deg) / 2 for joint in self.scene.joints])
         strokes = np.array([stroke_curve(self.scene, i, middle[i : i + 1])[0] for i in range(len(middle))])
         for k in range(20):
@@ -439,6 +445,11 @@ class Twin:
     def _doubt_pause(self, run: Run, first: Sample, why: TimeStep) -> None:
         """State what the model cannot know after a pause that ended with the sample `first`."""
         span = (first.stamp - run.newest) * NANO
+        if isinstance(self._boom, LengthPredictor):
+            if why is TimeStep.EITHER:
+                self._boom.add_phase(self._boom.prediction(run.newest))
+            return
+        assert isinstance(run.deviations, Deviations)
         run.deviations.add_pause(first.stamp, span, jerk_densities(self._boom, self._zeroed(first), span, self.settings))
         if why is TimeStep.EITHER:
             run.deviations.add_phase(first.stamp, self._boom.prediction(run.newest))
@@ -461,7 +472,8 @@ class Twin:
         """Stamps are later by `shift` (ns) from now on, and the model goes on."""
         before = run.newest
         run.rebase(shift)
-        self._modes.rebase(shift)
+        if self._modes is not run.deviations:
+            self._modes.rebase(shift)
         for line in self._lines.values():
             line.newest = None
         self._zeros.forget_past()
@@ -502,14 +514,21 @@ class Twin:
 
     def _start(self, sample: Sample, events: list[str]) -> Report:
         try:
-            self._boom.start(sample.values)
+            if isinstance(self._boom, LengthPredictor):
+                self._boom.start(sample.values, self._speeds)
+            else:
+                self._boom.start(sample.values)
         except BoomTwinError as error:
             self._failed = sample.stamp if isinstance(error, SolverError) else self._failed
             return self._refuse(sample, "model", *events, status=str(error))
         speeds, self._speeds = self._speeds, None
-        deviations = Deviations(self.plan, self.settings, self._modes.postures, self._state, sample.stamp, speeds)
+        deviations: Deviations | LengthPredictor
+        if isinstance(self._modes, LengthPredictor):
+            deviations = self._modes
+        else:
+            deviations = Deviations(self.plan, self.settings, self._modes.postures, self._state, sample.stamp, speeds)
+            self._modes.begin()
         self._run = Run(self._state, deviations, sample.stamp, speeds is not None)
-        self._modes.begin()
         return self._step(self._run, sample, events)
 
     def _step(self, run: Run, sample: Sample, events: list[str]) -> Report:
@@ -566,7 +585,7 @@ class Twin:
         """Taken as a witness of time alone, at first."""
         self.counts[event] += 1
         if sample.stream is Stream.STROKES:  # the model may start there: its modes are found while nothing is predicted
-            self._modes.postures.prepare_piece(self._zeroed(sample))
+            self._model.prepare_piece(self._zeroed(sample))
         return Report(sample.stamp, True, events=(event,))
 
     def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:

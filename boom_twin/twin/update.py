@@ -96,8 +96,10 @@ def update(
     while row < stamps.shape[0]:
         stamp = stamps[row]
         if streams[row] != STROKES:
-            if not compare(limits, state, tip, streams[row], stamp, values[row], row, trusted, found):
+            before = found.counts[1]
+            if not compare(limits, state, streams[row], stamp, values[row], row, trusted, found):
                 return ODD, row
+            correct_estimate(limits, tip, before, found)
             row += 1
             continue
         if not resumed:
@@ -127,7 +129,9 @@ def update(
                 return REFRESH, row
         resumed = False
         remember(live, bending, out, t.clearances.shape[0], track.passes[0], limits, state, tip, stamp, row, found)
-        flush_waiting(limits, state, tip, row, found)
+        before = found.counts[1]
+        flush_waiting(limits, state, row, found)
+        correct_estimate(limits, tip, before, found)
         estimate(out, t.clearances.shape[0], tip, found)
         row += 1
         if state.clock[BEGINS_SLOT] or state.clock[IS_DEFLECTED] or track.bank.began[0]:
@@ -141,7 +145,11 @@ def measure(limits, state, tip, stream, stamp, values, trusted, found):
 
     One that is `trusted` is refused only if nothing was expected at its stamp.
     """
-    return compare(limits, state, tip, stream, stamp, values, ALONE, trusted, found)
+    before = found.counts[1]
+    if not compare(limits, state, stream, stamp, values, ALONE, trusted, found):
+        return False
+    correct_estimate(limits, tip, before, found)
+    return True
 
 
 # -- strokes --------------------------------------------------------------------------------------------------------------
@@ -214,6 +222,17 @@ def remember(live, bending, out, pins, passes, limits, state, tip, stamp, row, f
     """Give the prediction, keep what residuals need, and let the estimate follow."""
     n, k = state.strokes.shape[0], found.counts[0]
     results, estimates = results_in(out, n, pins), estimates_in(out, n, pins)
+    give_prediction(live, bending, out, pins, passes, limits, state, stamp, row, found)
+    past, at = state.past, keep_strokes(state, stamp)
+    write_expected(limits, state, live, results, estimates, past.values[at], past.sigmas[at])
+    advance_estimate(tip, live, results, estimates, found.moments[k], limits.gravity, stamp)
+
+
+@inner
+def give_prediction(live, bending, out, pins, passes, limits, state, stamp, row, found):
+    """Give the row of the newest prediction with its bending moments, and note whether the boom is deflected too far."""
+    n, k = state.strokes.shape[0], found.counts[0]
+    results, estimates = results_in(out, n, pins), estimates_in(out, n, pins)
     found.at[k], found.stamps[k], found.passes[k] = row, stamp, passes
     for i in range(out.shape[0]):
         found.rows[k, i] = out[i]
@@ -227,9 +246,6 @@ def remember(live, bending, out, pins, passes, limits, state, tip, stamp, row, f
     found.counts[0] = k + 1
     off = math.hypot(results.tip[0, 0] - estimates.rigid_tip[0], results.tip[0, 1] - estimates.rigid_tip[1])
     state.clock[IS_DEFLECTED] = off > limits.valid
-    past, at = state.past, keep_strokes(state, stamp)
-    write_expected(limits, state, live, results, estimates, past.values[at], past.sigmas[at])
-    advance_estimate(tip, live, results, estimates, found.moments[k], limits.gravity, stamp)
 
 
 @inner
@@ -257,7 +273,7 @@ def estimate(out, pins, tip, found):
 
 
 @inner
-def compare(limits, state, tip, stream, stamp, values, row, trusted, found):
+def compare(limits, state, stream, stamp, values, row, trusted, found):
     """Residuals of a measured sample, now or when the strokes have come; False, and nothing done, if it is not ordinary."""
     if not trusted and not is_due(limits, state, stream, stamp, values):
         return False
@@ -266,7 +282,7 @@ def compare(limits, state, tip, stream, stamp, values, row, trusted, found):
             forget_waiting(state.waiting, 1)
             state.clock[UNMATCHED] += 1
         wait(limits, state, stream, stamp, values)
-    elif not write_residual(limits, state, tip, stream, stamp, values, row, found):
+    elif not write_residual(limits, state, stream, stamp, values, row, found):
         return False
     if not trusted:
         note_stamp(state, stream, stamp)
@@ -310,11 +326,11 @@ def move_row(ring, old, new):
 
 
 @inner
-def flush_waiting(limits, state, tip, row, found):
+def flush_waiting(limits, state, row, found):
     """Residuals of all samples that waited for the newest stroke."""
     ring, done = state.waiting, 0
     while done < ring.bounds[COUNT] and ring.stamps[done] <= state.clock[NEWEST]:
-        if not write_residual(limits, state, tip, ring.streams[done], ring.stamps[done], ring.values[done], row, found):
+        if not write_residual(limits, state, ring.streams[done], ring.stamps[done], ring.values[done], row, found):
             state.clock[UNMATCHED] += 1
         done += 1
     if done > 0:
@@ -330,7 +346,7 @@ def forget_waiting(ring, count):
 
 
 @kernel
-def write_residual(limits, state, tip, stream, stamp, values, row, found):
+def write_residual(limits, state, stream, stamp, values, row, found):
     """Residuals of one sample against what was expected at its stamp; False if nothing was."""
     after, share = matched(state.past, stamp)
     if after < 0:
@@ -355,19 +371,20 @@ def write_residual(limits, state, tip, stream, stamp, values, row, found):
         found.values[k, i] = found.sigmas[k, i] = found.raw[k, i] = math.nan
     found.residual_at[k], found.residual_streams[k], found.residual_stamps[k] = row, stream, stamp
     found.counts[1] = k + 1
-    correct_estimate(limits, tip, stream, stamp, found.values[k])
     return True
 
 
 @inner
-def correct_estimate(limits, tip, stream, stamp, residuals):
-    """Let the estimate know of residuals."""
-    if stream == ANGLES:
-        take_angles(tip, residuals, limits.first[ANGLES], stamp)
-    elif stream == IMU:
-        take_imu(tip, residuals, limits.first[IMU], stamp)
-    elif stream == FORCES:
-        take_forces(tip, residuals, limits.first[FORCES], stamp)
+def correct_estimate(limits, tip, first, found):
+    """Let the estimate know of the residuals from row `first` on."""
+    for k in range(first, found.counts[1]):
+        stream, stamp, residuals = found.residual_streams[k], found.residual_stamps[k], found.values[k]
+        if stream == ANGLES:
+            take_angles(tip, residuals, limits.first[ANGLES], stamp)
+        elif stream == IMU:
+            take_imu(tip, residuals, limits.first[IMU], stamp)
+        elif stream == FORCES:
+            take_forces(tip, residuals, limits.first[FORCES], stamp)
 
 
 @kernel
