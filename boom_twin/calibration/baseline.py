@@ -21,8 +21,8 @@ from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..twin.driver import drive
 from ..twin.twin import Twin
-from ..types import Mount, Sample
-from .run import common_mapping
+from ..types import Mount, Sample, StrokeReading
+from .run import common_mapping, refuse_lengths
 from .sessions import read_sessions
 
 
@@ -60,7 +60,7 @@ def _problems(
 ) -> list[BlockProblem]:
     """The linear problems that a twin makes of one session."""
     found: list[BlockProblem] = []
-    for _ in drive(Twin(scene, settings, mounts, Baseline(), found.append), session):
+    for _ in drive(Twin(scene, settings, mounts, Baseline(), found.append, StrokeReading.DRIVE), session):
         pass
     return found
 
@@ -105,7 +105,9 @@ def baseline_of(
     """
     paths, joints = [Path(bag) for bag in bags], len(scene.joints)
     progress(0.0, "reading")
-    topics = common_mapping(paths, Path(mapping) if mapping else None, joints).topics
+    mapped = common_mapping(paths, Path(mapping) if mapping else None, joints)
+    refuse_lengths(paths, mapped)
+    topics = mapped.topics
     sessions = read_sessions(paths, topics, joints, window)
     mounts = topics.mounts(joints)
     names = [f"{session.name} {session.digest}" for session in sessions]

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..bag.session_model import Mapped, mapping_of
+from ..bag.session_model import Mapped, mapping_of, strokes_of
 from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import BagError, SolverError, UsageError
 from ..scene.edit import with_parameters
 from ..scene.schema import Scene
-from ..types import NANO, SENSORS, Mount, Stream
+from ..types import NANO, SENSORS, Mount, Stream, StrokeReading
 from .forward_model import READINGS, CalibrationProblem
 from .least_squares import Fit, InseparableUnknowns, fitted, groups_of
 from .noise_model import ResidualBlocks, block_length, blocks_of, channel_names
@@ -142,6 +142,7 @@ def calibrate(
     progress(0.0, "reading")
     paths, joints = [Path(bag) for bag in bags], len(scene.joints)
     mapped = common_mapping(paths, Path(mapping) if mapping else None, joints)
+    refuse_lengths(paths, mapped)
     sessions = read_sessions(paths, mapped.topics, joints, window)
     streams = (Stream.STROKES, *_compared(sessions))
     names = choice.names or usual_names(scene, streams, choice.load, choice.damping, choice.stiffness, choice.zeros)
@@ -194,6 +195,18 @@ def _fitted(
 
 def _tell_pass(progress: Progress, number: int) -> None:
     progress(0.15 + 0.6 * (1.0 - 0.85**number), f"fit, pass {number}")
+
+
+def refuse_lengths(paths: Sequence[Path], mapped: Mapped) -> None:
+    """Raise a UsageError for a session whose stroke transducers read lengths, which the fit would take for drives."""
+    for path in paths:
+        strokes = strokes_of(path, mapped)
+        if strokes.reading is StrokeReading.LENGTH:
+            raise UsageError(
+                f"{path}: its stroke transducers read lengths ({strokes.source}), and the fit knows drives only: it would "
+                "count the oil's compression twice. If they do read drives, say reads: drive under inputs.cylinder_strokes of a "
+                "mapping (--mapping)."
+            )
 
 
 def common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int) -> Mapped:

@@ -12,7 +12,7 @@ from ..errors import BagError
 from ..scene.schema import Scene
 from ..twin.driver import drive
 from ..twin.twin import Twin
-from ..types import NANO, Array, Mount, Residuals, Stream
+from ..types import NANO, Array, Mount, Residuals, Stream, StrokeReading
 from .sessions import MeasuredSession
 
 
@@ -60,7 +60,7 @@ def judged(
     BagError
         The twin predicts nothing there.
     """
-    twin = Twin(scene, settings, mounts)
+    twin = Twin(scene, settings, mounts, reads=StrokeReading.DRIVE)
     found: dict[Stream, list[Residuals]] = {stream: [] for stream in Stream}
     for step in drive(twin, session.samples(zeros)):
         for residuals in (each for report in step.report.all for each in report.residuals):

@@ -27,10 +27,9 @@ from numpy.typing import NDArray
 
 from ..kernels.jit import by_reference, inner, kernel
 from ..types import Array, Stream
-from .posture import Posture
 
 VALVES, OPEN, BURST, ALL_VALVES, ALL_OPEN = range(5)  # models: three of the prediction, two of the estimate
-ANGLES, IMU = list(Stream).index(Stream.ANGLES), list(Stream).index(Stream.IMU)  # of `take_sensor`
+ANGLES, IMU = list(Stream).index(Stream.ANGLES), list(Stream).index(Stream.IMU)  # codes of these streams
 PREDICTION, ESTIMATE = range(2)  # mixtures of these
 STARTED, FED, FED_STAMP = range(3)  # of `status`
 
@@ -82,7 +81,8 @@ class Filters(NamedTuple):
     masked : (c,) measured channels that are not to be used. noise : variances.
     places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
     felt : (2,) specific force predicted at the tip, m/s^2. shaking : (1,) mean square of its acceleration, m^2/s^4.
-    angle : (1,) of the tip, rad. strokes : (n, 3) predicted lengths (m), their rates and accelerations. pulls : (n,) predicted forces, N. The others are scratch.
+    angle : (1,) of the tip, rad. strokes : (n, 3) predicted lengths (m), their rates and accelerations.
+    pulls : (n,) predicted forces, N. The others are scratch.
     """
 
     x: Array
@@ -127,7 +127,8 @@ def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> F
         places=np.zeros((states, 6 + n), np.int64), weights=np.zeros((states, 6 + n)), counts=np.zeros(states, np.int64),
         variances=np.zeros(states), felt=np.zeros(2), pulls=np.zeros(n), half=np.zeros((states, states)),
         turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)), mixed_p=np.zeros((3, states, states)),
-        row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((8, states)), likely=np.zeros(5), switch=np.zeros((3, 3)), shaking=np.zeros(1), angle=np.zeros(1), strokes=np.zeros((n, 3)),
+        row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((8, states)), likely=np.zeros(5),
+        switch=np.zeros((3, 3)), shaking=np.zeros(1), angle=np.zeros(1), strokes=np.zeros((n, 3)),
     )  # fmt: skip
 
 

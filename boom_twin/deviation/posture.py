@@ -25,7 +25,7 @@ from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.elements.linkage import angle_of_length, cylinder_length
 from ..kernels.integrators import REST, prepare
 from ..kernels.jit import by_reference, inner, kernel
-from ..kernels.tables import FRAME_ANGLE, FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y, JOINT_A, JOINT_B, OK, Z_SECTION, Motion
+from ..kernels.tables import FRAME_ANGLE, FRAME_COS, FRAME_SIN, FRAME_X, FRAME_Y, JOINT_A, JOINT_B, OK, Motion
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.natural_frequency import condense
@@ -234,7 +234,7 @@ def change_readings(t, boom, work, p, k):
 
 @inner
 def read_sensors(boom, p, found):
-    """Write angles that sensors read (n, rad; of an inclinometer to the base), x, y (m), angle of the tip, chords' angles (n)."""
+    """Write what angle sensors read (n, rad; to the base if absolute), x, y (m) and angle of the tip, angles of chords (n)."""
     n, last = p.frames.shape[0], boom.frames.shape[0] - 1
     for i in range(n):
         root = p.roots[i]

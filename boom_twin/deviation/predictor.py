@@ -74,7 +74,7 @@ class LengthPredictor(BoomPredictor):
         lengths = np.array([section.length for section in scene.sections])
         self.posture = new_posture(self.plan, MODES, lengths, mounting.frames, mounting.absolute)
         sizes = (USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)
-        variances = (settings.variance(SENSORS[stream]) for stream in (Stream.STROKES, Stream.ANGLES, Stream.IMU, Stream.FORCES))
+        variances = (settings.variance(kind) for kind in SENSORS.values())
         channels = sum(len(names) for stream, names in channels_of(n).items() if stream is not Stream.STROKES)
         self.filters = new_filters(n, MODES, channels, SensorNoise(*variances, *(size * weight for size in sizes)))
         self._struts = compile_scene(with_rigid_cylinders(scene))
@@ -84,9 +84,8 @@ class LengthPredictor(BoomPredictor):
     def held(self) -> tuple[Any, ...]:
         """Fields as compiled code takes them with every call, see `boom_twin.kernels.jit.hold`."""
         boom = self.compiled
-        return tuple(
-            map(hold, CompiledLengths(boom.tables, boom.anchor, boom.live, boom.work, self.posture, self.filters, boom.bending, boom.row))
-        )
+        own = boom.tables, boom.anchor, boom.live, boom.work, self.posture, self.filters, boom.bending, boom.row
+        return tuple(map(hold, CompiledLengths(*own)))
 
     @cached_property
     def filters_held(self) -> tuple[Any, ...]:
@@ -204,4 +203,4 @@ class LengthPredictor(BoomPredictor):
         rows[:, :m], rows[:, 2 * m : 2 * m + 2] = columns[:, 2 + n :], columns[:, :2]
         rows[:, 2 * m + 2 : 2 * m + 4], rows[:, 2 * m + 4 : 2 * m + 4 + n] = columns[:, :2], columns[:, 2 : 2 + n]
         spread = self.filters.spread[PREDICTION, : rows.shape[1], : rows.shape[1]]
-        return np.sqrt(np.einsum("ai,ij,aj->a", rows, spread, rows))
+        return np.asarray(np.sqrt(np.einsum("ai,ij,aj->a", rows, spread, rows)))

@@ -15,12 +15,13 @@ from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, OK
 from ..kernels.transfer.forward_kinematics import place
 from .models import (
     ESTIMATE,
-    PREDICTION,
     FED,
     FED_STAMP,
     PATIENCE,
-    acceleration_row,
+    PREDICTION,
     about_rest,
+    acceleration_row,
+    all_states,
     angle_row,
     column_row,
     covariance_of,
@@ -31,7 +32,6 @@ from .models import (
     rate_row,
     read,
     specific_force_row,
-    all_states,
     step_models,
     variance_of,
     zero_place,

@@ -233,6 +233,11 @@ class Topics(_Entry):
         numbered = re.compile(rf"{kind.named}_{NUMBER.pattern}")
         return [name for name in names if numbered.fullmatch(name) and number_of(name) > joints and name not in used]
 
+    @property
+    def stroke_reading(self) -> StrokeReading:
+        """What stroke transducers read: as the mapping says, else lengths."""
+        return self.inputs[Stream.STROKES].reads or StrokeReading.LENGTH
+
     def mounts(self, joints: int) -> list[Mount | None]:
         """Where the inclinometers of a boom sit, one entry for each joint; None is an encoder."""
         return [sensor.absolute for sensor in self.sensors_of(Stream.ANGLES, joints).values()]

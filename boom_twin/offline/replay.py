@@ -44,7 +44,7 @@ from ..system.summary_display import SummaryDisplay, data_frame
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..twin.events import EVENTS
-from ..types import NANO, Alarm, Array, Change, Report, Stream, channels_of
+from ..types import NANO, Alarm, Array, Change, Report, Stream, StrokeReading, channels_of
 from .ground_truth import TipErrors, TipTruth, load_truth
 from .process_pipe import Pipe
 from .reader_process import SampleReader
@@ -233,8 +233,9 @@ def replay_into(
         ahead = SampleReader(session.path, topics, wanted, joints, window, reader)
         behind = None if writer is None else ReportWriter(writer, session.notes, topics, scene, settings)
         with _unhurried_collector(), ExitStack() as ended:
-            twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline)
-            stepping = _stepping_twin(twin) if expected >= MANY and (cores or usable_cores()) > 1 else None
+            twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline, strokes.reading)
+            can_step = strokes.reading is StrokeReading.DRIVE and expected >= MANY
+            stepping = _stepping_twin(twin) if can_step and (cores or usable_cores()) > 1 else None
             ahead.wait_ready()
             if behind is not None:
                 behind.wait_ready()
@@ -387,18 +388,18 @@ def _processes(building: UnfinishedResult, with_bag: bool) -> Iterator[tuple[Pip
         yield reader, writer
 
 
-def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Baseline | None) -> Twin:
+def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Baseline | None, reads: StrokeReading) -> Twin:
     """A twin with its compiled model; its modules are imported here, while the other processes start."""
     from ..twin.twin import Twin
 
-    twin = Twin(scene, settings, topics.mounts(len(scene.joints)), baseline)
+    twin = Twin(scene, settings, topics.mounts(len(scene.joints)), baseline, reads=reads)
     twin.warm_up()
     return twin
 
 
 def _stepping_twin(twin: Twin) -> Twin:
     """One of the same boom and settings, without health."""
-    return type(twin)(twin.scene, twin.settings, twin.mounts)
+    return type(twin)(twin.scene, twin.settings, twin.mounts, reads=twin.reads)
 
 
 @contextmanager

@@ -220,6 +220,7 @@ class BlockUpdate:
         limits, (one, width) = hold(self._limits), (np.zeros(1, np.int64), int(self._widths.max()))
         block = one, one, np.zeros((1, width))
         kernels: tuple[Any, Any]
+        more: tuple[Any, ...]
         if isinstance(self._boom, LengthPredictor):
             kernels = update_lengths, measure_beside_lengths
             together = *self._boom.held, limits, state

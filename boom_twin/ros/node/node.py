@@ -173,7 +173,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             self._log.warning(str(oddity))
         settings, joints = current(self, Settings), len(scene.joints)
         topics = load_mapping(path_of(self, "mapping"), joints)
-        twin = Twin(scene, settings, topics.mounts(joints), baseline_of(self))
+        twin = Twin(scene, settings, topics.mounts(joints), baseline_of(self), reads=topics.stroke_reading)
         self._log.info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
         import_module("scipy.special")  # of the first alarm and the first pause, whose samples would wait for it for 0.3 s
