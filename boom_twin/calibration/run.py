@@ -204,8 +204,8 @@ def refuse_lengths(paths: Sequence[Path], mapped: Mapped) -> None:
         if strokes.reading is StrokeReading.LENGTH:
             raise UsageError(
                 f"{path}: its stroke transducers read lengths ({strokes.source}), and the fit knows drives only: it would "
-                "count the oil's compression twice. If they do read drives, say reads: drive under inputs.cylinder_strokes of a "
-                "mapping (--mapping)."
+                "count the oil's compression twice. If they do read drives, say reads: drive under inputs.cylinder_strokes of "
+                "a mapping (--mapping)."
             )
 
 

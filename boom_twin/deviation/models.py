@@ -138,19 +138,19 @@ def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> F
 @inner
 def force_place(p):
     """Return the first place of the fast load (2), behind the modes' coordinates and rates; the slow one (2) follows."""
-    return 2 * p.count[0]
+    return 2 * p.modes[0]
 
 
 @inner
 def drive_place(p):
     """Return the first place of the drives (n); their rates (n) and accelerations (n) follow."""
-    return 2 * p.count[0] + 4
+    return 2 * p.modes[0] + 4
 
 
 @inner
 def zero_place(p):
     """Return the number of states of the prediction; zeros of IMU (2), angles (n) and forces (n) follow."""
-    return 2 * p.count[0] + 4 + 3 * p.drives.shape[0]
+    return 2 * p.modes[0] + 4 + 3 * p.drives.shape[0]
 
 
 @inner
@@ -172,7 +172,7 @@ def clear(row, size):
 @inner
 def column_row(p, columns, at, scale, row):
     """Write the row of a quantity that changes by `scale` times a column of `columns` (c, ..) a state, see `Posture`."""
-    n, m = p.drives.shape[0], p.count[0]
+    n, m = p.drives.shape[0], p.modes[0]
     clear(row, all_states(p))
     load, drive = force_place(p), drive_place(p)
     for j in range(m):
@@ -186,7 +186,7 @@ def column_row(p, columns, at, scale, row):
 @inner
 def length_row(p, i, row):
     """Write the row of the length of cylinder `i`."""
-    n, m = p.drives.shape[0], p.count[0]
+    n, m = p.drives.shape[0], p.modes[0]
     column_row(p, p.forces, i, p.compliance[i], row)
     row[drive_place(p) + i] += 1.0
     for j in range(m):
@@ -196,7 +196,7 @@ def length_row(p, i, row):
 @inner
 def rate_row(p, a, row):
     """Write the row of the velocity of the tip (x, y, angle: `a`)."""
-    n, m = p.drives.shape[0], p.count[0]
+    n, m = p.drives.shape[0], p.modes[0]
     clear(row, all_states(p))
     drive = drive_place(p)
     for j in range(m):
@@ -208,7 +208,7 @@ def rate_row(p, a, row):
 @inner
 def acceleration_row(p, a, row):
     """Write the row of the acceleration of the tip (x, y, angle: `a`), less what its curved way needs at its speed."""
-    n, m = p.drives.shape[0], p.count[0]
+    n, m = p.drives.shape[0], p.modes[0]
     clear(row, all_states(p))
     load, drive = force_place(p), drive_place(p)
     for i in range(n):
@@ -275,7 +275,7 @@ def put_weight(f, row, place, weight):
 @inner
 def make_transition(p, f, h):
     """Write the transition over `h` (s), inputs of the modes held, and the variances that the drives gain; loads follow."""
-    n, m, load, drive = p.drives.shape[0], p.count[0], force_place(p), drive_place(p)
+    n, m, load, drive = p.drives.shape[0], p.modes[0], force_place(p), drive_place(p)
     for k in range(all_states(p)):
         f.counts[k], f.variances[k] = 0, 0.0
     for j in range(m):
@@ -417,7 +417,7 @@ def start_models(p, f, speeds, swing):
 
     `speeds` (n,) in m/s and `swing` (m) are how fast drives, and how far the tip, may move already.
     """
-    n, m, size = p.drives.shape[0], p.count[0], all_states(p)
+    n, m, size = p.drives.shape[0], p.modes[0], all_states(p)
     load, drive = force_place(p), drive_place(p)
     noise, x, covariance = f.noise, f.x[VALVES], f.p[VALVES]
     for i in range(f.x.shape[1]):
@@ -669,7 +669,7 @@ def take_reading(p, f, residual, zero, variance, age):
     """Take a residual against the prediction, of the quantity in `f.row` with its zero at place `zero`, `age` s ago."""
     if not math.isfinite(residual):
         return
-    size, every, m = zero_place(p), all_states(p), p.count[0]
+    size, every, m = zero_place(p), all_states(p), p.modes[0]
     n, drive = p.drives.shape[0], drive_place(p)
     if age > 0.0:
         for j in range(m):

@@ -49,7 +49,7 @@ class Posture(NamedTuple):
 
     Columns: force at the tip along x and y (the part that no mode has), the drives, the modes.
 
-    count : (1,) modes. drives : (n,) strokes of the drives at rest, m. angles : (n,) of the rigid boom there, rad.
+    modes : (1,) how many. drives : (n,) strokes of the drives at rest, m. angles : (n,) of the rigid boom there, rad.
     rest : (u,) unknowns at rest. columns : (c, u) their changes. motions : (m, h) of every mass point.
     readings : (c, 2 n + 3) changes of what angle sensors read (rad), of x, y, angle of the tip, and of the angles of the
     sections' chords, from pivot to pivot. forces : (c, n) of the
@@ -61,7 +61,7 @@ class Posture(NamedTuple):
     The other fields are scratch; `rate` (n,) stays zero.
     """
 
-    count: NDArray[np.int64]
+    modes: NDArray[np.int64]
     drives: Array
     angles: Array
     rest: Array
@@ -94,23 +94,23 @@ class Posture(NamedTuple):
     rate: Array
 
 
-def new_posture(plan: Plan, modes: int, lengths: Array, frames: NDArray[np.int64], absolute: NDArray[np.bool_]) -> Posture:
-    """Return room for a boom whose sections are `lengths` (m) long, with at most so many modes.
+def new_posture(plan: Plan, most: int, lengths: Array, frames: NDArray[np.int64], absolute: NDArray[np.bool_]) -> Posture:
+    """Return room for a boom whose sections are `lengths` (m) long, with `most` modes at most.
 
     `frames` and `absolute` (n,) are those of `boom_twin.estimation.sensor_model.Mounting`.
     """
     n, unknowns, histories = plan.joints, len(plan.names), len(plan.masses)
-    kinds, columns = plan.tables.operations.kind, 2 + n + modes
+    kinds, columns = plan.tables.operations.kind, 2 + n + most
     roots = np.append(np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1, len(kinds))
     return Posture(
-        count=np.zeros(1, np.int64), drives=np.full(n, np.inf), angles=np.zeros(n), rest=np.zeros(unknowns),
-        columns=np.zeros((columns, unknowns)), motions=np.zeros((modes, histories)), readings=np.zeros((columns, 2 * n + TIP)),
-        forces=np.zeros((columns, n)), read=np.zeros(2 * n + TIP), pulled=np.zeros(n), omega=np.zeros(modes),
-        decay=np.zeros(modes), compliance=np.zeros(n), lag=np.zeros(n), slope=np.zeros(n), curvature=np.zeros(n),
+        modes=np.zeros(1, np.int64), drives=np.full(n, np.inf), angles=np.zeros(n), rest=np.zeros(unknowns),
+        columns=np.zeros((columns, unknowns)), motions=np.zeros((most, histories)), readings=np.zeros((columns, 2 * n + TIP)),
+        forces=np.zeros((columns, n)), read=np.zeros(2 * n + TIP), pulled=np.zeros(n), omega=np.zeros(most),
+        decay=np.zeros(most), compliance=np.zeros(n), lag=np.zeros(n), slope=np.zeros(n), curvature=np.zeros(n),
         frames=np.array(frames, np.int64), absolute=np.array(absolute), roots=roots.astype(np.int64), masses=plan.masses,
         lengths=lengths, closed=plan.closed_lengths, still=np.zeros(histories), position=np.zeros(histories),
-        hat=np.zeros(histories), response=np.zeros((modes, unknowns)), sides=np.zeros((2, 2 * n + TIP)),
-        shifted=np.zeros((modes, histories)), small=np.zeros((4, modes, modes)), target=np.zeros(n), rate=np.zeros(n),
+        hat=np.zeros(histories), response=np.zeros((most, unknowns)), sides=np.zeros((2, 2 * n + TIP)),
+        shifted=np.zeros((most, histories)), small=np.zeros((4, most, most)), target=np.zeros(n), rate=np.zeros(n),
     )  # fmt: skip
 
 
@@ -140,7 +140,7 @@ def linearise(t, boom, work, p, drives, follow):
     status = settle_at(t, boom, work, p, drives)
     if status != OK:
         return status
-    n, m = drives.shape[0], p.count[0]
+    n, m = drives.shape[0], p.modes[0]
     for i in range(boom.z.shape[0]):
         p.rest[i] = boom.z[i]
     place(t, boom, work)
@@ -257,7 +257,7 @@ def leave_modes_out(p):
     """Take from the columns of the force what the modes have of them."""
     n = p.drives.shape[0]
     for a in range(2):
-        for j in range(p.count[0]):
+        for j in range(p.modes[0]):
             at = 2 + n + j
             share = p.readings[at, n + a] / (p.omega[j] * p.omega[j])
             for i in range(p.columns.shape[1]):
@@ -274,7 +274,7 @@ def leave_modes_out(p):
 @inner
 def iterate_modes(t, boom, work, p):
     """Bring the modes to the present posture: (K + s^2 M) y_j = s^2 M phi_j, then Rayleigh and Ritz in the span of the y_j."""
-    n, m = p.drives.shape[0], p.count[0]
+    n, m = p.drives.shape[0], p.modes[0]
     if m == 0:
         return
     shift2 = p.omega[0] * p.omega[0]

@@ -113,7 +113,7 @@ class LengthPredictor(BoomPredictor):
         settle(self.plan, boom, self._work, drives, rigid)
         p.angles[:] = rigid
         modes = natural_modes(self.plan, boom, self._work, MODES, WIDTH, 2.0 * math.pi * HIGHEST)
-        p.count[0] = len(modes)
+        p.modes[0] = len(modes)
         for j, mode in enumerate(modes):
             p.motions[j], p.columns[2 + self.plan.joints + j] = mode.motion, mode.increments
             p.omega[j] = 2.0 * math.pi * mode.frequency
@@ -123,7 +123,7 @@ class LengthPredictor(BoomPredictor):
         sag = float(np.hypot(*(boom.frames[-1, :2] - self._undeflected.at(rigid)[-1])))
         start_models(p, f, np.zeros_like(drives) if speeds is None else speeds, 0.0 if speeds is None else SWING * sag)
 
-    # -- strokes: what is expected of the lengths -----------------------------------------------------------------------------
+    # -- strokes: what is expected of the lengths
 
     @property
     def angles(self) -> Array:
@@ -160,14 +160,14 @@ class LengthPredictor(BoomPredictor):
         Speeds and braking are taken `sure` deviations to the safe side.
         """
         n, f = self.plan.joints, self.filters
-        first = 2 * int(self.posture.count[0]) + 4 + n
+        first = 2 * int(self.posture.modes[0]) + 4 + n
         mean, deviations = f.mean[PREDICTION], np.sqrt(np.maximum(f.spread[PREDICTION].diagonal(), 0.0))
         rates, accelerations = slice(first, first + n), slice(first + n, first + 2 * n)
         speeds = np.maximum(np.abs(mean[rates]) - sure * deviations[rates], 0.0)
         braking = np.maximum(-mean[accelerations] * np.sign(mean[rates]), 0.0) + sure * deviations[accelerations]
         return float(np.minimum(speeds * span, speeds**2 / (2.0 * np.maximum(braking, 1e-12))).max())
 
-    # -- what a run tells the filters -------------------------------------------------------------------------------------------
+    # -- what a run tells the filters
 
     def mask(self, masked: NDArray[np.bool_]) -> None:
         """Leave the measured channels (c,) that are masked out of the estimate, and forget what a new one has told it."""
@@ -184,7 +184,7 @@ class LengthPredictor(BoomPredictor):
 
     def add_phase(self, prediction: Prediction) -> None:
         """The time that passed is not known: two phases of the vibration in `prediction` are twice its amplitude apart."""
-        m, n, p = int(self.posture.count[0]), self.plan.joints, self.posture
+        m, n, p = int(self.posture.modes[0]), self.plan.joints, self.posture
         if m == 0:
             return
         velocity, acceleration = prediction.tip_velocity, prediction.tip_acceleration
@@ -197,7 +197,7 @@ class LengthPredictor(BoomPredictor):
     @property
     def tip_sigmas(self) -> Array:
         """Standard deviations of the predicted tip along x and y, m, shape (2,)."""
-        n, m = self.plan.joints, int(self.posture.count[0])
+        n, m = self.plan.joints, int(self.posture.modes[0])
         rows = np.zeros((2, 2 * m + 4 + 3 * n))
         columns = self.posture.readings[: 2 + n + m, n : n + 2].T
         rows[:, :m], rows[:, 2 * m : 2 * m + 2] = columns[:, 2 + n :], columns[:, :2]

@@ -86,7 +86,7 @@ def step_lengths(t, boom, live, work, p, f, h, stamp, y, gravity, out):
 @inner
 def place_live(t, boom, live, work, p, f):
     """Bring `live` to the mean of the prediction."""
-    n, m, load, drive = p.drives.shape[0], p.count[0], force_place(p), drive_place(p)
+    n, m, load, drive = p.drives.shape[0], p.modes[0], force_place(p), drive_place(p)
     for i in range(live.z.shape[0]):
         live.z[i] = p.rest[i]
     for a in range(2):
@@ -149,7 +149,7 @@ def write_prediction(t, live, p, f, h, gravity, out):
 @inner
 def length_rate(p, f, i):
     """Return the rate of the length of cylinder `i`, m/s: of the drives, and of the oil's extension."""
-    n, m, drive = p.drives.shape[0], p.count[0], drive_place(p)
+    n, m, drive = p.drives.shape[0], p.modes[0], drive_place(p)
     rate = f.mean[PREDICTION, drive + n + i]
     for k in range(n):
         rate += p.compliance[i] * p.forces[2 + k, i] * f.mean[PREDICTION, drive + n + k]
@@ -165,7 +165,7 @@ def write_bend(live, p, f, found):
     With the turning rate w_i of the chord r_i of section i, and what w_i changes by the geometry of the linkages, a_i,
     the tip has sum_i (a_i e_z x r_i - w_i^2 r_i).
     """
-    n, m, drive, change = p.drives.shape[0], p.count[0], drive_place(p), 0.0
+    n, m, drive, change = p.drives.shape[0], p.modes[0], drive_place(p), 0.0
     found[0], found[1], found[2] = 0.0, 0.0, 0.0
     for i in range(n):
         rate, v = 0.0, f.mean[PREDICTION, drive + n + i]
