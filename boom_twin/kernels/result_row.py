@@ -23,19 +23,21 @@ class Results(NamedTuple):
 
     Attributes
     ----------
-    joints, cylinder_forces, lengths : ndarray, shape (.., n)
-        rad; N; m, of the cylinders pin to pin less `closed_length`.
+    joints, cylinder_forces : ndarray, shape (.., n)
+        rad, N.
     tip : ndarray, shape (.., 3, 3)
         Position, velocity, acceleration; of x, y (m) and orientation (rad).
     pins : ndarray, shape (.., k, 4)
         Offset x, y of the journal in its bush (m), contact force (N), 1 where they touch.
+    lengths : ndarray, shape (.., n)
+        Of the cylinders, pin to pin less `closed_length`, m.
     """
 
     joints: Array
     cylinder_forces: Array
-    lengths: Array
     tip: Array
     pins: Array
+    lengths: Array
 
     def at(self, rows: NDArray[np.int64]) -> Results:
         """Some of the instants, by their numbers."""
@@ -59,14 +61,15 @@ def row_width(joints, pins):
 @inner
 def results_in(row, joints, pins):
     """The `Results` in a row, shape (row_width or more,), as views of it."""
-    tip = 3 * joints
+    tip = 2 * joints
     journals = tip + TIP
+    lengths = journals + PIN * pins
     return Results(
         row[:joints],
-        row[joints : 2 * joints],
-        row[2 * joints : tip],
+        row[joints:tip],
         row[tip:journals].reshape((3, 3)),
-        row[journals : journals + PIN * pins].reshape((pins, PIN)),
+        row[journals:lengths].reshape((pins, PIN)),
+        row[lengths : lengths + joints],
     )
 
 
@@ -87,9 +90,9 @@ class Places(NamedTuple):
 
     joints: slice
     cylinder_forces: slice
-    lengths: slice
     tip: slice
     pins: slice
+    lengths: slice
     strokes: slice
     variances: slice
     rigid_tip: slice
@@ -97,7 +100,7 @@ class Places(NamedTuple):
 
 def places_in(joints: int, pins: int) -> Places:
     """The `Places` of a boom."""
-    sizes = (joints, joints, joints, TIP, PIN * pins, joints, joints, 2)
+    sizes = (joints, joints, TIP, PIN * pins, joints, joints, joints, 2)
     return Places(*(slice(end - size, end) for size, end in zip(sizes, accumulate(sizes), strict=True)))
 
 
@@ -105,4 +108,4 @@ def results_of(rows: Array, joints: int, pins: int) -> Results:
     """The `Results` of rows, shape (.., row_width), with the same leading axes."""
     at, lead = places_in(joints, pins), rows.shape[:-1]
     tip, journals = rows[..., at.tip].reshape(*lead, 3, 3), rows[..., at.pins].reshape(*lead, pins, PIN)
-    return Results(rows[..., at.joints], rows[..., at.cylinder_forces], rows[..., at.lengths], tip, journals)
+    return Results(rows[..., at.joints], rows[..., at.cylinder_forces], tip, journals, rows[..., at.lengths])

@@ -18,6 +18,7 @@ from boom_twin.analysis.drive import PASSES, TOLERANCE
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.simulate import RHO
 from boom_twin.compiler.compile import compile_scene
+from boom_twin.compiler.plan import width_of
 from boom_twin.kernels.integrators import GENERALISED_ALPHA
 from boom_twin.kernels.tables import State
 from boom_twin.kernels.transfer.time_step import run
@@ -50,7 +51,7 @@ class Runner:
         times = STEP * np.arange(1, STEPS + 1)[:, None]
         self.drives = self.plan.closed_lengths + strokes + speeds * times**2 / (2.0 * BEGIN)
         self.rates = speeds * times / BEGIN
-        self.out = np.empty((1, 2 * self.plan.joints + 9))
+        self.out = np.empty((1, width_of(self.plan)))
         self.passes = 0.0
 
     def seconds(self) -> float:

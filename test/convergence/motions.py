@@ -8,6 +8,7 @@ from boom_twin.analysis.drive import PASSES, TOLERANCE
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.simulate import RHO
 from boom_twin.compiler.compile import compile_scene
+from boom_twin.compiler.plan import width_of
 from boom_twin.kernels.integrators import GENERALISED_ALPHA
 from boom_twin.kernels.transfer.time_step import observe, run
 
@@ -30,11 +31,11 @@ def smooth_drive(start, travel, duration):
 
 
 def follow(scene, drive, angles, step, count, every=1, rho=RHO):
-    """Rows (count/every + 1, 2 n + 9) of `observe` along `drive`, from rest in equilibrium; steps of `step` s."""
+    """Rows (count/every + 1, width) of `observe` along `drive`, from rest in equilibrium; steps of `step` s."""
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, drive(0.0)[0] - plan.closed_lengths, angles)
-    rows = np.empty((count // every + 1, 2 * plan.joints + 9))
+    rows = np.empty((count // every + 1, width_of(plan)))
     observe(plan.tables, state, rows[0])
     times = step * np.arange(1, count + 1)[:, None]
     lengths, rates, _ = drive(times)

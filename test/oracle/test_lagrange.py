@@ -50,7 +50,7 @@ def errors(scene, angles, travel, steps):
                 np.abs(rows[:, :n] - joints).max(),
                 np.max(np.abs(rows[:, n : 2 * n] - forces).max(axis=0) / np.abs(forces).max(axis=0)),
                 np.abs(rows[:, 2 * n : 2 * n + 3] - tip).max(),
-                np.abs(rows[:, 2 * n + 6 :] - acceleration).max(),
+                np.abs(rows[:, 2 * n + 6 : 2 * n + 9] - acceleration).max(),
             ]
         )
     return np.array(table), np.abs(acceleration).max()

@@ -10,7 +10,7 @@ from boom_twin.analysis.drive import PASSES
 from boom_twin.analysis.equilibrium import set_undeformed
 from boom_twin.analysis.simulate import RHO
 from boom_twin.compiler.compile import compile_scene
-from boom_twin.compiler.plan import Plan
+from boom_twin.compiler.plan import Plan, taken_apart, width_of
 from boom_twin.kernels.integrators import DEPTH, GENERALISED_ALPHA, HAT, NEW_A, A, P, Scheme, X, new_weights
 from boom_twin.kernels.tables import State, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
@@ -61,7 +61,7 @@ def stepped(start, step, count, every, drive=None, rho=RHO):
     `drive` gives lengths (m) and rates (m/s) of the cylinders, each (m, n), at times (m,); without it they keep their length.
     """
     plan, state, work = start.plan, State(*(array.copy() for array in start.state)), start.work
-    rows = np.empty((count // every + 1, 2 * plan.joints + 9))
+    rows = np.empty((count // every + 1, width_of(plan)))
     observe(plan.tables, state, rows[0])
     if drive is None:
         lengths = np.tile(start.lengths, (count, 1))
@@ -73,7 +73,7 @@ def stepped(start, step, count, every, drive=None, rho=RHO):
         plan.tables, state, work, steps, counts, lengths, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
     )
     assert status == 0, f"status {status} in row {row}"
-    return rows[:, 2 * plan.joints :].reshape(-1, 3, 3)
+    return taken_apart(plan, rows).tip
 
 
 def halved(start, step, duration, rows, drive=None, halvings=3, rho=RHO):
