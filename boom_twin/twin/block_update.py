@@ -228,8 +228,8 @@ class BlockUpdate:
             more = *block, 0, False, found
         else:
             kernels, beside = (update, measure), (limits, state, self._modes.held)
-            together = *self._boom.held, *beside, self._steps.held
-            more = *block, 0, False, False, found
+            together = *self._boom.held, *beside
+            more = self._steps.held, *block, 0, False, False, found
         if self._code is None:
             advance = kernels[0].for_types_of(*together, *more)
             self._code = advance, kernels[1].for_types_of(*beside, 0, 0, np.zeros(width), False, found)
@@ -251,13 +251,13 @@ class BlockUpdate:
         row, is_resumed, size = 0, False, len(block.stamps)
         assert run is not None
         (advance, _), (arguments, _, found) = self._held or self._hold()
-        resumed: tuple[bool, ...] = ()
         if self._steps.are_recorded:
             self._steps.make_room(size, self._boom.step_width)
         while True:
             if isinstance(self._modes, DeviationModes):
-                resumed = (is_resumed,)
-            reason, row = advance(*arguments, *block, row, *resumed, trusted, found)
+                reason, row = advance(*arguments, self._steps.held, *block, row, is_resumed, trusted, found)
+            else:
+                reason, row = advance(*arguments, *block, row, trusted, found)
             if (is_resumed := reason == REFRESH) and isinstance(self._modes, DeviationModes):
                 interval, boom = run.interval or self._step, self._boom
                 assert isinstance(run.deviations, Deviations)
