@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin import Sample, Stream, load_scene
 from boom_twin.analysis.bending_moments import increments_by_tip_force, moments_by_unknowns, stations
 from boom_twin.analysis.bending_stress import BOX, BendingStressModel, section_moduli
 from boom_twin.analysis.equilibrium import rest_at
@@ -109,7 +110,7 @@ def test_a_force_at_the_tip_bends_as_a_payload_does():
 
 def test_what_sensors_know_beyond_the_prediction_is_added_with_its_deviation():
     strokes, model = strokes_of_posture(SCENE, "horizontal"), BendingStressModel(SCENE)
-    prediction = Twin(SCENE).update(Sample(Stream.STROKES, 10**9, strokes)).prediction
+    prediction = drive_twin(SCENE).update(Sample(Stream.STROKES, 10**9, strokes)).prediction
     zeros = np.zeros(3)
     load, variance = np.array([0.0, -100.0]), np.array([0.0, 400.0])
     estimate = Estimate(10**9, zeros, zeros, load, np.zeros(6), np.zeros(6), variance)

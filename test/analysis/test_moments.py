@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin import Sample, Stream, load_scene
 from boom_twin.analysis.bending_moments import PLACES, moments_by_unknowns, stations
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.compiler.compile import compile_scene
@@ -42,7 +43,7 @@ def test_one_column_for_every_station(at_rest):
 
 
 def test_predictions_carry_them():
-    twin, strokes = Twin(SCENE), strokes_of_posture(SCENE, "horizontal")
+    twin, strokes = drive_twin(SCENE), strokes_of_posture(SCENE, "horizontal")
     prediction = twin.update(Sample(Stream.STROKES, 10**9, strokes)).prediction
     assert prediction.moments.shape == (len(stations(SCENE)),)
     assert prediction.moments[0] == pytest.approx(-33038.1, rel=1e-3)

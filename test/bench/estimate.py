@@ -20,6 +20,7 @@ from typing import NamedTuple
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
+from drive_twin import drive_twin
 
 from boom_twin.config.settings import Settings
 from boom_twin.estimation.load_spectrum import tip_load as pulses_of
@@ -30,7 +31,6 @@ from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.load import examine_text, example_text
 from boom_twin.scene.schema import Scene
 from boom_twin.twin.blocks import CODES, ReportBlock, SampleBlock
-from boom_twin.twin.twin import Twin
 from boom_twin.types import NANO, Array, Stream
 from boom_twin.validation.rig import Programme, Scheme, Sensors, at_rest, move, observe, random_programme
 from boom_twin.validation.rig.faults import RigFault
@@ -183,7 +183,7 @@ def block_of(session: Session, streams: list[Stream]) -> SampleBlock:
 
 def measured(session: Session, case: Case, sensors: str, skip: float = 0.0) -> dict[str, float | str]:
     """Errors of prediction and estimate from `skip` (s) on; see the module's text."""
-    twin = Twin(scene_of(case), Settings(**dict(case.settings)))
+    twin = drive_twin(scene_of(case), Settings(**dict(case.settings)))
     parts = [
         part for part in twin.update_block(block_of(session, [Stream[each.upper()] for each in sensors.split(",")]))
         if isinstance(part, ReportBlock)

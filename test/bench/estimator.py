@@ -17,10 +17,11 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from drive_twin import drive_twin
 from estimation.motions import measured
 from estimation.test_motions import error, followed
 
-from boom_twin import Settings, Stream, Twin, load_scene
+from boom_twin import Settings, Stream, load_scene
 from boom_twin.bag.reader import read, scan
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.offline.ground_truth import load_truth
@@ -52,7 +53,7 @@ def strokes_of_session() -> tuple[list[int], np.ndarray, np.ndarray]:
 
 def errors(stamps, strokes, **tuning) -> tuple[float, float, float]:
     """Tip error (mm rms), acceleration error (m/s^2 rms), microseconds per sample."""
-    twin, truth = Twin(load_scene(), Settings(**tuning)), load_truth(SESSION)
+    twin, truth = drive_twin(load_scene(), Settings(**tuning)), load_truth(SESSION)
     start = time.perf_counter()
     recording = Recording(strokes.shape[1])
     for part in twin.update_block(SampleBlock(np.zeros(len(stamps), np.int64), np.array(stamps), strokes)):
@@ -112,7 +113,7 @@ def compare_rates() -> None:
 
 
 if __name__ == "__main__":
-    Twin(load_scene()).warm_up()
+    drive_twin(load_scene()).warm_up()
     sweep("agility", [{"stroke_agility": value} for value in AGILITIES])
     sweep("steps", [{"step": step, "look_step": look} for step, look in STEPS])
     compare_rates()

@@ -21,6 +21,7 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in a replay
 
 import numpy as np
+from drive_twin import drive_twin
 
 from boom_twin.bag.reader import scan
 from boom_twin.bag.session_model import baseline_of, mapping_of, scene_of, settings_of
@@ -76,7 +77,7 @@ def run(session: Path, durations: Durations) -> str:
     following, items = timed(lambda: next(read, None), durations["reading, decoding"]), list[SampleBlock | Change]()
     while (item := following()) is not None:
         items += [item] if isinstance(item, SampleBlock | Change) else []
-    twin, digest = Twin(scene, settings, topics.mounts(joints), usual.baseline), hashlib.sha256()
+    twin, digest = drive_twin(scene, settings, topics.mounts(joints), usual.baseline), hashlib.sha256()
     twin.warm_up()
     for name in STAGES:
         durations[name].clear()

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Twin
 from boom_twin.config.settings import Settings, Thresholds
 from boom_twin.diagnostics import twin_status as module
 from boom_twin.diagnostics.levels import Evaluation, Level, Status
@@ -225,7 +225,7 @@ def test_an_idle_node_tells_of_its_model_only(rig: Rig) -> None:
 
 def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() -> None:
     scene, strokes = load_scene(), strokes_of_posture(load_scene(), "horizontal")
-    prediction = Twin(scene).update(Sample(Stream.STROKES, 10**18, strokes)).prediction
+    prediction = drive_twin(scene).update(Sample(Stream.STROKES, 10**18, strokes)).prediction
     watch, at = stress_watch(scene), Evaluation(Thresholds(), 0.0, 0.0)
     assert watch is not None and prediction is not None
     for load, told in (
@@ -258,7 +258,7 @@ def test_the_load_at_the_tip_is_told_once_anything_was_measured() -> None:
 def test_reports_of_rows_are_judged_as_those_that_were_made_at_once() -> None:
     """Residuals of several streams, at once or when strokes come, the load, the bending stresses."""
     scene, random = load_scene(), np.random.default_rng(3)
-    twin, rest = Twin(scene), strokes_of_posture(scene, "horizontal")
+    twin, rest = drive_twin(scene), strokes_of_posture(scene, "horizontal")
     watches = []
     for _ in range(2):
         sensors = sensors_of(scene, Settings(), REQUIRED, [None] * 4)

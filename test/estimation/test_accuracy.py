@@ -6,8 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, Twin, load_scene, statics
+from boom_twin import Sample, Stream, load_scene, statics
 from boom_twin.cli.accuracy import sensors_of, sets_of
 from boom_twin.errors import UsageError
 from boom_twin.estimation import deviation_filter
@@ -35,7 +36,7 @@ def test_more_sensors_are_never_worse(found: list[TipAccuracy]) -> None:
 
 def test_it_is_what_a_twin_comes_to(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same sensors on a twin whose load level is held: mean of its variances after 10 s of readings of a boom at rest."""
-    stated, twin = accuracy_at(SCENE, ARCH, [Stream.ANGLES]), Twin(SCENE)
+    stated, twin = accuracy_at(SCENE, ARCH, [Stream.ANGLES]), drive_twin(SCENE)
     rng, angles = np.random.default_rng(1), np.array(statics(SCENE, strokes=ARCH).joints)
     estimates = []
     for k in range(4000):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
 from boom_twin import Sample, Settings, Twin, load_scene
 from boom_twin.kernels.transfer.kept_tangent import GAIN
@@ -39,7 +40,7 @@ def tips(twin: Twin, stamps: Array, strokes: Array, anew: bool = False) -> tuple
 @pytest.mark.parametrize("rate", [50.0, 200.0, 1000.0])
 def test_kept_tangents_change_predictions_by_far_less_than_noise_does(rate: float) -> None:
     stamps, strokes = moving(rate, 4.0, 0.02 / rate)
-    (tip, acceleration, _), (fresh, accelerated, _) = (tips(Twin(SCENE), stamps, strokes, anew) for anew in (False, True))
+    (tip, acceleration, _), (fresh, accelerated, _) = (tips(drive_twin(SCENE), stamps, strokes, anew) for anew in (False, True))
     assert np.abs(tip - fresh).max() < 2e-5
     assert np.sqrt(np.square(acceleration - accelerated).mean()) < 0.01
     quiet = np.sqrt(np.square(np.diff(accelerated[len(stamps) // 2 :], axis=0)).mean())
@@ -49,7 +50,7 @@ def test_kept_tangents_change_predictions_by_far_less_than_noise_does(rate: floa
 def test_kept_tangents_are_those_of_most_passes() -> None:
     """A pass with a kept tangent does not make condensed matrices anew: gains of the first joint are those of long ago."""
     stamps, strokes = moving(200.0, 4.0, 1e-4)
-    twin, changes, before = Twin(SCENE), 0, None
+    twin, changes, before = drive_twin(SCENE), 0, None
     for stamp, row in zip(stamps.tolist(), strokes, strict=True):
         twin.update(Sample(Stream.STROKES, stamp, row))
         gains = twin._boom.compiled.tangents.condensed.gains[0].copy()
@@ -60,7 +61,7 @@ def test_kept_tangents_are_those_of_most_passes() -> None:
 def test_a_boom_that_started_anew_is_predicted_as_by_a_new_twin() -> None:
     """Tangents of before a start from rest are forgotten."""
     stamps, strokes = moving(200.0, 2.0, 1e-4)
-    twin, other = Twin(SCENE, Settings()), Twin(SCENE, Settings())
+    twin, other = drive_twin(SCENE, Settings()), drive_twin(SCENE, Settings())
     tips(twin, stamps, strokes)
     twin.reset()
     later = stamps + 20_000_000_000

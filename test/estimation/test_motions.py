@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 from estimation.motions import measured, rms
 
-from boom_twin import Sample, Settings, Stream, Twin, load_scene
+from boom_twin import Sample, Settings, Stream, load_scene
 from boom_twin.errors import UsageError
 from boom_twin.estimation.stroke_filter import corners
 from boom_twin.health.baseline import load_baseline
@@ -18,7 +19,7 @@ from boom_twin.twin.blocks import SampleBlock
 
 def followed(session, **options):
     """A twin that has followed the strokes of a session, and what it predicted."""
-    twin, recording = Twin(load_scene(), **options), Recording(4)
+    twin, recording = drive_twin(load_scene(), **options), Recording(4)
     block = SampleBlock(np.zeros(len(session.stamps), np.int64), session.stamps, session.strokes)
     for part in twin.update_block(block):
         recording.add(part)
@@ -48,7 +49,7 @@ def test_a_motion_that_cannot_be_followed_is_an_event_and_widens_deviations():
     assert twin.counts["not followed"] == 1 and not followed(quiet)[0].counts
     deviations = {}
     for name, each in (("lost", session), ("quiet", quiet)):
-        twin = Twin(load_scene())
+        twin = drive_twin(load_scene())
         for stamp, strokes, joints in zip(each.stamps[:600].tolist(), each.strokes, each.joints, strict=False):
             twin.update(Sample(Stream.STROKES, stamp, strokes))
             found = twin.update(Sample(Stream.ANGLES, stamp, joints)).residuals[0]
@@ -59,7 +60,7 @@ def test_a_motion_that_cannot_be_followed_is_an_event_and_widens_deviations():
 @pytest.mark.parametrize("name", ["stops", "35 Hz"])
 def test_one_by_one_is_as_in_blocks(name):
     session = measured(name, 100.0)
-    (_, predictions), twin = followed(session), Twin(load_scene())
+    (_, predictions), twin = followed(session), drive_twin(load_scene())
     reports = [twin.update(Sample(Stream.STROKES, *row)) for row in zip(session.stamps.tolist(), session.strokes, strict=True)]
     assert predictions.tip_acceleration.tobytes() == np.array([r.prediction.tip_acceleration for r in reports]).tobytes()
     assert sum("not followed" in report.events for report in reports) == twin.counts["not followed"] == int(name == "35 Hz")
@@ -68,7 +69,7 @@ def test_one_by_one_is_as_in_blocks(name):
 @pytest.mark.parametrize(("name", "rate"), [("stops", 50.0), ("sweep", 50.0), ("12 Hz", 50.0)])
 def test_no_sensor_is_accused_of_a_motion_in_haste(name, rate):
     """At 50 Hz a filter that lags has the readings of joints jump."""
-    twin, session, alarms = Twin(load_scene(), baseline=load_baseline(None)), measured(name, rate), set()
+    twin, session, alarms = drive_twin(load_scene(), baseline=load_baseline(None)), measured(name, rate), set()
     for stamp, strokes, joints in zip(session.stamps.tolist(), session.strokes, session.joints, strict=True):
         for stream, values in ((Stream.STROKES, strokes), (Stream.ANGLES, joints)):
             if (health := twin.update(Sample(stream, stamp, values)).health) is not None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 from oracle import booms
 
-from boom_twin import Twin
 from boom_twin.analysis.methods import integrate_with
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.config.settings import Settings
@@ -76,6 +76,6 @@ def test_a_scene_without_the_test_move_takes_the_longest_steps():
 
 
 def test_the_twin_steps_by_it():
-    twin = Twin(SCENE, Settings(step_tip_error=1e-5))
+    twin = drive_twin(SCENE, Settings(step_tip_error=1e-5))
     tuning = twin._compiled.limits.tuning
     assert (tuning.step, tuning.look_step) == twin.steps[:2] == chosen(step_tip_error=1e-5)[:2]

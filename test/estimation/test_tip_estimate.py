@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 from scipy.linalg import expm
 
 from boom_twin import load_scene, statics
@@ -31,7 +32,6 @@ from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.load import examine_text, example_text
 from boom_twin.scene.schema import Scene
 from boom_twin.twin.blocks import ReportBlock, block_of, row_of
-from boom_twin.twin.twin import Twin
 from boom_twin.types import Array, Estimate, Sample, Stream
 from boom_twin.validation.rig.faulty_boom import wrong_by
 
@@ -336,7 +336,7 @@ def test_the_stated_deviation_of_the_acceleration_at_rest_is_true(scene: Scene) 
     errors = []
     for seed in range(2):
         samples, _ = pseudo_session(scene, scene, 8.0, 20 + seed)
-        twin, told = Twin(scene), []
+        twin, told = drive_twin(scene), []
         for sample in with_imu(scene, scene, samples, seed):
             report = twin.update(sample)
             told += [report.estimate] if report.estimate is not None else []
@@ -420,7 +420,7 @@ def pseudo_session(scene: Scene, true: Scene, seconds: float, seed: int) -> tupl
 
 def estimate_far_nearer_than_prediction(scene: Scene, samples: list[Sample], truth: Array) -> Estimate:
     """The last estimate, whose error is less than 8 % of that of the prediction (m), which is off by 20 mm or more."""
-    twin, report = Twin(scene), None
+    twin, report = drive_twin(scene), None
     for sample in samples:
         told = twin.update(sample)
         report = told if told.prediction is not None else report
@@ -457,7 +457,7 @@ def test_what_agrees_with_the_scene_is_stated_more_closely(scene: Scene, is_righ
     for seed in range(2 if is_right else 8):
         true = scene if is_right else wrong_by(scene, 0.02, 200 + seed)
         samples, truth = pseudo_session(scene, true, 3.0, 30 + seed)
-        twin = Twin(scene)
+        twin = drive_twin(scene)
         told = [report.estimate for report in map(twin.update, samples) if report.estimate is not None][200:]
         variances = np.array([each.tip_covariance[[0, 3]] for each in told])
         errors.append(np.mean((np.array([each.tip[:2] for each in told]) - truth["tip"]) ** 2 / variances))
@@ -542,7 +542,7 @@ def test_a_sag_that_only_the_imu_shows_is_in_the_deviations(scene: Scene, stiffn
     """A section 40 % softer turns the tip and no joint: prediction and estimate are off by what they say, not by far more."""
     true = with_parameters(scene, {"section_2.EI": stiffness * parameter(scene, "section_2.EI")})
     samples, truth = pseudo_session(scene, true, 10.0, 1)
-    twin = Twin(scene, baseline=Baseline())
+    twin = drive_twin(scene, baseline=Baseline())
     health = []
     for sample in with_imu(scene, true, samples):
         report = twin.update(sample)
@@ -557,7 +557,7 @@ def test_a_sag_that_only_the_imu_shows_is_in_the_deviations(scene: Scene, stiffn
 
 
 def test_without_other_sensors_it_is_the_prediction(scene: Scene) -> None:
-    twin, strokes = Twin(scene), strokes_of_posture(scene, "arch")
+    twin, strokes = drive_twin(scene), strokes_of_posture(scene, "arch")
     for k in range(40):
         report = twin.update(Sample(Stream.STROKES, k * STEP, strokes))
     assert report.prediction is not None and report.estimate is not None
@@ -579,7 +579,7 @@ def test_order_of_streams_within_a_stamp_changes_little_and_blocks_nothing(scene
     late = [each for k in range(8, len(strokes)) for each in (strokes[k], angles[k - 8])]
     ends = []
     for order in (samples, before, [*strokes[:8], *late]):
-        one, many = Twin(light), Twin(light)
+        one, many = drive_twin(light), drive_twin(light)
         rows = [row_of(report.estimate) for report in map(one.update, order) if report.estimate is not None]
 
         found = []
@@ -597,7 +597,7 @@ def test_order_of_streams_within_a_stamp_changes_little_and_blocks_nothing(scene
 def test_the_covariance_stays_one(scene: Scene) -> None:
     """After a minute of readings at 200 Hz it is symmetric and positive, at rest as with late and missing readings."""
     samples, _ = pseudo_session(scene, scene, 60.0, 3)
-    twin = Twin(scene)
+    twin = drive_twin(scene)
     for sample in samples:
         twin.update(sample)
     f = twin._modes.filter
@@ -640,7 +640,7 @@ def test_a_force_that_reads_wrong_moves_the_tip_little(scene: Scene, cylinder: i
     true, rng, settings = statics(scene, strokes=strokes_of_posture(scene, "arch")), np.random.default_rng(8), Settings()
     forces = np.array(true.cylinder_forces)
     forces[cylinder] = factor * forces[cylinder] + zero
-    twin, told = Twin(scene), []
+    twin, told = drive_twin(scene), []
     for sample in samples:
         told.append(twin.update(sample).estimate)
         if sample.stream is Stream.ANGLES:
@@ -659,7 +659,7 @@ def test_noise_beyond_what_is_stated_is_noise_to_the_estimate_too(scene: Scene, 
     samples, truth = pseudo_session(scene, scene, 8.0, 9)
     rng, settings = np.random.default_rng(10), Settings()
     forces = np.array(statics(scene, strokes=strokes_of_posture(scene, "arch")).cylinder_forces)
-    twin, told = Twin(scene), []
+    twin, told = drive_twin(scene), []
     for sample in with_imu(scene, scene, samples) if "imu" in sensors else samples:
         if sample.stream is Stream.STROKES:
             sample = Sample(sample.stream, sample.stamp, sample.values + 4.9 * settings.stroke_sigma * rng.normal(size=4))
@@ -685,7 +685,7 @@ def test_its_covariance_is_true_for_booms_drawn_from_it(scene: Scene) -> None:
             for i in range(4)
         }
         samples, truth = pseudo_session(scene, with_parameters(scene, values), 3.0, seed)
-        twin, estimates = Twin(scene), []
+        twin, estimates = drive_twin(scene), []
         for sample in samples:
             report = twin.update(sample)
             if report.estimate is not None:
@@ -698,7 +698,7 @@ def test_its_covariance_is_true_for_booms_drawn_from_it(scene: Scene) -> None:
 def test_absurd_readings_leave_an_estimate(scene: Scene) -> None:
     """A sensor that reads millions for a while; afterwards the estimate is where it was."""
     samples, truth = pseudo_session(scene, scene, 6.0, 4)
-    twin, ends = Twin(scene), []
+    twin, ends = drive_twin(scene), []
     for sample in samples:
         is_spoilt = sample.stream is Stream.ANGLES and 1_000_000_000 < sample.stamp < 1_500_000_000
         report = twin.update(Sample(sample.stream, sample.stamp, sample.values + 9e6) if is_spoilt else sample)
@@ -719,7 +719,7 @@ def test_a_boom_without_springs_or_beams_has_one_too(scene: Scene, drop: str) ->
         content["modes"] = 0
     other = Scene.model_validate(content)
     samples, _ = pseudo_session(other, other, 2.0, 5)
-    twin = Twin(other)
+    twin = drive_twin(other)
     estimates = [report.estimate for report in map(twin.update, samples) if report.estimate is not None]
     f = twin._modes.filter
     assert np.isfinite(row_of(estimates[-1])).all() and (estimates[-1].tip_covariance[[0, 3, 5]] > 0.0).all()

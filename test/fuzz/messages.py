@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from drive_twin import drive_twin
 from numpy.random import Generator
 
-from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin import Sample, Stream, load_scene
 from boom_twin.bag.integrity import PARSE_ERRORS
 from boom_twin.bag.session_files import sensor_message
 from boom_twin.config.settings import Settings
@@ -78,7 +79,7 @@ def _encoded(sample: Sample, little_endian: bool = True) -> bytes:
 def _outputs() -> dict[str, list[bytes]]:
     """What a twin publishes, by role."""
     random, scene = np.random.default_rng(3), load_scene()
-    twin, encoder, found = Twin(scene, baseline=load_baseline(None)), ReportEncoder(scene, Settings()), {}
+    twin, encoder, found = drive_twin(scene, baseline=load_baseline(None)), ReportEncoder(scene, Settings()), {}
     for number in range(400):
         for stream in Stream:
             for key, data in encoder.fill(twin.update(_true(random, number, stream))):
@@ -176,7 +177,7 @@ class _Listener:
     def __init__(self) -> None:
         self.odd = 0
         scene, topics = load_scene(), load_topics()
-        self._twin, self._decoder = Twin(scene, baseline=load_baseline(None)), SampleDecoder(4, topics)
+        self._twin, self._decoder = drive_twin(scene, baseline=load_baseline(None)), SampleDecoder(4, topics)
         self._wires = {stream: CdrDecoder(TYPES[stream], field=kind.field) for stream, kind in SENSORS.items()}
         self._feed, self._topics = Feed("fuzz", Store(2000), topics, scene), topics
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from drive_twin import drive_twin
 
 from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.bag.reader import read, scan
@@ -80,7 +81,7 @@ class Outcome(NamedTuple):
 def run(samples: Iterable[Sample], settings: Settings | None = None, baseline: Baseline | None = None, twin=None) -> Outcome:
     """A twin of the default boom takes them all."""
     samples = list(samples)
-    twin = twin or Twin(load_scene(), settings, baseline=baseline or Baseline())
+    twin = twin or drive_twin(load_scene(), settings, baseline=baseline or Baseline())
     reports = [twin.update(sample) for sample in samples]
     return Outcome(twin, reports, [r.health for r in reports if r.health is not None], samples[0].stamp)
 

@@ -6,9 +6,10 @@ import re
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 from health.recorded import run, session
 
-from boom_twin import Twin, load_scene, simulate
+from boom_twin import load_scene, simulate
 from boom_twin.analysis.equilibrium import statics
 from boom_twin.health.alarm_text import AlarmText
 from boom_twin.health.baseline import Baseline
@@ -292,7 +293,7 @@ def test_holds_raise_no_alarm_by_a_single_frequency() -> None:
     hold = drawn(np.random.default_rng(1), 0.0)[0]
     place = next(i for i, each in enumerate(parameters(load_scene())) if each.cause == "section_1.EI")
     for is_of_one in (True, False):
-        monitor = Twin(load_scene(), baseline=Baseline()).judge.residuals
+        monitor = drive_twin(load_scene(), baseline=Baseline()).judge.residuals
         best = Cause("section_1.EI", 1.0, (Explanation(place, 0, 30.0, 0.4, 0.05),), 1.0, 1.0)
         found = HoldVerdict(hold.start, Verdict((best,), 1.0, 1.0, 0, 30.0), 0.007)
         monitor._hold_test.take = lambda *_, found=found: found
@@ -332,7 +333,7 @@ def test_a_softer_section_of_a_recorded_session() -> None:
     """
     scene = load_scene()
     stiff = with_parameters(scene, {"section_1.EI": parameter(scene, "section_1.EI") / 0.7})
-    found = run(session(33.0), twin=Twin(stiff, baseline=learnt(scene)))
+    found = run(session(33.0), twin=drive_twin(stiff, baseline=learnt(scene)))
     assert found.causes() == {"section_1.EI"}
     alarm = next(each for _, each in found.states())
     assert (alarm.channel, alarm.kind, alarm.cause) == ("tip", "softer", None) and "puts the tip off by" in alarm.told
@@ -346,14 +347,14 @@ def test_a_tip_that_is_far_off_is_told_with_the_baseline_that_ships() -> None:
     """
     scene = load_scene()
     stiff = with_parameters(scene, {"section_1.EI": parameter(scene, "section_1.EI") / 0.6})
-    found = run(session(60.0), twin=Twin(stiff, baseline=Baseline()))
+    found = run(session(60.0), twin=drive_twin(stiff, baseline=Baseline()))
     assert [told[1:] for told in found.told()] == [("tip", "residual", None)]
     alarm = found.health[-1].alarms[0]
     assert alarm.until is None and alarm.ranked[0].cause == "section_1.EI"
     assert re.match(
         r"the tip is off by about (1[5-9]|2\d) mm: natural frequency 1 by -[34]\.\d %, .* m/s\^2; a fault", alarm.told
     )
-    assert run(session(60.0), twin=Twin(scene, baseline=Baseline())).told() == []
+    assert run(session(60.0), twin=drive_twin(scene, baseline=Baseline())).told() == []
 
 
 def test_a_section_that_holds_have_named_is_known_and_one_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -364,14 +365,14 @@ def test_a_section_that_holds_have_named_is_known_and_one_alarm(monkeypatch: pyt
     monkeypatch.setattr(HoldTest, "is_borne_out", lambda *_: True)
     scene = load_scene()
     stiff = with_parameters(scene, {"section_1.EI": parameter(scene, "section_1.EI") / 0.7})
-    found = run(session(60.0), twin=Twin(stiff, baseline=learnt(scene)))
+    found = run(session(60.0), twin=drive_twin(stiff, baseline=learnt(scene)))
     assert [told[1:] for told in found.told()] == [("tip", "softer", "section_1.EI")]
     assert found.health[-1].alarms[0].until is None, "it lasts"
 
 
 def test_the_same_session_of_the_right_boom_gives_no_alarm() -> None:
     scene = load_scene()
-    assert run(session(27.0), twin=Twin(scene, baseline=learnt(scene))).told() == []
+    assert run(session(27.0), twin=drive_twin(scene, baseline=learnt(scene))).told() == []
 
 
 def test_a_weight_that_may_be_the_mean_of_a_load_is_no_alarm_of_holds() -> None:
@@ -380,7 +381,7 @@ def test_a_weight_that_may_be_the_mean_of_a_load_is_no_alarm_of_holds() -> None:
     known = parameters(load_scene())
     place = next(i for i, each in enumerate(known) if each.cause == "tip.payload")
     for weight, level, alarms in ((-4.3, 0, 1), (-4.3, 2, 0), (20.0, 2, 1)):
-        monitor = Twin(load_scene(), baseline=Baseline()).judge.residuals
+        monitor = drive_twin(load_scene(), baseline=Baseline()).judge.residuals
         best = Cause("tip.payload", 1.0, (Explanation(place, 0, 30.0, weight, 0.5),), 1.0, 1.0)
         found = HoldVerdict(hold.start, Verdict((best,), 1.0, 1.0, 0, 30.0), 0.007)
         monitor._hold_test.take = lambda *_, found=found: found
@@ -397,7 +398,7 @@ def test_a_far_tip_by_a_weight_takes_a_hold_that_no_load_shakes() -> None:
     known = parameters(load_scene())
     places = {each.cause: i for i, each in enumerate(known)}
     for cause, at, alarms in (("tip.payload", shaken, 0), ("tip.payload", hold, 1), ("section_1.EI", shaken, 1)):
-        monitor = Twin(load_scene(), baseline=Baseline()).judge.residuals
+        monitor = drive_twin(load_scene(), baseline=Baseline()).judge.residuals
         best = Cause(cause, 1.0, (Explanation(places[cause], 0, 6.0, 12.0, 0.5),), 1.0, 1.0)
         found = HoldVerdict(hold.start, Verdict((best,), 1.0, 1.0, 0, 6.0), 0.02, is_far=True)
         monitor._hold_test.take = lambda *_, found=found: found

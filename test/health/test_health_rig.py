@@ -7,9 +7,10 @@ import pytest
 
 pytest.importorskip("exudyn")
 
+from drive_twin import drive_twin
 from health.recorded import run
 
-from boom_twin import Twin, load_scene
+from boom_twin import load_scene
 from boom_twin.bag.session_files import samples_of
 from boom_twin.calibration.baseline import learn_baseline
 from boom_twin.config.settings import Settings
@@ -51,7 +52,7 @@ def baseline() -> Baseline:
 
 def surprises(samples, baseline) -> np.ndarray:
     """What is left of every block, shape (blocks, channels)."""
-    twin, found = Twin(load_scene(), baseline=baseline), []
+    twin, found = drive_twin(load_scene(), baseline=baseline), []
     for sample in samples:
         twin.update(sample)
         if not found or twin.judge.residuals.surprise is not found[-1]:

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Twin, load_scene
+from boom_twin import load_scene
 from boom_twin.health.alarm_text import AlarmText
 from boom_twin.health.baseline import Baseline
 from boom_twin.health.inference.block_problem import BLOCK, BlockProblem
@@ -193,13 +194,13 @@ def test_what_a_known_fault_does_in_motion_is_as_unsure_as_the_acceleration_is_l
     problem = BlockProblem(0, table, np.zeros(6), np.zeros((6, 6)), 1.0, 0.0, STIFF)
     alarm = Alarm("joint_4", "changed", 0, None, "tip.payload", "")
     for cause, share in (("tip.payload", 1.0 / 9.81), ("joint_2.sensor", 0.0)):
-        monitor = Twin(scene, baseline=Baseline()).judge.residuals
+        monitor = drive_twin(scene, baseline=Baseline()).judge.residuals
         monitor._known = {cause: _KnownFault(alarm, places[cause], 20.0)}
         assert np.sqrt(monitor._known_in_motion2(problem)) == pytest.approx(share * 20.0 * 1e-4)
 
 
 def test_what_is_blamed_is_told_with_the_offset_that_it_would_be():
-    monitor = Twin(load_scene(), baseline=Baseline()).judge.residuals
+    monitor = drive_twin(load_scene(), baseline=Baseline()).judge.residuals
     ranked = (
         Ranked("cylinder_2.sensor", 0.6, (("scale", 0.01, 1e-3, ""), ("drift", 2.5e-3, 4e-5, "m"))),
         Ranked("cylinder_2.k", 0.4, (("softer", 0.3, 0.02, ""),)),

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 from health.recorded import NANO, Outcome, run, session, spoilt
 
-from boom_twin import Sample, Settings, Stream, Twin, load_scene
+from boom_twin import Sample, Settings, Stream, load_scene
 from boom_twin.health.baseline import Baseline
 
 DEGREE, ONSET = math.radians(1.0), 6.0
@@ -133,7 +134,7 @@ def test_healthy_sessions_give_no_alarm():
 @pytest.mark.slow  # 60 s of session, against 12 s of all others
 def test_innovations_of_a_right_model_are_white():
     """The bundled session with nothing learnt: model errors that could be there are not, so their variance is below 1."""
-    twin, found = Twin(load_scene(), baseline=Baseline()), []
+    twin, found = drive_twin(load_scene(), baseline=Baseline()), []
     for sample in session(60.0):
         twin.update(sample)
         if not found or twin.judge.residuals.surprise is not found[-1]:
@@ -226,7 +227,7 @@ def test_noise_of_strokes_is_no_load() -> None:
 
 
 def test_a_twin_without_a_baseline_tells_nothing():
-    twin = Twin(load_scene())
+    twin = drive_twin(load_scene())
     outcome = run(session(3.0), twin=twin)
     assert outcome.health == [] and twin.judge is None
     assert outcome.tips().tobytes() == healthy().tips()[: len(outcome.tips())].tobytes()
@@ -235,7 +236,7 @@ def test_a_twin_without_a_baseline_tells_nothing():
 def test_another_load_is_asked_for():
     """40 kg that are not there: an alarm; taken back, it is over and all is well again."""
     samples, start = session(18.0), session()[0].stamp
-    twin, alarms = Twin(load_scene(), baseline=Baseline()), []
+    twin, alarms = drive_twin(load_scene(), baseline=Baseline()), []
     for sample in samples:
         time = (sample.stamp - start) * NANO
         if sample.stream is Stream.STROKES and abs(time - 5.0) < 0.0025:

@@ -24,10 +24,11 @@ from boom_twin.twin.blocks import ReportBlock, SampleBlock
 from boom_twin.twin.health_rows import copy_predictions, copy_residuals, count_residuals
 from boom_twin.twin.twin import Twin
 from boom_twin.twin.update import measure, update, write_residual
+from drive_twin import drive_twin
 
 path = Path(sys.argv[1])
 scene, topics = scene_of(path, None).scene, mapping_of(path, None, 4, "").topics
-twin = Twin(scene, baseline=baseline_of(path, None).baseline)
+twin = drive_twin(scene, baseline=baseline_of(path, None).baseline)
 twin.warm_up()
 kernels = filter_block, correct, survey, summarise, update, measure, write_residual
 kernels += first_and_last, largest_step, write_table, has_strayed, collect_means, copy_predictions, copy_residuals

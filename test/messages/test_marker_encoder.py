@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin import Sample, Stream, load_scene
 from boom_twin.messages.marker_encoder import TRACE, ShapeMarkers, force_colour
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output
@@ -28,7 +29,7 @@ def scene() -> Any:
 @pytest.fixture(scope="module")
 def predictions(scene: Any) -> list[Prediction]:
     """Those with a shape of 6 s of the default boom, cylinders 1 and 3 moving."""
-    twin, strokes, found = Twin(scene), strokes_of_posture(scene, "arch"), []
+    twin, strokes, found = drive_twin(scene), strokes_of_posture(scene, "arch"), []
     for k in range(1200):
         moved = strokes + np.array([0.02, 0.0, 0.01, 0.0]) * (1.0 - np.cos(0.01 * k))
         prediction = twin.update(Sample(Stream.STROKES, 3_000_000_000 + k * PERIOD, moved)).prediction

@@ -8,8 +8,9 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Report, Sample, Stream, Twin, load_scene
+from boom_twin import Report, Sample, Stream, load_scene
 from boom_twin.cli.main import main
 from boom_twin.config.settings import Settings
 from boom_twin.messages.report_encoder import ReportEncoder
@@ -187,7 +188,7 @@ def at(pose: np.ndarray, own: tuple[float, float], expected: Any) -> None:
 def test_joint_states_drive_every_joint() -> None:
     """A message that comes with a shape names each joint of the URDF that can move, and no other."""
     scene = load_scene()
-    twin, encoder = Twin(scene), ReportEncoder(scene, Settings())
+    twin, encoder = drive_twin(scene), ReportEncoder(scene, Settings())
     report: Report = twin.update(Sample(Stream.STROKES, 0, strokes_of_posture(scene, "arch")))
     msg = jazzy().deserialize_cdr(dict(encoder.fill(report))[Output.JOINT_STATES], TYPES[Output.JOINT_STATES])
     robot = ElementTree.fromstring(urdf(scene))
@@ -206,7 +207,7 @@ def test_joint_states_drive_every_joint() -> None:
 def test_the_joints_lead_to_the_tip_that_is_predicted(name: str) -> None:
     """Position and pitch of the frame ``tip`` by the rules of URDF, while the boom moves; apart from that of straight ones."""
     scene = booms()[name]
-    twin, encoder, robot = Twin(scene), ReportEncoder(scene, Settings()), ElementTree.fromstring(urdf(scene))
+    twin, encoder, robot = drive_twin(scene), ReportEncoder(scene, Settings()), ElementTree.fromstring(urdf(scene))
     middle = np.radians([sum(joint.range_deg) / 2 for joint in scene.joints])
     begin = np.array([stroke_curve(scene, i, middle[i : i + 1])[0] for i in range(len(middle))])
     apart = []

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Settings, Stream, Twin, load_scene, replay
+from boom_twin import Settings, Stream, load_scene, replay
 from boom_twin.bag.reader import read, scan
 from boom_twin.cli.replay import as_text
 from boom_twin.health.baseline import load_baseline
@@ -59,7 +60,7 @@ def test_true_strokes_leave_the_lag_of_the_estimator_alone():
     truth = np.genfromtxt(SESSION / "truth.csv.gz", delimiter=",", names=True)
     strokes = np.column_stack([truth[f"stroke_{i}_m"] for i in range(1, 5)])
     stamps = np.round(truth["t_s"] * 1e9).astype(np.int64)
-    twin = Twin(load_scene())
+    twin = drive_twin(load_scene())
     recording = Recording(4)
     for part in twin.update_block(SampleBlock(np.zeros(len(stamps), np.int64), stamps, strokes)):
         recording.add(part)
@@ -90,7 +91,7 @@ def test_the_result_bag_holds_what_the_three_calls_give_in_one_process(first):
     roles = {inputs[stream].name: stream for stream in (Stream.STROKES, Stream.ANGLES, Stream.IMU)}
     wanted = {name: inputs[stream].type for name, stream in roles.items()}
     scene, store = load_scene(), jazzy()
-    twin, decoder, encoder = Twin(scene, baseline=load_baseline()), SampleDecoder(4), ReportEncoder(scene, Settings())
+    twin, decoder, encoder = drive_twin(scene, baseline=load_baseline()), SampleDecoder(4), ReportEncoder(scene, Settings())
     expected = []
     for name, log_time, message in read(scan(SESSION), wanted):
         sample = decoder.put(roles[name], stamp_of(message), message)

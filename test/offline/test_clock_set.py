@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin import Sample, Stream, load_scene
 from boom_twin.offline.ground_truth import TipTruth
 from boom_twin.offline.recording import Recording
 from boom_twin.scene.kinematics import strokes_of_posture
@@ -16,7 +17,7 @@ MS = 1_000_000
 @pytest.mark.parametrize("shift", [-7_200_000, 7_200_000])
 def test_duration_and_errors_go_by_the_time_that_passed(shift):
     scene = load_scene()
-    still, twin, recording = strokes_of_posture(scene, "arch"), Twin(scene), Recording(4)
+    still, twin, recording = strokes_of_posture(scene, "arch"), drive_twin(scene), Recording(4)
     for k in range(200):
         stamp = 1_700_000_000_000 * MS + (5 * k + (shift if k >= 120 else 0)) * MS
         recording.add(twin.update(Sample(Stream.STROKES, stamp, still)))

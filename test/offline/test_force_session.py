@@ -7,9 +7,10 @@ import math
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 from matplotlib.axes import Axes
 
-from boom_twin import Sample, Settings, Stream, Twin, load_scene, replay
+from boom_twin import Sample, Settings, Stream, load_scene, replay
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_samples
 from boom_twin.cli.main import main
@@ -41,7 +42,7 @@ def scene():
 @pytest.fixture(scope="module")
 def samples(scene):
     """Of a gentle move; the force of cylinder 2 reads `WRONG` too much, all have a noise of `SIGMA`."""
-    still, noise, model, found = strokes_of_posture(scene, "arch"), np.random.default_rng(4), Twin(scene), []
+    still, noise, model, found = strokes_of_posture(scene, "arch"), np.random.default_rng(4), drive_twin(scene), []
     for stamp in (START + 5 * MS * np.arange(COUNT)).tolist():
         strokes = still + 0.01 * math.sin(1.5e-9 * (stamp - START)) * np.array([1.0, 0.0, 0.5, 0.0])
         p = model.update(Sample(Stream.STROKES, stamp, strokes)).prediction
@@ -68,7 +69,7 @@ def test_residuals_zeros_and_diagnostics(scene, samples):
     topics, now = load_topics(), 0.0
     required = {stream: topic.required for stream, topic in topics.inputs.items()}
     sensors, names = sensors_of(scene, Settings(), required, [None] * 4), {s: t.name for s, t in topics.inputs.items()}
-    twin, watch, found = Twin(scene, baseline=Baseline()), TwinWatch(sensors, names, Thresholds(), lambda: now), []
+    twin, watch, found = drive_twin(scene, baseline=Baseline()), TwinWatch(sensors, names, Thresholds(), lambda: now), []
     watch.begin()
     alarms = set()
     for sample in samples:
@@ -93,7 +94,7 @@ def test_residuals_zeros_and_diagnostics(scene, samples):
 
 def test_a_force_without_its_stamp_among_the_strokes_is_interpolated(scene, samples):
     """Half way between two strokes it is compared with the middle of what was expected at both."""
-    twin = Twin(scene)
+    twin = drive_twin(scene)
     strokes = [sample for sample in samples if sample.stream is Stream.STROKES][:200]
     before, after = [twin.update(sample).prediction for sample in strokes][-2:]
     middle = Sample(FORCES, strokes[-2].stamp + 2_500_000, np.zeros(4))
@@ -104,7 +105,7 @@ def test_a_force_without_its_stamp_among_the_strokes_is_interpolated(scene, samp
 def test_a_stuck_or_silent_sensor_is_told_and_a_shaken_boom_is_not(scene, samples):
     """A load that the model does not know changes a force by far more than its noise, from one reading to the next."""
     known = set()
-    twin = Twin(scene, baseline=load_baseline(None))
+    twin = drive_twin(scene, baseline=load_baseline(None))
     stuck, last = 0.0, samples[-1].stamp
     for sample in samples:
         if sample.stream is FORCES:

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 from health.recorded import written
 
-from boom_twin import Settings, Stream, Twin, load_scene
+from boom_twin import Settings, Stream, load_scene
 from boom_twin.offline import history, recording
 from boom_twin.offline.recording import Recording, Stretch
 from boom_twin.offline.replay import replay_into
@@ -82,7 +83,7 @@ def blocks(seconds: float) -> list[ReportBlock]:
     truth = np.genfromtxt(SESSION / "truth.csv.gz", delimiter=",", names=True)[: round(200 * seconds)]
     strokes, stamps = np.column_stack([truth[f"stroke_{i}_m"] for i in range(1, 5)]), np.round(truth["t_s"] * 1e9)
     rows, streams = np.repeat(strokes, 2, axis=0), np.tile([CODES[Stream.STROKES], CODES[Stream.ANGLES]], len(strokes))
-    found = Twin(load_scene()).update_block(SampleBlock(streams, np.repeat(stamps.astype(np.int64), 2), rows))
+    found = drive_twin(load_scene()).update_block(SampleBlock(streams, np.repeat(stamps.astype(np.int64), 2), rows))
     return [each for each in found if isinstance(each, ReportBlock)]
 
 

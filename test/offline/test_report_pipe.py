@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 from mcap.reader import make_reader
 from messages.random_reports import Told, boom, random_reports
 from rosbags.highlevel import AnyReader
 
-from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin import Sample, Stream, load_scene
 from boom_twin.bag.writer import FILE_NAME, RESULT_CHUNK_SIZE, SessionWriter
 from boom_twin.config.settings import Settings
 from boom_twin.messages.report_encoder import ReportEncoder
@@ -35,7 +36,7 @@ def test_a_prediction_with_clearance_comes_through_whole() -> None:
     scene = load_scene()
     worn = Pin(at="cylinder_1.rod", pin_radius=0.025, radial_clearance=1e-4)
     scene = scene.model_copy(update={"clearance": Clearance(pins=(worn,))})
-    twin, strokes = Twin(scene), strokes_of_posture(scene, "arch")
+    twin, strokes = drive_twin(scene), strokes_of_posture(scene, "arch")
     given = [twin.update(Sample(Stream.STROKES, k * 5_000_000, strokes)) for k in range(30)]
     (block,) = pickle.loads(pickle.dumps(pack([replace(report, change=None) for report in given], 4)))
     assert isinstance(block, ReportBlock)

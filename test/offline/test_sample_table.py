@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Stream, Twin, load_scene
+from boom_twin import Stream, load_scene
 from boom_twin.bag.session_files import write_session
 from boom_twin.cli.main import main
 from boom_twin.offline import recording
@@ -54,7 +55,7 @@ def table(folder: Path, stretch: int, monkeypatch: pytest.MonkeyPatch) -> tuple[
         stretches.append(each)
         made.add(each)
 
-    parts, twin, given = Recording(4, take), Twin(load_scene()), samples()
+    parts, twin, given = Recording(4, take), drive_twin(load_scene()), samples()
     for first in range(0, len(given), 300):
         block = block_of(given[first : first + 300], 4)
         parts.add_samples(block)

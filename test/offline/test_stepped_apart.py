@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, Twin
+from boom_twin import Sample, Stream
 from boom_twin.bag.session_files import write_session
 from boom_twin.bag.time_window import TimeWindow
 from boom_twin.errors import BagError, UsageError
@@ -82,7 +83,7 @@ def _goes_on() -> bool:
 
 
 def test_what_fails_in_the_thread_fails_here_after_what_came_before() -> None:
-    strokes, twin, taken = strokes_of_posture(load_scene(), "arch"), Twin(load_scene()), []
+    strokes, twin, taken = strokes_of_posture(load_scene(), "arch"), drive_twin(load_scene()), []
     block = block_of([Sample(Stream.STROKES, 10**18 + 5_000_000 * k, strokes) for k in range(20)], 4)
 
     def items() -> Iterator[SampleBlock | None]:
@@ -91,7 +92,7 @@ def test_what_fails_in_the_thread_fails_here_after_what_came_before() -> None:
         raise BagError("cut off")
 
     with pytest.raises(BagError, match="cut off"):
-        for item in stepped_ahead(items(), twin, Twin(load_scene())):
+        for item in stepped_ahead(items(), twin, drive_twin(load_scene())):
             taken.append(item)
             if item is not None:
                 assert len(twin.update_block(item)) > 0
@@ -100,9 +101,9 @@ def test_what_fails_in_the_thread_fails_here_after_what_came_before() -> None:
 
 def test_the_thread_ends_where_its_items_are_left() -> None:
     """Of more than it may be ahead of who takes them."""
-    strokes, twin = strokes_of_posture(load_scene(), "arch"), Twin(load_scene())
+    strokes, twin = strokes_of_posture(load_scene(), "arch"), drive_twin(load_scene())
     one = [block_of([Sample(Stream.STROKES, 10**18 + 5_000_000 * k, strokes)], 4) for k in range(100)]
-    taking = stepped_ahead(one, twin, Twin(load_scene()))
+    taking = stepped_ahead(one, twin, drive_twin(load_scene()))
     assert next(taking) is one[0] and any(thread.name == NAME for thread in threading.enumerate())
     taking.close()
     assert not _goes_on()

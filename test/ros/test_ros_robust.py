@@ -15,12 +15,13 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
+from drive_twin import drive_twin
 from geometry_msgs.msg import PointStamped
 from lifecycle_msgs.msg import Transition
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
-from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin import Sample, Stream, load_scene
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.scene.kinematics import strokes_of_posture
 
@@ -35,7 +36,7 @@ class Rig:
     def __init__(self, namespace: str = "", posture: str = "arch") -> None:
         self.node = rclpy.create_node("rig", namespace=namespace)
         self.strokes = strokes_of_posture(load_scene(), posture)
-        prediction = Twin(load_scene()).update(Sample(Stream.STROKES, 0, self.strokes)).prediction
+        prediction = drive_twin(load_scene()).update(Sample(Stream.STROKES, 0, self.strokes)).prediction
         assert prediction is not None
         self.tip, self.joints = prediction.tip_position, prediction.joints
         self.shift = BEGIN - time.monotonic()

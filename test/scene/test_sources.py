@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 from ruamel.yaml import YAML
 
-from boom_twin import Twin, load_scene, simulate, statics
+from boom_twin import load_scene, simulate, statics
 from boom_twin.errors import SceneError, UsageError
 from boom_twin.scene.load import default_text
 
@@ -21,7 +22,7 @@ def test_a_path_a_dict_and_nothing_are_scenes(tmp_path: Path) -> None:
     path.write_text(default_text())
     found = [statics(source, "arch").tip for source in (path, str(path), DOCUMENT, None, load_scene(DOCUMENT))]
     assert all(np.array_equal(tip, found[0]) for tip in found)
-    assert Twin(str(path)).scene == Twin(DOCUMENT).scene == load_scene()
+    assert drive_twin(str(path)).scene == drive_twin(DOCUMENT).scene == load_scene()
     rest = statics(DOCUMENT, "arch")
     assert statics(DOCUMENT, rest.strokes.tolist()).tip == pytest.approx(rest.tip, abs=1e-9)
     motion = simulate(DOCUMENT, [0.0, 0.1], [rest.strokes, rest.strokes], estimate_errors=False)
@@ -62,7 +63,7 @@ def test_texts_of_results_are_short_and_say_what_matters() -> None:
     assert table.startswith("<table>") and "<th>tip</th><td>8.188, -0.4401 m</td>" in table
     assert repr(load_scene()).startswith("Scene(sections 4, 3.86, 3.3, 3.2, 3.1 m")
     assert "arch<" not in load_scene().with_(description="<b>arch</b>")._repr_html_()
-    assert len(repr(Twin())) < 400
+    assert len(repr(drive_twin())) < 400
 
 
 def test_motions_are_frames_too() -> None:

@@ -11,6 +11,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from drive_twin import drive_twin
 
 from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
@@ -94,7 +95,7 @@ def phases(count: int, first: int) -> Iterator[tuple[str, float]]:
     for seed in range(first, first + -(-count // 25)):
         samples, rng = session(seed), np.random.default_rng([seed, 1])
         begins = sorted(rng.integers(200, COUNT - AFTER - 220, min(25, count - 25 * (seed - first))).tolist())
-        clean, twin, tips = Twin(load_scene()), Twin(load_scene()), list[np.ndarray]()
+        clean, twin, tips = drive_twin(load_scene()), drive_twin(load_scene()), list[np.ndarray]()
         for sample in samples:
             prediction = clean.update(sample).prediction
             assert prediction is not None

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
+from boom_twin import Report, Sample, Settings, Stream, load_scene
 from boom_twin.errors import UsageError
 from boom_twin.scene.edit import loaded
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
@@ -49,7 +50,7 @@ def equal(one: Report, other: Report) -> bool:
 
 
 def test_a_load_starts_the_loaded_boom_from_rest(strokes: Any) -> None:
-    twin = Twin(load_scene())
+    twin = drive_twin(load_scene())
     first = twin.update(stroke(0, strokes))
     assert first.change is not None and first.change.from_rest and first.events == ()
     twin.requests.tune({"payload": 40.0, "line_fill": 10.0})
@@ -57,7 +58,7 @@ def test_a_load_starts_the_loaded_boom_from_rest(strokes: Any) -> None:
     assert report.events == ("load",) and twin.counts["load"] == 1
     assert report.change is not None and report.change.from_rest
     assert (report.change.settings["payload"], report.change.settings["line_fill"]) == (40.0, 10.0)
-    other = Twin(loaded(load_scene(), 40.0, 10.0)).update(stroke(1, strokes))
+    other = drive_twin(loaded(load_scene(), 40.0, 10.0)).update(stroke(1, strokes))
     assert report.prediction is not None and other.prediction is not None and first.prediction is not None
     assert report.prediction.tip_position.tobytes() == other.prediction.tip_position.tobytes()
     assert report.prediction.tip_position[1] < first.prediction.tip_position[1] - 0.01
@@ -68,7 +69,7 @@ def test_a_load_starts_the_loaded_boom_from_rest(strokes: Any) -> None:
 
 
 def test_another_load_starts_from_rest_even_where_the_first_twin_had_it_before(strokes: Any) -> None:
-    twin, other = Twin(load_scene(), Settings(payload=40.0)), Twin(load_scene())
+    twin, other = drive_twin(load_scene(), Settings(payload=40.0)), drive_twin(load_scene())
     for each in (twin, other):
         each.update(stroke(0, strokes))
     twin.requests.tune({"gap": 0.2})
@@ -80,7 +81,7 @@ def test_another_load_starts_from_rest_even_where_the_first_twin_had_it_before(s
 
 
 def test_limits_hold_at_once_and_do_not_disturb(strokes: Any) -> None:
-    twin, quiet = Twin(load_scene()), Twin(load_scene())
+    twin, quiet = drive_twin(load_scene()), drive_twin(load_scene())
     for each in (twin, quiet):
         each.update(stroke(0, strokes))
     twin.requests.tune({"gap": 0.02})
@@ -94,14 +95,14 @@ def test_limits_hold_at_once_and_do_not_disturb(strokes: Any) -> None:
 
 @pytest.mark.parametrize("live", [{"gap": 0.0}, {"payload": -2.0}, {"line_fill": np.nan}, {"stroke_agility": 2.0}, {"x": 1.0}])
 def test_what_cannot_be_asked_is_refused_with_its_name(live: dict[str, float], strokes: Any) -> None:
-    twin = Twin(load_scene())
+    twin = drive_twin(load_scene())
     with pytest.raises(UsageError, match=next(iter(live))):
         twin.requests.tune(live)
     assert twin.update(stroke(0, strokes)).events == ()
 
 
 def test_the_zero_of_an_angle(strokes: Any, joints: Any) -> None:
-    twin, offset = Twin(load_scene()), np.array([0.0, 0.01, 0.0, 0.0])
+    twin, offset = drive_twin(load_scene()), np.array([0.0, 0.01, 0.0, 0.0])
     for k in range(100):
         twin.update(stroke(k, strokes))
         report = twin.update(angle(k, joints + offset))
@@ -123,7 +124,7 @@ def test_the_zero_of_an_angle(strokes: Any, joints: Any) -> None:
 
 
 def test_the_zero_of_a_stroke_is_the_one_that_its_angle_tells(strokes: Any) -> None:
-    right, twin = Twin(load_scene()), Twin(load_scene())
+    right, twin = drive_twin(load_scene()), drive_twin(load_scene())
     angles = right.update(stroke(0, strokes)).prediction.joints  # type: ignore[union-attr]
     offset = np.array([0.0, 0.0, 0.003, 0.0])
     for k in range(100):
@@ -141,7 +142,7 @@ def test_the_zero_of_a_stroke_is_the_one_that_its_angle_tells(strokes: Any) -> N
 
 
 def test_no_zero_without_residuals(strokes: Any) -> None:
-    twin = Twin(load_scene())
+    twin = drive_twin(load_scene())
     with pytest.raises(UsageError, match="nothing is predicted yet"):
         twin.rezero("joint_1")
     twin.update(stroke(0, strokes))
@@ -151,7 +152,7 @@ def test_no_zero_without_residuals(strokes: Any) -> None:
 
 def test_a_second_twin_repeats_it_bit_for_bit(strokes: Any, joints: Any) -> None:
     """Loads, limits, zeros, starts asked for and starts by the clock, told by `Report.change` alone."""
-    random, twin, other = np.random.default_rng(4), Twin(load_scene()), Twin(load_scene())
+    random, twin, other = np.random.default_rng(4), drive_twin(load_scene()), drive_twin(load_scene())
     asks = {
         40: lambda: twin.requests.tune({"payload": 35.0}),
         80: lambda: twin.rezero("joint_1"),

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
 import boom_twin
-from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene, statics
+from boom_twin import Report, Sample, Settings, Stream, load_scene, statics
 from boom_twin.estimation.deviation_modes import DeviationModes
 from boom_twin.health.baseline import load_baseline
 from boom_twin.health.sensor_check import MISSTATED
@@ -38,7 +39,7 @@ def items() -> Iterator[Sample | Change | None]:
 
 def test_drive_is_update_by_update() -> None:
     """To the bit what `Twin.update` gives, with the change repeated before its stroke sample."""
-    twin, other = Twin(load_scene()), Twin(load_scene())
+    twin, other = drive_twin(load_scene()), drive_twin(load_scene())
     steps = list(drive(twin, items()))
     assert [step is None for step in steps] == [item is None for item in items() if not isinstance(item, Change)]
     residuals = 0
@@ -68,10 +69,14 @@ def test_a_twin_that_began_anew_is_repeated_by_one_that_does() -> None:
     again, anew = (replace(CHANGE, settings=Settings().live, is_new=is_new) for is_new in (False, True))
     samples, known = [item for item in items() if isinstance(item, Sample)], load_baseline()
     kept, reports = (
-        [step.report for step in drive(Twin(load_scene(), baseline=known), [*samples[:40], change, *samples[40:]]) if step]
+        [
+            step.report
+            for step in drive(drive_twin(load_scene(), baseline=known), [*samples[:40], change, *samples[40:]])
+            if step
+        ]
         for change in (again, anew)
     )
-    other = Twin(load_scene(), baseline=known)
+    other = drive_twin(load_scene(), baseline=known)
     other.requests.zero(CHANGE.zeros)
     fresh = [other.update(sample) for sample in samples[40:]]
     assert len(bits(fresh)) > 15 and bits(reports[40:]) == bits(fresh)
@@ -91,7 +96,7 @@ def test_no_item_is_asked_for_before_the_last_report_was_taken() -> None:
             asked.append(k)
             yield Sample(Stream.STROKES, k * RATE, STROKES)
 
-    for k, step in enumerate(drive(Twin(load_scene()), source())):
+    for k, step in enumerate(drive(drive_twin(load_scene()), source())):
         assert step.sample.stamp == k * RATE and asked == list(range(k + 1))
 
 
@@ -126,10 +131,10 @@ def spoilt_samples(seconds: float, noise: float = 1.0) -> Iterator[Sample]:
 def test_health_judged_after_a_sample_was_told_is_the_same() -> None:
     """Every message of the two ways, to the bit; what was told first lacks nothing but the health."""
     whole, apart, encoder = {}, {}, ReportEncoder(load_scene(), Settings())
-    for step in drive(Twin(load_scene(), baseline=load_baseline()), spoilt_samples(6.0)):
+    for step in drive(drive_twin(load_scene(), baseline=load_baseline()), spoilt_samples(6.0)):
         for key, data in encoder.fill(step.report):
             whole.setdefault(key, []).append(data)
-    twin, told = Twin(load_scene(), baseline=load_baseline()), set()
+    twin, told = drive_twin(load_scene(), baseline=load_baseline()), set()
     for step in drive(twin, spoilt_samples(6.0), judged=False):
         assert step.report.health is None
         messages = encoder.fill(step.report)
@@ -146,7 +151,7 @@ def test_health_judged_after_a_sample_was_told_is_the_same() -> None:
 
 def test_a_judgement_that_was_not_asked_for_still_guards_the_next_sample() -> None:
     """What is believed of a sensor never depends on who asks."""
-    judged, neglected = (Twin(load_scene(), baseline=load_baseline()) for _ in range(2))
+    judged, neglected = (drive_twin(load_scene(), baseline=load_baseline()) for _ in range(2))
     for one, other in zip(drive(judged, spoilt_samples(4.0)), drive(neglected, spoilt_samples(4.0), judged=False), strict=True):
         if one.report.estimate is not None:
             assert other.report.estimate is not None
@@ -163,7 +168,7 @@ def test_what_health_finds_changes_the_estimate_alone(monkeypatch: pytest.Monkey
         if not is_heard:
             monkeypatch.setattr(DeviationModes, "mask", lambda *_: None)
             monkeypatch.setattr(DeviationModes, "expect_noise", lambda *_: None)
-        reports = [step.report for step in drive(Twin(load_scene(), baseline=load_baseline()), spoilt_samples(5.0, 3.0))]
+        reports = [step.report for step in drive(drive_twin(load_scene(), baseline=load_baseline()), spoilt_samples(5.0, 3.0))]
         judged = [each.health for each in reports if each.health is not None]
         assert {alarm.cause for alarm in judged[-1].alarms} == {"joint_3.sensor"}
         assert judged[-1].noise["noise_over_angle_sigma"] > MISSTATED

@@ -9,8 +9,9 @@ import sys
 from collections import Counter
 
 import numpy as np
+from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, Twin, load_scene, statics
+from boom_twin import Sample, Stream, load_scene, statics
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
@@ -29,12 +30,12 @@ class Live:
 
     def __init__(self) -> None:
         scene, self.now, self.random = load_scene(), 0.0, np.random.default_rng(5)
-        self.twin = Twin(scene, baseline=load_baseline())
+        self.twin = drive_twin(scene, baseline=load_baseline())
         self.encoder = ReportEncoder(scene, self.twin.settings, "base_link")
         sensors = sensors_of(scene, self.twin.settings, dict.fromkeys(Stream, False), self.twin.mounts)
         self.watch = TwinWatch(sensors, {stream: stream.value for stream in Stream}, Thresholds(), lambda: self.now)
         strokes = strokes_of_posture(scene, "arch")
-        prediction = Twin(scene).update(Sample(Stream.STROKES, 0, strokes)).prediction
+        prediction = drive_twin(scene).update(Sample(Stream.STROKES, 0, strokes)).prediction
         assert prediction is not None
         up = GRAVITY * np.array([np.sin(prediction.tip_angle), np.cos(prediction.tip_angle)])
         self.rest: dict[Stream, tuple[Array, float]] = {

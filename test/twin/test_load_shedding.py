@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
 from boom_twin import Report, Sample, Stream, Twin, load_scene
 from boom_twin.config.settings import Settings
@@ -22,7 +23,7 @@ LEFT_OUT = {Output.SHAPE, Output.HEALTH, Output.TIP_UNCERTAINTY, Output.JOINT_ST
 def run(share: float) -> tuple[Twin, list[Report], list[tuple[Output, bytes]]]:
     """A boom at rest whose encoders read what is predicted, with noise."""
     scene, random = load_scene(), np.random.default_rng(4)
-    twin, encoder = Twin(scene, baseline=load_baseline()), ReportEncoder(scene, Settings())
+    twin, encoder = drive_twin(scene, baseline=load_baseline()), ReportEncoder(scene, Settings())
     strokes, reports = strokes_of_posture(scene, "arch"), []
     for k in range(SECONDS * RATE):
         twin.shedding.filled(share if k in BUSY else 0.0)

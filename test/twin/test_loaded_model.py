@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
 from boom_twin import Report, Sample, Stream, Twin, load_scene
 from boom_twin.analysis.modal import ModeSeries
@@ -58,13 +59,13 @@ def driven(twin: Twin, preparation: ModelPreparation, asked: dict[int, Any], row
 
 
 def test_no_sample_waits_for_the_model_of_another_load_and_a_replay_repeats_it(makers: list[str]) -> None:
-    rows, twin = samples(160), Twin(load_scene(), baseline=load_baseline())
+    rows, twin = samples(160), drive_twin(load_scene(), baseline=load_baseline())
     reports = driven(twin, ModelPreparation(twin), {50: {"payload": 40.0}}, rows)
     assert makers == ["MainThread", "model"]
     changes = [report.change for report in reports if report.change is not None]
     assert [change.settings["payload"] for change in changes] == [-1.0, 40.0]
     assert 50 * STEP <= changes[1].stamp <= 100 * STEP and changes[1].from_rest
-    other = Twin(load_scene(), baseline=load_baseline())
+    other = drive_twin(load_scene(), baseline=load_baseline())
     for sample, report in zip(rows, reports, strict=True):
         if report.change is not None:
             other.requests.repeat(report.change)
@@ -72,7 +73,7 @@ def test_no_sample_waits_for_the_model_of_another_load_and_a_replay_repeats_it(m
 
 
 def test_what_is_asked_while_a_model_is_made_counts_too_and_all_takes_effect_at_once(makers: list[str]) -> None:
-    rows, twin = samples(130), Twin(load_scene())
+    rows, twin = samples(130), drive_twin(load_scene())
     preparation = ModelPreparation(twin)
     preparation.tune({"payload": 40.0})
     preparation.tune({"gap": 0.3})
@@ -84,7 +85,7 @@ def test_what_is_asked_while_a_model_is_made_counts_too_and_all_takes_effect_at_
 
 
 def test_what_was_asked_is_there_once_it_was_waited_for(makers: list[str]) -> None:
-    twin = Twin(load_scene())
+    twin = drive_twin(load_scene())
     preparation = ModelPreparation(twin)
     preparation.tune({"payload": 40.0})
     preparation.tune({"payload": 20.0})
@@ -94,7 +95,7 @@ def test_what_was_asked_is_there_once_it_was_waited_for(makers: list[str]) -> No
 
 
 def test_a_model_counts_only_with_the_settings_that_it_was_made_for(makers: list[str]) -> None:
-    twin = Twin(load_scene())
+    twin = drive_twin(load_scene())
     preparation = ModelPreparation(twin)
     preparation.tune({"payload": 40.0})
     preparation.finish()
@@ -105,7 +106,7 @@ def test_a_model_counts_only_with_the_settings_that_it_was_made_for(makers: list
 
 
 def test_limits_need_no_model_and_what_cannot_be_is_refused_at_once(makers: list[str]) -> None:
-    twin = Twin(load_scene())
+    twin = drive_twin(load_scene())
     preparation = ModelPreparation(twin)
     preparation.tune({"gap": 0.3})
     assert twin.requests.due and makers == ["MainThread"]
@@ -130,7 +131,7 @@ def test_a_restart_and_another_load_leave_health_and_limits_to_others(monkeypatc
         found.append(f"limits in {current_thread().name}")
         return limits(*arguments)
 
-    rows, twin = samples(60), Twin(load_scene(), baseline=load_baseline())
+    rows, twin = samples(60), drive_twin(load_scene(), baseline=load_baseline())
     preparation = ModelPreparation(twin)
     for sample in rows[:30]:
         twin.update(sample)
@@ -161,7 +162,7 @@ def test_a_restart_and_another_load_find_their_natural_modes_made(monkeypatch: p
         return modes
 
     monkeypatch.setattr(ModeSeries, "lowest", noted)
-    twin, rows = Twin(load_scene()), samples(160)
+    twin, rows = drive_twin(load_scene()), samples(160)
     preparation = ModelPreparation(twin)
     driven(twin, preparation, {50: {"payload": 40.0}}, rows[:120])
     assert twin.settings.payload == 40.0 and found == ["MainThread", "model"]
@@ -194,17 +195,17 @@ def test_a_restart_elsewhere_finds_natural_modes_that_were_made_while_samples_we
     scene, rows = load_scene(), samples(60)
     elsewhere = np.array([0.1, -0.08, 0.1, 0.05])
     rows += [replace(each, stamp=each.stamp + 60_000_000_000, values=each.values + elsewhere) for each in rows]
-    found = reports(Twin(scene))
+    found = reports(drive_twin(scene))
     (restart,) = [k for k, (_, report) in enumerate(found) if any("restart" in each.events for each in report.all)]
     held = [count for count, _ in found[60:restart]]
     assert found[restart][0] == 0 and sum(held) >= 2 and max(held) == 1
     monkeypatch.setattr(PostureModes, "prepare_piece", lambda *_: None)
-    assert all(equal(one, other) for (_, one), (_, other) in zip(found, reports(Twin(scene)), strict=True))
+    assert all(equal(one, other) for (_, one), (_, other) in zip(found, reports(drive_twin(scene)), strict=True))
 
 
 def test_code_that_is_compiled_for_a_boom_takes_it_under_any_load() -> None:
     """Its tables have the same types, so that another load does not look them up while a sample waits."""
-    twin, kinds = Twin(load_scene()), set()
+    twin, kinds = drive_twin(load_scene()), set()
     for live in ({}, {"payload": 40.0}, {"line_fill": 20.0}, {"payload": 40.0, "line_fill": 20.0}):
         model = twin.model(twin.settings.tuned(live))
         kinds.add((_kind(model.boom.compiled), _kind(model.modes.filter)))

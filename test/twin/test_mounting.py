@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Sample, Settings, Stream, Twin, load_scene
+from boom_twin import Sample, Settings, Stream, load_scene
 from boom_twin.bag.reader import read, scan
 from boom_twin.estimation.sensor_model import TURN
 from boom_twin.scene.kinematics import strokes_of_posture
@@ -23,7 +24,7 @@ def scene():
 
 def readings(scene, mounts, count=1):
     """Predicted joint angles and tip angle at rest, and what the sensors should read: measured zero minus residual."""
-    twin = Twin(scene, Settings(), mounts)
+    twin = drive_twin(scene, Settings(), mounts)
     report = twin.update(Sample(Stream.STROKES, MS, strokes_of_posture(scene, "arch")))
     residuals = twin.update(Sample(Stream.ANGLES, MS, np.zeros(len(scene.joints)))).residuals[0]
     return report.prediction, -residuals.values, residuals.sigmas
@@ -53,13 +54,13 @@ def test_an_inclined_base_is_in_the_reading(scene):
 
 
 def test_whole_turns_do_not_matter(scene):
-    twin = Twin(scene, Settings(), ["root", "head", None, None])
+    twin = drive_twin(scene, Settings(), ["root", "head", None, None])
     twin.update(Sample(Stream.STROKES, MS, strokes_of_posture(scene, "arch")))
     values, turns = np.array([0.5, -0.2, 0.1, 0.1]), np.array([TURN, -2 * TURN, TURN, 0.0])
     one = twin.update(Sample(Stream.ANGLES, MS, values)).residuals[0].values
     other = twin.update(Sample(Stream.ANGLES, MS + 1, values)).residuals
     assert other == ()  # after the newest stroke: waits
-    turned = Twin(scene, Settings(), ["root", "head", None, None])
+    turned = drive_twin(scene, Settings(), ["root", "head", None, None])
     turned.update(Sample(Stream.STROKES, MS, strokes_of_posture(scene, "arch")))
     again = turned.update(Sample(Stream.ANGLES, MS, values + turns)).residuals[0].values
     assert np.abs(one[:2]).max() <= np.pi
@@ -77,7 +78,7 @@ def test_an_inclinometer_at_the_tip_of_the_bundled_session(scene):
     """The rig's own angle of the last head, from an independent code, with the noise of the session's encoders."""
     truth = np.genfromtxt(SESSION / "truth.csv.gz", delimiter=",", names=True)
     noise = np.random.default_rng(5).normal(0.0, Settings().angle_sigma, len(truth))
-    twin, found = Twin(scene, Settings(), [None, None, None, "head"]), []
+    twin, found = drive_twin(scene, Settings(), [None, None, None, "head"]), []
     rows = 4000
     for row, (_, _, msg) in zip(
         range(rows), read(scan(SESSION), {"cylinder_strokes": "sensor_msgs/msg/JointState"}), strict=False

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 from twin.hostile import PHASES, session
 from twin.test_update import stream, told
 
@@ -35,7 +36,7 @@ def reports_of(twin: Twin, items: Items) -> list[Report]:
 
 def repeated(twin: Twin, items: Items) -> Iterator[SampleBlock | Change]:
     """The items, of which `twin` repeats the steps; in a thread as in a replay."""
-    for item in stepped_ahead(items, twin, Twin(twin.scene, twin.settings, twin.mounts)):
+    for item in stepped_ahead(items, twin, drive_twin(twin.scene, twin.settings, twin.mounts)):
         assert item is not None
         yield item
 
@@ -57,7 +58,7 @@ def blocks(samples: list[Sample], rng: np.random.Generator, changes: float = 0.0
 def test_odd_samples_of_all_streams_and_changes(seed: int) -> None:
     samples, mounts = stream(seed, 600, strange=0.0 if seed == 0 else 0.02), ("root", None, "head", "root") if seed == 1 else ()
     items = list(blocks(samples, np.random.default_rng(seed), changes=0.3))
-    one, other = (Twin(load_scene(), Settings(), mounts, load_baseline() if seed < 3 else None) for _ in range(2))
+    one, other = (drive_twin(load_scene(), Settings(), mounts, load_baseline() if seed < 3 else None) for _ in range(2))
     expected = told(reports_of(one, items))
     assert told(reports_of(other, repeated(other, items))) == expected and other.counts == one.counts
     assert sum(bool(each[4]) for each in expected) > 300  # predictions
@@ -69,7 +70,7 @@ def test_hostile_strokes(phase: str) -> None:
     true = session(int(rng.integers(1000)))[:900]
     samples = [*true[:300], *PHASES[phase](rng, true[300:450]), *true[450:]]
     items = list(blocks(samples, rng))
-    one, other = (Twin(load_scene()) for _ in range(2))
+    one, other = (drive_twin(load_scene()) for _ in range(2))
     assert told(reports_of(other, repeated(other, items))) == told(reports_of(one, items))
     assert other.counts == one.counts
 
@@ -79,7 +80,7 @@ def test_a_step_for_other_strokes_is_not_repeated() -> None:
     samples = [Sample(Stream.STROKES, 10**18 + 5_000_000 * k, strokes) for k in range(20)]
     others = [*samples[:10], Sample(Stream.STROKES, samples[10].stamp, strokes + 1e-4), *samples[11:]]
     for given in (others, [*samples[:10], *samples[11:]]):
-        recording, repeating = Twin(load_scene()), Twin(load_scene())
+        recording, repeating = drive_twin(load_scene()), drive_twin(load_scene())
         recording.recorded_steps.record()
         recording.update_block(block_of(samples, N))
         repeating.recorded_steps.repeat(recording.recorded_steps.taken())
@@ -90,7 +91,7 @@ def test_a_step_for_other_strokes_is_not_repeated() -> None:
 def test_steps_that_are_left_over_are_told() -> None:
     strokes = strokes_of_posture(load_scene(), "arch")
     samples = [Sample(Stream.STROKES, 10**18 + 5_000_000 * k, strokes) for k in range(20)]
-    recording, repeating = Twin(load_scene()), Twin(load_scene())
+    recording, repeating = drive_twin(load_scene()), drive_twin(load_scene())
     recording.recorded_steps.record()
     recording.update_block(block_of(samples, N))
     repeating.recorded_steps.repeat(recording.recorded_steps.taken().copy())
@@ -103,7 +104,7 @@ def test_steps_that_are_left_over_are_told() -> None:
 def test_stamps_of_another_unit_are_refused_with_the_same_words() -> None:
     strokes = strokes_of_posture(load_scene(), "arch")
     items = [block_of([Sample(Stream.STROKES, 5 * k, strokes) for k in range(200)], N)] * 2
-    one, other = Twin(load_scene()), Twin(load_scene())
+    one, other = drive_twin(load_scene()), drive_twin(load_scene())
     with pytest.raises(UsageError) as alone:
         reports_of(one, items)
     with pytest.raises(UsageError) as beside:
@@ -114,7 +115,7 @@ def test_stamps_of_another_unit_are_refused_with_the_same_words() -> None:
 def test_modes_of_a_posture_need_no_more_of_the_history_than_positions() -> None:
     """Where there is no equilibrium on the grid, its modes are of the boom as it is: of recorded steps, too."""
     scene = load_scene()
-    twin, strokes = Twin(scene), strokes_of_posture(scene, "arch")
+    twin, strokes = drive_twin(scene), strokes_of_posture(scene, "arch")
     for k in range(200):
         twin.update(Sample(Stream.STROKES, 10**18 + 5_000_000 * k, strokes + 1e-2 * np.sin(0.02 * k)))
     live, found = twin._boom.live, []

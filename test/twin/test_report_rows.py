@@ -8,8 +8,9 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin import Sample, Stream, load_scene
 from boom_twin.config.settings import Settings
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import Output
@@ -21,7 +22,7 @@ from boom_twin.validation.study.clearance.scenes import with_play
 
 def reports(scene: Scene, count: int = 120) -> list[Report]:
     """Of strokes, angles, accelerations and forces, which come late too."""
-    twin, random, rest = Twin(scene), np.random.default_rng(1), strokes_of_posture(scene, "arch")
+    twin, random, rest = drive_twin(scene), np.random.default_rng(1), strokes_of_posture(scene, "arch")
     joints, found = len(scene.joints), []
     for k in range(count):
         stamp = 10**18 + k * 5_000_000
@@ -89,8 +90,8 @@ def test_it_is_any_other_report(given: list[Report]) -> None:
 
 def test_it_keeps_what_it_was_made_of() -> None:
     """Samples that come later change nothing: made long after, it is what it is when made at once."""
-    at_once = [repr(replace(report)) for report in map(Twin(load_scene()).update, plain())]
-    assert [repr(report) for report in list(map(Twin(load_scene()).update, plain()))] == at_once
+    at_once = [repr(replace(report)) for report in map(drive_twin(load_scene()).update, plain())]
+    assert [repr(report) for report in list(map(drive_twin(load_scene()).update, plain()))] == at_once
 
 
 @pytest.mark.parametrize("is_worn", [False, True])
@@ -121,9 +122,9 @@ def test_only_what_is_wanted_is_encoded_of_rows(given: list[Report]) -> None:
 def test_a_copy_of_a_twin_goes_on_by_itself() -> None:
     """It shares nothing with the one that it was made of, which goes on, or is gone."""
     samples = plain()
-    twin = Twin(load_scene())
+    twin = drive_twin(load_scene())
     whole = [repr(twin.update(sample)) for sample in samples]
-    twin = Twin(load_scene())
+    twin = drive_twin(load_scene())
     for sample in samples[:60]:
         twin.update(sample)
     other = copy.deepcopy(twin)

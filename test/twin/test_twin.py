@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
+from boom_twin import Sample, Settings, Stream, load_scene, statics
 from boom_twin.scene.kinematics import strokes_of_posture
 
 MS = 1_000_000
@@ -19,7 +20,7 @@ def scene():
 
 @pytest.fixture
 def twin(scene):
-    return Twin(scene)
+    return drive_twin(scene)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +75,7 @@ def test_every_stroke_stamp_is_answered_with_its_own(twin, still):
 
 
 def test_late_and_double_samples_are_left_out_and_counted(scene, still):
-    clean, disturbed = Twin(scene), Twin(scene)
+    clean, disturbed = drive_twin(scene), drive_twin(scene)
     expected = follow(clean, still, 300)
     got = []
     for ms in range(0, 300, 5):
@@ -87,7 +88,7 @@ def test_late_and_double_samples_are_left_out_and_counted(scene, still):
 
 
 def test_partial_strokes_use_what_is_there(scene, still):
-    whole, partial = Twin(scene), Twin(scene)
+    whole, partial = drive_twin(scene), drive_twin(scene)
     for ms in range(0, 400, 5):
         values = moved(still, ms * 1e-3)
         a = whole.update(strokes(ms, values)).prediction
@@ -110,7 +111,7 @@ def test_waits_for_all_strokes(twin, still):
 
 
 def test_a_gap_is_bridged_and_flagged(scene, still):
-    steady, gappy = Twin(scene), Twin(scene)
+    steady, gappy = drive_twin(scene), drive_twin(scene)
     for ms in range(0, 3000, 5):
         a = steady.update(strokes(ms, moved(still, ms * 1e-3))).prediction
         if not 100 < ms < 400:
@@ -134,7 +135,7 @@ def test_a_long_pause_starts_again_from_rest(twin, still):
 
 
 def test_time_set_back_starts_everything_again(scene, still):
-    fresh, looped = Twin(scene), Twin(scene)
+    fresh, looped = drive_twin(scene), drive_twin(scene)
     follow(looped, still, 2000)
     looped.update(angles(5000, np.zeros(4)))  # would wait for a stroke that never comes
     again, expected = follow(looped, still, 300), follow(fresh, still, 300)
@@ -149,7 +150,7 @@ def test_time_set_back_starts_everything_again(scene, still):
 @pytest.mark.parametrize("stream", [Stream.STROKES, Stream.ANGLES])
 def test_a_stray_stamp_changes_nothing(scene, still, stamp, stream):
     """Of the year 2100, or of 1970: counted, in no prediction, and the next sample is used at once."""
-    clean, disturbed = Twin(scene), Twin(scene)
+    clean, disturbed = drive_twin(scene), drive_twin(scene)
     for ms in range(0, 200, 5):
         if ms in (100, 110):
             held = disturbed.update(Sample(stream, stamp, still + 0.1))
@@ -165,7 +166,7 @@ def test_a_stray_stamp_changes_nothing(scene, still, stamp, stream):
 @pytest.mark.parametrize("at", [1000, 400], ids=["resting", "moving"])
 def test_a_clock_that_was_set_while_strokes_go_on(scene, still, far, at):
     """Told, and nothing else: the same predictions by other stamps; of all samples that were accepted the same comes again."""
-    clean, twin, again = Twin(scene), Twin(scene), Twin(scene)
+    clean, twin, again = drive_twin(scene), drive_twin(scene), drive_twin(scene)
     times = range(0, at + 300, 5)
     expected = [clean.update(strokes(ms, moved(still, ms * 1e-3))).prediction for ms in times]
     samples = [strokes(ms if ms < at else ms + far, moved(still, ms * 1e-3)) for ms in times]
@@ -183,7 +184,7 @@ def test_a_clock_that_was_set_while_strokes_go_on(scene, still, far, at):
 
 @pytest.mark.parametrize("far", [-1_600_000_000_000, 1_000_000_000_000])
 def test_a_clock_that_was_set_with_strokes_elsewhere_starts_from_rest(scene, still, far):
-    fresh, twin = Twin(scene), Twin(scene)
+    fresh, twin = drive_twin(scene), drive_twin(scene)
     follow(twin, still, 1500)
     samples = [strokes(far + ms, moved(still, ms * 1e-3)) for ms in range(0, 200, 5)]
     reports = [twin.update(sample) for sample in samples]
@@ -218,9 +219,9 @@ def test_a_failed_step_is_a_status_and_the_twin_starts_again(twin, still):
 @pytest.mark.parametrize("cylinder, size", [(3, -0.18), (0, 0.02), (1, 0.2)])
 def test_a_stroke_that_is_lost_for_half_a_second_does_not_move_the_tip(scene, still, cylinder, size):
     """It is held, with its cylinder at rest; what the strokes of the others do is followed."""
-    twin, right = Twin(scene), []
+    twin, right = drive_twin(scene), []
     follow(twin, still, 1000)
-    other = Twin(scene)
+    other = drive_twin(scene)
     follow(other, still, 1000)
     for k in range(200):
         ms = 1000 + 5 * k
@@ -261,7 +262,7 @@ def test_residuals_do_not_depend_on_the_order_of_arrival(scene, still, order):
     second = [angles(ms + 1.7, rng.normal(0.0, 1.0, 4)) for ms in range(0, 390, 5)]
 
     def residuals(samples):
-        twin = Twin(scene)
+        twin = drive_twin(scene)
         return {r.stamp: r.values for sample in samples for r in twin.update(sample).residuals}
 
     expected = residuals(sorted(first + second, key=lambda s: s.stamp))
@@ -276,7 +277,7 @@ def test_residuals_do_not_depend_on_the_order_of_arrival(scene, still, order):
 
 
 def test_predictions_are_a_function_of_the_strokes_alone(scene, still):
-    alone, watched = Twin(scene), Twin(scene)
+    alone, watched = drive_twin(scene), drive_twin(scene)
     for ms in range(0, 400, 5):
         a = alone.update(strokes(ms, moved(still, ms * 1e-3))).prediction
         watched.update(angles(ms, np.full(4, 0.3)))
@@ -303,7 +304,7 @@ def test_measured_samples_without_a_prediction_are_counted(twin, still):
 
 def test_quiet_sensors_give_smaller_deviations(scene, still):
     def sigma(**noise):
-        twin = Twin(scene, Settings(**noise))
+        twin = drive_twin(scene, Settings(**noise))
         follow(twin, still, 300)
         return twin.update(angles(290, np.zeros(4))).residuals[0].sigmas
 
@@ -337,7 +338,7 @@ def test_a_shape_is_sent_after_time_was_set_back(twin, still):
 
 @pytest.mark.parametrize("absurd", [np.inf, -np.inf, 1e300, -1e8])
 def test_what_no_sensor_reads_is_taken_for_missing(scene, twin, still, absurd):
-    clean = Twin(scene)
+    clean = drive_twin(scene)
     follow(clean, still, 100), follow(twin, still, 100)
     values = moved(still, 0.1)
     values[2] = absurd

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin import Sample, Stream, load_scene
 from boom_twin.config.settings import Settings
 from boom_twin.errors import UsageError
 from boom_twin.health.baseline import load_baseline
@@ -23,7 +24,7 @@ def stream(seed: int, count: int = 900, strange: float = 0.02) -> list[Sample]:
     """All streams at 200 Hz of a boom that moves: late, missing, doubled, far off, of other times."""
     rng, scene = np.random.default_rng(seed), load_scene()
     still = strokes_of_posture(scene, "arch")
-    twin, found, shift = Twin(scene), [], 0
+    twin, found, shift = drive_twin(scene), [], 0
     for k in range(count):
         stamp = START + 5 * k * MS + int(rng.normal() * 0.05 * MS)
         strokes = still + 0.01 * np.sin(0.004 * k) * np.array([1.0, 0.0, 1.0, 0.5]) + rng.normal(size=N) * 2e-5
@@ -69,7 +70,7 @@ def test_blocks_of_any_size_give_what_single_samples_give(seed: int) -> None:
     samples = stream(seed, strange=0.0 if seed == 0 else 0.02)
     mounts = ("root", None, "head", "root") if seed == 1 else ()
     usual = load_baseline() if seed < 3 else None
-    one, many = (Twin(load_scene(), Settings(), mounts, usual) for _ in range(2))
+    one, many = (drive_twin(load_scene(), Settings(), mounts, usual) for _ in range(2))
     first, blocks = 0, 0
     while first < len(samples):
         part = samples[first : first + int(rng.integers(1, 500))]
@@ -91,7 +92,7 @@ def test_blocks_keep_samples_and_reports_as_they_are() -> None:
     again = samples_in(block_of(samples, N), N)
     for one, other in zip(again, samples, strict=True):
         assert (one.stream, one.stamp, one.values.tobytes()) == (other.stream, other.stamp, other.values.tobytes())
-    twin = Twin(load_scene())
+    twin = drive_twin(load_scene())
     reports = [twin.update(sample) for sample in samples]
     whole = report_block(reports, N)
     assert told(whole.reports(N))[1:] == told(reports)[1:]  # the first one tells of a change
@@ -100,7 +101,7 @@ def test_blocks_keep_samples_and_reports_as_they_are() -> None:
 
 
 def test_a_block_is_taken_in_one_piece_where_nothing_is_odd() -> None:
-    samples, twin = stream(0, 600, 0.0), Twin(load_scene())
+    samples, twin = stream(0, 600, 0.0), drive_twin(load_scene())
     for sample in samples[:400]:
         twin.update(sample)
     (block,) = twin.update_block(block_of(samples[400:], N))
@@ -111,13 +112,13 @@ def test_a_block_is_taken_in_one_piece_where_nothing_is_odd() -> None:
 def test_the_first_block_tells_that_stamps_are_nanoseconds() -> None:
     """All but the sample that the model starts with are taken in one piece; stamps of another unit are refused as ever."""
     samples = stream(0, 120, 0.0)
-    first, rest = Twin(load_scene()).update_block(block_of(samples, N))
+    first, rest = drive_twin(load_scene()).update_block(block_of(samples, N))
     assert isinstance(first, Report) and first.change is not None
     assert isinstance(rest, ReportBlock) and len(rest.stamps) == len(samples) - 1
     milliseconds = [replace(sample, stamp=sample.stamp // MS) for sample in samples]
     for given in (milliseconds, [sample for sample in milliseconds if sample.stream is Stream.STROKES]):
         with pytest.raises(UsageError, match="nanoseconds"):
-            Twin(load_scene()).update_block(block_of(given, N))
+            drive_twin(load_scene()).update_block(block_of(given, N))
 
 
 def test_arrays_of_another_layout_and_kind_are_taken_as_what_they_say() -> None:
@@ -128,7 +129,7 @@ def test_arrays_of_another_layout_and_kind_are_taken_as_what_they_say() -> None:
     streams = np.zeros(40, np.int64)
     rows = [SampleBlock(streams, stamps, values)]
     others = [SampleBlock(streams.astype(np.int8), np.repeat(stamps, 2)[::2], np.asfortranarray(values))]
-    found = [Twin(load_scene()).update_block(block) for blocks in (rows, others) for block in blocks]
+    found = [drive_twin(load_scene()).update_block(block) for blocks in (rows, others) for block in blocks]
     tips = [np.concatenate([np.atleast_2d(of_tip(each)) for each in reports]) for reports in found]
     assert len(tips[0]) == 40 and tips[0].tobytes() == tips[1].tobytes()
 

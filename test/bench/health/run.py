@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import stored
+from drive_twin import drive_twin
 from scenarios import Scenario, learning, nominal, scenario
 
 from boom_twin import Twin
@@ -68,7 +69,7 @@ def outcome(sessions: Path, out: Path, each: Scenario, shipped: bool = False) ->
     By the baseline of its rig, or by the one that ships.
     """
     baseline = load_baseline(baseline_file(out, each.rig, each.scene)) if each.rig and not shipped else Baseline()
-    twin = Twin(each.model, baseline=baseline)
+    twin = drive_twin(each.model, baseline=baseline)
     told: list[dict[str, Any]] = []
     last: dict[tuple[str, int, str], tuple[Any, ...]] = {}
     newest: dict[tuple[str, int, str], dict[str, Any]] = {}
