@@ -48,7 +48,7 @@ OPENED, SHUT = 4.0, 3.0  # standard deviations of a drive's rate: beyond the one
 SHUT_TIME = 0.15  # s below the second before its valve is believed closed
 LONGEST_STEP = 0.02  # s of one transition
 IMU_ZERO, IMU_DRIFT = 0.05, 1e-3  # m/s^2; m/s^2 in a root second
-ANGLE_ZERO, ANGLE_DRIFT = 3e-4, 5e-5  # rad; rad in a root second: sensors' zeros, and the error of the model's statics
+ANGLE_ZERO, ANGLE_DRIFT = 2e-4, 1e-5  # rad; rad in a root second: sensors' zeros, and the error of the model's statics
 FORCE_ZERO, FORCE_DRIFT = 1.0, 0.03  # share of the force; in a root second
 INEXACT = 0.03  # share of the tip's acceleration that modes left out and those there are wrong by
 DOF = 4.0  # degrees of freedom of Student's t, by which innovations of the estimate are weighed
@@ -244,22 +244,21 @@ def about_rest(p, row, x, size):
 
 
 @inner
-def variance_of(row, covariance, size):
-    """Return the variance of the reading of a row."""
-    return covariance_of(row, row, covariance, size)
+def variance_of(row, covariance, gain, size):
+    """Return the variance of the reading of a row; `gain` is scratch."""
+    spread_of(row, covariance, gain, size)
+    return max(read(row, gain, size), 0.0)
 
 
 @inner
-def covariance_of(one, other, covariance, size):
-    """Return the covariance of the readings of two rows."""
-    total = 0.0
+def spread_of(row, covariance, gain, size):
+    """Write the covariance of all states with the reading of a row."""
+    clear(gain, size)
     for k in range(size):
-        if one[k] != 0.0:
-            part = 0.0
+        if row[k] != 0.0:
+            weight, line = row[k], covariance[k]
             for i in range(size):
-                part += covariance[k, i] * other[i]
-            total += one[k] * part
-    return total
+                gain[i] += weight * line[i]
 
 
 # -- transition ---------------------------------------------------------------------------------------------------------------
@@ -363,11 +362,7 @@ def multiply(f, right, found, size):
 @inner
 def correct(x, covariance, row, gain, innovation, variance, size):
     """Take a reading into a state and its covariance; returns the variance of the innovation."""
-    for i in range(size):
-        total = 0.0
-        for k in range(size):
-            total += covariance[i, k] * row[k]
-        gain[i] = total
+    spread_of(row, covariance, gain, size)
     expected = variance
     for k in range(size):
         expected += row[k] * gain[k]
@@ -682,7 +677,7 @@ def take_reading(p, f, residual, zero, variance, age):
         innovation = residual - f.x[k, zero]
         for i in range(size):
             innovation -= f.row[i] * (f.x[k, i] - f.mean[PREDICTION, i])
-        expected = variance + variance_of(f.row, f.p[k], every)
+        expected = variance + variance_of(f.row, f.p[k], f.gain, every)
         weight = min((DOF + 1.0) / (DOF + innovation * innovation / expected), 1.0)
         expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, variance / weight, every)
         f.likely[k] -= 0.5 * (innovation * innovation / expected + math.log(expected))

@@ -11,7 +11,7 @@ from ..kernels.elements.linkage import angle_of_length
 from ..kernels.integrators import X
 from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
-from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, OK
+from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, NOT_FINITE, OK
 from ..kernels.transfer.forward_kinematics import place
 from .models import (
     ESTIMATE,
@@ -24,7 +24,6 @@ from .models import (
     all_states,
     angle_row,
     column_row,
-    covariance_of,
     drive_place,
     follow_prediction,
     force_place,
@@ -32,6 +31,7 @@ from .models import (
     rate_row,
     read,
     specific_force_row,
+    spread_of,
     step_models,
     variance_of,
     zero_place,
@@ -78,9 +78,21 @@ def step_lengths(t, boom, live, work, p, f, h, stamp, y, gravity, out):
     if f.status[FED] == 1 and stamp - f.status[FED_STAMP] > PATIENCE:
         f.status[FED] = 0
     step_models(p, f, h, y)
+    if not is_finite(p, f):
+        return NOT_FINITE
     place_live(t, boom, live, work, p, f)
     write_prediction(t, live, p, f, h, gravity, out)
     return OK
+
+
+@inner
+def is_finite(p, f):
+    """Return True if mean and variances of prediction and estimate are numbers."""
+    total = 0.0
+    for k in range(zero_place(p)):
+        total += abs(f.mean[PREDICTION, k]) + f.spread[PREDICTION, k, k]
+        total += abs(f.mean[ESTIMATE, k]) + f.spread[ESTIMATE, k, k]
+    return math.isfinite(total)
 
 
 @inner
@@ -121,7 +133,7 @@ def write_prediction(t, live, p, f, h, gravity, out):
         f.pulls[i] = found.cylinder_forces[i] = live.z[t.cylinders[i].z]
         length_row(p, i, f.row)
         estimates.strokes[i] = p.drives[i] + p.compliance[i] * p.pulled[i] + about_rest(p, f.row, f.mean[PREDICTION], size)
-        estimates.variances[i] = variance_of(f.row, f.spread[PREDICTION], size)
+        estimates.variances[i] = variance_of(f.row, f.spread[PREDICTION], f.gain, size)
         found.lengths[i] = f.strokes[i, 0] = estimates.strokes[i]
         f.strokes[i, 1] = length_rate(p, f, i)
         f.strokes[i, 2] = f.mean[PREDICTION, drive_place(p) + 2 * n + i]
@@ -210,16 +222,16 @@ def write_expected_readings(p, f, live, results, inclination, values, sigmas):
     for i in range(n):
         values[i] = live.frames[p.frames[i], FRAME_ANGLE] + inclination if p.absolute[i] else results.joints[i]
         angle_row(p, i, f.row)
-        sigmas[i] = math.sqrt(f.noise.angle2 + variance_of(f.row, f.spread[PREDICTION], size))
+        sigmas[i] = math.sqrt(f.noise.angle2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
     at, angle = n, results.tip[0, 2]
     for axis in range(2):
         values[at + axis] = f.felt[axis]
         specific_force_row(p, f, axis, math.cos(angle), math.sin(angle), f.row)
-        sigmas[at + axis] = math.sqrt(f.noise.acceleration2 + variance_of(f.row, f.spread[PREDICTION], size))
+        sigmas[at + axis] = math.sqrt(f.noise.acceleration2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
     for i in range(n):
         values[at + 2 + i] = results.cylinder_forces[i]
         column_row(p, p.forces, i, 1.0, f.row)
-        sigmas[at + 2 + i] = math.sqrt(f.noise.force2 + variance_of(f.row, f.spread[PREDICTION], size))
+        sigmas[at + 2 + i] = math.sqrt(f.noise.force2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
 
 
 @inner
@@ -233,12 +245,8 @@ def write_tip_estimate(p, f, results, out):
         acceleration_row(p, a, f.rows[3 + a])
         out[TIP_AT + a] = results.tip[0, a] + difference(f, f.rows[a], size)
         out[ACCELERATION + a] = results.tip[2, a] + difference(f, f.rows[3 + a], size)
-    at = 0
-    for a in range(3):
-        for b in range(a, 3):
-            out[TIP_COVARIANCE + at] = covariance_of(f.rows[a], f.rows[b], f.spread[ESTIMATE], every)
-            out[ACCELERATION_COVARIANCE + at] = covariance_of(f.rows[3 + a], f.rows[3 + b], f.spread[ESTIMATE], every)
-            at += 1
+    write_covariance(f, 0, every, out[TIP_COVARIANCE:ACCELERATION_COVARIANCE])
+    write_covariance(f, 3, every, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
     covariance = f.spread[ESTIMATE]
     for a in range(2):
         fast, slow = load + a, load + 2 + a
@@ -253,3 +261,14 @@ def difference(f, row, size):
     for k in range(size):
         total += row[k] * (f.mean[ESTIMATE, k] - f.mean[PREDICTION, k])
     return total
+
+
+@inner
+def write_covariance(f, first, size, out):
+    """Write the upper triangle of the estimate's covariance of what three of `f.rows` read."""
+    at = 0
+    for a in range(first, first + 3):
+        spread_of(f.rows[a], f.spread[ESTIMATE], f.gain, size)
+        for b in range(a, first + 3):
+            out[at] = read(f.rows[b], f.gain, size)
+            at += 1
