@@ -224,11 +224,11 @@ def open_session_scene(session: str | Path, source: str | None) -> SessionScene:
     return found
 
 
-def open_session_settings(session: str | Path, params: Path | None) -> Settings:
-    """The numbers of a session's twin, see `boom_twin.bag.session_model.settings_of`; those that are not usual go to stderr."""
+def open_session_settings(session: str | Path, params: Path | None, namespace: str = "") -> Settings:
+    """Return the numbers of a session's twin, see `boom_twin.bag.session_model.settings_of`; unusual ones go to stderr."""
     from ..bag.session_model import settings_of
 
-    found = settings_of(Path(session), params)
+    found = settings_of(Path(session), params, namespace)
     if found.others:
         told = ", ".join(f"{name} {value:g}" for name, value in found.others.items())
         print(f"parameters: {found.source}: {told}", file=sys.stderr)

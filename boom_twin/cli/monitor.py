@@ -118,7 +118,7 @@ def _sessions(args: Namespace) -> SessionList:
 
     def open_feed(path: Path) -> Feed:
         warn_incomplete(scan(path))
-        scene, settings = open_session_scene(path, args.scene), open_session_settings(path, args.params)
+        scene, settings = open_session_scene(path, args.scene), open_session_settings(path, args.params, args.namespace)
         return bag_feed(path, scene, settings, args.mapping, args.baseline, window, args.namespace)
 
     print("opening the session (compiles for up to a minute the first time) ..", file=sys.stderr)
