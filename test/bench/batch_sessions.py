@@ -112,7 +112,7 @@ def kill_sessions(process: subprocess.Popen[bytes], every: float, ended: Event) 
 
 
 def faults(sessions: Path, out: Path, every: float) -> None:
-    """Three broken sessions, one that takes too long, one that takes too much memory, a session's process killed now and then, Ctrl-C."""
+    """Three broken sessions, one that is too slow, one too large, a session's process killed now and then, Ctrl-C."""
     whole = (SESSION / "session_0.mcap").read_bytes()
     for number, content in enumerate((whole[: len(whole) // 2], b"", whole[:5000] + bytes(200) + whole[5200:])):
         (sessions / f"x{number}").mkdir()
