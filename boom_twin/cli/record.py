@@ -103,7 +103,8 @@ def run(args: Namespace) -> int:
     if sheet.scene is None:
         _say("no scene is kept in session.yaml: none was given by --scene, and no twin told its own")
     if not any(count.received for count in counts):
-        raise BoomTwinError(f"{args.out}: nothing came. Check that the publishers run, and ROS_DOMAIN_ID.")
+        remedy = "Check that the publishers run, as the same user, and ROS_DOMAIN_ID."
+        raise BoomTwinError(f"{args.out}: nothing came. {remedy}")
     return 0
 
 
