@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import BagError, UsageError
 from ..offline.progress import progress_of
-from .arguments import add_window, positive, window_of
+from .arguments import add_mapping, add_window, positive, window_of
 from .main import add_params
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     scene = "scene file (YAML) for all sessions; without it, the one that each was made with, else the default scene"
     parser.add_argument("--scene", metavar="SCENE", type=Path, help=scene)
     add_params(parser)
-    parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors of all sessions; as for replay")
+    add_mapping(parser)
     parser.add_argument("--baseline", metavar="FILE", type=Path, help="of all sessions; as for replay")
     add_window(parser)
     parser.add_argument("--report", action="store_true", help="write report.html with its pictures for every session")

@@ -37,13 +37,12 @@ def read_parameters(path: Path, namespace: str = "") -> dict[str, Any]:
         The file is no ROS parameter file, or has no block for this node.
     """
     content = read_plain(path, UsageError, "Give a ROS parameter file.")
+    node = "/".join(["", *filter(None, namespace.split("/")), "boom_twin"])
     try:
         blocks = list(_blocks(content))
-        nodes = [(re.sub(r"/\\\*(\\\*)?", _wildcard, re.escape(name)), dict(_dotted(values))) for name, values in blocks]
+        found = [dict(_dotted(values)) for name, values in blocks if re.fullmatch(_pattern(name), node)]
     except (AttributeError, ValueError):
         raise UsageError(f"{path}: not a ROS parameter file. It needs `/**:` with `ros__parameters:` below.") from None
-    node = "/".join(["", *filter(None, namespace.split("/")), "boom_twin"])
-    found = [values for pattern, values in nodes if re.fullmatch(pattern, node)]
     if not found:
         names = ", ".join(name for name, _ in blocks)
         raise UsageError(f"{path}: no parameters of {node}, only of {names}. Name the node `/**`, or give its --namespace.")
@@ -61,9 +60,8 @@ def _blocks(content: Any, node: str = "") -> Iterator[tuple[str, Any]]:
             yield from _blocks(value, f"{node}/{key.removeprefix('/')}")
 
 
-def _wildcard(match: re.Match[str]) -> str:
-    """Return the pattern of ``/*`` or ``/**`` in the name of a node."""
-    return r"(/\w+)*" if match[1] else r"/\w+"
+def _pattern(name: str) -> str:
+    return re.escape(name).replace(r"/\*\*", r"(/\w+)*").replace(r"/\*", r"/\w+")
 
 
 def _dotted(values: Any, block: str = "") -> Iterator[tuple[str, Any]]:
