@@ -17,7 +17,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
     where = parser.add_mutually_exclusive_group(required=True)
-    where.add_argument("--posture", metavar="NAME", help="a posture of the scene")
+    where.add_argument("--posture", metavar="P", help="a posture of the scene, or section angles, deg: 60,-20,-30")
     where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes, m")
     add_json(parser)
 
