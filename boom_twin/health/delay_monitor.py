@@ -32,7 +32,6 @@ FEWEST_CLEAR, CLEAR = (
 )  # motions of channels where that share, at most, of what is off is left beside the lag: it is clear
 NEWEST = (30, 15, 7, 3)  # spans that are looked at: if all show no clear lag, fewer, for it may have come since
 FLOOR = 3e-3  # s, deviation of what a lag is taken for, by the model's own
-HASTE = 0.025  # s, by which readings may be ahead of a prediction: it lags where strokes are smoothed in haste
 SURE, GONE = 5.0, 3.0  # deviations from which on it is told, and below which it has ended
 LONGEST = 1.5  # s, lag that is looked for: of a span more is left than is lost at its ends
 ROUNDS, ROUND = 6, 0.25  # of Gauss-Newton, and by how much (s) a lag changes in one at most
@@ -63,6 +62,8 @@ class DelayMonitor:
     ----------
     alarm : Alarm or None
         While it lasts.
+    lag : float
+        By the newest spans, s; 0 while too little has moved.
     """
 
     def __init__(self, stream: Stream, least: float = 0.0) -> None:
@@ -72,7 +73,7 @@ class DelayMonitor:
 
     def begin(self) -> None:
         """The boom starts from rest; what is known of the lag stays known no longer, an alarm lasts until it is refuted."""
-        self._number = 0
+        self._number, self.lag = 0, 0.0
         self._blocks: deque[tuple[StreamReadings, NDArray[np.bool_]]] = deque()
         self._spans: deque[tuple[Array, Array]] = deque(maxlen=NEWEST[0])
 
@@ -84,6 +85,7 @@ class DelayMonitor:
         end: int,
         is_doubted: Callable[[], bool] = lambda: False,
         period: float = 1.0,
+        shared: float = 0.0,
     ) -> list[Alarm]:
         """Take a block; gives an alarm that began, changed or ended.
 
@@ -100,6 +102,8 @@ class DelayMonitor:
             Asked once a span is complete: whether another fault puts vibration out of step, so that no alarm begins.
         period : float
             Of the slowest vibration, s.
+        shared : float
+            Lag (s) of other readings; what both are ahead by is a lag of the prediction, where it smooths fast strokes.
         """
         stamps = readings.rows.stamps
         is_empty = len(stamps) < 2 or stamps[-1] <= stamps[0]
@@ -121,7 +125,7 @@ class DelayMonitor:
             self._blocks.popleft()
         is_known = np.isfinite(rows).all(axis=0) & np.isfinite(slopes).all(axis=0)
         self._spans.append((np.where(is_known, rows, 0.0), np.where(is_known, slopes, 0.0)))
-        return self._judge(end, is_doubted())
+        return self._judge(end, is_doubted(), shared)
 
     @staticmethod
     def _averaged(blocks: Array, half: int) -> Array:
@@ -144,12 +148,14 @@ class DelayMonitor:
                     return lag, sigma, True
         return (*_small_lag(rows, slopes), False)
 
-    def _judge(self, end: int, is_doubted: bool) -> list[Alarm]:
+    def _judge(self, end: int, is_doubted: bool, shared: float) -> list[Alarm]:
         lag, sigma, is_clear = self._estimate()
+        self.lag = lag
+        lag -= min(0.0, max(shared, lag))
         if self.alarm is not None and abs(lag) < GONE * sigma and math.isfinite(sigma):
             ended, self.alarm = replace(self.alarm, until=end), None
             return [ended]
-        if abs(lag) - (HASTE if lag < 0.0 else 0.0) < SURE * sigma or (
+        if abs(lag) < SURE * sigma or (
             self.alarm is None and (is_doubted or (self._least > 0.0 and not (is_clear and abs(lag) >= self._least)))
         ):
             return []

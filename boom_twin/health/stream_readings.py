@@ -127,6 +127,7 @@ class StreamSurvey:
     ----------
     noise2 : ndarray, shape (channels,)
         The same as measured, by second differences.
+    slow : SlowMeans
     """
 
     def __init__(self, variance: float, channels: int) -> None:
@@ -135,10 +136,10 @@ class StreamSurvey:
         self._numbers, slow = np.zeros((6, channels)), np.zeros((4, channels))
         self._work = ReadingsWork(limits, self._numbers, slow, self.noise2, np.zeros(ROOM))
         self._held = hold(self._work)
-        self._slow = SlowMeans(slow[SLOW_READ], slow[SLOW_EXPECTED], slow[SLOW_SQUARES], slow[WEIGHT])
+        self.slow = SlowMeans(slow[SLOW_READ], slow[SLOW_EXPECTED], slow[SLOW_SQUARES], slow[WEIGHT])
         nothing = np.zeros((6, channels))
         nothing[NEAR], nothing[RATES] = np.nan, np.nan
-        self._nothing = StreamReadings(MeasuredRows.room(0, channels), nothing, self._slow, False)
+        self._nothing = StreamReadings(MeasuredRows.room(0, channels), nothing, self.slow, False)
         self._summarise = SameTypes(summarise)
 
     def take(self, rows: MeasuredRows | None, masked: NDArray[np.bool_], span: float) -> StreamReadings:
@@ -160,7 +161,7 @@ class StreamSurvey:
             self._held = hold(self._work)
         stamps, raw, left = map(np.ascontiguousarray, rows)
         is_bent = self._summarise(self._held, stamps, raw, left, masked, min(1.0, span / WINDOW))
-        return StreamReadings(rows, self._numbers.copy(), self._slow, bool(is_bent))
+        return StreamReadings(rows, self._numbers.copy(), self.slow, bool(is_bent))
 
 
 class PredictionMeans(NamedTuple):

@@ -31,7 +31,8 @@ def judged(monitor: DelayMonitor, lag: float, seconds: float, first: int = 0, **
         expected = force(times)
         read = force(times - lag) * more.get("scale", 1.0) + more.get("bias", 0.0) + rng.normal(0.0, 100.0, expected.shape)
         read[:, 1] += more.get("lost", 0.0) * math.nan if "lost" in more else 0.0
-        news += monitor.take(number, block_of(monitor, read, expected, number), NONE, round(times[-1] * 1e9))
+        readings, end = block_of(monitor, read, expected, number), round(times[-1] * 1e9)
+        news += monitor.take(number, readings, NONE, end, shared=more.get("shared", 0.0))
     return news
 
 
@@ -47,7 +48,9 @@ def test_a_lag_is_told_with_its_size(lag: float) -> None:
 
 
 def test_a_prediction_that_lags_in_haste_makes_no_stream_early() -> None:
-    assert judged(DelayMonitor(Stream.FORCES), -0.02, 60.0) == []
+    assert judged(DelayMonitor(Stream.FORCES), -0.02, 60.0, shared=-0.02) == []
+    (began, *_) = judged(DelayMonitor(Stream.FORCES), -0.02, 60.0)
+    assert began.cause == "cylinder_forces.delay" and began.ranked[0].parts[0][1] == pytest.approx(-0.02, abs=0.009)
 
 
 @pytest.mark.parametrize("wrong", [{}, {"bias": 2e3}, {"scale": 1.05}, {"lost": 1.0}])
