@@ -267,7 +267,8 @@ class HealthMonitor:
         if findings.is_calm and not monitor.alarms:
             return []
         may_come_back = not findings.is_calm and findings.jumped.any()
-        blamed, newest = self.residuals.blamed if may_come_back else {}, raw[-1] if len(raw) else None
+        blamed = self.residuals.blamed if may_come_back else {}
+        newest = (raw if stream is Stream.STROKES else raw - expected)[-1] if len(raw) else None
         news = monitor.take(findings, block.number * BLOCK, block.end, blamed, newest)
         if stream in JUDGED and monitor.masked is not before and (monitor.masked & ~before).any():
             self.residuals.forget()

@@ -100,9 +100,10 @@ class SensorMonitor:
 
         `blamed`: causes that residuals' alarms are explained by, and by how much a sensor would then be off. One among them
         that jumps to what the model expects, or back by that much where none does, has come back, and residuals tell so.
-        `newest`: the block's last readings, shape (channels,), if it has any.
+        `newest`: by how much the block's last readings are off (strokes: the readings), shape (channels,), if it has any.
         """
         news = self._back_after_start(end, newest)
+        self._see_jumps(end, newest)
         if not findings.is_calm or self._faults:
             news += self._found(findings, start, end, blamed)
         if news:
@@ -121,7 +122,7 @@ class SensorMonitor:
                 jump = (float(findings.jumped[channel]), float(findings.level[channel])) if kind == "jump" else None
                 news += self._seen(channel, kind, start, end, jump)
         for key, fault in list(self._faults.items()):
-            if key[1] != "jump" and end - fault.seen > SETTLED:
+            if (key[1] != "jump" or self._is_predicted) and end - fault.seen > SETTLED:
                 del self._faults[key]
                 news.append(replace(fault.alarm, until=fault.seen))
         return news
@@ -137,6 +138,13 @@ class SensorMonitor:
                 del self._faults[key]
                 news.append(replace(fault.alarm, until=end))
         return news
+
+    def _see_jumps(self, end: int, newest: Array | None) -> None:
+        """Keep the jumps of sensors that the model predicts, unless they are off as before the jump, or less."""
+        for (channel, kind), fault in self._faults.items() if self._is_predicted else ():
+            off = math.nan if newest is None or kind != "jump" else abs(float(newest[channel]))
+            if kind == "jump" and not off < abs(fault.before) + CAME_BACK * abs(fault.offset):
+                fault.seen = end
 
     def _is_wild(self, channel: int) -> bool:
         """Whether jumps mean nothing more: the sensor has another fault, out of which it jumps when it recovers."""
