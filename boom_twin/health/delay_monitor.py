@@ -26,10 +26,7 @@ from .stream_readings import StreamReadings
 LEAST = 10  # blocks of half a triangle, at least
 SPAN = 40  # blocks of one estimate
 FEWEST = 4.0  # spans, by how much they weigh, before anything is told
-FEWEST_CLEAR, CLEAR = (
-    2.0,
-    0.1,
-)  # motions of channels where that share, at most, of what is off is left beside the lag: it is clear
+FEWEST_CLEAR, CLEAR = 2.0, 0.1  # motions of channels, and share of what is off that is left beside a lag that is clear
 NEWEST = (30, 15, 7, 3)  # spans that are looked at: if all show no clear lag, fewer, for it may have come since
 FLOOR = 3e-3  # s, deviation of what a lag is taken for, by the model's own
 SURE, GONE = 5.0, 3.0  # deviations from which on it is told, and below which it has ended
@@ -62,8 +59,6 @@ class DelayMonitor:
     ----------
     alarm : Alarm or None
         While it lasts.
-    lag : float
-        By the newest spans, s; 0 while too little has moved.
     """
 
     def __init__(self, stream: Stream, least: float = 0.0) -> None:
@@ -73,7 +68,7 @@ class DelayMonitor:
 
     def begin(self) -> None:
         """The boom starts from rest; what is known of the lag stays known no longer, an alarm lasts until it is refuted."""
-        self._number, self.lag = 0, 0.0
+        self._number = 0
         self._blocks: deque[tuple[StreamReadings, NDArray[np.bool_]]] = deque()
         self._spans: deque[tuple[Array, Array]] = deque(maxlen=NEWEST[0])
 
@@ -133,13 +128,10 @@ class DelayMonitor:
         triangle = np.convolve(np.ones(half), np.ones(half)) / half**2
         return np.column_stack([np.convolve(column, triangle, "valid") for column in blocks.T])
 
-    def estimate(self) -> tuple[float, float]:
-        """The lag and its deviation, s; infinite while too little has moved."""
-        lag, sigma, _ = self._estimate()
-        return lag, sigma
-
-    def _estimate(self) -> tuple[float, float, bool]:
-        """Lag, deviation, and whether it is clear: nearly all that readings are off by is that of an earlier time."""
+    def estimate(self) -> tuple[float, float, bool]:
+        """Return lag and deviation (s; infinite while too little has moved), and whether nearly all that is off is a lag."""
+        if not self._spans:
+            return 0.0, math.inf, False
         rows, slopes = (np.array(each) for each in zip(*self._spans, strict=True))
         for count in NEWEST:
             if count == NEWEST[0] or count < len(rows):
@@ -149,8 +141,7 @@ class DelayMonitor:
         return (*_small_lag(rows, slopes), False)
 
     def _judge(self, end: int, is_doubted: bool, shared: float) -> list[Alarm]:
-        lag, sigma, is_clear = self._estimate()
-        self.lag = lag
+        lag, sigma, is_clear = self.estimate()
         lag -= min(0.0, max(shared, lag))
         if self.alarm is not None and abs(lag) < GONE * sigma and math.isfinite(sigma):
             ended, self.alarm = replace(self.alarm, until=end), None

@@ -211,8 +211,8 @@ class HealthMonitor:
             stamps, raw, left = each.rows
             expected = raw - left if is_followed else np.full(raw.shape, np.nan)
             news += self._check(stream, block, stamps, raw, expected)
-        if is_followed and not self._sensors[Stream.STROKES].is_any_masked:
-            if not self._sensors[Stream.IMU].is_any_masked:
+        if is_followed and not self._sensors[Stream.STROKES].masked.any():
+            if not self._sensors[Stream.IMU].masked.any():
                 news += self._void(self._mount.take(readings[Stream.IMU], start, block.end), block.end)
             angles = readings[Stream.ANGLES]
             news += self._void(self._angles.take(angles, predicted.strokes, BLOCK * NANO, start, block.end), block.end)
@@ -223,7 +223,7 @@ class HealthMonitor:
         strokes = predictions.measured
         expected = np.full(strokes.shape, np.nan) if is_shaken else np.zeros(strokes.shape)
         news += self._check(Stream.STROKES, block, predictions.stamps, strokes, expected)
-        if self._sensors[Stream.STROKES].is_any_masked or self._angles.has_wrong_strokes or self._noise is None:
+        if self._sensors[Stream.STROKES].masked.any() or self._angles.has_wrong_strokes or self._noise is None:
             news += self.residuals.close(start)
             self.residuals.begin()
             return news
@@ -240,9 +240,9 @@ class HealthMonitor:
     def _judge_delay(self, stream: Stream, monitor: DelayMonitor, block: Block, readings: StreamReadings) -> list[Alarm]:
         """Look for a lag of a stream; gives the alarm that began, changed or ended."""
         is_doubted = partial(self._is_doubted, stream, block.end)
-        shared = 0.0 if stream is Stream.ANGLES else self._delays[Stream.ANGLES].lag
-        masked = self._sensors[stream].masked
-        return monitor.take(block.number, readings, masked, block.end, is_doubted, self._slowest(), shared)
+        shared = 0.0 if stream is Stream.ANGLES else self._delays[Stream.ANGLES].estimate()[0]
+        period = 1.0 / self._noise.modes[0].frequency if self._noise is not None and self._noise.modes else 0.0
+        return monitor.take(block.number, readings, self._sensors[stream].masked, block.end, is_doubted, period, shared)
 
     def _is_doubted(self, stream: Stream, stamp: int) -> bool:
         """Whether a load, or a fault that is not its lag, may put the vibration that a stream reads out of step at `stamp`.
@@ -255,10 +255,6 @@ class HealthMonitor:
         suspects = [{each.cause, *(rank.cause for rank in each.ranked)} for each in self.residuals.alarms]
         return self.residuals.is_shaken(stamp) or any(cause not in each for each in suspects)
 
-    def _slowest(self) -> float:
-        """Period (s) of the slowest vibration at the present posture; 0 where it is not known."""
-        return 1.0 / self._noise.modes[0].frequency if self._noise is not None and self._noise.modes else 0.0
-
     def _check(self, stream: Stream, block: Block, stamps: NDArray[np.int64], raw: Array, expected: Array) -> list[Alarm]:
         """Check the sensors of a stream: stamps (k,) in ns, readings and what they should be (k, channels); gives the news."""
         monitor = self._sensors[stream]
@@ -266,8 +262,7 @@ class HealthMonitor:
         findings = self._checks[stream].look(np.asarray(stamps * NANO), raw, expected, block.end * NANO)
         if findings.is_calm and not monitor.alarms:
             return []
-        may_come_back = not findings.is_calm and findings.jumped.any()
-        blamed = self.residuals.blamed if may_come_back else {}
+        blamed = self.residuals.blamed if not findings.is_calm and findings.jumped.any() else {}
         newest = (raw if stream is Stream.STROKES else raw - expected)[-1] if len(raw) else None
         news = monitor.take(findings, block.number * BLOCK, block.end, blamed, newest)
         if stream in JUDGED and monitor.masked is not before and (monitor.masked & ~before).any():

@@ -49,8 +49,7 @@ LEAST = 3.0
 """s; the shortest interval that is looked at."""
 LONGEST = 60.0
 """s; the longest: free vibration has died away by then, and memory goes by the square of it."""
-SHAKEN = 0.003
-"""Of the boom's weight: standard deviation of the load at the tip, from which on it shakes the boom."""
+SHAKEN = 0.003  # of the boom's weight, standard deviation of a load at the tip that shakes the boom
 NEAR = 0.2
 """A vibration belongs to the nearest mode of the model, if it is no further from it than this share."""
 SURE = 0.02

@@ -11,13 +11,25 @@ import pytest
 from boom_twin import load_scene
 from boom_twin.errors import BagError
 from boom_twin.health.baseline import load_baseline
-from boom_twin.report.quantities import Quantity, batch_mean, digest, path_length, read, write
+from boom_twin.report.quantities import BatchMeans, PathLength, Quantity, digest, read, write
 from boom_twin.report.vibration import still
+
+
+def mean(values: np.ndarray) -> tuple[float, float]:
+    means = BatchMeans()
+    means.add(values)
+    return means.mean
+
+
+def length(stroke: np.ndarray) -> tuple[float, int]:
+    path = PathLength()
+    path.add(stroke)
+    return path.length
 
 
 def test_batch_means_are_as_sure_as_they_say() -> None:
     random = np.random.default_rng(0)
-    pairs = np.array([batch_mean(random.normal(3.0, 2.0, 500)) for _ in range(200)])
+    pairs = np.array([mean(random.normal(3.0, 2.0, 500)) for _ in range(200)])
     assert pairs[:, 0].std() == pytest.approx(2.0 / np.sqrt(500), rel=0.2)
     assert pairs[:, 1].mean() == pytest.approx(2.0 / np.sqrt(500), rel=0.2)
 
@@ -27,9 +39,9 @@ def test_the_way_of_a_stroke() -> None:
     random = np.random.default_rng(1)
     legs_of = [(0.1, 0.1, 500), (0.1, 0.6, 500), (0.6, 0.4, 300), (0.4, 0.5, 300)]
     way = np.concatenate([np.linspace(*leg) for leg in legs_of])
-    travel, legs = path_length(way + random.normal(0.0, 2e-5, len(way)))
+    travel, legs = length(way + random.normal(0.0, 2e-5, len(way)))
     assert travel == pytest.approx(0.8, abs=3e-4) and legs == 3
-    assert path_length(np.full(100, 0.3) + random.normal(0.0, 2e-5, 100)) == (0.0, 0)
+    assert length(np.full(100, 0.3) + random.normal(0.0, 2e-5, 100)) == (0.0, 0)
 
 
 def test_standing_still() -> None:
