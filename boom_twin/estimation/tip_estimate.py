@@ -71,7 +71,7 @@ import math
 
 from ..kernels.jit import inner, kernel
 from .cause_mixture import chance_of_soft, covariance_of, mean_of, read_covariances, weigh_causes, write_covariance
-from .deviation_filter import ANGLE, BIAS, COUNT, FELT_X, FELT_Y, LOAD, STAYING, STEP, clear, states_of
+from .deviation_filter import ANGLE, BIAS, COUNT, FELT_X, FELT_Y, LOAD, SHARES, STAYING, STEP, clear, states_of
 from .deviation_readings import read_acceleration, read_tip
 
 REMEMBERED = 2.0  # s, over which the mean square of the deviation is taken
@@ -83,8 +83,7 @@ WIDTH = 22
 TIP, ACCELERATION, FORCE, TIP_COVARIANCE, ACCELERATION_COVARIANCE, FORCE_VARIANCE = 0, 3, 6, 8, 14, 20
 """First places in a row of an estimate: x, y, angle of the tip (3); their second derivatives (3); load (2); covariances of the
 first two, upper triangles by rows (6 each); variances of the load (2). SI."""
-VARIANCES = [0, 3, 5]
-"""Places of the variances in such a triangle."""
+VARIANCES = [0, 3, 5]  # places of the variances in such a triangle
 
 
 @kernel
@@ -117,6 +116,10 @@ def write_estimate(f, results, out):
     for a in range(3):
         out[at] += inexact2 * (out[TIP + a] - results.tip[0, a]) ** 2
         at += 3 - a
+    for i in range(f.softness.shape[0]):  # a joint that turns far moves the tip towards it, by second order
+        bent = 0.5 * (f.x[SHARES + i] * f.drawn[i]) ** 2 / f.slopes[i]
+        out[TIP_COVARIANCE] += (bent * f.lever[i, 1]) ** 2
+        out[TIP_COVARIANCE + 3] += (bent * f.lever[i, 0]) ** 2
     add_sag(f, out)
     write_spread(f, results, out)
 

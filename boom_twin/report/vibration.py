@@ -14,8 +14,7 @@ from ..scene.schema import Scene
 from ..scene.summary import weight_of
 from ..types import Array, Stream, stream_of
 
-RATE = 40.0
-"""Hz to which samples are thinned out."""
+RATE = 40.0  # Hz, to which samples are thinned out
 
 
 def vibrations(times: Array, values: Array) -> list[Vibration]:
