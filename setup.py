@@ -77,7 +77,6 @@ setup(
             "distributed>=2025.5,<2027",
             "pyarrow>=18,<27",
             "psutil>=5.9,<8",
-            "bokeh>=3.4,<4",  # Dask's dashboard
         ],
         "fatigue": ["rainflow>=3.2,<4"],
         "notebook": ["pandas>=2.2,<4", "nbclient>=0.10,<1", "nbformat>=5.10,<6", "ipykernel>=6.29,<8"],

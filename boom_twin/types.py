@@ -162,7 +162,7 @@ SENSORS: dict[Stream, SensorKind] = {
         noise="imu_sigma",
         resolution="",
         lack="there are no residuals of the tip's acceleration (optional)",
-        alarms=(),
+        alarms=("stuck",),
     ),
     Stream.FORCES: SensorKind(
         title="cylinder forces",

@@ -1,4 +1,8 @@
-"""Envelope of a boom at rest over its working range: deflection, forces, frequencies, moments and stresses by posture."""
+"""Envelope of a boom at rest over its working range: deflection, forces, frequencies, moments and stresses by posture.
+
+A grid over the ranges of the joints is coarse for many sections. So each extreme is searched by a bounded quasi-Newton method
+from the best postures of the grid.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +11,10 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from scipy.optimize import minimize
 
 from ..compiler.compile import compile_scene
-from ..compiler.plan import Plan, first_row, taken_apart
+from ..compiler.plan import first_row, taken_apart
 from ..errors import SolverError
 from ..scene.kinematics import posture_angles, skeleton, stroke_curve
 from ..scene.schema import Scene
@@ -22,6 +27,9 @@ MOST = 700  # postures of the grid
 FINEST = 11  # angles of a joint
 MODES = 3
 WIDTH = 1e-5  # relative accuracy of frequencies
+STARTS = 5  # best postures of the grid from which each extreme is searched
+STEP = 1e-3  # of the search's differences, rad
+GAIN = 1e-4  # relative gain by which a step of the search must better the extreme
 
 
 @dataclass(frozen=True)
@@ -31,7 +39,7 @@ class Envelope:
     Attributes
     ----------
     names : tuple of str
-        Of the scene's postures; empty for those of the grid.
+        Of the scene's postures; empty for those of the grid and of the search.
     angles : ndarray, shape (m, n)
         Section angles to the base, degrees.
     tips : ndarray, shape (m, 2)
@@ -47,7 +55,9 @@ class Envelope:
     stresses : ndarray, shape (m, n)
         Size of that over the section modulus, Pa; NaN where the section has no height.
     skipped : dict of str to int
-        How many postures are left out, by reason.
+        How many postures of scene and grid are left out, by reason.
+    searched : int
+        How many of the postures, the last ones, were found by the search.
     """
 
     names: tuple[str, ...]
@@ -59,20 +69,21 @@ class Envelope:
     moments: Array
     stresses: Array
     skipped: dict[str, int]
+    searched: int
 
     def posture(self, row: int) -> str:
-        """A posture in words: its name, or its section angles."""
-        return self.names[row] or "[" + ", ".join(f"{round(angle)}" for angle in self.angles[row].tolist()) + "]"
+        """Return a posture as ``--posture`` takes it: its name, or its section angles."""
+        return self.names[row] or ",".join(f"{round(angle, 1) + 0.0:g}" for angle in self.angles[row].tolist())
 
 
 def envelope(scene: Scene, progress: Callable[[int, int], None] = lambda done, total: None) -> Envelope:
-    """The boom at rest in its named postures and on a grid over the ranges of its joints.
+    """Return the boom at rest in its named postures, on a grid over the ranges of its joints, and at the extremes.
 
     Parameters
     ----------
     scene : Scene
     progress : callable, optional
-        Told after every posture how many of how many are done.
+        Told after every posture how many of how many are done, and then after the search of every extreme.
 
     Returns
     -------
@@ -86,26 +97,26 @@ def envelope(scene: Scene, progress: Callable[[int, int], None] = lambda done, t
         There is no posture with an equilibrium.
     """
     postures = [(name, posture_angles(scene, name)) for name in scene.postures] + [("", angles) for angles in _grid(scene)]
-    plan = compile_scene(scene)
-    bending, owners = moments_by_unknowns(plan), np.array([station.section for station in stations(scene)], dtype=int)
-    rows, names, skipped = [], [], dict.fromkeys(("out of a cylinder's travel", "no equilibrium"), 0)
+    boom = _Boom(scene)
+    n, rows, names = len(scene.joints), [], []
     for number, (name, relative) in enumerate(postures, 1):
-        strokes = np.array([stroke_curve(scene, i, relative[i : i + 1])[0] for i in range(plan.joints)])
-        if not all(0.0 <= s <= joint.cylinder.max_stroke for s, joint in zip(strokes, scene.joints, strict=True)):
-            skipped["out of a cylinder's travel"] += 1
-        else:
-            try:
-                rows.append(_at_rest(scene, plan, strokes, relative, bending, owners))
-                names.append(name)
-            except SolverError:
-                skipped["no equilibrium"] += 1
+        if (row := boom.at_rest(relative)) is not None:
+            rows.append(row)
+            names.append(name)
         progress(number, len(postures))
     if not rows:
         raise SolverError(f"none of {len(postures)} postures has an equilibrium. Check masses, stiffnesses and range_deg.")
-    angles, tips, deflections, forces, frequencies, moments = (np.array(column) for column in zip(*rows, strict=True))
+    skipped, grid = dict(boom.skipped), np.array(rows)
+    extremes = [(k, sign) for k in range(n + 2, grid.shape[1]) if np.ptp(grid[:, k]) > 0.0 for sign in (-1.0, 1.0)]
+    for number, (k, sign) in enumerate(extremes, 1):
+        if (row := boom.extreme(grid, k, sign)) is not None:
+            rows.append(row)
+        progress(number, len(extremes))
+    angles, tips, deflections, forces, moments, frequencies = np.split(np.array(rows), np.cumsum([n, 2, 1, n, n]), axis=1)
     moduli = np.array([section.section_modulus or np.nan for section in scene.sections])
-    stresses = np.abs(moments) / moduli
-    return Envelope(tuple(names), angles, tips, deflections, forces, frequencies, moments, stresses, skipped)
+    stresses, searched = np.abs(moments) / moduli, len(rows) - len(names)
+    names += [""] * searched
+    return Envelope(tuple(names), angles, tips, deflections[:, 0], forces, frequencies, moments, stresses, skipped, searched)
 
 
 def _grid(scene: Scene) -> list[Array]:
@@ -115,19 +126,61 @@ def _grid(scene: Scene) -> list[Array]:
     return [np.array(angles) for angles in product(*axes)]
 
 
-def _at_rest(
-    scene: Scene, plan: Plan, strokes: Array, angles: Array, bending: Array, owners: Array
-) -> tuple[Array, Array, float, Array, Array, Array]:
-    """Section angles, tip, deflection, forces, frequencies, moments of one posture."""
-    state, work = plan.state(), plan.work()
-    settle(plan, state, work, strokes, angles)
-    tip, straight = state.frames[-1, :2].copy(), skeleton(scene, angles)
-    forces = taken_apart(plan, first_row(plan, state)).cylinder_forces
-    moments = _largest(bending @ state.z, owners, plan.joints)
-    modes = natural_modes(plan, state, work, MODES, WIDTH)
-    frequencies = np.array([mode.frequency for mode in modes])
-    deflection = float(np.hypot(*(tip - straight.pivots[-1])))
-    return np.degrees(straight.headings), tip, deflection, forces, frequencies, moments
+class _Boom:
+    """A compiled boom that is brought to rest in one posture after the other.
+
+    Attributes
+    ----------
+    skipped : dict of str to int
+        How many postures had no result, by reason.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene, self._plan = scene, compile_scene(scene)
+        self._bending = moments_by_unknowns(self._plan)
+        self._owners = np.array([station.section for station in stations(scene)], dtype=int)
+        self._bounds = np.radians([joint.range_deg for joint in scene.joints])
+        self.skipped = dict.fromkeys(("out of a cylinder's travel", "no equilibrium"), 0)
+
+    def at_rest(self, relative: Array, modes: int = MODES) -> Array | None:
+        """Return section angles (deg), tip, deflection, forces, moments and frequencies in one row, None at no rest."""
+        scene, plan = self._scene, self._plan
+        strokes = np.array([stroke_curve(scene, i, relative[i : i + 1])[0] for i in range(plan.joints)])
+        if not all(0.0 <= s <= joint.cylinder.max_stroke for s, joint in zip(strokes, scene.joints, strict=True)):
+            self.skipped["out of a cylinder's travel"] += 1
+            return None
+        state, work = plan.state(), plan.work()
+        try:
+            settle(plan, state, work, strokes, relative)
+            frequencies = [mode.frequency for mode in natural_modes(plan, state, work, modes, WIDTH)]
+        except SolverError:
+            self.skipped["no equilibrium"] += 1
+            return None
+        tip, straight = state.frames[-1, :2], skeleton(scene, relative)
+        forces = taken_apart(plan, first_row(plan, state)).cylinder_forces
+        moments = _largest(self._bending @ state.z, self._owners, plan.joints)
+        deflection = np.hypot(*(tip - straight.pivots[-1]))
+        return np.concatenate([np.degrees(straight.headings), tip, [deflection], forces, moments, frequencies])
+
+    def extreme(self, grid: Array, k: int, sign: float) -> Array | None:
+        """Return the row of largest ``sign * row[k]`` that is found from the best of `grid`; None if none is better."""
+        n, values = len(self._bounds), -sign * grid[:, k]
+        modes = MODES if k >= 3 + 3 * n else 0
+        best, found = values.min(), None
+
+        def lacking(relative: Array) -> float:
+            """Return what is minimised; the worst of the grid where there is no rest."""
+            nonlocal best, found
+            row = self.at_rest(relative, modes)
+            value = values.max() if row is None else -sign * row[k]
+            if value < best:
+                best, found = value, relative.copy()
+            return float(value)
+
+        for start in np.argsort(values)[:STARTS]:
+            relative = np.diff(np.radians(grid[start, :n]), prepend=0.0)
+            minimize(lacking, relative, method="L-BFGS-B", bounds=self._bounds, options={"eps": STEP, "ftol": GAIN})
+        return None if found is None else self.at_rest(found)
 
 
 def _largest(values: Array, owners: Array, count: int) -> Array:

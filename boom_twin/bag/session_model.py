@@ -148,10 +148,11 @@ class SessionSettings:
         return {name: value for name, value in self.settings.model_dump().items() if value != usual[name]}
 
 
-def settings_of(session: Path, given: Path | None = None) -> SessionSettings:
-    """The numbers of a session's twin.
+def settings_of(session: Path, given: Path | None = None, namespace: str = "") -> SessionSettings:
+    """Return the numbers of a session's twin.
 
-    Those of the parameter file `given`; else of the node that ran beside the recording; else the package's own.
+    Those of the parameter file `given` for the node in `namespace`; else of the node that ran beside the recording; else the
+    package's own.
 
     Raises
     ------
@@ -161,7 +162,7 @@ def settings_of(session: Path, given: Path | None = None) -> SessionSettings:
         What the session keeps cannot be used.
     """
     if given is not None:
-        return SessionSettings(load_settings(given), str(given))
+        return SessionSettings(load_settings(given, namespace), str(given))
     values, source = kept_parameters(session)
     own = {name: value for name, value in values.items() if name in Settings.model_fields}  # others are of the node alone
     try:

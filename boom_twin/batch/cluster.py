@@ -1,43 +1,51 @@
-"""Tasks on Dask distributed: a cluster on this machine or a scheduler that runs elsewhere, and the rows as they come."""
+"""Sessions side by side: threads of this process, each of which waits for a session's process, here or by way of Dask."""
 
 from __future__ import annotations
 
+import json
 import os
-import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
-from logging import CRITICAL
-from math import inf
-from threading import Event, Thread
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from threading import Thread
 from typing import TYPE_CHECKING
 
 from ..errors import BagError, UsageError
-from .session_task import Row, SessionTask, failed
+from .session_task import Row, SessionTask, failed, run_task
 
 if TYPE_CHECKING:
-    from distributed import Client, Future, LocalCluster
+    from distributed import Client
 
 REMEDY = 'Run `pip install "boom_twin[batch]"`.'
-ALLOWED = 5
-"""Workers that may end while they have a task, before it counts as a failed attempt."""
-LOST = 5
-"""Seconds without a word of a worker after which another one takes its place; also between counts of the workers."""
+KILLED = "the workers that had it were ended from outside. Look for what ends them, as the system's memory."
+COUNTED = 5
+"""Seconds between two counts of a cluster's workers."""
 CONNECT = 20.0
 """Seconds for a scheduler to answer."""
 
 
+@dataclass(frozen=True, slots=True)
+class Workers:
+    """What does sessions: `work` gives the row of one, `capacity` the number of those that may run at once."""
+
+    work: Callable[[SessionTask], Row]
+    capacity: Callable[[], int]
+    dashboard: str = ""
+
+
 @contextmanager
-def connected(scheduler: str | None, workers: int | None) -> Iterator[Client]:
-    """A client of the scheduler at an address, or of a cluster on this machine, which ends with the block.
+def connected(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
+    """Give the workers of the scheduler at an address, or those of this process, which opens no port.
 
     Parameters
     ----------
     scheduler : str, optional
         Address, as ``tcp://host:8786``.
     workers : int, optional
-        Of a cluster on this machine, a process each; by default as many as it has cores.
+        Sessions at once on this machine; by default as many as it has cores.
 
     Raises
     ------
@@ -46,106 +54,75 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Client]:
     BagError
         No scheduler answers there.
     """
-    try:
-        import dask
-        from distributed import Client, LocalCluster
-    except ImportError:
-        raise UsageError(f"dask is not installed, and batch needs it. {REMEDY}") from None
-    if scheduler is not None:
-        try:
-            client = Client(scheduler, timeout=CONNECT, set_as_default=False)
-        except (TimeoutError, OSError, ValueError) as error:
-            remedy = "Start `dask scheduler`, check host and port."
-            raise BagError(f"--scheduler {scheduler}: no Dask scheduler answers ({type(error).__name__}). {remedy}") from None
-        with client:
-            yield client
+    if scheduler is None:
+        count = workers or os.cpu_count() or 1
+        yield Workers(run_task, lambda: count)
         return
-    settings = {
-        "distributed.scheduler.allowed-failures": ALLOWED,
-        "distributed.worker.daemon": False,  # a worker has children of its own
-        "distributed.deploy.lost-worker-timeout": f"{LOST}s",
-    }
-    options = {"host": "127.0.0.1", "dashboard_address": "127.0.0.1:0", "memory_limit": 0, "silence_logs": CRITICAL}
-    with (
-        dask.config.set(settings),
-        LocalCluster(n_workers=workers or os.cpu_count(), threads_per_worker=1, processes=True, **options) as cluster,
-        Client(cluster, set_as_default=False) as client,
-        _kept_up(cluster),
-    ):
-        yield client
-
-
-@contextmanager
-def _kept_up(cluster: LocalCluster) -> Iterator[None]:
-    """Replace workers that have gone for good: Dask restarts one that is killed, but not if that happens while it starts."""
-    count, ended = len(cluster.worker_spec), Event()
-
-    def watch() -> None:
-        while not ended.wait(LOST):
-            cluster.scale(count)
-
-    thread = Thread(target=watch, name="workers", daemon=True)
-    thread.start()
     try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
+        from distributed import Client
+    except ImportError:
+        raise UsageError(f"dask is not installed, and --scheduler needs it. {REMEDY}") from None
+    try:
+        client = Client(scheduler, timeout=CONNECT, set_as_default=False)
+    except (TimeoutError, OSError, ValueError) as error:
+        remedy = "Start `dask scheduler`, check host and port."
+        raise BagError(f"--scheduler {scheduler}: no Dask scheduler answers ({type(error).__name__}). {remedy}") from None
+    with client:
+        yield on_dask(client, run_task)
 
 
-def rows_of(client: Client, tasks: Sequence[SessionTask], work: Callable[[SessionTask], Row]) -> Iterator[Row]:
-    """The rows of all tasks, as they are done.
+def on_dask(client: Client, work: Callable[[SessionTask], Row]) -> Workers:
+    """Return workers that have `work` done by those of a Dask cluster.
 
-    No more tasks are with the scheduler than its workers have threads: when a worker ends, Dask counts that against every task
-    that waits there, not only against the one that it had at work.
-    A task whose workers end (killed, out of memory, a machine that is lost) goes to others; when `ALLOWED` of them have,
-    that counts as one of its attempts. What fails in any other way costs its own row only.
-    """
-    from distributed import as_completed
-
-    waiting, running, attempts = deque(tasks), dict[str, SessionTask](), dict[str, int]()
-
-    def submitted(task: SessionTask) -> Future:
-        attempts[task.key] = attempts.get(task.key, 0) + 1
-        future = client.submit(work, task, key=f"{task.key}-{attempts[task.key]}", pure=False, retries=0)
-        running[future.key] = task
-        return future
-
-    done, most, looked = as_completed([], loop=client.loop), 1, -inf
-
-    def fill() -> None:
-        nonlocal most, looked
-        if (now := time.monotonic()) > looked + LOST:
-            most, looked = max(most, sum(client.nthreads().values())), now
-        while waiting and len(running) < most:
-            done.add(submitted(waiting.popleft()))
-
-    fill()
-    for future in done:
-        task = running.pop(future.key)
-        row, reason = _row_or_reason(future)
-        if row is not None:
-            yield row
-        elif attempts[task.key] <= task.retries:
-            done.add(submitted(task))
-        else:
-            yield failed(task, reason, attempts[task.key])
-        future.release()
-        fill()
-
-
-def _row_or_reason(future: Future) -> tuple[Row | None, str]:
-    """The row of a task that has ended; else why it has none.
-
-    A worker that ends before its row was fetched takes the row with it: the task runs once more, and may then fail too.
+    A task whose workers end (killed, out of memory, a machine that is lost) goes to others. When Dask gives it up, that counts
+    as one of its attempts.
     """
     from distributed import KilledWorker
 
+    def row_of(task: SessionTask) -> Row:
+        for attempt in range(1, task.retries + 2):
+            future = client.submit(work, task, key=f"{task.key}-{attempt}", pure=False, retries=0)
+            try:
+                return dict(future.result())
+            except KilledWorker:
+                reason = KILLED
+            except CancelledError:  # as of a row that was lost with its worker
+                reason = f"Dask gave it up ({future.status})"
+            except Exception as error:
+                reason = f"{type(error).__name__}: {error}"
+        return failed(task, reason, attempt)
+
+    return Workers(row_of, lambda: sum(client.nthreads().values()), client.dashboard_link)
+
+
+def rows_of(workers: Workers, tasks: Sequence[SessionTask]) -> Iterator[Row]:
+    """Yield the rows of all tasks as they are done; what fails costs its own row only.
+
+    No more tasks are with a scheduler than its workers have threads: when a worker ends, Dask counts that against every task
+    that waits there, not only against the one that it had at work. Workers that come later are used, too.
+    """
+    waiting, rows, threads = deque(tasks), SimpleQueue[Row](), list[Thread]()
+
+    def go() -> None:
+        while waiting:
+            task = waiting.popleft()
+            try:
+                row = workers.work(task)
+            except Exception as error:
+                row = failed(task, f"{type(error).__name__}: {error}", 1)
+            rows.put(json.loads(json.dumps(row, ensure_ascii=False).encode(errors="replace")))  # names that are not UTF-8
+
     try:
-        return future.result(), ""
-    except KilledWorker:
-        return None, f"{ALLOWED} workers that had it were ended from outside. Look for what ends them, as the system's memory."
-    except CancelledError:
-        return None, f"Dask gave it up ({future.status})"
-    except Exception as error:
-        return None, f"{type(error).__name__}: {error}"
+        for _ in tasks:
+            row = None
+            while row is None:
+                for _ in range(min(max(workers.capacity(), 1), len(tasks)) - len(threads)):
+                    threads.append(Thread(target=go, daemon=True))  # sessions end with this process, see end_with_caller
+                    threads[-1].start()
+                try:
+                    row = rows.get(timeout=COUNTED)
+                except Empty:
+                    continue
+            yield row
+    finally:
+        waiting.clear()

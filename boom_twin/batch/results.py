@@ -7,19 +7,21 @@ import json
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..errors import BagError, UsageError
+from ..errors import BagError
 from ..system.atomic_files import DRAFT, write_atomic
 from ..system.result_folder import check_lasting
-from .cluster import REMEDY
 from .session_task import OK, Row
 
 MARK, TABLE, PAGE = "batch.json", "sessions.parquet", "batch.html"
 ROWS, SESSIONS = "rows", "sessions"
 """Folders of the rows, and of the replays."""
+DIGEST = "row_sha256"
+"""Key of a row's file that shows that the others are whole."""
 _OWN = frozenset({MARK, TABLE, PAGE, ROWS, SESSIONS})
 
 
@@ -42,7 +44,7 @@ def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
     check_lasting(out)
     place = out.resolve()
     for session in sessions:
-        path = session.resolve()
+        path = Path(os.path.realpath(session))
         if path == place or place in path.parents or path in place.parents:
             raise BagError(f"{out}: {session} lies in it, or it in the session, and a source is never touched. Choose another.")
     try:
@@ -81,16 +83,27 @@ class BatchFolder:
         return self.folder / SESSIONS / key
 
     def kept(self, key: str, fingerprint: str) -> Row | None:
-        """The row of a session if it is finished and the same was asked for; None otherwise."""
+        """Return the row of a session if it is finished and the same was asked for; None otherwise.
+
+        Raises
+        ------
+        BagError
+            Its file is not as `keep` wrote it.
+        """
+        file = self.folder / ROWS / f"{key}.json"
         try:
-            row = json.loads((self.folder / ROWS / f"{key}.json").read_bytes())
-            return dict(row) if row["fingerprint"] == fingerprint else None
-        except (OSError, ValueError, KeyError, TypeError):
+            row = json.loads(file.read_bytes())
+            if row.pop(DIGEST) != _digest(row):
+                raise ValueError("changed")
+        except FileNotFoundError:
             return None
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+            raise BagError(f"{file}: this row of an earlier call is damaged. Its session is done anew.") from None
+        return dict(row) if row["fingerprint"] == fingerprint else None
 
     def keep(self, row: Row) -> None:
         """Write a finished row."""
-        write_atomic(self.folder / ROWS / f"{row['key']}.json", json.dumps(row) + "\n")
+        write_atomic(self.folder / ROWS / f"{row['key']}.json", json.dumps(row | {DIGEST: _digest(row)}) + "\n")
 
     def mark(self, total: int, finished: int) -> None:
         """Say how far the batch is."""
@@ -98,6 +111,10 @@ class BatchFolder:
         told = {"command": "batch", "version": __version__, "sessions": total, "finished": finished, "state": state}
         os.truncate(self._lock, 0)
         os.pwrite(self._lock, (json.dumps(told) + "\n").encode(), 0)
+
+
+def _digest(row: Row) -> str:
+    return sha256(json.dumps(row).encode()).hexdigest()
 
 
 _ALWAYS: dict[str, str] = {
@@ -113,18 +130,10 @@ _ALWAYS: dict[str, str] = {
 
 
 def write_table(path: Path, rows: Sequence[Row]) -> None:
-    """Write all rows as Parquet, one a session: columns that a row lacks are null there.
+    """Write all rows as Parquet, one a session: columns that a row lacks are null there."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
 
-    Raises
-    ------
-    UsageError
-        pyarrow is not installed.
-    """
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError:
-        raise UsageError(f"pyarrow is not installed, and batch needs it. {REMEDY}") from None
     alarm = pa.struct([(name, pa.float64() if name.endswith("_s") else pa.string()) for name in
                        ("channel", "kind", "from_s", "to_s", "cause", "told")])  # fmt: skip
     types: dict[str, Any] = {

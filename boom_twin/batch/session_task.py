@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -88,10 +89,9 @@ def failed(task: SessionTask, reason: str, attempts: int) -> Row:
 
 
 def _head(task: SessionTask) -> Row:
-    path = Path(task.session)
     return {
         "key": task.key,
-        "session": path.resolve().name,
+        "session": os.path.basename(os.path.realpath(task.session)),
         "path": task.session,
         "fingerprint": task.fingerprint,
         "version": __version__,

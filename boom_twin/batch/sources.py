@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import glob
+import os
+import re
 from collections.abc import Iterable, Iterator
 from hashlib import sha256
 from pathlib import Path
@@ -29,10 +31,10 @@ def sessions_of(sources: Iterable[str]) -> list[Path]:
     UsageError
         A glob fits no session, or a list cannot be read or is empty.
     """
-    found: dict[Path, Path] = {}
+    found: dict[str, Path] = {}
     for source in sources:
         for path in _listed(Path(source)) if source.endswith(LIST) else _matching(source):
-            found.setdefault(path.resolve(), path)
+            found.setdefault(os.path.realpath(path), path)
     return list(found.values())
 
 
@@ -52,15 +54,29 @@ def _matching(pattern: str) -> Iterator[Path]:
     if not glob.has_magic(pattern) or Path(pattern).exists():
         yield Path(pattern)
         return
-    found = [path for path in map(Path, sorted(glob.glob(pattern, recursive=True))) if is_session(path)]
+    found = [path for path in map(Path, sorted(_expanded(pattern))) if is_session(path)]
     if not found:
         raise UsageError(f"{pattern}: fits no session, a folder of a rosbag2 or a file of a session. Check it, and quote it.")
     yield from found
 
 
+def _expanded(pattern: str) -> Iterator[str]:
+    """Yield the paths that a glob fits; ``**`` does not go on through links, which may lead in a circle."""
+    before, *after = re.split(r"(?<![^/])\*\*(?![^/])", pattern, maxsplit=1)
+    if not after:
+        yield from glob.glob(pattern)
+        return
+    for top in glob.glob(before or "."):
+        if not after[0]:
+            yield top
+        for folder, inner, _ in os.walk(top):
+            inner[:] = [name for name in inner if not name.startswith(".")]
+            yield from _expanded(glob.escape(folder) + (after[0] or "/*"))
+
+
 def key_of(session: Path) -> str:
     """Name of a session's files among the results: its own, and a digest of its path."""
-    path = session.resolve()
+    path = Path(os.path.realpath(session))
     name = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in path.stem)
     return f"{name[:40]}-{sha256(str(path).encode(errors='surrogateescape')).hexdigest()[:10]}"
 

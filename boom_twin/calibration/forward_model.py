@@ -155,9 +155,14 @@ class CalibrationProblem:
         self.stroke_variance = settings.stroke_variance
 
     @property
+    def least(self) -> Array:
+        """Return the lower bounds of the deviations."""
+        return np.array([unknown.least for unknown in self.unknowns])
+
+    @property
     def start(self) -> Array:
-        """Deviations of the present values; a load that is not there begins a little off its bound."""
-        return np.array([max(0.0, unknown.least + START) for unknown in self.unknowns])
+        """Return the deviations of the present values; a load that is not there begins a little off its bound."""
+        return np.maximum(0.0, self.least + START)
 
     def values(self, deviations: Array) -> dict[str, float]:
         """Values of the unknowns by name."""

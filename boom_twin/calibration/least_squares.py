@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 
 from ..errors import BoomTwinError
 from ..estimation.load_spectrum import TipLoad
@@ -69,8 +69,8 @@ class Fit:
         """Inverse of the covariance (p, p) that white noise would give, with the priors."""
         return np.asarray((self.information + more) / max(1.0, self.misfit) ** 2 + np.eye(len(self.deviations)))
 
-    def without(self, left_out: Sequence[int]) -> Array:
-        """The deviations (p,) that fit best where those in places `left_out` stay 0.
+    def without(self, left_out: Sequence[int], least: Array) -> Array:
+        """Return the deviations (p,) of at least `least` (p,) that fit best where those in places `left_out` stay 0.
 
         What was fitted together cannot be taken apart: a zero that makes up for another's would be wrong without that.
         """
@@ -79,8 +79,14 @@ class Fit:
         found, precision = np.where(fixed, 0.0, self.deviations), self._precision()
         if fixed.any() and not fixed.all():
             moved = precision[np.ix_(~fixed, fixed)] @ self.deviations[fixed]
-            found[~fixed] += np.linalg.solve(precision[np.ix_(~fixed, ~fixed)], moved)
+            found[~fixed] += bounded_minimum(precision[np.ix_(~fixed, ~fixed)], moved, (least - found)[~fixed])
         return found
+
+
+def bounded_minimum(precision: Array, pull: Array, least: Array) -> Array:
+    """Return the x >= `least` that minimises x^T `precision` x / 2 - `pull`^T x; shapes (p, p), (p,), (p,)."""
+    root = np.linalg.cholesky(precision)
+    return np.asarray(lsq_linear(root.T, np.linalg.solve(root, pull), (least, np.inf), "bvls").x)
 
 
 def fitted(problem: CalibrationProblem, tell: Tell) -> Fit:
@@ -90,7 +96,6 @@ def fitted(problem: CalibrationProblem, tell: Tell) -> Fit:
     out of step, from where least squares do not find back. So the means over holds are fitted first, as equilibria. The noise
     rings at the boom's frequencies, too: it is made anew at the first estimate of the swinging boom, and the fit repeated.
     """
-    least = np.array([unknown.least for unknown in problem.unknowns])
     deviations, passes = fitted_in_holds(problem), 0
     for _ in range(ROUNDS):
         noise = problem.noise(deviations)
@@ -100,7 +105,7 @@ def fitted(problem: CalibrationProblem, tell: Tell) -> Fit:
             tell()
             return problem.moving(deviations, whitening)
 
-        deviations, more = _minimised(moving, deviations, least)
+        deviations, more = _minimised(moving, deviations, problem.least)
         passes += more
     residuals, slopes = problem.moving(deviations, whitening)
     freedom = max(int(np.count_nonzero(residuals)) - len(deviations), 1)
@@ -110,8 +115,7 @@ def fitted(problem: CalibrationProblem, tell: Tell) -> Fit:
 
 def fitted_in_holds(problem: CalibrationProblem) -> Array:
     """Deviations that fit the means over holds."""
-    least = np.array([unknown.least for unknown in problem.unknowns])
-    return _minimised(_in_holds(problem), problem.start, least)[0]
+    return _minimised(_in_holds(problem), problem.start, problem.least)[0]
 
 
 def _scatter(noise: list[Array], whitening: NoiseModel, slopes: Array) -> Array:

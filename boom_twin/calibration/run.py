@@ -28,6 +28,7 @@ MOVED = 0.01  # m, least travel of some stroke
 LOADED = 1.2  # misfit from which on an unknown load is looked for, and up to which it explains the residuals
 MISFIT = 1.5  # from which on the fit is remarked on
 GROWN = 1.1  # of residuals on what was held out, likewise
+AT_BOUND = 1e-6  # deviations of the prior, within which an estimate is at its bound
 BETWEEN = 1.96  # deviations, of a normal distribution's 95 %
 
 Progress = Callable[[float, str], None]
@@ -167,7 +168,7 @@ def calibrate(
     held_out = sessions[-1].name if len(sessions) > 1 else f"the last third of {sessions[-1].name}"
     return Calibration(
         better, zeros, estimates, tuple(groups), fit.misfit, fit.passes, tuple(sessions), held_out, before, after, mapped,
-        tuple(_remarks(problem, fit, sessions, mounts) + ([] if fit.load else _worse(before, after))),
+        tuple(_remarks(problem, fit, estimates, sessions, mounts) + ([] if fit.load else _worse(before, after))),
     )  # fmt: skip
 
 
@@ -288,7 +289,7 @@ def _refuse_other_boom(scene: Scene, sessions: Sequence[MeasuredSession], course
 def _estimates(problem: CalibrationProblem, fit: Fit, groups: Sequence[InseparableUnknowns]) -> tuple[Estimate, ...]:
     untold = {name for group in groups for name in group.names}
     reach = BETWEEN * np.sqrt(np.diag(fit.covariance()))
-    best = fit.without([i for i, unknown in enumerate(problem.unknowns) if unknown.name in untold])
+    best = fit.without([i for i, unknown in enumerate(problem.unknowns) if unknown.name in untold], problem.least)
     best = np.where([unknown.name in untold for unknown in problem.unknowns], fit.deviations, best)
     found = []
     for unknown, at, half in zip(problem.unknowns, best.tolist(), reach.tolist(), strict=True):
@@ -307,8 +308,18 @@ def _worse(before: HeldOutResult, after: HeldOutResult) -> list[str]:
     ]
 
 
-def _remarks(problem: CalibrationProblem, fit: Fit, sessions: Sequence[MeasuredSession], mounts: Sequence[object]) -> list[str]:
+def _remarks(
+    problem: CalibrationProblem, fit: Fit, estimates: Sequence[Estimate], sessions: Sequence[MeasuredSession],
+    mounts: Sequence[object],
+) -> list[str]:  # fmt: skip
     found = []
+    for each in estimates:
+        bound = each.unknown.value(each.unknown.least)
+        if each.told and each.value <= bound + AT_BOUND * each.unknown.kind.prior:
+            found.append(
+                f"{each.unknown.name} is at its lower bound of {bound:g} {each.unknown.kind.unit}: the sessions fit best with "
+                "less, which no boom has. Check the zeros of the sensors and the other loads of the scene."
+            )
     if fit.misfit > MISFIT:
         found.append(
             f"The residuals of the fit are {fit.misfit:.1f} times what noise explains: the sessions hold something that the "

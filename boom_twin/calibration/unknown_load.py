@@ -29,7 +29,7 @@ from ..scene.summary import weight_of
 from ..system.cores import usable_cores
 from ..types import NANO, Array
 from .forward_model import CalibrationProblem, ForwardModel, boom_of
-from .least_squares import Fit, Tell, fitted_in_holds
+from .least_squares import Fit, Tell, bounded_minimum, fitted_in_holds
 from .load_filter import Innovations, LoadPrior, filter_model, gained_variance, innovations, stroke_error, tilted
 from .load_modes import PosturePath, modes_along, posture_path
 from .noise_model import ResidualBlocks
@@ -131,13 +131,12 @@ def is_plausible(load: TipLoad | None, scene: Scene) -> bool:
 
 def _after_step(problem: CalibrationProblem, passes: Sequence[Pass], deviations: Array) -> tuple[Array, float]:
     """Deviations after a step of Gauss and Newton, and how long it would be at its full length, in those of the estimate."""
-    least = np.array([unknown.least for unknown in problem.unknowns])
     information = _information(passes) + np.eye(len(deviations))
     pull = -deviations - sum(np.einsum("pbc,bc->p", each.slopes, each.white) for each in passes)
-    step = np.linalg.solve(information, pull)
+    step = bounded_minimum(information, pull, problem.least - deviations)
     size = float(np.sqrt(step @ information @ step / len(step)))
     shorter = min(1.0, FURTHEST / max(float(np.abs(step).max()), 1e-12))
-    return np.maximum(deviations + shorter * step, least), size
+    return deviations + shorter * step, size
 
 
 def _information(passes: Sequence[Pass]) -> Array:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..errors import BagError, UsageError
 from ..offline.progress import progress_of
-from .arguments import add_window, positive, window_of
+from .arguments import add_mapping, add_window, positive, window_of
 from .main import add_params
 
 if TYPE_CHECKING:
@@ -26,15 +28,15 @@ def add_arguments(parser: ArgumentParser) -> None:
     place = "folder for sessions.parquet, batch.html and the replays: new, empty, or of an earlier batch, which goes on"
     parser.add_argument("--out", required=True, metavar="DIR", type=Path, help=place)
     parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="a running Dask scheduler; without it, a cluster on this machine"
+        "--scheduler", metavar="ADDRESS", help="a running Dask scheduler; without it, sessions run on this machine"
     )
     parser.add_argument(
-        "--workers", metavar="N", type=at_least(1), help="of the cluster on this machine; by default as many as cores"
+        "--workers", metavar="N", type=at_least(1), help="sessions at once on this machine; by default as many as cores"
     )
     scene = "scene file (YAML) for all sessions; without it, the one that each was made with, else the default scene"
     parser.add_argument("--scene", metavar="SCENE", type=Path, help=scene)
     add_params(parser)
-    parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors of all sessions; as for replay")
+    add_mapping(parser)
     parser.add_argument("--baseline", metavar="FILE", type=Path, help="of all sessions; as for replay")
     add_window(parser)
     parser.add_argument("--report", action="store_true", help="write report.html with its pictures for every session")
@@ -59,21 +61,23 @@ def at_least(least: int) -> Callable[[str], int]:
 
 def run(args: Namespace) -> int:
     """Replay what is not done yet, and write the table of all; exit code 1 if a session failed."""
-    from ..batch.cluster import connected, rows_of
+    from ..batch.cluster import REMEDY, connected, rows_of
     from ..batch.page import write_page
     from ..batch.results import PAGE, TABLE, batch_folder, counts, write_table
-    from ..batch.session_task import run_task
     from ..batch.sources import sessions_of
 
+    if missing := [name for name in ("pyarrow", "psutil") if find_spec(name) is None]:
+        raise UsageError(f"{missing[0]} is not installed, and batch needs it. {REMEDY}")
     sessions = sessions_of(args.bags)
     with batch_folder(args.out, sessions) as folder:
         tasks = _tasks(args, sessions, folder)
         done = {task.key: row for task in tasks if (row := _kept(args, folder, task)) is not None}
         if waiting := [task for task in tasks if task.key not in done]:
-            with connected(args.scheduler, args.workers) as client:
-                print(f"{len(done)} of {len(tasks)} sessions are done; dashboard: {client.dashboard_link}", file=sys.stderr)
+            with connected(args.scheduler, args.workers) as workers:
+                dashboard = f"; dashboard: {workers.dashboard}" if workers.dashboard else ""
+                print(f"{len(done)} of {len(tasks)} sessions are done{dashboard}", file=sys.stderr)
                 try:
-                    for row in _shown(rows_of(client, waiting, run_task), len(done), len(tasks)):
+                    for row in _shown(rows_of(workers, waiting), len(done), len(tasks)):
                         folder.keep(row)
                         done[row["key"]] = row
                 finally:
@@ -124,10 +128,14 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
 
 
 def _kept(args: Namespace, folder: BatchFolder, task: SessionTask) -> Row | None:
-    """The row of an earlier call, unless it is to be tried again."""
+    """Return the row of an earlier call, unless it is to be tried again."""
     from ..batch.session_task import OK
 
-    row = folder.kept(task.key, task.fingerprint)
+    try:
+        row = folder.kept(task.key, task.fingerprint)
+    except BagError as error:
+        print(f"warning: {error}", file=sys.stderr)
+        return None
     return None if row is not None and row["status"] != OK and args.retry_failed else row
 
 

@@ -58,12 +58,13 @@ def _examined(scene: Scene, folder: Path | None) -> tuple[dict[str, Any], list[s
     bars: list[ProgressBar] = []
 
     def progress(done: int, total: int) -> None:
-        if not bars:
-            bars.append(progress_of(total, "postures", "envelope"))
-        bars[0].update(1)
+        if done == 1:
+            bars.append(progress_of(total, "extremes" if bars else "postures", "envelope"))
+        bars[-1].update(1)
+        if done == total:
+            bars[-1].close()
 
     found = envelope(scene, progress)
-    bars[0].close()
     quantities = quantities_of(found)
     values = _summary(found, quantities)
     if folder is not None:
@@ -87,7 +88,7 @@ def quantities_of(found: Envelope) -> list[Quantity]:
 
 
 def _summary(found: Envelope, quantities: list[Quantity]) -> dict[str, Any]:
-    values: dict[str, Any] = {"postures": len(found.names)}
+    values: dict[str, Any] = {"postures": len(found.names), "searched": found.searched}
     values |= {f"skipped_{reason.replace(' ', '_')}": count for reason, count in found.skipped.items()}
     for quantity in quantities:
         for name, row in (("least", quantity.values.argmin()), ("greatest", quantity.values.argmax())):
@@ -99,7 +100,8 @@ def _summary(found: Envelope, quantities: list[Quantity]) -> dict[str, Any]:
 def _report(found: Envelope, quantities: list[Quantity]) -> list[str]:
     skipped = ", ".join(f"{count} {reason}" for reason, count in found.skipped.items() if count)
     lines = [f"{len(found.names)} postures at rest{f'; left out: {skipped}' if skipped else ''}"]
-    lines += ["postures: by name, or section angles to the base in degrees", ""]
+    lines += [f"{found.searched} of them were found by a search (L-BFGS-B) for each extreme, from the best of a grid"]
+    lines += ["postures: by name, or section angles to the base in degrees, as --posture takes them", ""]
     rows = [["", "least", "in posture", "greatest", "in posture"]]
     for quantity in quantities:
         row = [f"{quantity.words}, {quantity.unit}"]

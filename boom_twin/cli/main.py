@@ -14,7 +14,7 @@ import os
 import sys
 from argparse import REMAINDER, SUPPRESS, ArgumentParser, Namespace
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TextIO, cast
@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TextIO, cast
 from .. import __version__
 from ..errors import BoomTwinError, Fault
 from ..system.blas_threads import use_one_blas_thread
-from ..system.terminal_text import PrintableStream
+from ..system.terminal_text import PrintableStream, open_closed_streams
 from .examples import epilog_of
 from .parser import CommandParser
 from .quiet import QuietStream
@@ -91,6 +91,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     if argv is not None:
         return _main(argv)
+    open_closed_streams()
     gc.set_threshold(COLLECT_AFTER)
     try:
         return _main(sys.argv[1:])
@@ -100,12 +101,18 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _main(arguments: Sequence[str]) -> int:
     """Run one command; whatever it prints, of whatever file or message, cannot steer the terminal."""
-    with redirect_stdout(_printable(sys.stdout)), redirect_stderr(_printable(sys.stderr)):
-        return _run(arguments)
+    out, told = (_printable(stream, name) for stream, name in ((sys.stdout, "standard output"), (sys.stderr, "")))
+    with redirect_stdout(out), redirect_stderr(told):
+        try:
+            return _run(arguments)
+        finally:
+            with suppress(OSError):
+                out.flush()  # of help, too
 
 
-def _printable(stream: TextIO) -> TextIO:
-    return cast(TextIO, PrintableStream(stream))
+def _printable(stream: TextIO | None, name: str) -> TextIO:
+    """Return a stream for all that is printed; it leads nowhere if the caller has closed it."""
+    return cast(TextIO, PrintableStream(stream or open(os.devnull, "w", encoding="utf-8"), name))
 
 
 def _run(arguments: Sequence[str]) -> int:
@@ -117,9 +124,6 @@ def _run(arguments: Sequence[str]) -> int:
             code = _command(args.command).run(args)
         sys.stdout.flush()
         return code
-    except BrokenPipeError:  # the reader of stdout has gone; let nothing be flushed to it at exit
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
     except BoomTwinError as error:
         reason = str(error)
     except OSError as error:
@@ -224,11 +228,11 @@ def open_session_scene(session: str | Path, source: str | None) -> SessionScene:
     return found
 
 
-def open_session_settings(session: str | Path, params: Path | None) -> Settings:
-    """The numbers of a session's twin, see `boom_twin.bag.session_model.settings_of`; those that are not usual go to stderr."""
+def open_session_settings(session: str | Path, params: Path | None, namespace: str = "") -> Settings:
+    """Return the numbers of a session's twin, see `boom_twin.bag.session_model.settings_of`; unusual ones go to stderr."""
     from ..bag.session_model import settings_of
 
-    found = settings_of(Path(session), params)
+    found = settings_of(Path(session), params, namespace)
     if found.others:
         told = ", ".join(f"{name} {value:g}" for name, value in found.others.items())
         print(f"parameters: {found.source}: {told}", file=sys.stderr)

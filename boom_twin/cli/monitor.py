@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
-from .arguments import add_window, window_of
+from .arguments import add_mapping, add_window, window_of
 from .main import (
+    add_params,
     add_ros_args,
     add_session_scene,
     open_scene,
@@ -48,12 +49,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="a recorded session, the bag of a replay, or a folder of several sessions to choose from (the live topics)",
     )
     add_session_scene(parser)
-    parser.add_argument(
-        "--params", metavar="FILE", type=Path, help="ROS parameter file for a session's twin (as recorded, else the package's)"
-    )
+    add_params(parser)
     usual = "what is known of this rig while all is well, for a session's twin (as recorded, else the package's)"
     parser.add_argument("--baseline", metavar="FILE", type=Path, help=usual)
-    parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors (as recorded, else topics.yaml)")
+    add_mapping(parser)
     add_window(parser)
     parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
     parser.add_argument("--host", default="127.0.0.1", help="listen here (127.0.0.1); elsewhere a token is needed, and printed")
@@ -118,7 +117,7 @@ def _sessions(args: Namespace) -> SessionList:
 
     def open_feed(path: Path) -> Feed:
         warn_incomplete(scan(path))
-        scene, settings = open_session_scene(path, args.scene), open_session_settings(path, args.params)
+        scene, settings = open_session_scene(path, args.scene), open_session_settings(path, args.params, args.namespace)
         return bag_feed(path, scene, settings, args.mapping, args.baseline, window, args.namespace)
 
     print("opening the session (compiles for up to a minute the first time) ..", file=sys.stderr)

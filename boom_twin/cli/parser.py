@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from argparse import SUPPRESS, Action, ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -34,6 +35,7 @@ class CommandParser(ArgumentParser):
     def __init__(self, *args: object, **options: object) -> None:
         options.setdefault("formatter_class", DefaultsFormatter)
         super().__init__(*args, **options)  # type: ignore[arg-type]
+        self._negative_number_matcher = re.compile(r"-\.?\d")  # values, no options: also lists, as -5,-170
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: Namespace | None = None

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from ..bag.session_sheet import SessionSheet
 from ..config.settings import DEFAULT_FILE as DEFAULT_PARAMETERS
-from ..config.settings import load_thresholds
+from ..config.settings import load_settings, load_thresholds
 from ..errors import BagError, BoomTwinError
 from ..messages.mapping import load_mapping
 from ..messages.topic_table import DEFAULT_FILE, Topic, Topics
@@ -71,13 +71,15 @@ def run(args: Namespace) -> int:
 
     signals: list[bool] = []
     on_stop_signal(lambda: signals.append(True))
-    known, thresholds = load_mapping(args.mapping), load_thresholds(args.params or DEFAULT_PARAMETERS)
+    known = load_mapping(args.mapping)
     wanted, sheet = _wanted(args, known), _sheet(args)
     given = {"origin": args.origin, "note": args.note}
     check_lasting(args.out)
     if args.out.is_dir() and (told := incompleteness(args.out)):
         raise BoomTwinError(f"{args.out}: {told} Record into a new directory.")
     with ros(ros_arguments(args)), recorder_node() as node:
+        load_settings(args.params, node.get_namespace())  # raises if they cannot be used
+        thresholds = load_thresholds(args.params or DEFAULT_PARAMETERS, node.get_namespace())
         wanted = [resolved(each, node) for each in wanted]
         sheet = replace(sheet, mapping=resolved_mapping(sheet.mapping or "", known, node))
         sheet = replace(sheet, topics={each.name: each.type for each in wanted})
@@ -101,17 +103,16 @@ def run(args: Namespace) -> int:
     if sheet.scene is None:
         _say("no scene is kept in session.yaml: none was given by --scene, and no twin told its own")
     if not any(count.received for count in counts):
-        raise BoomTwinError(f"{args.out}: nothing came. Check that the publishers run, and ROS_DOMAIN_ID.")
+        remedy = "Check that the publishers run, as the same user, and ROS_DOMAIN_ID."
+        raise BoomTwinError(f"{args.out}: nothing came. {remedy}")
     return 0
 
 
 def _sheet(args: Namespace) -> SessionSheet:
     """What is known before anything is recorded; the files that are given must be valid."""
     from ..bag.session_model import scene_from
-    from ..config.settings import load_settings
     from ..health.baseline import load_baseline
 
-    load_settings(args.params)
     scene = None if args.scene is None else scene_from(args.scene)
     if scene is not None:
         tell(scene.oddities, scene.source)

@@ -39,7 +39,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="DIR", help=place)
     add_params(parser)
     add_mapping(parser)
-    add_namespace(parser, "ROS namespace of the node in the session, where its mapping does not tell that")
+    add_namespace(parser, "ROS namespace of the node in the session, for topics and --params")
     parser.add_argument(
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
     )
@@ -74,7 +74,7 @@ def run(args: Namespace) -> int:
         raise UsageError(f"--fatigue {args.fatigue:g}: goes into the report. Give --report too.")
     scene = open_session_scene(args.bag, args.scene)
     heights = section_heights(args.section_height, scene.scene)
-    settings = open_session_settings(args.bag, args.params)
+    settings = open_session_settings(args.bag, args.params, args.namespace)
     check_kind(args.table)
     window = window_of(args)
     if window.start:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
@@ -45,9 +46,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
     where = parser.add_mutually_exclusive_group(required=True)
-    where.add_argument("--posture", metavar="NAME", help="a posture of the scene")
+    where.add_argument("--posture", metavar="P", help="a posture of the scene, or section angles, deg: 60,-20,-30")
     where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes, m")
-    told = "resonance map over these postures, or `all` of the scene's; needs --pump, whose rate it varies"
+    told = "resonance map over these postures (angles in brackets), or `all` of the scene's; needs --pump, whose rate it varies"
     where.add_argument("--map", metavar="P1,P2,..", help=told)
     load = parser.add_mutually_exclusive_group()
     load.add_argument("--tip", type=numbers, metavar="FX,FY", help="harmonic force at the tip, N (default 0,1)")
@@ -257,7 +258,7 @@ def _map(scene: Scene, args: Namespace) -> Answer:
         raise UsageError("--map needs --pump RATE:HEIGHT, the pulses whose rate it varies. Add --pump 0.4:130.")
     if not 1 <= args.steps <= 1000:
         raise UsageError(f"--steps {args.steps}: must be 1 to 1000 from each posture to the next.")
-    names = list(scene.postures) if args.map == "all" else args.map.split(",")
+    names = list(scene.postures) if args.map == "all" else re.findall(r"\[[^]]*]|[^,]+", args.map)
     if not names:
         raise UsageError("--map all: the scene names no posture. Add `postures` to it.")
     postures = postures_along(scene, names, args.steps)

@@ -35,7 +35,7 @@ SPARSE = 1.0  # s from row to row
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    told = "the posture that the first row must be in; else it may be any"
+    told = "the posture that the first row must be in: a name, or section angles, deg; else it may be any"
     parser.add_argument("--posture", metavar="NAME", help=told)
     followed = parser.add_mutually_exclusive_group(required=True)
     followed.add_argument("--drive", metavar="IN.csv", help="t_s,stroke_1_m,.. (absolute strokes of the drives)")

@@ -17,7 +17,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
     where = parser.add_mutually_exclusive_group(required=True)
-    where.add_argument("--posture", metavar="NAME", help="a posture of the scene")
+    where.add_argument("--posture", metavar="P", help="a posture of the scene, or section angles, deg: 60,-20,-30")
     where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes of the drives, m")
     read = "cylinder lengths less closed_length, m: what stroke transducers read of the boom at rest"
     where.add_argument("--lengths", type=numbers, metavar="L1,..,LN", help=read)

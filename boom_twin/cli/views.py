@@ -6,6 +6,7 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from ..errors import BoomTwinError
+from ..system.atomic_files import write_atomic
 from .main import add_namespace
 
 
@@ -27,6 +28,6 @@ def run(args: Namespace) -> int:
         raise BoomTwinError(f"{', '.join(map(str, there))}: there already. Move it away, or choose another folder.")
     for view in VIEWS:
         path = args.out / view.name
-        path.write_text(view_text(view.read_text(encoding="utf-8"), args.namespace, args.frame_prefix), encoding="utf-8")
+        write_atomic(path, view_text(view.read_text(encoding="utf-8"), args.namespace, args.frame_prefix))
         print(path)
     return 0

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
@@ -20,13 +21,56 @@ RETIRED = dict.fromkeys(("jerk_density", "lag"), "the stroke filter adapts by it
 """Parameters of earlier versions, and what takes their place."""
 
 
-def read_parameters(path: Path) -> dict[str, Any]:
-    """Names and values of a ROS parameter file (``/**: ros__parameters:``); UsageError if it is none."""
+ROS_OWN = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+"""How the names of parameters begin that rclpy declares for every node."""
+
+
+def read_parameters(path: Path, namespace: str = "") -> dict[str, Any]:
+    """Return the parameters that a ROS parameter file sets for the node ``boom_twin``, resolved as rclpy does.
+
+    Every block whose name fits the node's full name counts: ``*`` stands for one part of it, ``**`` for any number of parts.
+    The last value of a parameter wins.
+
+    Raises
+    ------
+    UsageError
+        The file is no ROS parameter file, or has no block for this node.
+    """
     content = read_plain(path, UsageError, "Give a ROS parameter file.")
+    node = "/".join(["", *filter(None, namespace.split("/")), "boom_twin"])
     try:
-        return dict(next(iter(content.values()))["ros__parameters"])
-    except (AttributeError, KeyError, TypeError, StopIteration, ValueError):
+        blocks = list(_blocks(content))
+        found = [dict(_dotted(values)) for name, values in blocks if re.fullmatch(_pattern(name), node)]
+    except (AttributeError, ValueError):
         raise UsageError(f"{path}: not a ROS parameter file. It needs `/**:` with `ros__parameters:` below.") from None
+    if not found:
+        names = ", ".join(name for name, _ in blocks)
+        raise UsageError(f"{path}: no parameters of {node}, only of {names}. Name the node `/**`, or give its --namespace.")
+    return {name: value for values in found for name, value in values.items()}
+
+
+def _blocks(content: Any, node: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield node and values of every ``ros__parameters``; ValueError if a block has none."""
+    if not content:
+        raise ValueError(f"{node}: no ros__parameters")
+    for key, value in content.items():
+        if key == "ros__parameters" and node:
+            yield node, value
+        else:
+            yield from _blocks(value, f"{node}/{key.removeprefix('/')}")
+
+
+def _pattern(name: str) -> str:
+    return re.escape(name).replace(r"/\*\*", r"(/\w+)*").replace(r"/\*", r"/\w+")
+
+
+def _dotted(values: Any, block: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield names and values; blocks inside become parts of the names: ``a.b``."""
+    for key, value in values.items():
+        if isinstance(value, dict):
+            yield from _dotted(value, f"{block}{key}.")
+        else:
+            yield f"{block}{key}", value
 
 
 def checked(table: type[Table], values: dict[str, Any], source: str, others: Iterable[str] = ()) -> Table:
@@ -87,9 +131,9 @@ class Thresholds(BaseModel):
     disk_error: Positive = Field(default=120.0, description="the disk is full in less, at the present pace: error, s")
 
 
-def load_thresholds(path: Path) -> Thresholds:
-    """Thresholds from a ROS parameter file; other parameters in it are passed over."""
-    values = read_parameters(path)
+def load_thresholds(path: Path, namespace: str = "") -> Thresholds:
+    """Return the thresholds of a ROS parameter file, see `read_parameters`; its other parameters are passed over."""
+    values = read_parameters(path, namespace)
     return checked(Thresholds, {name: value for name, value in values.items() if name in Thresholds.model_fields}, str(path))
 
 
@@ -191,15 +235,17 @@ class Settings(BaseModel):
         return self.angle_sigma**2 + self.angle_resolution**2 / 12.0
 
 
-def load_settings(path: Path | None = None) -> Settings:
-    """Settings from a ROS parameter file (``/**: ros__parameters:``); the package's own if no path is given.
+def load_settings(path: Path | None = None, namespace: str = "") -> Settings:
+    """Return the settings of a ROS parameter file, see `read_parameters`; the package's own if no path is given.
 
-    Parameters of the node alone (`NODE_ONLY`) and of ``/diagnostics`` are passed over.
+    Parameters of the node alone (`NODE_ONLY`), of ``/diagnostics`` and of rclpy (`ROS_OWN`) are passed over.
 
     Parameters
     ----------
     path : Path, optional
         The file; by default ``msg_config/twin.yaml`` of the package.
+    namespace : str
+        ROS namespace of the node ``boom_twin``.
 
     Returns
     -------
@@ -212,6 +258,7 @@ def load_settings(path: Path | None = None) -> Settings:
         The file cannot be read, or a parameter is unknown or out of bounds.
     """
     source = DEFAULT_FILE if path is None else Path(path)
-    others = {*NODE_ONLY, *Thresholds.model_fields}
-    values = {name: value for name, value in read_parameters(source).items() if name not in others}
+    others = (*NODE_ONLY, *Thresholds.model_fields)
+    found = read_parameters(source, namespace).items()
+    values = {name: value for name, value in found if name not in others and not name.startswith(ROS_OWN)}
     return checked(Settings, values, str(source), others)

@@ -10,6 +10,12 @@ from ..types import NANO, SECOND
 from .levels import Bounds, ComponentJudge, Evaluation, Level, Status
 from .stream_stats import StreamWatch
 
+OTHER_USER = (
+    "If it sends as another user of this machine, which shared memory keeps apart: run both as one user, or set "
+    "FASTDDS_BUILTIN_TRANSPORTS=UDPv4 for it and leave ROS_AUTOMATIC_DISCOVERY_RANGE unset"
+)
+"""Why endpoints of Fast DDS match and nothing arrives; measured with rmw_fastrtps 8.4.3."""
+
 
 @dataclass(frozen=True, slots=True)
 class Peers:
@@ -90,6 +96,8 @@ class TopicJudge:
         if stream.newest is None and not self._required:
             return judge.finish("not there; optional")
         told = f"silent for {age:.1f} s" if stream.newest is not None else "nothing received yet"
+        if stream.newest is None and len(publishers.names) > len(publishers.incompatible):
+            told += f", though a publisher is there. {OTHER_USER}"
         judge.check_age(age, at.thresholds.stale_after, told)
         if stream.newest is not None:
             judge.note("newest_stamp_s", seconds(stream.newest))

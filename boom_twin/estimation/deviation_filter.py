@@ -24,9 +24,10 @@ FORCE_OFF, FORCE_DRIFT = 1.0, 0.03  # standard deviation of o once forces are me
 LEAST_FORCE = 0.1  # both of a cylinder's force and this share of the largest one
 SOFT, SOFTENING = 0.5, 0.02  # standard deviation of a once anything is measured, and what is added to it in a second
 
-LOAD, LOAD_CHANGE, ERROR, BIAS, STAYING, SHARES = 0, 2, 4, 6, 8, 10
-"""First places in the state: the load's x and y, their rates, e's x and y, biases of the IMU's x and z, the part of the load
-that stays (x and y), the shares a (n,) and b (n,); then q_j and q_j' of every mode, and o (n,) if forces are measured."""
+LOAD, LOAD_CHANGE, ERROR, BIAS, TURNED, SCALE, STAYING, SHARES = 0, 2, 4, 6, 8, 9, 10, 12
+"""First places in the state: the load's x and y, their rates, e's x and y, biases of the IMU's x and z, its mounting angle
+and scale, the part of the load that stays (x and y), the shares a (n,) and b (n,); then q_j and q_j' of every mode, and
+o (n,) if forces are measured."""
 
 COUNT, STARTED, FED, STAMP, ANGLES_STAMP, FORCED, IMU_STAMP = range(7)  # of `status`
 ANGLE, FELT_X, FELT_Y, STEP, SHAKEN = range(5)

@@ -61,7 +61,6 @@ class DeviationModes:
         self._angle_variance = settings.angle_variance
         self._weight = weight_of(scene)
         self._motions: list[Array] = []
-        self._masked: NDArray[np.bool_] | None = None
         self._at = np.full(plan.joints, math.inf)
 
     @cached_property
@@ -70,29 +69,22 @@ class DeviationModes:
         return hold(self.filter)
 
     def begin(self) -> None:
-        """A new run: nothing is known of the deviation."""
+        """Begin a new run: nothing is known of the deviation."""
         self.filter.status[STARTED:] = 0
         self._at[:] = math.inf
         self._forget()
         self.expect_noise(1.0, 1.0)
 
     def _forget(self) -> None:
-        """Know nothing of the deviation from the next strokes on."""
+        """Begin anew from the prediction with the next strokes."""
         f = self.filter
-        f.status[STARTED] = 0
+        f.status[STARTED] = f.status[FED] = 0
         f.level[:] = f.loads[FIRST_LOAD]
         f.before[:], f.spread[:] = 0.0, 0.0
 
     def mask(self, masked: NDArray[np.bool_]) -> None:
-        """Leave out the channels (c,) that are masked; once these are all angles, what they have shown is forgotten.
-
-        The same array is of the same channels.
-        """
-        if masked is self._masked:
-            return
-        self._masked = masked
-        angles = slice(len(self.filter.slopes))
-        if masked[angles].all() and not self.filter.masked[angles].all():
+        """Leave out the masked channels (c,); forget what a channel has shown that was used until now."""
+        if (masked & ~self.filter.masked).any():
             self._forget()
         self.filter.masked[:] = masked
 

@@ -21,9 +21,11 @@ from .deviation_filter import (
     FORCED,
     IMU_STAMP,
     LOAD,
+    SCALE,
     SHARES,
     SOFT,
     STAMP,
+    TURNED,
     add_row,
     clear,
     covary,
@@ -162,8 +164,9 @@ def take_imu(f, residuals, first, stamp):
     for axis in range(2):
         if usable(f, first + axis, residuals[axis]):
             x, y = (c, s) if axis == 0 else (-s, c)
-            read_acceleration(f, x, y, 0.0, x * f.now[FELT_Y] - y * f.now[FELT_X], f.row)
-            f.row[BIAS + axis] = 1.0
+            across, along = x * f.now[FELT_Y] - y * f.now[FELT_X], x * f.now[FELT_X] + y * f.now[FELT_Y]
+            read_acceleration(f, x, y, 0.0, across, f.row)
+            f.row[BIAS + axis], f.row[TURNED], f.row[SCALE] = 1.0, across, along
             deviation = math.sqrt(f.noise[first + axis])
             by_x, by_y = f.row[LOAD] / deviation, f.row[LOAD + 1] / deviation
             add_innovation(f, by_x, by_y, correct(f, residuals[axis], f.noise[first + axis], age))

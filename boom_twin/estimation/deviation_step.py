@@ -25,6 +25,7 @@ from .deviation_filter import (
     LEAST_FORCE,
     LOAD,
     LOAD_CHANGE,
+    SCALE,
     SCENE_ERROR,
     SHAKEN,
     SHARES,
@@ -35,6 +36,7 @@ from .deviation_filter import (
     STAYING,
     STAYS,
     STEP,
+    TURNED,
     USUAL_LOAD,
     add_row,
     clear,
@@ -52,6 +54,7 @@ SLOWEST, QUICKEST = 2.0, 15.0  # 1/s, rates of the load
 JERK_TIME = 0.02  # s
 SLOW = 0.5  # s, over which the forces and moments are taken that a and b are learnt from
 BIAS_OFF, BIAS_DRIFT = 0.1, 0.001  # m/s^2, standard deviation of the IMU's bias, and of its change in a second
+TURNED_OFF, SCALE_OFF = 0.035, 0.02  # rad and share, standard deviations of the IMU's mounting angle and scale
 LEAST_ERROR = 0.02  # m/s^2, of the standard deviation of e
 INEXACT_MOTION = 0.01  # share of the predicted acceleration, over `SLOW` seconds, that it is off by in haste
 
@@ -123,6 +126,7 @@ def start_state(f):
         swing = math.hypot(f.tip[j, 0], f.tip[j, 1]) * f.loads[USUAL_LOAD] / (f.omega[j] * f.omega[j])
         f.p[at, at] += swing * swing
         f.p[at + 1, at + 1] += (swing * f.omega[j]) ** 2
+    f.p[TURNED, TURNED], f.p[SCALE, SCALE] = TURNED_OFF**2, SCALE_OFF**2
     if f.status[FORCED]:
         add_offsets(f)
     f.status[STARTED] = 1

@@ -31,7 +31,8 @@ Measured less predicted:
 
     angle_i   Theta_i q + what is quasi-static in a and in no mode; of an inclinometer, the sag inboard of it
     force_i   N_i q, likewise, and an offset o_i
-    IMU       Phi q'' + e, turned into the tip's axes, the specific force turned by the tip's own turn, and a bias of each axis
+    IMU       Phi q'' + e, turned into the tip's axes, the specific force turned by the tip's own turn and by the angle that
+              the IMU is mounted askew by, a share of it by the IMU's scale, and a bias of each axis
 
 - o_i, N, a random walk once forces are measured: by what a model whose masses are not exact, friction and the sensor's own zero
   and scale put a force off, and by what this changes as the boom moves: `FORCE_DRIFT` of the force in a second. So forces
@@ -51,7 +52,7 @@ filter itself knows the wide deviations only; what each cause makes of its state
 cause's chance is what that reading and its prior say (`weigh_causes`). Sections have no such causes: no sensor tells whether
 they bend as the scene says, and cylinders that do so tell nothing of them.
 
-A section that sags turns the tip and no joint, and to an IMU that turn is a bias. As far as the biases are beyond doubt, the
+A section that sags turns the tip and no joint, and to an IMU that turn is one of its mount. As far as that is beyond doubt, the
 stated covariance of the tip is wider: by the shares b, alike in all sections, that make such a turn.
 
 The modes are made anew when the posture has changed; their motion of the tip follows the posture at every sample, for the
@@ -70,11 +71,11 @@ import math
 
 from ..kernels.jit import inner, kernel
 from .cause_mixture import chance_of_soft, covariance_of, mean_of, read_covariances, weigh_causes, write_covariance
-from .deviation_filter import ANGLE, BIAS, COUNT, FELT_X, FELT_Y, LOAD, STAYING, STEP, clear, states_of
+from .deviation_filter import ANGLE, BIAS, COUNT, FELT_X, FELT_Y, LOAD, SHARES, STAYING, STEP, clear, states_of
 from .deviation_readings import read_acceleration, read_tip
 
 REMEMBERED = 2.0  # s, over which the mean square of the deviation is taken
-BEYOND_DOUBT = 2.0  # standard deviations of the IMU's bias, beyond which it may be a sag that no angle shows
+BEYOND_DOUBT = 2.0  # standard deviations of the IMU's turn, beyond which it may be a sag that no angle shows
 INEXACT = 0.02  # share of the deviation that modes and static corrections may be wrong by: 1.8 % of a load's, of statics
 SOFT_INEXACT = 0.05  # the same where a cylinder is softer: modes are then others
 
@@ -82,8 +83,7 @@ WIDTH = 22
 TIP, ACCELERATION, FORCE, TIP_COVARIANCE, ACCELERATION_COVARIANCE, FORCE_VARIANCE = 0, 3, 6, 8, 14, 20
 """First places in a row of an estimate: x, y, angle of the tip (3); their second derivatives (3); load (2); covariances of the
 first two, upper triangles by rows (6 each); variances of the load (2). SI."""
-VARIANCES = [0, 3, 5]
-"""Places of the variances in such a triangle."""
+VARIANCES = [0, 3, 5]  # places of the variances in such a triangle
 
 
 @kernel
@@ -116,24 +116,32 @@ def write_estimate(f, results, out):
     for a in range(3):
         out[at] += inexact2 * (out[TIP + a] - results.tip[0, a]) ** 2
         at += 3 - a
+    for i in range(f.softness.shape[0]):  # a joint that turns far moves the tip towards it, by second order
+        bent = 0.5 * (f.x[SHARES + i] * f.drawn[i]) ** 2 / f.slopes[i]
+        out[TIP_COVARIANCE] += (bent * f.lever[i, 1]) ** 2
+        out[TIP_COVARIANCE + 3] += (bent * f.lever[i, 0]) ** 2
     add_sag(f, out)
     write_spread(f, results, out)
 
 
 @inner
 def unexplained_turn2(f):
-    """Square of the turn of the tip (rad) that the IMU's biases would be, as far as it is beyond doubt.
+    """Return the square of the turn of the tip (rad) that the IMU's mount and biases would be, as far as it is beyond doubt.
 
-    A bias of the two axes and a turn of gravity in them are the same to the filter, and no angle shows a section that sags.
+    They and a turn of gravity in the axes are the same to the filter, and no angle shows a section that sags.
     """
     c, s = math.cos(f.now[ANGLE]), math.sin(f.now[ANGLE])
     x, z = c * f.now[FELT_Y] - s * f.now[FELT_X], -c * f.now[FELT_X] - s * f.now[FELT_Y]
     felt2 = x * x + z * z
     if felt2 == 0.0:
         return 0.0
-    turn = (x * f.x[BIAS] + z * f.x[BIAS + 1]) / felt2
-    variance = x * x * f.p[BIAS, BIAS] + 2.0 * x * z * f.p[BIAS, BIAS + 1] + z * z * f.p[BIAS + 1, BIAS + 1]
-    return max(turn * turn - BEYOND_DOUBT * BEYOND_DOUBT * variance / (felt2 * felt2), 0.0)
+    row = x / felt2, z / felt2, 1.0  # of the biases and the mounting angle
+    turn, variance = 0.0, 0.0
+    for k in range(3):
+        turn += row[k] * f.x[BIAS + k]
+        for i in range(3):
+            variance += row[k] * row[i] * f.p[BIAS + k, BIAS + i]
+    return max(turn * turn - BEYOND_DOUBT * BEYOND_DOUBT * variance, 0.0)
 
 
 @inner

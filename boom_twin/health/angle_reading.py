@@ -80,11 +80,6 @@ class AngleReading:
         return mask
 
     @property
-    def is_wrong(self) -> bool:
-        """Whether there are alarms."""
-        return bool(self._found)
-
-    @property
     def has_wrong_strokes(self) -> bool:
         """Whether strokes are swapped, and so nothing is predicted rightly."""
         return any(found.is_of_strokes for found in self._found)

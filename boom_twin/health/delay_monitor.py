@@ -26,13 +26,9 @@ from .stream_readings import StreamReadings
 LEAST = 10  # blocks of half a triangle, at least
 SPAN = 40  # blocks of one estimate
 FEWEST = 4.0  # spans, by how much they weigh, before anything is told
-FEWEST_CLEAR, CLEAR = (
-    2.0,
-    0.1,
-)  # motions of channels where that share, at most, of what is off is left beside the lag: it is clear
+FEWEST_CLEAR, CLEAR = 2.0, 0.1  # motions of channels, and share of what is off that is left beside a lag that is clear
 NEWEST = (30, 15, 7, 3)  # spans that are looked at: if all show no clear lag, fewer, for it may have come since
 FLOOR = 3e-3  # s, deviation of what a lag is taken for, by the model's own
-HASTE = 0.025  # s, by which readings may be ahead of a prediction: it lags where strokes are smoothed in haste
 SURE, GONE = 5.0, 3.0  # deviations from which on it is told, and below which it has ended
 LONGEST = 1.5  # s, lag that is looked for: of a span more is left than is lost at its ends
 ROUNDS, ROUND = 6, 0.25  # of Gauss-Newton, and by how much (s) a lag changes in one at most
@@ -84,6 +80,7 @@ class DelayMonitor:
         end: int,
         is_doubted: Callable[[], bool] = lambda: False,
         period: float = 1.0,
+        shared: float = 0.0,
     ) -> list[Alarm]:
         """Take a block; gives an alarm that began, changed or ended.
 
@@ -100,6 +97,8 @@ class DelayMonitor:
             Asked once a span is complete: whether another fault puts vibration out of step, so that no alarm begins.
         period : float
             Of the slowest vibration, s.
+        shared : float
+            Lag (s) of other readings; what both are ahead by is a lag of the prediction, where it smooths fast strokes.
         """
         stamps = readings.rows.stamps
         is_empty = len(stamps) < 2 or stamps[-1] <= stamps[0]
@@ -121,7 +120,7 @@ class DelayMonitor:
             self._blocks.popleft()
         is_known = np.isfinite(rows).all(axis=0) & np.isfinite(slopes).all(axis=0)
         self._spans.append((np.where(is_known, rows, 0.0), np.where(is_known, slopes, 0.0)))
-        return self._judge(end, is_doubted())
+        return self._judge(end, is_doubted(), shared)
 
     @staticmethod
     def _averaged(blocks: Array, half: int) -> Array:
@@ -129,13 +128,10 @@ class DelayMonitor:
         triangle = np.convolve(np.ones(half), np.ones(half)) / half**2
         return np.column_stack([np.convolve(column, triangle, "valid") for column in blocks.T])
 
-    def estimate(self) -> tuple[float, float]:
-        """The lag and its deviation, s; infinite while too little has moved."""
-        lag, sigma, _ = self._estimate()
-        return lag, sigma
-
-    def _estimate(self) -> tuple[float, float, bool]:
-        """Lag, deviation, and whether it is clear: nearly all that readings are off by is that of an earlier time."""
+    def estimate(self) -> tuple[float, float, bool]:
+        """Return lag and deviation (s; infinite while too little has moved), and whether nearly all that is off is a lag."""
+        if not self._spans:
+            return 0.0, math.inf, False
         rows, slopes = (np.array(each) for each in zip(*self._spans, strict=True))
         for count in NEWEST:
             if count == NEWEST[0] or count < len(rows):
@@ -144,12 +140,13 @@ class DelayMonitor:
                     return lag, sigma, True
         return (*_small_lag(rows, slopes), False)
 
-    def _judge(self, end: int, is_doubted: bool) -> list[Alarm]:
-        lag, sigma, is_clear = self._estimate()
+    def _judge(self, end: int, is_doubted: bool, shared: float) -> list[Alarm]:
+        lag, sigma, is_clear = self.estimate()
+        lag -= min(0.0, max(shared, lag))
         if self.alarm is not None and abs(lag) < GONE * sigma and math.isfinite(sigma):
             ended, self.alarm = replace(self.alarm, until=end), None
             return [ended]
-        if abs(lag) - (HASTE if lag < 0.0 else 0.0) < SURE * sigma or (
+        if abs(lag) < SURE * sigma or (
             self.alarm is None and (is_doubted or (self._least > 0.0 and not (is_clear and abs(lag) >= self._least)))
         ):
             return []

@@ -16,6 +16,7 @@ from .stream_readings import SlowMeans, StreamReadings
 G = SENSORS[Stream.IMU].units["g"]
 FAR, GONE = 0.2 * G, 0.1 * G  # m/s^2, by which the means differ from which on it is told, and below which it has ended
 CLOSE, CLEAR = 0.1 * G, 0.05 * G  # m/s^2, how well a reason must explain the mean, and how much better than others
+KNOWN = 0.25  # weight of the slow means from which on readings are judged, and used: after 0.6 s
 CAUSE = "tip_imu.sensor"
 REASONS = {
     "in g": lambda x, z: (G * x, G * z),
@@ -52,7 +53,7 @@ class ImuMount:
         slow = readings.slow
         weight, read, expected = min(slow.weight.tolist()), slow.read.tolist(), slow.expected.tolist()
         off = math.dist(read, expected)  # of sums that begin at 0: less than the means' at first
-        if self.alarm is None and off > FAR:
+        if self.alarm is None and weight > KNOWN and off > FAR:
             swing2 = float(slow.squares.sum()) * weight - off**2  # of vibration out of step: it stays in the means
             return [self._begun(slow, start)] if off > math.sqrt(max(0.0, swing2)) else []
         if self.alarm is not None and off < GONE * weight and not self._is_reason_open(slow):

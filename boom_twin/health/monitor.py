@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from operator import is_
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,7 @@ from .baseline import JUDGED, Baseline, judged_channels
 from .delay_monitor import DelayMonitor, delay_cause, normal_equations
 from .detection import Detector
 from .force_reading import ForceReading
-from .imu_mount import ImuMount
+from .imu_mount import KNOWN, ImuMount
 from .inference.block_problem import (
     BLOCK,
     Block,
@@ -44,8 +43,6 @@ from .stream_readings import PredictionMeans, StreamReadings, StreamSurvey
 PERIOD = 1_000_000_000  # ns between two `Health` without news
 UNCERTAIN = 2.0
 """Variances of a reading; strokes that are known worse are not followed, and then sensors are not judged by residuals."""
-CHECKED = tuple(stream for stream, kind in SENSORS.items() if kind.alarms)
-"""The streams whose single sensors are checked."""
 MEASURED_NOISE = (Stream.STROKES, Stream.ANGLES)
 """Those whose noise is told: what an IMU reads of vibration is not told from noise."""
 DELAYED = {Stream.ANGLES: 0.1, Stream.IMU: 0.0, Stream.FORCES: 0.0}
@@ -82,18 +79,15 @@ class HealthMonitor:
         self._ranges = sensor_ranges(scene, mounts)
         self._uncertain = UNCERTAIN * settings.stroke_variance
         self._stated = {stream: settings.variance(kind) for stream, kind in SENSORS.items()}
-        self._late_angles = np.ones(len(self._channels[Stream.ANGLES]), dtype=bool)
-        self._trusted = {stream: np.zeros(len(names), dtype=bool) for stream, names in self._channels.items()}
         self._sensors = {
-            stream: SensorMonitor(self._channels[stream], SENSORS[stream], stream is not Stream.STROKES) for stream in CHECKED
+            stream: SensorMonitor(names, SENSORS[stream], stream is not Stream.STROKES)
+            for stream, names in self._channels.items()
         }
         self._delays = {stream: DelayMonitor(stream, least) for stream, least in DELAYED.items()}
         self._mount, self._forces = ImuMount(), ForceReading(self._channels[Stream.FORCES])
         self._angles = AngleReading(scene, mounts)
         self._ended: list[Alarm] = []
         self._told = 0
-        self._parts: tuple[NDArray[np.bool_], ...] = ()
-        self._all_masked = np.zeros(0, dtype=bool)  # of these parts
         self._collect_means = SameTypes(collect_means)
         self.begin()
 
@@ -103,8 +97,8 @@ class HealthMonitor:
         self._blocks = BlockBuilder()
         fastest = {Stream.STROKES: settings.stroke_rate}
         self._checks = {
-            stream: SensorCheck(*settings.noise(SENSORS[stream]), *self._ranges[stream], fastest.get(stream, 0.0))
-            for stream in CHECKED
+            stream: SensorCheck(*settings.noise(kind), *self._ranges[stream], fastest.get(stream, 0.0))
+            for stream, kind in SENSORS.items()
         }
         for sensors in self._sensors.values():
             sensors.begin()
@@ -134,27 +128,31 @@ class HealthMonitor:
         return self._checks[Stream.STROKES].noise_now, self._checks[Stream.ANGLES].noise_now
 
     @property
-    def masked(self) -> NDArray[np.bool_]:
-        """Of all measured channels in the order of the streams, those whose sensor is known to fail."""
-        parts = tuple(map(self._masked, self._surveys))
-        if not (self._parts and all(map(is_, parts, self._parts))):
-            self._parts, self._all_masked = parts, np.concatenate(parts)
-        return self._all_masked
+    def suspected(self) -> NDArray[np.bool_]:
+        """Return which of all measured channels, in the order of the streams, the estimate is to leave out.
+
+        Those are the channels of sensors and streams that an alarm holds most likely at fault. An IMU is used once its mean
+        is known, for no noise tells that its axes are wrong.
+        """
+        causes = {alarm.ranked[0].cause for alarm in self.residuals.alarms if alarm.ranked}
+        found = []
+        for stream, names in self._channels.items():
+            if stream is Stream.STROKES:
+                continue
+            is_unknown = stream is Stream.IMU and self._surveys[stream].slow.weight.max() < KNOWN
+            is_out = is_unknown or self._delays[stream].alarm is not None
+            is_out |= not causes.isdisjoint((f"{SENSORS[stream].stem}.sensor", delay_cause(stream)))
+            found.append(self._masked(stream) | is_out | np.array([f"{name}.sensor" in causes for name in names]))
+        return np.concatenate(found)
 
     def _masked(self, stream: Stream) -> NDArray[np.bool_]:
-        """The same of one stream; another array once these are others."""
-        masked = self._failing(stream)
-        if stream is Stream.ANGLES and self._delays[stream].alarm is not None:
-            return self._late_angles
+        """Return which channels of a stream are not judged by residuals."""
+        masked = self._sensors[stream].masked
+        if stream is Stream.ANGLES:
+            return masked | self._angles.masked | (self._delays[stream].alarm is not None)
         if stream is Stream.FORCES and self._forces.alarms:
             return masked | self._forces.masked
-        if stream is Stream.ANGLES and self._angles.is_wrong:
-            return masked | self._angles.masked
-        return ~masked if stream is Stream.IMU and self._mount.alarm is not None else masked
-
-    def _failing(self, stream: Stream) -> NDArray[np.bool_]:
-        """Which sensors of a stream are known to fail, each by itself."""
-        return self._sensors[stream].masked if stream in self._sensors else self._trusted[stream]
+        return masked | (stream is Stream.IMU and self._mount.alarm is not None)
 
     def judge(self, stamp: int, variances: Array, noise: StrokeNoise | None, tip: Callable[[], Array]) -> Health | None:
         """Judge what is complete now that strokes came with `stamp` (ns); None if there is nothing to tell.
@@ -210,12 +208,12 @@ class HealthMonitor:
             readings[stream] = survey.take(block.readings(stream), self._masked(stream), span)
         is_shaken = any(each.is_bent for each in readings.values())
         for stream, each in readings.items():
-            if stream in CHECKED:
-                stamps, raw, left = each.rows
-                expected = raw - left if is_followed else np.full(raw.shape, np.nan)
-                news += self._check(stream, block, stamps, raw, expected)
-        if is_followed:
-            news += self._void(self._mount.take(readings[Stream.IMU], start, block.end), block.end)
+            stamps, raw, left = each.rows
+            expected = raw - left if is_followed else np.full(raw.shape, np.nan)
+            news += self._check(stream, block, stamps, raw, expected)
+        if is_followed and not self._sensors[Stream.STROKES].masked.any():
+            if not self._sensors[Stream.IMU].masked.any():
+                news += self._void(self._mount.take(readings[Stream.IMU], start, block.end), block.end)
             angles = readings[Stream.ANGLES]
             news += self._void(self._angles.take(angles, predicted.strokes, BLOCK * NANO, start, block.end), block.end)
             news += self._forces.take(readings[Stream.FORCES], start, block.end)
@@ -225,7 +223,7 @@ class HealthMonitor:
         strokes = predictions.measured
         expected = np.full(strokes.shape, np.nan) if is_shaken else np.zeros(strokes.shape)
         news += self._check(Stream.STROKES, block, predictions.stamps, strokes, expected)
-        if self._sensors[Stream.STROKES].is_any_masked or self._angles.has_wrong_strokes or self._noise is None:
+        if self._sensors[Stream.STROKES].masked.any() or self._angles.has_wrong_strokes or self._noise is None:
             news += self.residuals.close(start)
             self.residuals.begin()
             return news
@@ -242,7 +240,9 @@ class HealthMonitor:
     def _judge_delay(self, stream: Stream, monitor: DelayMonitor, block: Block, readings: StreamReadings) -> list[Alarm]:
         """Look for a lag of a stream; gives the alarm that began, changed or ended."""
         is_doubted = partial(self._is_doubted, stream, block.end)
-        return monitor.take(block.number, readings, self._failing(stream), block.end, is_doubted, self._slowest())
+        shared = 0.0 if stream is Stream.ANGLES else self._delays[Stream.ANGLES].estimate()[0]
+        period = 1.0 / self._noise.modes[0].frequency if self._noise is not None and self._noise.modes else 0.0
+        return monitor.take(block.number, readings, self._sensors[stream].masked, block.end, is_doubted, period, shared)
 
     def _is_doubted(self, stream: Stream, stamp: int) -> bool:
         """Whether a load, or a fault that is not its lag, may put the vibration that a stream reads out of step at `stamp`.
@@ -255,10 +255,6 @@ class HealthMonitor:
         suspects = [{each.cause, *(rank.cause for rank in each.ranked)} for each in self.residuals.alarms]
         return self.residuals.is_shaken(stamp) or any(cause not in each for each in suspects)
 
-    def _slowest(self) -> float:
-        """Period (s) of the slowest vibration at the present posture; 0 where it is not known."""
-        return 1.0 / self._noise.modes[0].frequency if self._noise is not None and self._noise.modes else 0.0
-
     def _check(self, stream: Stream, block: Block, stamps: NDArray[np.int64], raw: Array, expected: Array) -> list[Alarm]:
         """Check the sensors of a stream: stamps (k,) in ns, readings and what they should be (k, channels); gives the news."""
         monitor = self._sensors[stream]
@@ -266,8 +262,8 @@ class HealthMonitor:
         findings = self._checks[stream].look(np.asarray(stamps * NANO), raw, expected, block.end * NANO)
         if findings.is_calm and not monitor.alarms:
             return []
-        may_come_back = not findings.is_calm and findings.jumped.any()
-        blamed, newest = self.residuals.blamed if may_come_back else {}, raw[-1] if len(raw) else None
+        blamed = self.residuals.blamed if not findings.is_calm and findings.jumped.any() else {}
+        newest = (raw if stream is Stream.STROKES else raw - expected)[-1] if len(raw) else None
         news = monitor.take(findings, block.number * BLOCK, block.end, blamed, newest)
         if stream in JUDGED and monitor.masked is not before and (monitor.masked & ~before).any():
             self.residuals.forget()

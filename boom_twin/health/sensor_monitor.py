@@ -63,14 +63,13 @@ class SensorMonitor:
     ----------
     masked : ndarray of bool, shape (channels,)
         Channels that are not to be trusted; another array once these are others.
-    is_any_masked : bool
     """
 
     def __init__(self, names: tuple[str, ...], kind: SensorKind, is_predicted: bool = True) -> None:
         self._names, self._sensors, self._is_predicted = names, kind, is_predicted
         self._faults: dict[tuple[int, str], _Fault] = {}
         self._none: Flags = np.zeros(len(names), dtype=bool)
-        self.masked, self.is_any_masked, self._is_anew = self._none, False, False
+        self.masked, self._is_anew = self._none, False
 
     def begin(self) -> None:
         """The boom starts from rest: what jumped may have come back unseen."""
@@ -86,7 +85,6 @@ class SensorMonitor:
         self.masked = self._none.copy()
         for channel, kind in self._faults:
             self.masked[channel] |= kind != "spikes"
-        self.is_any_masked = bool(self.masked.any())
 
     def take(
         self,
@@ -100,17 +98,19 @@ class SensorMonitor:
 
         `blamed`: causes that residuals' alarms are explained by, and by how much a sensor would then be off. One among them
         that jumps to what the model expects, or back by that much where none does, has come back, and residuals tell so.
-        `newest`: the block's last readings, shape (channels,), if it has any.
+        `newest`: by how much the block's last readings are off (strokes: the readings), shape (channels,), if it has any.
         """
         news = self._back_after_start(end, newest)
         if not findings.is_calm or self._faults:
-            news += self._found(findings, start, end, blamed)
+            news += self._found(findings, start, end, blamed, newest)
         if news:
             self._mask()
         return news
 
-    def _found(self, findings: SensorFindings, start: int, end: int, blamed: Mapping[str, float]) -> list[Alarm]:
-        """Begin, keep and end faults by what was found; gives alarms that began or ended."""
+    def _found(
+        self, findings: SensorFindings, start: int, end: int, blamed: Mapping[str, float], newest: Array | None
+    ) -> list[Alarm]:
+        """Begin, keep and end faults by what was found; gives alarms that began or ended. See `take`."""
         news: list[Alarm] = []
         for kind, flags in findings.by_kind().items():
             if kind not in self._sensors.alarms or not flags.any():
@@ -121,7 +121,10 @@ class SensorMonitor:
                 jump = (float(findings.jumped[channel]), float(findings.level[channel])) if kind == "jump" else None
                 news += self._seen(channel, kind, start, end, jump)
         for key, fault in list(self._faults.items()):
-            if key[1] != "jump" and end - fault.seen > SETTLED:
+            off = abs(float(newest[key[0]])) if newest is not None and self._is_predicted else math.inf
+            if key[1] == "jump" and not off < abs(fault.before) + CAME_BACK * abs(fault.offset):
+                fault.seen = end
+            if end - fault.seen > SETTLED:
                 del self._faults[key]
                 news.append(replace(fault.alarm, until=fault.seen))
         return news

@@ -13,10 +13,8 @@ from ..types import Array
 from .inference.block_problem import MeasuredRows, PredictionRows
 from .sensor_survey import (
     COUNTS,
-    EVENED,
     MEASURED,
     NEAR,
-    NEAR_COUNTS,
     OFF,
     RATES,
     ROOM,
@@ -99,19 +97,9 @@ class StreamReadings(NamedTuple):
         return np.asarray(self.numbers[NEAR])
 
     @property
-    def near_counts(self) -> Array:
-        """Of how many readings that is the mean."""
-        return np.asarray(self.numbers[NEAR_COUNTS])
-
-    @property
     def rates(self) -> Array:
         """Of what the model expects from the first reading to the last, per s; NaN of fewer than two; shape (channels,)."""
         return np.asarray(self.numbers[RATES])
-
-    @property
-    def evened(self) -> Array:
-        """Of how many with the stated noise `near` would be as sure, as noisy as they are; shape (channels,)."""
-        return np.asarray(self.numbers[EVENED])
 
 
 class StreamSurvey:
@@ -127,6 +115,7 @@ class StreamSurvey:
     ----------
     noise2 : ndarray, shape (channels,)
         The same as measured, by second differences.
+    slow : SlowMeans
     """
 
     def __init__(self, variance: float, channels: int) -> None:
@@ -135,10 +124,10 @@ class StreamSurvey:
         self._numbers, slow = np.zeros((6, channels)), np.zeros((4, channels))
         self._work = ReadingsWork(limits, self._numbers, slow, self.noise2, np.zeros(ROOM))
         self._held = hold(self._work)
-        self._slow = SlowMeans(slow[SLOW_READ], slow[SLOW_EXPECTED], slow[SLOW_SQUARES], slow[WEIGHT])
+        self.slow = SlowMeans(slow[SLOW_READ], slow[SLOW_EXPECTED], slow[SLOW_SQUARES], slow[WEIGHT])
         nothing = np.zeros((6, channels))
         nothing[NEAR], nothing[RATES] = np.nan, np.nan
-        self._nothing = StreamReadings(MeasuredRows.room(0, channels), nothing, self._slow, False)
+        self._nothing = StreamReadings(MeasuredRows.room(0, channels), nothing, self.slow, False)
         self._summarise = SameTypes(summarise)
 
     def take(self, rows: MeasuredRows | None, masked: NDArray[np.bool_], span: float) -> StreamReadings:
@@ -160,7 +149,7 @@ class StreamSurvey:
             self._held = hold(self._work)
         stamps, raw, left = map(np.ascontiguousarray, rows)
         is_bent = self._summarise(self._held, stamps, raw, left, masked, min(1.0, span / WINDOW))
-        return StreamReadings(rows, self._numbers.copy(), self._slow, bool(is_bent))
+        return StreamReadings(rows, self._numbers.copy(), self.slow, bool(is_bent))
 
 
 class PredictionMeans(NamedTuple):

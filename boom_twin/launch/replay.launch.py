@@ -22,7 +22,7 @@ from launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
 from boom_twin.bag.advice import publishable
 from boom_twin.bag.reader import scan
 from boom_twin.bag.session_sheet import kept
-from boom_twin.config.settings import DEFAULT_FILE
+from boom_twin.config.settings import DEFAULT_FILE, read_parameters
 from boom_twin.system.child_process import python_command
 
 FLAG = ("true", "false")
@@ -31,17 +31,21 @@ ARGUMENTS = [
     DeclareLaunchArgument("rate", default_value="1.0", description="session time over real time"),
     DeclareLaunchArgument("start", default_value="0.0", description="begin so many seconds into the session"),
     DeclareLaunchArgument("wait", default_value="120.0", description="seconds to wait for the node; the first start compiles"),
-    DeclareLaunchArgument("scene", default_value="", description="scene file of the boom; empty: that of the session"),
+    DeclareLaunchArgument("params_file", default_value=str(DEFAULT_FILE), description="parameters of the node"),
     DeclareLaunchArgument(
-        "params_file", default_value=str(DEFAULT_FILE), description="parameters of the node; the arguments here win"
+        "scene", default_value="", description="scene file of the boom; empty: of params_file, or that of the session"
     ),
-    DeclareLaunchArgument("mapping", default_value="", description="names and units of sensors; empty: those of the session"),
+    DeclareLaunchArgument(
+        "mapping", default_value="", description="names and units of sensors; empty: of params_file, or those of the session"
+    ),
     DeclareLaunchArgument(
         "namespace", default_value="", description="of all nodes; topics of a session that was recorded in one stay in that"
     ),
-    DeclareLaunchArgument("frame_prefix", default_value="", description="before the name of every frame: front/"),
+    DeclareLaunchArgument("frame_prefix", default_value="", description="before every frame: front/; empty: of params_file"),
     DeclareLaunchArgument("state_publisher", default_value="true", choices=FLAG, description="start robot_state_publisher: TF"),
-    DeclareLaunchArgument("monitor", default_value="false", choices=FLAG, description="the live page beside the node"),
+    DeclareLaunchArgument(
+        "monitor", default_value="", choices=(*FLAG, ""), description="the live page beside the node; empty: as in params_file"
+    ),
     DeclareLaunchArgument("rviz", default_value="true", choices=FLAG, description="start RViz"),
     DeclareLaunchArgument("record", default_value="", description="new folder to record the session into; empty: none"),
 ]
@@ -61,11 +65,12 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def twin(context: LaunchContext) -> list[LaunchDescriptionEntity]:
-    """``twin.launch.py`` on the session's clock, with the session's scene and mapping where no others are given."""
+    """``twin.launch.py`` on the session's clock; scene and mapping are the session's where none are given."""
     given = {name: LaunchConfiguration(name).perform(context) for name in PASSED_ON}
     bag = Path(LaunchConfiguration("bag").perform(context))
     publishable(scan(bag))  # raises if nothing of it can be played
-    files = kept_files(bag, [name for name in KEPT if not given[name]])
+    values = read_parameters(Path(given["params_file"]), given["namespace"])
+    files = kept_files(bag, [name for name in KEPT if not given[name] and not values.get(name)])
     source = PythonLaunchDescriptionSource([ThisLaunchFileDir(), "/twin.launch.py"])
     arguments = {**given, **files, "use_sim_time": "true", "ignore_timestamp": "true"}
     return [IncludeLaunchDescription(source, launch_arguments=list(arguments.items()))]

@@ -6,6 +6,7 @@ ros2 launch boom_twin twin.launch.py namespace:=front frame_prefix:=front/      
 """
 
 from pathlib import Path
+from typing import Any
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
@@ -25,27 +26,33 @@ from boom_twin.system.child_process import python_command
 from boom_twin.system.result_folder import check_lasting
 
 FLAG = ("true", "false")
+FLAG_OR_FILE = (*FLAG, "")
+PARAMETERS = {"scene": "", "mapping": "", "frame_prefix": "", "monitor": False, "use_sim_time": False}
+"""The node's parameters that are arguments here, with the defaults that hold where `params_file` has none."""
 ARGUMENTS = [
-    DeclareLaunchArgument("scene", default_value="", description="scene file of the boom; empty: the default scene"),
+    DeclareLaunchArgument("params_file", default_value=str(DEFAULT_FILE), description="parameters of the node"),
     DeclareLaunchArgument(
-        "params_file", default_value=str(DEFAULT_FILE), description="parameters of the node; the arguments here win"
+        "scene", default_value="", description="scene file of the boom; empty: of params_file, or the default"
     ),
-    DeclareLaunchArgument("mapping", default_value="", description="names and units of the rig's own sensors; empty: as usual"),
+    DeclareLaunchArgument("mapping", default_value="", description="names and units of the sensors; empty: of params_file"),
     DeclareLaunchArgument("namespace", default_value="", description="of all nodes and topics, for several booms"),
-    DeclareLaunchArgument("frame_prefix", default_value="", description="before the name of every frame: front/"),
+    DeclareLaunchArgument("frame_prefix", default_value="", description="before every frame: front/; empty: of params_file"),
     DeclareLaunchArgument(
-        "use_sim_time", default_value="false", choices=FLAG, description="time from /clock instead of the machine's"
+        "use_sim_time", default_value="", choices=FLAG_OR_FILE, description="time from /clock; empty: as in params_file"
     ),
     DeclareLaunchArgument("state_publisher", default_value="true", choices=FLAG, description="start robot_state_publisher: TF"),
     DeclareLaunchArgument(
         "ignore_timestamp", default_value="false", choices=FLAG, description="TF of stamps that were there before, too"
     ),
-    DeclareLaunchArgument("monitor", default_value="false", choices=FLAG, description="the live page beside the node"),
+    DeclareLaunchArgument(
+        "monitor", default_value="", choices=FLAG_OR_FILE, description="the live page beside the node; empty: as in params_file"
+    ),
     DeclareLaunchArgument("rviz", default_value="false", choices=FLAG, description="start RViz"),
     DeclareLaunchArgument("rviz_config", default_value=str(RVIZ), description="what RViz shows"),
     DeclareLaunchArgument("record", default_value="", description="new folder to record the session into; empty: none"),
 ]
 Given = dict[str, str]
+Values = dict[str, Any]
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -57,18 +64,29 @@ def everything(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     """All that is asked for; what cannot be found or used is told before anything starts."""
     given = {each.name: LaunchConfiguration(each.name).perform(context) for each in ARGUMENTS}
     check_packages(given)
-    scene = load_scene(given["scene"] or None)
-    load_mapping(path(given["mapping"]), len(scene.joints))
-    read_parameters(Path(given["params_file"]))
-    found: list[LaunchDescriptionEntity] = [twin(given)]
+    values = parameters(given)
+    scene = load_scene(values["scene"] or None)
+    load_mapping(Path(values["mapping"]) if values["mapping"] else None, len(scene.joints))
+    found: list[LaunchDescriptionEntity] = [twin(given, values)]
     if is_set(given, "state_publisher"):
-        found.append(state_publisher(given, scene))
+        found.append(state_publisher(given, values, scene))
     if is_set(given, "rviz"):
         Path(given["rviz_config"]).read_bytes()
-        found.append(rviz(given))
+        found.append(rviz(given, values))
     if given["record"]:
-        found.append(recorder(given))
+        found.append(recorder(given, values))
     return found
+
+
+def parameters(given: Given) -> Values:
+    """Return the node's parameters: arguments that are given, else those of the file, else the defaults.
+
+    They are given to the node as one set: a name with wildcards in the file could win over an argument.
+    """
+    values = PARAMETERS | read_parameters(Path(given["params_file"]), given["namespace"])
+    for name in filter(given.get, PARAMETERS):
+        values[name] = given[name] == "true" if name in ("monitor", "use_sim_time") else given[name]
+    return values
 
 
 def check_packages(given: Given) -> None:
@@ -84,60 +102,58 @@ def check_packages(given: Given) -> None:
             raise BoomTwinError(f"package {package} is not in AMENT_PREFIX_PATH: {remedy}") from None
 
 
-def path(text: str) -> Path | None:
-    """Of an argument that may be empty."""
-    return Path(text) if text else None
-
-
 def is_set(given: Given, name: str) -> bool:
     """Whether a flag is true."""
     return given[name] == "true"
 
 
-def twin(given: Given) -> Node:
+def as_launched(values: Values) -> Values:
+    """Return parameters for launch, which would read a text as YAML."""
+    return {name: ParameterValue(value, value_type=str) if isinstance(value, str) else value for name, value in values.items()}
+
+
+def twin(given: Given, values: Values) -> Node:
     """The node; it configures and activates itself. Without it nothing else goes on."""
-    own = {name: ParameterValue(given[name], value_type=str) for name in ("scene", "mapping", "frame_prefix")}
-    own |= {name: is_set(given, name) for name in ("monitor", "use_sim_time")}
     return Node(
         package="boom_twin",
         executable="twin_node",
         name="boom_twin",
         namespace=given["namespace"],
         output="screen",
-        parameters=[given["params_file"], own],
+        parameters=[as_launched(values)],
         on_exit=Shutdown(reason="the twin has ended"),
     )
 
 
-def state_publisher(given: Given, scene: Scene) -> Node:
+def state_publisher(given: Given, values: Values, scene: Scene) -> Node:
     """TF up to the deflected tip, driven by the twin's joint states."""
-    texts = {"frame_prefix": given["frame_prefix"], "robot_description": urdf(scene)}
-    own = {name: ParameterValue(text, value_type=str) for name, text in texts.items()}
-    own |= {name: is_set(given, name) for name in ("ignore_timestamp", "use_sim_time")}
+    own = {name: values[name] for name in ("frame_prefix", "use_sim_time")}
+    own |= {"robot_description": urdf(scene), "ignore_timestamp": is_set(given, "ignore_timestamp")}
     return Node(
         package="robot_state_publisher",
         executable="robot_state_publisher",
         namespace=given["namespace"],
-        parameters=[own],
+        parameters=[as_launched(own)],
         remappings=[("joint_states", "boom_twin/joint_states")],
     )
 
 
-def rviz(given: Given) -> IncludeLaunchDescription:
+def rviz(given: Given, values: Values) -> IncludeLaunchDescription:
     """RViz, as ``rviz.launch.py`` starts it."""
     source = PythonLaunchDescriptionSource([ThisLaunchFileDir(), "/rviz.launch.py"])
-    names = ("rviz_config", "namespace", "frame_prefix", "use_sim_time")
-    return IncludeLaunchDescription(source, launch_arguments=[(name, given[name]) for name in names])
+    own = {"frame_prefix": values["frame_prefix"], "use_sim_time": str(values["use_sim_time"]).lower()}
+    arguments = {name: given[name] for name in ("rviz_config", "namespace")} | own
+    return IncludeLaunchDescription(source, launch_arguments=list(arguments.items()))
 
 
-def recorder(given: Given) -> ExecuteProcess:
+def recorder(given: Given, values: Values) -> ExecuteProcess:
     """The recorder beside the node, with all that the node is given."""
     check_lasting(Path(given["record"]))
     options = {
         "--out": given["record"],
         "--scene": given["scene"],
         "--params": given["params_file"],
-        "--mapping": given["mapping"],
+        "--mapping": values["mapping"],
         "--namespace": given["namespace"],
     }
     command = python_command("boom_twin.cli.main", "record")

@@ -143,7 +143,9 @@ class Connection(web.RequestHandler):
     def handle_error(
         self, request: web.BaseRequest, status: int = 500, exc: BaseException | None = None, message: str | None = None
     ) -> web.StreamResponse:
-        """Answer to what is no request, which is told in one line, or to a fault of a handler."""
+        """Answer to what is no request, which is told in one line, or to a fault of a handler; a peer that has gone is none."""
+        if isinstance(exc, ConnectionError):
+            return web.Response(status=status)
         if status == HTTPStatus.BAD_REQUEST:
             LOG.warning("no request from %s: %s", self.address, printable(str(message)[:LONGEST], keep=""))
             response: web.StreamResponse = web.Response(status=status, text=message)

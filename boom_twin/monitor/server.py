@@ -125,12 +125,17 @@ class Server:
         return f"opening {self._sessions.names[index]} .."
 
     async def _open(self, sessions: SessionList, index: int) -> None:
-        """Show another session: its viewers' sockets are closed, and their pages connect again."""
+        """Show another session: its viewers' sockets are closed, and their pages connect again.
+
+        It is opened in a thread. The one before is read here, between two turns of this loop, so it is closed here, too.
+        """
         try:
-            self._feed = await asyncio.to_thread(sessions.open, index)
+            feed = await asyncio.to_thread(sessions.open, index)
         except BoomTwinError as error:
             self._feed.trouble = str(error)
             return
+        sessions.show(index, feed)
+        self._feed = feed
         self._actions, self._analyst = self._actions.of(self._feed), Analyst(self._feed, self._compiler)
         for socket in set(self._viewers):
             await socket.close()

@@ -143,13 +143,6 @@ class BatchMeans:
         return total / self.count, float(means.std(ddof=1) / sqrt(len(means))) if len(means) > 1 else 0.0
 
 
-def batch_mean(values: Array) -> tuple[float, float]:
-    """Mean of a row of values (k,), and its standard deviation, see `BatchMeans`."""
-    means = BatchMeans()
-    means.add(values)
-    return means.mean
-
-
 def _frequencies(still: list[HoldInterval], detuning: float) -> Iterator[Quantity]:
     """Of every mode that was seen: measured over model frequency, and damping.
 
@@ -199,13 +192,6 @@ class PathLength:
         if not self._way or self._begin is None:
             return 0.0, 0
         return self._travel + abs(self._extreme - self._begin), self._legs + 1
-
-
-def path_length(stroke: Array) -> tuple[float, int]:
-    """Travel (m) and legs of a stroke (k,), see `PathLength`."""
-    path = PathLength()
-    path.add(stroke)
-    return path.length
 
 
 def write(folder: Path, scene: Scene, found: list[Quantity]) -> Path:

@@ -8,14 +8,13 @@ from math import inf
 import numpy as np
 
 from ..analysis.free_vibration import ORDER, Vibration, free_vibrations, is_free
-from ..estimation.load_spectrum import LEAST as LEAST_LOAD
 from ..monitor.data.present_posture import ModeList
 from ..plots import History
 from ..scene.schema import Scene
+from ..scene.summary import weight_of
 from ..types import Array, Stream, stream_of
 
-RATE = 40.0
-"""Hz to which samples are thinned out."""
+RATE = 40.0  # Hz, to which samples are thinned out
 
 
 def vibrations(times: Array, values: Array) -> list[Vibration]:
@@ -49,6 +48,7 @@ LEAST = 3.0
 """s; the shortest interval that is looked at."""
 LONGEST = 60.0
 """s; the longest: free vibration has died away by then, and memory goes by the square of it."""
+SHAKEN = 0.003  # of the boom's weight, standard deviation of a load at the tip that shakes the boom
 NEAR = 0.2
 """A vibration belongs to the nearest mode of the model, if it is no further from it than this share."""
 SURE = 0.02
@@ -80,7 +80,7 @@ class HoldFinder:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._modes = ModeList(scene)
+        self._modes, self._least_load = ModeList(scene), SHAKEN * weight_of(scene)
         self._found: list[HoldInterval] = []
         self._strokes = self._motion = self._load = _NOTHING  # times and values, from where an interval may have begun
         self._told_to = -inf  # s; end of an interval of `LONGEST`, which may go on
@@ -125,7 +125,7 @@ class HoldFinder:
         inside, there = _between(times, start, stop), _between(moved, start, stop)
         model = self._modes.at(np.median(strokes[inside], axis=0).tolist())
         load = self._load[1][_between(self._load[0], start, stop)]
-        if float(np.hypot(*load.std(axis=0))) > LEAST_LOAD:
+        if float(np.hypot(*load.std(axis=0))) > self._least_load:
             return HoldInterval(start, stop, model, {}, True)
         found = [each for each in vibrations(moved[there], values[there]) if is_free(each)]
         sure = [each for each in found if each.frequency_sigma * (stop - start) < SURE]

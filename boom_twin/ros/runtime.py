@@ -30,6 +30,13 @@ STOPPED = (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException)
 NO_PROFILES = "SKIP_DEFAULT_XML_FILE"
 """Set to 1: Fast DDS does not take ``DEFAULT_FASTRTPS_PROFILES.xml``, which may name log files, from the working directory."""
 
+REMEDIES = {
+    "Couldn't parse": "Check what follows --ros-args.",
+    "initialize logging": "Set HOME, or ROS_LOG_DIR, to a folder that can be written.",
+}
+"""Remedies by words of rclpy's errors; `OTHER_REMEDY` for those of its environment (domain, security, middleware)."""
+OTHER_REMEDY = "Check the environment variables ROS_*."
+
 
 @contextmanager
 def ros(arguments: Sequence[str] | None = None) -> Iterator[None]:
@@ -42,13 +49,15 @@ def ros(arguments: Sequence[str] | None = None) -> Iterator[None]:
     Raises
     ------
     UsageError
-        The arguments after ``--ros-args`` cannot be used.
+        The arguments after ``--ros-args``, or what the environment says of ROS, cannot be used.
     """
     os.environ.setdefault(NO_PROFILES, "1")
     try:
         rclpy.init(args=None if arguments is None else list(arguments), signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # rclpy raises types of its C++ part here
-        raise UsageError(f"ROS arguments: {one_line(error)}. Check what follows --ros-args.") from error
+        told = one_line(error)
+        remedy = next((remedy for words, remedy in REMEDIES.items() if words in told), OTHER_REMEDY)
+        raise UsageError(f"ROS cannot start: {told}. {remedy}") from error
     try:
         yield
     finally:

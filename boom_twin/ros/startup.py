@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -12,6 +13,7 @@ from importlib.util import find_spec
 from types import FrameType
 
 from ..errors import UsageError
+from ..system.child_process import python_command
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """What asks a process to end; SIGHUP comes when its terminal is closed, and is ignored where ``nohup`` has it so."""
@@ -95,9 +97,17 @@ class StopSignal:
 
 
 def require_rclpy() -> None:
-    """Raise UsageError, with the remedy, where rclpy is not installed."""
+    """Raise UsageError, with the remedy, where rclpy is not installed, or has not the middleware that is asked for.
+
+    A middleware that is not there ends the process that imports rclpy, so another one tries that.
+    """
     if find_spec("rclpy") is None:
         raise UsageError(
             'rclpy is not installed, and this needs ROS 2. Run `pip install "boom_twin[ros]"`, '
             "or source the setup file of a ROS 2 Jazzy installation."
         )
+    if name := os.environ.get("RMW_IMPLEMENTATION"):
+        command = python_command("rclpy.impl.implementation_singleton")
+        if subprocess.run(command, capture_output=True, check=False).returncode:
+            told = "rclpy cannot load this middleware. Install its package, or unset the variable."
+            raise UsageError(f"RMW_IMPLEMENTATION={name}: {told}")

@@ -85,17 +85,46 @@ def stroke_range(scene: Scene, index: int, samples: int) -> tuple[float, float]:
     return max(float(np.nanmin(strokes)), 0.0), min(float(np.nanmax(strokes)), joint.cylinder.max_stroke)
 
 
-def posture_angles(scene: Scene, name: str) -> Array:
-    """Relative joint angles (rad), shape (n,), of the undeformed boom in a named posture."""
-    if name not in scene.postures:
-        known = ", ".join(scene.postures) or "none"
-        raise UsageError(f"posture = {name!r}: the scene has {known}. Choose one of these or give the strokes.")
-    return np.diff(np.radians(scene.postures[name]), prepend=0.0)
+def section_angles(scene: Scene, posture: str) -> tuple[float, ...]:
+    """Return the section angles to the base (deg) of a posture.
+
+    Parameters
+    ----------
+    scene : Scene
+    posture : str
+        A name of the scene, or the angles themselves, as `envelope` and `init` print them: ``90,-23,-23``.
+
+    Raises
+    ------
+    UsageError
+        There is no such name, or a joint cannot take its angle.
+    """
+    if posture in scene.postures:
+        return scene.postures[posture]
+    try:
+        angles = tuple(float(part) for part in posture.strip("[] ").split(","))
+    except ValueError:
+        known = ", ".join(scene.postures) or "no posture"
+        remedy = "Choose one of these, or give the angle of every section to the horizontal, deg: 60,20,-30."
+        raise UsageError(f"posture = {posture!r}: the scene has {known}. {remedy}") from None
+    if len(angles) != len(scene.joints):
+        raise UsageError(f"posture = {posture!r}: {len(angles)} angles for {len(scene.joints)} sections. Give one for each.")
+    for i, (joint, angle) in enumerate(zip(scene.joints, np.diff(angles, prepend=0.0).tolist(), strict=True)):
+        low, high = joint.range_deg
+        if not low - math.degrees(MARGIN) <= angle <= high + math.degrees(MARGIN):
+            told = f"turns joint {i + 1} to {angle:g} deg, outside its range_deg {low:g} to {high:g}"
+            raise UsageError(f"posture = {posture!r}: {told}. A joint angle is the difference of neighbouring section angles.")
+    return angles
 
 
-def strokes_of_posture(scene: Scene, name: str) -> Array:
-    """Strokes (m), shape (n,), that bring the undeformed boom to a named posture."""
-    relative = posture_angles(scene, name)
+def posture_angles(scene: Scene, posture: str) -> Array:
+    """Return the relative joint angles (rad), shape (n,), of the undeformed boom in a posture, see `section_angles`."""
+    return np.diff(np.radians(section_angles(scene, posture)), prepend=0.0)
+
+
+def strokes_of_posture(scene: Scene, posture: str) -> Array:
+    """Return the strokes (m), shape (n,), that bring the undeformed boom to a posture, see `section_angles`."""
+    relative = posture_angles(scene, posture)
     return np.array([stroke_curve(scene, i, relative[i : i + 1])[0] for i in range(len(scene.joints))])
 
 

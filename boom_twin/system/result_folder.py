@@ -9,6 +9,7 @@ whenever a kill comes, one of the two is there whole, and the next run of the co
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
@@ -27,6 +28,8 @@ BUILDING, REPLACED = ".unfinished", ".replaced"
 """What the names of the folders beside the result end with."""
 OF_THE_SYSTEM = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 """Files that a file manager leaves where somebody looks."""
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Errors of a disk, a user's share of it, or a file that takes no more; those of writing name no file."""
 _LARGEST = 2**20  # bytes of a manifest that is read
 _WRITABLE = 0o222  # mode of a folder that somebody may write to
 
@@ -130,11 +133,14 @@ def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Itera
             _clear(building, kind)
             yield UnfinishedResult(building, lock)
             _complete(building, kind)
-        except BaseException:
+        except BaseException as error:
             with suppress(OSError, BagError):
                 _clear(building, kind)
                 (building / UNFINISHED).unlink()
                 _remove_empty(building)
+            if isinstance(error, OSError) and error.errno in FULL and not error.filename:
+                remedy = "Make room on the disk, or choose another place."
+                raise BagError(f"{out}: cannot be written ({os.strerror(error.errno)}). {remedy}") from None
             raise
         _put_in_place(out, place, building, replaced, kind)
 

@@ -45,3 +45,15 @@ def test_keys_and_fingerprints_tell_sessions_and_changes_apart(there: Path) -> N
     assert before == fingerprint(there / "a", "options") != fingerprint(there / "a", "others")
     (there / "a" / "session_0.mcap").write_bytes(b"xy")
     assert fingerprint(there / "a", "options") != before
+
+
+def test_links_that_lead_in_a_circle_are_no_sessions_and_no_end(there: Path) -> None:
+    """Two of them: a search that follows both meets 2^40 folders."""
+    for name in ("one", "two"):
+        (there / "a" / name).symlink_to(there)
+    (there / "to_itself.mcap").symlink_to("to_itself.mcap")
+    (there / "linked").symlink_to(there / "b")
+    found = [there / name / "session_0.mcap" for name in ("a", "b", "c")]
+    assert sessions_of([str(there / "**" / "*.mcap")]) == [*found, there / "to_itself.mcap"]
+    assert there / "a" in sessions_of([str(there / "**")])
+    assert fingerprint(there / "to_itself.mcap", "") and key_of(there / "to_itself.mcap").startswith("to_itself-")

@@ -20,11 +20,12 @@ from threading import Event, Thread
 
 import psutil
 import pyarrow.parquet as parquet
+from distributed import Client, LocalCluster
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from boom_twin.bag.reader import read_blocks, scan
-from boom_twin.batch.cluster import connected, rows_of
+from boom_twin.batch.cluster import on_dask, rows_of
 from boom_twin.batch.session_task import Row, SessionTask
 from boom_twin.system.child_process import python_command
 
@@ -101,18 +102,17 @@ def write_hog(folder: Path, times: int) -> None:
         writer.finish()
 
 
-def kill_workers(process: subprocess.Popen[bytes], every: float, ended: Event) -> None:
-    """End a worker by force now and then, chosen at random."""
+def kill_sessions(process: subprocess.Popen[bytes], every: float, ended: Event) -> None:
+    """End the process of a session by force now and then, chosen at random."""
     choice = random.Random(1)
     while not ended.wait(every):
         with suppress(psutil.Error):
-            busy = [each for each in psutil.Process(process.pid).children() if each.children()]
-            if busy:
+            if busy := psutil.Process(process.pid).children():
                 choice.choice(busy).kill()
 
 
 def faults(sessions: Path, out: Path, every: float) -> None:
-    """Three broken sessions, one that takes too long, one that takes too much memory, a worker killed now and then, Ctrl-C."""
+    """Three broken sessions, one that is too slow, one too large, a session's process killed now and then, Ctrl-C."""
     whole = (SESSION / "session_0.mcap").read_bytes()
     for number, content in enumerate((whole[: len(whole) // 2], b"", whole[:5000] + bytes(200) + whole[5200:])):
         (sessions / f"x{number}").mkdir()
@@ -125,7 +125,7 @@ def faults(sessions: Path, out: Path, every: float) -> None:
     before: dict[str, int] = {}
     for is_stopped in (True, False):
         ended, process = Event(), subprocess.Popen(command(*arguments))
-        killer = Thread(target=kill_workers, args=(process, every, ended))
+        killer = Thread(target=kill_sessions, args=(process, every, ended))
         killer.start()
         while process.poll() is None:
             if is_stopped and len(list((out / "rows").glob("*"))) > len(list(sessions.iterdir())) // 2:
@@ -146,7 +146,7 @@ def faults(sessions: Path, out: Path, every: float) -> None:
     single(sessions, out.with_name("alone"), 1)
     alone = json.loads((out.with_name("alone") / "0" / "summary.json").read_text())
     print("equal to a single replay:", all(row[name] == alone[name] for row in right for name in FIGURES))
-    print("workers lost, by the attempts of right rows:", sorted({row["attempts"] for row in right}))
+    print("processes lost, by the attempts of right rows:", sorted({row["attempts"] for row in right}))
 
 
 def nothing(task: SessionTask) -> Row:
@@ -155,11 +155,11 @@ def nothing(task: SessionTask) -> Row:
 
 
 def overhead(count: int) -> None:
-    """What Dask takes for a task, on the client's and the scheduler's core together."""
+    """What Dask takes for a task: client, scheduler and two worker threads together."""
     tasks = [SessionTask(str(k), "s", "o", "f", None, None, None, None, False, False, 1.0, 1, 0) for k in range(count)]
-    with connected(None, 2) as client:
+    with Client(LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None)) as client:
         began = time.perf_counter()
-        assert sum(1 for _ in rows_of(client, tasks, nothing)) == count
+        assert sum(1 for _ in rows_of(on_dask(client, nothing), tasks)) == count
         print(f"Dask: {1e3 * (time.perf_counter() - began) / count:.2f} ms a task, {count} tasks, 2 workers")
 
 

@@ -157,10 +157,24 @@ def test_starting_up_imports_neither_ros_nor_a_compiler_nor_pictures() -> None:
     assert (done.stdout, done.stderr) == ("[]\n", "")
 
 
-def test_as_a_process_with_a_reader_that_goes_away() -> None:
-    shell = f"{sys.executable} -m boom_twin.cli.main scene | head -c 1 > /dev/null; echo ${{PIPESTATUS[0]}}"
+@pytest.mark.parametrize(
+    ("command", "redirection", "code", "told"),
+    [
+        ("scene", "| head -c 1 > /dev/null", 0, ""),
+        ("check nothing.yaml", "2>&1 | true", 1, ""),
+        ("--help", "| true", 0, ""),
+        ("scene", ">&-", 0, ""),
+        ("scene", ">&- 2>&- <&-", 0, ""),
+        ("check nothing.yaml", "2>&-", 1, ""),
+        ("check nothing.yaml", ">&- 2>/dev/full", 1, ""),
+        ("scene --nix", "2>&-", 2, ""),
+        ("scene", "> /dev/full", 1, "boom_twin scene: standard output: No space left on device\n"),
+    ],
+)
+def test_as_a_process_whose_streams_are_closed_or_full(command: str, redirection: str, code: int, told: str) -> None:
+    shell = f"{sys.executable} -m boom_twin.cli.main {command} {redirection}; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, check=False)
-    assert done.stdout.strip() in ("0", "1") and done.stderr == ""
+    assert (done.returncode, done.stderr) == (code, told)
 
 
 def test_as_a_process_a_bad_scene_leaves_no_traceback(tmp_path: Path) -> None:

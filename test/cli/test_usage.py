@@ -55,6 +55,34 @@ def test_the_scene_is_one_option_and_a_positional_argument(tmp_path: Path, capsy
     assert "not allowed with argument" in refused(capsys, "statics", "--scene", "a", "b", f"--strokes={STROKES}")
 
 
+@pytest.mark.parametrize("posture", ["-2,-160,-200,-210", "[-2, -160, -200, -210]", " -2., -160.0,-200,-210"])
+def test_section_angles_are_a_posture(posture: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """As `init` and `envelope` print them, also from a minus on."""
+    assert main(["statics", "--posture", posture.strip(), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    strokes = ",".join(map(str, found["stroke_m"]))
+    assert main(["statics", "--strokes", strokes, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["tip_m"] == pytest.approx(found["tip_m"], abs=1e-9)
+    assert main(["response", "--posture", posture.strip(), "--tip", "-100,0", "--points", "3", "--json"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("posture", "told"),
+    [
+        (
+            "up",
+            "posture = 'up': the scene has horizontal, arch, high, low. Choose one of these, or give the angle",
+        ),
+        ("60,20", "posture = '60,20': 2 angles for 4 sections. Give one for each."),
+        ("60,20,90,0", "turns joint 3 to 70 deg, outside its range_deg"),
+        ("nan,0,0,0", "turns joint 1 to nan deg, outside its range_deg"),
+    ],
+)
+def test_section_angles_that_no_boom_takes_are_refused(posture: str, told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["statics", "--posture", posture]) == 1
+    assert told in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("command", EXAMPLES)
 def test_every_help_ends_with_examples(capsys: pytest.CaptureFixture[str], command: str) -> None:
     with pytest.raises(SystemExit) as ended:

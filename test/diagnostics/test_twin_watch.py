@@ -201,6 +201,19 @@ def test_clocks_that_differ(rig: Rig) -> None:
     assert status.values["clock_offset_s"] == pytest.approx(0.08) and status.values["clock_offset_s_warn"] == 0.05
 
 
+def test_a_publisher_of_which_nothing_arrives(rig: Rig) -> None:
+    """As between two users of one machine: the ends match, and shared memory keeps them apart."""
+    rig.now += 2.5
+    for names, told in (
+        (("/driver",), "though a publisher is there. If it sends as another user"),
+        ((), "nothing received yet"),
+    ):
+        rig.peers[Stream.STROKES] = Peers("/strokes", names)
+        found = {status.name: status for status in all_pieces(rig.watch.look({}, True, rig.peers, [], rig.now))}
+        assert found["cylinder_strokes"].level == Level.STALE and told in found["cylinder_strokes"].message
+    assert found["cylinder_strokes"].message == "nothing received yet"
+
+
 def test_other_ends(rig: Rig) -> None:
     rig.peers[Stream.STROKES] = Peers("/strokes", ("/a", "/b"), ("/b: Best effort publisher and reliable subscription",))
     status = after(rig, 4)["cylinder_strokes"]

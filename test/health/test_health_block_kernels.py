@@ -7,6 +7,7 @@ import pytest
 
 from boom_twin.health.inference.block_problem import BLOCK, MeasuredRows, PredictionRows
 from boom_twin.health.sensor_check import NOISY_WINDOW, SensorCheck
+from boom_twin.health.sensor_survey import NEAR_COUNTS
 from boom_twin.health.stream_readings import PredictionMeans, StreamReadings, StreamSurvey
 from boom_twin.types import NANO, Array
 
@@ -33,8 +34,8 @@ def test_means_leave_out_what_is_far_from_the_median(rows: int) -> None:
     left[rows // 2, 1] += 100.0 * SIGMA
     near = np.abs(left - np.sort(left, axis=0)[rows // 2]) <= 6.0 * SIGMA
     _, found = taken(left, left)
-    assert found.near_counts.tolist() == near.sum(axis=0).tolist()
-    assert np.array_equal(found.near, np.where(near, left, 0.0).sum(axis=0) / found.near_counts)
+    assert found.numbers[NEAR_COUNTS].tolist() == near.sum(axis=0).tolist()
+    assert np.array_equal(found.near, np.where(near, left, 0.0).sum(axis=0) / found.numbers[NEAR_COUNTS])
     assert found.off == pytest.approx(left.mean(axis=0)) and found.counts.tolist() == [rows] * 4
 
 
@@ -42,7 +43,7 @@ def test_means_of_readings_some_of_which_are_missing() -> None:
     left = readings(1)
     left[3, 0], left[:, 2] = np.nan, np.nan
     survey, found = taken(left + 1.0, left)
-    assert found.near_counts.tolist() == [19.0, 20.0, 0.0, 20.0] == found.counts.tolist()
+    assert found.numbers[NEAR_COUNTS].tolist() == [19.0, 20.0, 0.0, 20.0] == found.counts.tolist()
     assert np.isnan(found.near).tolist() == [False, False, True, False]
     assert found.near[0] == pytest.approx(np.nanmean(left[:, 0])) and found.off[2] == 0.0
     assert found.slow.weight == pytest.approx([0.05, 0.05, 0.0, 0.05])

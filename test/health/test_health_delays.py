@@ -31,7 +31,8 @@ def judged(monitor: DelayMonitor, lag: float, seconds: float, first: int = 0, **
         expected = force(times)
         read = force(times - lag) * more.get("scale", 1.0) + more.get("bias", 0.0) + rng.normal(0.0, 100.0, expected.shape)
         read[:, 1] += more.get("lost", 0.0) * math.nan if "lost" in more else 0.0
-        news += monitor.take(number, block_of(monitor, read, expected, number), NONE, round(times[-1] * 1e9))
+        readings, end = block_of(monitor, read, expected, number), round(times[-1] * 1e9)
+        news += monitor.take(number, readings, NONE, end, shared=more.get("shared", 0.0))
     return news
 
 
@@ -39,7 +40,7 @@ def judged(monitor: DelayMonitor, lag: float, seconds: float, first: int = 0, **
 def test_a_lag_is_told_with_its_size(lag: float) -> None:
     monitor = DelayMonitor(Stream.FORCES)
     assert judged(monitor, lag, 40.0)
-    value, sigma = monitor.estimate()
+    value, sigma = monitor.estimate()[:2]
     assert value == pytest.approx(lag, abs=3.0 * sigma) and 0.0 < sigma < 0.006
     assert monitor.alarm is not None and monitor.alarm.cause == "cylinder_forces.delay"
     assert "cylinder_forces.delay late: " in monitor.alarm.told and "add it to `delay` of cylinder_forces" in monitor.alarm.told
@@ -47,7 +48,9 @@ def test_a_lag_is_told_with_its_size(lag: float) -> None:
 
 
 def test_a_prediction_that_lags_in_haste_makes_no_stream_early() -> None:
-    assert judged(DelayMonitor(Stream.FORCES), -0.02, 60.0) == []
+    assert judged(DelayMonitor(Stream.FORCES), -0.02, 60.0, shared=-0.02) == []
+    (began, *_) = judged(DelayMonitor(Stream.FORCES), -0.02, 60.0)
+    assert began.cause == "cylinder_forces.delay" and began.ranked[0].parts[0][1] == pytest.approx(-0.02, abs=0.009)
 
 
 @pytest.mark.parametrize("wrong", [{}, {"bias": 2e3}, {"scale": 1.05}, {"lost": 1.0}])
@@ -55,7 +58,7 @@ def test_nothing_else_is_a_lag(wrong: dict[str, float]) -> None:
     """Force pins that read 5 % too much, or so many N, or one that is silent."""
     monitor = DelayMonitor(Stream.FORCES)
     assert judged(monitor, 0.0, 60.0, **wrong) == []
-    value, sigma = monitor.estimate()
+    value, sigma = monitor.estimate()[:2]
     assert abs(value) < 3.0 * sigma < math.inf
 
 
@@ -101,7 +104,7 @@ def test_a_lag_that_came_later_is_told_with_its_size() -> None:
     monitor = DelayMonitor(Stream.FORCES)
     assert judged(monitor, 0.0, 60.0) == []
     assert judged(monitor, 0.3, 30.0, first=600)
-    value, sigma = monitor.estimate()
+    value, sigma = monitor.estimate()[:2]
     assert value == pytest.approx(0.3, abs=3.0 * sigma) and sigma < 0.01
 
 
@@ -160,7 +163,7 @@ def test_an_imu_that_begins_later_than_the_boom_stands_still_stops_nothing() -> 
 def test_a_late_imu_is_named_and_nothing_else() -> None:
     found = run(late(60.0, 0.05))
     assert found.causes() == {"tip_imu.delay"}
-    value, sigma = found.twin.judge._delays[Stream.IMU].estimate()
+    value, sigma = found.twin.judge._delays[Stream.IMU].estimate()[:2]
     assert value == pytest.approx(0.05, abs=max(3.0 * sigma, 0.01))
 
 

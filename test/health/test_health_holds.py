@@ -28,7 +28,14 @@ STROKES = np.array([0.5, 0.2])
 
 
 def held(
-    seconds: float, left, motion, drift: float = 0.0, seed: int = 1, is_felt: bool = True, noise: float = 0.05
+    seconds: float,
+    left,
+    motion,
+    drift: float = 0.0,
+    seed: int = 1,
+    is_felt: bool = True,
+    noise: float = 0.05,
+    decay: float = 4.0 * np.pi * 1.05 * 0.008,
 ) -> list[StillReadings]:
     """What a collector finds of a hold of so many seconds that a move ends; `left` (t) by channel, `motion` (t) of the IMU.
 
@@ -39,9 +46,12 @@ def held(
         stamps = k * BLOCK + np.arange(0, BLOCK, round(1e9 / RATE))
         values = motion(stamps * 1e-9)
         values = values + rng.normal(0.0, noise, values.shape)
-        found.append(collector.take(k * BLOCK, left(0.1 * k + 0.05), STROKES + drift * k, (stamps, values), is_felt, BLOCK))
+        found.append(
+            collector.take(k * BLOCK, left(0.1 * k + 0.05), STROKES + drift * k, (stamps, values), is_felt, BLOCK, decay)
+        )
     nothing = np.zeros(0, np.int64), np.zeros((0, 2))
-    found.append(collector.take(round(seconds * 1e9) // BLOCK * BLOCK, left(0.0), STROKES + 0.01, nothing, is_felt, BLOCK))
+    end = round(seconds * 1e9) // BLOCK * BLOCK
+    found.append(collector.take(end, left(0.0), STROKES + 0.01, nothing, is_felt, BLOCK, decay))
     return [each for each in found if each is not None]
 
 
@@ -59,6 +69,18 @@ def test_mean_and_frequencies_of_a_hold() -> None:
     assert [round(each.frequency, 2) for each in found.vibrations] == [1.05, 2.4]
     for each, frequency in zip(found.vibrations, (1.05, 2.4), strict=True):
         assert abs(each.frequency - frequency) < 4.0 * each.frequency_sigma < 0.01
+
+
+@pytest.mark.parametrize("damping, told", [(0.012, [0.32, 1.1]), (0.0, [])])
+def test_a_slow_boom_that_swings_freely_is_not_shaken_by_a_load(damping: float, told: list[float]) -> None:
+    """Within 6 s the boom of 0.32 Hz loses an eighth of its power by its own damping; a load keeps up what loses none."""
+
+    def motion(times: np.ndarray) -> np.ndarray:
+        slow, quick = (np.exp(-damping * 2 * np.pi * f * times) * np.cos(2 * np.pi * f * times) for f in (0.32, 1.1))
+        return np.stack([slow + 0.5 * quick, quick - slow], axis=1)
+
+    (found,) = held(6.0, lambda t: np.zeros(1), motion, noise=0.01, decay=4.0 * np.pi * 0.32 * 0.012)
+    assert [round(each.frequency, 2) for each in found.vibrations] == told
 
 
 def frequencies_after_a_stop(posture: str, travel: float) -> tuple[np.ndarray, np.ndarray]:

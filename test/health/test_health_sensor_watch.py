@@ -31,9 +31,9 @@ class Watched:
     def __init__(self) -> None:
         self.watch, self.block = SensorMonitor(NAMES, SENSORS[Stream.ANGLES]), 0
 
-    def take(self, found: SensorFindings):
+    def take(self, found: SensorFindings, newest: np.ndarray | None = None):
         self.block += 1
-        return self.watch.take(found, (self.block - 1) * BLOCK, self.block * BLOCK)
+        return self.watch.take(found, (self.block - 1) * BLOCK, self.block * BLOCK, newest=newest)
 
     def rest(self, time: int):
         return [alarm for _ in range(time // BLOCK) for alarm in self.take(findings())]
@@ -75,6 +75,16 @@ def test_a_jump_lasts_until_it_jumps_back():
     watched.rest(SETTLED)
     (ended,) = watched.take(findings(0, "jump", -0.0099))
     assert ended.until == watched.block * BLOCK and watched.watch.alarms == ()
+
+
+def test_a_jump_ends_where_readings_are_right_for_two_seconds_without_a_jump_back():
+    """As of an encoder that slipped while a looped bag began anew."""
+    watched = Watched()
+    watched.take(findings(0, "jump", 0.01, level=0.0102))
+    off, right = np.array([0.0099, 0.0]), np.array([-0.0001, 0.0])
+    assert [alarm for _ in range(50) for alarm in watched.take(findings(), off)] == [] and watched.watch.masked[0]
+    told = [alarm for _ in range(SETTLED // BLOCK + 1) for alarm in watched.take(findings(), right)]
+    assert [alarm.kind for alarm in told] == ["jump"] and not watched.watch.masked.any()
 
 
 def test_jumps_of_a_wild_sensor_mean_nothing_more():

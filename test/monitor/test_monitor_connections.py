@@ -8,6 +8,7 @@ import re
 import resource
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import time
@@ -98,6 +99,21 @@ async def visit(server: Server) -> None:
                 message = await link.receive()
                 assert message.type in (WSMsgType.TEXT, WSMsgType.BINARY)
                 kinds.add(json.loads(message.data)["kind"] if message.type is WSMsgType.TEXT else "rows")
+
+
+def test_pages_that_reset_their_connection_leave_no_trace(server: Server) -> None:
+    """More of them than pages may be open, before they are answered and after."""
+    asked = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13"
+    own = f"{asked}\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA=="
+    request = f"GET /socket HTTP/1.1\r\nHost: {server.host}\r\nOrigin: http://{server.host}\r\n{own}\r\n\r\n".encode()
+    for number in range(60):
+        with socket.create_connection(server.address, PATIENCE) as link:
+            link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # closing it resets it
+            link.sendall(request)
+            if number % 3 == 0:
+                link.recv(15)
+    asyncio.run(visit(server))
+    assert "Traceback" not in server.said()
 
 
 def test_a_thousand_half_open_connections_keep_no_page_out(server: Server, many_files: None) -> None:

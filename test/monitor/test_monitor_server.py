@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import json
 import struct
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.access_control import AccessControl, is_loopback
 from boom_twin.monitor.actions import ViewerActions
 from boom_twin.monitor.data.analyst import PREDICTION, SIGNALS
+from boom_twin.monitor.data.bag_feed import BagFeed
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.session_list import SessionList, sessions_in
 from boom_twin.monitor.data.store import Store
@@ -391,6 +393,60 @@ def test_a_spectrum_of_a_boom_that_moved_says_so_and_names_no_mode() -> None:
     lines = lines_of(feed)
     assert lines["moved"] == pytest.approx(0.03, rel=1e-3)
     assert lines["peaks"][0]["mode"] is None and lines["peaks"][0]["deviation"] is None
+
+
+def test_a_session_that_is_being_read_gives_way_to_the_one_chosen(tmp_path: Path) -> None:
+    """It was shown on under the name of the other: what reads it cannot be closed from another thread meanwhile."""
+    inside, ever = Event(), Event()
+
+    def steps() -> Iterator[None]:
+        while True:
+            inside.set()
+            ever.wait(0.05)
+            inside.clear()
+            yield
+
+    def opened(path: Path) -> Feed:
+        if path.name == "b":
+            inside.wait()
+        feed = BagFeed(path.name, Store(100, keeps_statuses=True), load_topics(), load_scene(), 10.0)
+        feed.begin(steps())  # type: ignore[arg-type]
+        return feed
+
+    async def run() -> None:
+        sessions = SessionList([tmp_path / "a", tmp_path / "b"], opened)
+        server = Server(sessions.feed, ViewerActions(sessions.feed, frozenset()), AccessControl("127.0.0.1"), sessions)
+        async with TestServer(server.application()) as served, ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
+            url = str(served.make_url("/"))
+            async with connect(session, url) as socket:
+                await socket.send_json({"do": "session", "value": 1})
+                while (await socket.receive()).type in (WSMsgType.TEXT, WSMsgType.BINARY):
+                    pass  # until the server lets go
+            async with connect(session, url) as socket:
+                hello = await until(socket, "hello")
+                assert (hello["title"], hello["session"]) == ("b", 1)
+
+    asyncio.run(asyncio.wait_for(run(), 60.0))
+
+
+def test_a_session_that_cannot_be_read_keeps_no_others_out(tmp_path: Path) -> None:
+    """A link to itself, and one that fails as it is read: told, and the next one is shown."""
+    for name in ("b.csv", "c.csv"):
+        (tmp_path / name).touch()
+    (tmp_path / "a.csv").symlink_to("a.csv")
+
+    def opened(path: Path) -> Feed:
+        if path.name == "b.csv":
+            raise BagError(f"{path}: damaged")
+        path.read_bytes()
+        return Made(end=10.0)
+
+    sessions = SessionList(sessions_in(tmp_path), opened)
+    assert (sessions.names, sessions.index) == (["a.csv", "b.csv", "c.csv"], 2)
+    assert "a.csv: cannot be read (Too many levels of symbolic links)" in sessions.feed.trouble
+    assert sessions.feed.trouble.endswith("b.csv: damaged")
+    with pytest.raises(BagError, match=r"a\.csv"):
+        SessionList(sessions_in(tmp_path)[:2], opened)
 
 
 def test_one_of_several_sessions_is_chosen_for_all(tmp_path: Path) -> None:

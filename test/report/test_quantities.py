@@ -11,8 +11,20 @@ import pytest
 from boom_twin import load_scene
 from boom_twin.errors import BagError
 from boom_twin.health.baseline import load_baseline
-from boom_twin.report.quantities import Quantity, batch_mean, digest, path_length, read, write
+from boom_twin.report.quantities import BatchMeans, PathLength, Quantity, digest, read, write
 from boom_twin.report.vibration import still
+
+
+def batch_mean(values: np.ndarray) -> tuple[float, float]:
+    means = BatchMeans()
+    means.add(values)
+    return means.mean
+
+
+def path_length(stroke: np.ndarray) -> tuple[float, int]:
+    path = PathLength()
+    path.add(stroke)
+    return path.length
 
 
 def test_batch_means_are_as_sure_as_they_say() -> None:

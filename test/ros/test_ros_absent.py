@@ -1,9 +1,11 @@
-"""Without rclpy: everything else works, and what needs it says so."""
+"""Without rclpy, or what it needs: everything else works, and what needs it says so."""
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from importlib.util import find_spec
 
 import pytest
 
@@ -31,3 +33,25 @@ def test_what_needs_ros_names_the_remedy(call: str) -> None:
     done = _run(call)
     assert done.returncode == 1
     assert 'pip install "boom_twin[ros]"' in done.stderr and "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(find_spec("rclpy") is None, reason="rclpy is not installed")
+@pytest.mark.parametrize(
+    ("environment", "told"),
+    [
+        (
+            {"RMW_IMPLEMENTATION": "rmw_none"},
+            "RMW_IMPLEMENTATION=rmw_none: rclpy cannot load this middleware. Install its package,",
+        ),
+        ({"HOME": None}, "Failed to get logging directory. Set HOME, or ROS_LOG_DIR, to a folder that can be written."),
+        ({"ROS_LOG_DIR": "/proc/none"}, "'/proc/none': 2. Set HOME, or ROS_LOG_DIR, to a folder that can be written."),
+        ({"ROS_DOMAIN_ID": "one"}, "ROS_DOMAIN_ID is not an integral number. Check the environment variables ROS_*."),
+    ],
+)
+def test_an_environment_that_ros_cannot_use_is_told_with_its_reason(environment: dict[str, str | None], told: str) -> None:
+    own = {name: text for name, text in (os.environ | environment).items() if text is not None and name != "ROS_LOG_DIR"}
+    own |= {name: text for name, text in environment.items() if text is not None}
+    command = [sys.executable, "-m", "boom_twin.ros.node.main"]
+    done = subprocess.run(command, env=own, capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and "Traceback" not in done.stderr
+    assert told in done.stderr.splitlines()[-1]

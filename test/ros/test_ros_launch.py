@@ -176,6 +176,33 @@ def test_robot_state_publisher_is_told_everything(start: Start) -> None:
     assert launched.is_gone()
 
 
+@pytest.mark.parametrize("name", ["/**", "/front/boom_twin"])
+def test_the_parameter_file_holds_where_no_argument_is_given(start: Start, tmp_path: Path, name: str) -> None:
+    """Empty arguments are not given; those that are win, whatever name the file gives the node."""
+    scene, mapping, params = (tmp_path / f"{each}.yaml" for each in ("boom", "mapping", "params"))
+    scene.write_text(default_text() + "# of the file\n")
+    mapping.write_text("inputs: {tip_imu: {delay: 0.01}}\n")
+    own = {"scene": f'"{scene}"', "mapping": f'"{mapping}"', "frame_prefix": "file/", "use_sim_time": "true", "payload": "7.5"}
+    blocks = "".join(f"    {key}: {value}\n" for key, value in own.items())
+    params.write_text(f"{name}:\n  ros__parameters:\n{blocks}")
+    out = tmp_path / "session"
+    given = {"namespace": "front", "params_file": params, "record": out}
+    launched = start("twin", "robot_state_publisher", **given)
+    launched.wait_for("active;", "recording", "frame_prefix: file/", "use_sim_time: true")
+    end = time.monotonic() + PATIENCE
+    while "payload: 7.5" not in (out / "session.yaml").read_text():
+        assert time.monotonic() < end
+        time.sleep(0.1)
+    launched.end(signal.SIGINT)
+    assert mapping_of(out).topics.frame == "file/base_link" and scene_of(out).text.endswith("# of the file\n")
+    launched = start(
+        "twin", "robot_state_publisher", params_file=params, namespace="front", frame_prefix="given/", monitor="false"
+    )
+    launched.wait_for("active;", "frame_prefix: given/", "use_sim_time: true")
+    launched.end(signal.SIGINT)
+    assert launched.is_gone()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -331,3 +331,11 @@ def test_only_an_earlier_result_is_a_target_where_that_can_be_told(tmp_path: Pat
         check_target(path, [], b"t_s,stroke_1_m,")
     path.write_text("t_s,stroke_1_m,joint_1_rad\n0,1,2\n")
     check_target(path, [], b"t_s,stroke_1_m,")
+
+
+def test_a_full_disk_is_told_with_the_folder_and_a_remedy(tmp_path: Path) -> None:
+    """Whatever writes in it: the system names no file."""
+    told = rf"^{tmp_path / 'out'}: cannot be written \(No space left on device\)\. Make room on the disk"
+    with pytest.raises(BagError, match=told), result_folder(tmp_path / "out", REPLAY, []), Path("/dev/full").open("w") as file:
+        file.write("x")
+    assert list(tmp_path.iterdir()) == []

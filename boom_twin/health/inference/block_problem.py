@@ -295,7 +295,8 @@ class LinearModel:
 
     def take(self, block: BlockMeans, noise: StrokeNoise) -> BlockProblem | None:
         """One block; None while there is no equilibrium to linearise about."""
-        held = self._holds.take(block.start, block.left, block.strokes, block.motion[:2], block.is_felt, BLOCK)
+        decay = float(noise.decay.min()) if len(noise.decay) else 0.0
+        held = self._holds.take(block.start, block.left, block.strokes, block.motion[:2], block.is_felt, BLOCK, decay)
         if held is not None and (begun := self.signatures.hold(held)) is not None:
             self._in_work.append(begun)
         hold = self._hold()

@@ -29,6 +29,8 @@ class Form(Enum):
     PLAY = "play"  # lengthens one cylinder the way it is pulled
     DELAY = "delay"  # readings of a stream are those of an earlier time
     IMU = "imu"  # adds to one axis of the IMU
+    IMU_SCALE = "imu scale"  # multiplies both axes of the IMU
+    IMU_TURN = "imu turn"  # turns the IMU in the plane of the boom
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +107,8 @@ def parameters(scene: Scene) -> tuple[Parameter, ...]:
     found.append(Parameter("joint_angles.delay", "late", Form.DELAY, 0, "s", 5e-4, 0.05, prior=0.5))
     found.append(Parameter("tip_imu.delay", "late", Form.DELAY, 1, "s", 2e-3, 0.05, prior=0.5))
     found += [Parameter("tip_imu.sensor", f"bias {axis}", Form.IMU, i, "m/s^2", 0.01, 0.5) for i, axis in enumerate("xz")]
+    found.append(Parameter("tip_imu.sensor", "scale", Form.IMU_SCALE, 0, "", 1e-3, 0.05, prior=0.5))
+    found.append(Parameter("tip_imu.sensor", "turned", Form.IMU_TURN, 0, "rad", 1e-3, 0.1, prior=0.5))
     found += [
         Parameter(f"section_{i + 1}.mass", "changed", Form.SCENE, i, "", 0.02, 0.0)
         for i in each

@@ -24,9 +24,9 @@ RATE = 40.0  # Hz to which samples are thinned out
 LAGS = 80  # of these samples, 2 s
 SURE = 0.004  # largest relative deviation of a frequency
 PART = 1.0  # s, over which means are compared, to see how calm a hold is
-KEPT_UP = 0.8  # of its power that a vibration still has in the second half, if something keeps it up
+KEPT_UP = 0.5  # of the boom's own rate of decay, below which a load keeps a vibration up
 COLOURED = 3.0  # times the power of white noise that is left, from which on something else than free vibration is in it
-HEARD = 4.0  # times the power of noise, below which nothing is told of that
+CERTAIN = 3.0  # standard deviations of the decay by which it has to be below that
 FADED = 0.5  # of its own decay by which a vibration has to be less than in the part before of the same hold
 SECOND_ORDER, MOVED = 50.0, 0.4  # 1/rad, and of a resolution: see `_with_second_order`
 
@@ -107,7 +107,8 @@ class HoldCollector:
         self._starts: list[int] = []
 
     def take(
-        self, start: int, left: Array, strokes: Array, motion: tuple[NDArray[np.int64], Array], is_felt: bool, block: int
+        self, start: int, left: Array, strokes: Array, motion: tuple[NDArray[np.int64], Array], is_felt: bool, block: int,
+        decay: float,
     ) -> StillReadings | None:  # fmt: skip
         """One block of `block` ns; gives the hold that it ends, if that was long enough.
 
@@ -121,13 +122,15 @@ class HoldCollector:
             Stamps (k,) in ns and readings (k, any) of what shows vibration best.
         is_felt : bool
             Whether that is the IMU, m/s^2; else it is angles, rad.
+        decay : float
+            Rate (1/s) at which the power of the boom's most lasting free vibration decays.
         """
         is_next = bool(self._starts) and start - self._starts[-1] < 3 * block
         is_next = is_next and is_felt == self._is_felt
         is_still = is_next and _largest_step(strokes, self._strokes[-1]) < PACE
         found = None
         if self._starts and (not is_still or (start - self._starts[0]) * NANO >= LONGEST):
-            found = self._finished(block)
+            found = self._finished(block, decay)
             if not is_still:
                 self._before = None
             self._begin()
@@ -138,7 +141,7 @@ class HoldCollector:
         self._is_felt = is_felt
         return found
 
-    def _finished(self, block: int) -> StillReadings | None:
+    def _finished(self, block: int, decay: float) -> StillReadings | None:
         span = (self._starts[-1] + block - self._starts[0]) * NANO
         if span < LEAST:
             return None
@@ -147,7 +150,7 @@ class HoldCollector:
         values = np.concatenate([values for _, values in self._motion])
         dt, thin = _thinned(stamps, values)
         vibrations = free_vibrations(dt, thin, LAGS)
-        is_shaken = not _is_explained(dt, thin, vibrations) or _is_kept_up(thin)
+        is_shaken = not _is_explained(dt, thin, vibrations) or any(_is_kept_up(each, decay) for each in vibrations)
         part = 1 if is_shaken else max(1, round(PART / (block * NANO)))
         left, unrest = _mean_at_rest(np.array(self._left), part, is_shaken)
         clear = [] if is_shaken else [each for each in vibrations if is_free(each) and _is_sure(each) and self._fades(each)]
@@ -198,13 +201,9 @@ def _with_second_order(vibrations: list[Vibration], span: float, reach: float | 
     return [replace(each, frequency_sigma=sigma) for each, sigma in zip(vibrations, sigmas, strict=True)]
 
 
-def _is_kept_up(values: Array) -> bool:
-    """Whether vibration in `values` (k, c) does not decay: a load shakes the boom."""
-    if len(values) < 8:
-        return False
-    noise = (np.diff(values, 2, axis=0) ** 2).mean(axis=0) / 6.0
-    first, second = (half.var(axis=0) for half in (values[: len(values) // 2], values[len(values) // 2 :]))
-    return bool((second.sum() > KEPT_UP * first.sum()) and (second > HEARD * noise).any())
+def _is_kept_up(each: Vibration, decay: float) -> bool:
+    """Return True if a vibration decays more slowly than any of the boom (`decay`, 1/s, of its power): a load shakes it."""
+    return 4.0 * np.pi * each.frequency * (each.damping + CERTAIN * each.damping_sigma) < KEPT_UP * decay
 
 
 def _is_explained(dt: float, values: Array, vibrations: list[Vibration]) -> bool:

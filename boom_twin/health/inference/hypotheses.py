@@ -45,7 +45,7 @@ from .normal_distribution import log_normal_below
 
 STEADY, GROWING = 0, 1
 BOUNDLESS = (Form.ANGLE, Form.STROKE, Form.IMU)  # of sensors whose zero may be off by any amount
-LASTING = (Form.DELAY, Form.SCALE, Form.ANGLE_SCALE)  # lags and scales do not grow
+LASTING = (Form.DELAY, Form.SCALE, Form.ANGLE_SCALE, Form.IMU_SCALE, Form.IMU_TURN)  # lags, scales and mounts do not grow
 CRUDE = 0.001  # see above
 AS_WELL = 12.0  # ln by which a level of the load may be less probable than the best and still explain the evidence
 

@@ -88,6 +88,8 @@ COLUMNS: dict[Form, Callable[[Posture, int], Array]] = {
     Form.STROKE: lambda at, i: -at.by_stroke[:, i],
     Form.SCALE: lambda at, i: -at.by_stroke[:, i] * at.strokes[i],
     Form.ANGLE_SCALE: lambda at, i: at.unit(i) * at.readings[i],
+    Form.IMU_SCALE: lambda at, _: at.unit(-4) * at.readings[-4] + at.unit(-3) * at.readings[-3],
+    Form.IMU_TURN: lambda at, _: at.unit(-4) * at.readings[-3] - at.unit(-3) * at.readings[-4],
     Form.PLAY: lambda at, i: at.by_stroke[:, i] * np.sign(at.forces[i]),
 }
 """Derivative of the readings by a parameter of that form and index; of `Form.SCENE` it comes from another boom at rest, and

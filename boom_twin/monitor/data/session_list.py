@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from ...bag.storages import is_session
+from ...errors import BagError, BoomTwinError
 from .feed import Feed
 
 
@@ -22,7 +23,7 @@ class SessionList:
     Parameters
     ----------
     paths : sequence of Path
-        At least one; the first is opened at once.
+        At least one; the first that can be read is opened at once.
     open_feed : callable
         Gives the feed of a path.
 
@@ -38,20 +39,33 @@ class SessionList:
     Raises
     ------
     BoomTwinError
-        From here and `open`: the session cannot be read; the one before stays.
+        No session can be read. From `open`: this one cannot.
     """
 
     def __init__(self, paths: Sequence[Path], open_feed: Callable[[Path], Feed]) -> None:
         self._paths, self._open_feed = paths, open_feed
-        self.names, self.index = [path.name for path in paths], 0
-        self.feed = open_feed(paths[0])
+        self.names = [path.name for path in paths]
+        errors: list[BoomTwinError] = []
+        for self.index in range(len(paths)):
+            try:
+                self.feed = self.open(self.index)
+                self.feed.trouble = "; ".join(map(str, errors))
+                return
+            except BoomTwinError as error:
+                errors.append(error)
+        raise errors[0]
 
     def open(self, index: int) -> Feed:
-        """Open another session and close the one before; gives its feed."""
-        feed = self._open_feed(self._paths[index])
+        """Return the feed of a session, which is shown from `show` on; nothing else changes, so a thread may wait for it."""
+        try:
+            return self._open_feed(self._paths[index])
+        except OSError as error:
+            raise BagError(f"{self._paths[index]}: cannot be read ({error.strerror}). Choose another session.") from None
+
+    def show(self, index: int, feed: Feed) -> None:
+        """Take another session's feed for the one before, which is closed."""
         before, self.feed, self.index = self.feed, feed, index
         before.close()
-        return feed
 
     def close(self) -> None:
         """Close the one that is open."""

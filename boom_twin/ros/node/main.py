@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import BoomTwinError
 from ...system.blas_threads import use_one_blas_thread
+from ...system.terminal_text import open_closed_streams
 from ..startup import StopSignal, require_rclpy
 
 use_one_blas_thread()
@@ -29,6 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     argv : sequence of str, optional
         Arguments without the program's name; by default those of the process.
     """
+    open_closed_streams()
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
         require_rclpy()

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ....plots.stability import MatrixRow, matrix_picture, roundoff_picture
-from ....scene.kinematics import posture_angles
+from ....scene.kinematics import section_angles
 from ....scene.schema import Scene
 from ....system.atomic_files import write_atomic
 from ..report import machine, provenance, table, write_json
@@ -202,9 +202,8 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
 
 
 def _only(scene: Scene, posture: str) -> Scene:
-    """With no posture but this one; UsageError if it is not there."""
-    posture_angles(scene, posture)
-    return scene.model_copy(update={"postures": {posture: scene.postures[posture]}})
+    """With no posture but this one; UsageError if there is no such posture."""
+    return scene.model_copy(update={"postures": {posture: section_angles(scene, posture)}})
 
 
 def _stuck(rows: Sequence[CaseResult], case: Case) -> bool:
