@@ -91,7 +91,7 @@ def summarise(path: Path) -> McapFile:
         header = next(StreamReader(file, record_size_limit=limit).records)
         if not isinstance(header, Header):
             raise McapError(f"begins with a {type(header).__name__}, not with a header")
-        if header.profile != PROFILE:
+        if header.profile not in (PROFILE, ""):
             raise BagError(f"{path}: profile = {header.profile!r}: only {PROFILE!r} is read. Record the session with ROS 2.")
         summary = _summary(file, limit)
         told = summary.statistics

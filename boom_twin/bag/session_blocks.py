@@ -32,7 +32,8 @@ class SessionBlocks:
 
     Parameters
     ----------
-    files : sequence of SessionFile
+    files : sequence of (SessionFile, set of int)
+        With the channels that are read.
     asked : mapping of str to str
         As what each topic is asked for, by its name in the files.
     window : TimeWindow
@@ -50,19 +51,18 @@ class SessionBlocks:
         statistics say.
     """
 
-    def __init__(self, files: Sequence[SessionFile], asked: Mapping[str, str], window: TimeWindow) -> None:
+    def __init__(self, files: Sequence[tuple[SessionFile, set[int]]], asked: Mapping[str, str], window: TimeWindow) -> None:
         self.sources: list[Source] = []
         self._window = window
-        self._files = [(file, self._numbers(file, asked)) for file in files]
+        self._files = [(file, self._numbers(file, channels, asked)) for file, channels in files]
 
-    def _numbers(self, file: SessionFile, asked: Mapping[str, str]) -> dict[int, int]:
+    def _numbers(self, file: SessionFile, channels: set[int], asked: Mapping[str, str]) -> dict[int, int]:
         """Places in `sources` by channel; -1 for what was not asked for."""
         numbers = dict.fromkeys(file.channels, -1)
         for channel in file.channels.values():
-            if channel.topic in asked:
+            if channel.id in channels:
                 numbers[channel.id] = len(self.sources)
-                kind = file.schemas[channel.schema_id].name
-                self.sources.append(Source(file.path, channel.topic, asked[channel.topic], kind))
+                self.sources.append(Source(file.path, channel.topic, asked[channel.topic], file.type_of(channel)))
         return numbers
 
     def __iter__(self) -> Iterator[MessageBlock]:

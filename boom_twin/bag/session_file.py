@@ -53,6 +53,14 @@ class SessionFile(ABC):
         one, two = by_topic(counts, self.channels), by_topic(others, self.channels)
         compare_counts(self.path, source, one, other, two)
 
+    def type_of(self, channel: Channel) -> str:
+        """Return the type of a channel as ``package/msg/Name``, whose name may be in two parts or of DDS; "" without one."""
+        schema = self.schemas.get(channel.schema_id)
+        parts = schema.name.replace("::", "/").split("/") if schema else [""]
+        if parts[-2:-1] == ["dds_"]:
+            parts = [*parts[:-2], parts[-1].removesuffix("_")]
+        return "/".join([parts[0], "msg", parts[1]] if len(parts) == 2 else parts)
+
     @property
     @abstractmethod
     def storage(self) -> str:

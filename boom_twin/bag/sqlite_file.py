@@ -44,11 +44,20 @@ class SqliteFile(SessionFile):
         return f"rosbag2_storage_sqlite3{f' ({self.distro})' if self.distro else ''}", "none"
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
-        """See `SessionFile`; by log time, of equal times in the order of the file."""
+        """See `SessionFile`; by log time, of equal times in the order of the file.
+
+        No more bytes than the file has are read of it: columns with a default, or generated, can give any number.
+        """
+        left = self.path.stat().st_size
         with _database(self.path) as database:
             for channel, time, data in database.execute(_MESSAGES):
                 if channel not in self.channels or not isinstance(data, bytes) or not isinstance(time, int) or time < 0:
                     raise BagError(f"{self.path}: a message of topic {channel!r} at {time!r} ns is none. {_REMEDY}")
+                left -= len(data)
+                if left < 0:
+                    raise BagError(
+                        f"{self.path}: its messages have more bytes than the file, so are not stored in it. {_REMEDY}"
+                    )
                 yield channel, time, data
 
 
@@ -118,7 +127,7 @@ def _database(path: Path) -> Iterator[sqlite3.Connection]:
                 )
         address = f"file:{quote(str(path.absolute()))}?mode=ro&immutable=1"  # immutable: no lock, no file beside it
         with closing(sqlite3.connect(address, uri=True)) as database:
-            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
+            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(path.stat().st_size, LARGEST))
             database.execute("PRAGMA trusted_schema = OFF")
             yield database
     except OSError as error:
