@@ -13,7 +13,7 @@ from ..types import NANO, SENSORS, Stream
 from .inspect import BagInfo, Tally
 from .joint_names import other_names
 from .metadata import profiles
-from .reader import Session, TopicInfo, check_topic, readable
+from .reader import Session, TopicInfo, check_topic, clocks_set_back, readable
 from .session_file import CDR
 from .session_model import mapping_of
 
@@ -88,10 +88,16 @@ def remarks(info: BagInfo, topics: Topics) -> list[str]:
         found.append("No checksums: a flipped bit cannot be noticed. Record with `boom_twin record`.")
     if info.synthetic is None:
         found.append("Its origin is not noted, so whether a rig made it is unknown. Record with --origin.")
+    found += clocks_set_back(info.session)
     inputs = topics.inputs.values()
     for topic in inputs:
         found += _passed_over(info.session, topic)
     known = [tally for topic in inputs if (tally := info.tally(topic.name)) and tally.skewed]
+    if known and abs(skew := known[0].skews[2] / known[0].skewed * NANO) > SKEW:
+        side = "after" if skew > 0.0 else "before"
+        found.append(
+            f"Log times are on average {abs(skew):.3f} s {side} the stamps of {known[0].name}. Results go by the stamps."
+        )
     for one, other in pairwise(known):
         apart = (other.skews[2] / other.skewed - one.skews[2] / one.skewed) * NANO
         if abs(apart) > SKEW:

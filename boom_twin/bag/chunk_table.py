@@ -1,59 +1,63 @@
-"""Table of where the chunks of an .mcap file lie: 40 bytes a chunk, of which a day's recording has some hundred thousand."""
+"""Table of where the pieces of an .mcap file lie: 56 bytes a piece, of which a day's recording has some hundred thousand."""
 
 from __future__ import annotations
 
 from array import array
 from collections.abc import Iterator
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
+from mcap.records import ChunkIndex
 from numpy.typing import NDArray
 
 
 class ChunkPlace(NamedTuple):
-    """What is needed of a ``ChunkIndex`` to read its chunk; fields as there."""
+    """Place of a chunk, or of messages outside chunks on end; fields as in ``ChunkIndex``.
+
+    `channels` are those that have messages in it; none if that is not known.
+    """
 
     message_start_time: int
     message_end_time: int
     chunk_start_offset: int
     chunk_length: int
     uncompressed_size: int
+    message_index_length: int
+    channels: frozenset[int]
 
-
-class _Index(Protocol):
-    """What has these fields: `ChunkPlace`, and ``mcap.records.ChunkIndex``."""
-
-    @property
-    def message_start_time(self) -> int: ...
-    @property
-    def message_end_time(self) -> int: ...
-    @property
-    def chunk_start_offset(self) -> int: ...
-    @property
-    def chunk_length(self) -> int: ...
-    @property
-    def uncompressed_size(self) -> int: ...
+    @classmethod
+    def of(cls, index: ChunkIndex) -> ChunkPlace:
+        """Return what is needed of the index of a chunk."""
+        return cls(
+            index.message_start_time, index.message_end_time, index.chunk_start_offset, index.chunk_length,
+            index.uncompressed_size, index.message_index_length, frozenset(index.message_index_offsets),
+        )  # fmt: skip
 
 
 class ChunkTable:
-    """The chunks of a file in the order of its index; empty where it has none."""
+    """The pieces of a file in the order of its index, which for most files is that of the file."""
 
     def __init__(self) -> None:
         self._columns = [array("Q") for _ in ChunkPlace._fields]
+        self._numbers: dict[frozenset[int], int] = {}
+        self._channels: list[frozenset[int]] = []
 
-    def append(self, index: _Index) -> None:
-        """Add one chunk."""
-        for column, name in zip(self._columns, ChunkPlace._fields, strict=True):
-            column.append(getattr(index, name))
+    def append(self, place: ChunkPlace) -> None:
+        """Add one piece."""
+        if (number := self._numbers.setdefault(place.channels, len(self._numbers))) == len(self._channels):
+            self._channels.append(place.channels)
+        for column, value in zip(self._columns, (*place[:-1], number), strict=True):
+            column.append(value)
 
     def __len__(self) -> int:
         return len(self._columns[0])
 
     def __getitem__(self, row: int) -> ChunkPlace:
-        return ChunkPlace(*(column[row] for column in self._columns))
+        start, end, offset, length, size, index, channels = (column[row] for column in self._columns)
+        return ChunkPlace(start, end, offset, length, size, index, self._channels[channels])
 
     def __iter__(self) -> Iterator[ChunkPlace]:
-        return map(ChunkPlace, *self._columns)
+        return map(self.__getitem__, range(len(self)))
 
     def by_time(self) -> Iterator[ChunkPlace]:
         """In the order of their first log times, of one time in that of the file."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Set
 from dataclasses import dataclass, field
 from io import SEEK_END
 from pathlib import Path
@@ -30,10 +30,11 @@ from mcap.stream_reader import StreamReader
 from ..errors import BagError
 from ..messages.message_block import MessageBlock
 from ..system.received_files import open_received
-from .chunk_reader import message_blocks
+from .chunk_reader import log_clock, message_blocks
 from .chunk_table import ChunkPlace, ChunkTable
 from .integrity import FOOTER, as_bag_error, check_ends
-from .mcap_records import LARGEST, chunk_at, heads, records
+from .log_clock import LogClock
+from .mcap_records import CHUNK_HEAD, LARGEST, MESSAGE_HEAD, PREFIX, UnpackBudget, chunk_records, heads, outer_records
 from .recovery.chunk_head import head_at
 from .session_file import SessionFile
 
@@ -49,10 +50,13 @@ class McapFile(SessionFile):
     Attributes
     ----------
     chunks : ChunkTable
-        Empty when the file has no complete index and must be read as a whole.
+        By the index of the file, or made by a walk through it.
+    compression : str
+        Of its first chunk, or that it has no index.
     """
 
     chunks: ChunkTable
+    compression: str
 
     @property
     def storage(self) -> str:
@@ -62,18 +66,19 @@ class McapFile(SessionFile):
     def written_by(self) -> tuple[str, str]:
         """See `SessionFile`."""
         with open_received(self.path) as stream:
-            library = NonSeekingReader(stream, record_size_limit=LARGEST).get_header().library
-            if not self.chunks:
-                return library, "no index of chunks"
-            return library, chunk_at(stream, self.chunks[0]).compression or "none"
+            return NonSeekingReader(stream, record_size_limit=LARGEST).get_header().library, self.compression
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
-        """See `SessionFile`; in the order of the file, one chunk in memory."""
+        """See `SessionFile`; in the order of the file, one piece in memory."""
         return heads(self.path, self.chunks)
 
-    def blocks(self) -> Iterator[MessageBlock]:
+    def log_clock(self) -> LogClock:
         """See `SessionFile`."""
-        return message_blocks(self.path, self.chunks)
+        return log_clock(self.path, self.chunks)
+
+    def blocks(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
+        """See `SessionFile`."""
+        return message_blocks(self.path, self.chunks, passed, clock)
 
 
 def summarise(path: Path) -> McapFile:
@@ -107,6 +112,7 @@ def summarise(path: Path) -> McapFile:
             chunks=summary.chunks,
             checked=all(_has_checksum(file, place) for place in summary.chunks),
             notes=_notes(_metadata_at(file, place, limit) for place in summary.metadata),
+            compression=summary.compression or "none",
         )
 
 
@@ -119,6 +125,7 @@ class _Summary:
     schemas: dict[int, Schema] = field(default_factory=dict)
     chunks: ChunkTable = field(default_factory=ChunkTable)
     metadata: list[int] = field(default_factory=list)
+    compression: str = ""
 
     def add(self, record: McapRecord) -> None:
         """Take one record in."""
@@ -130,7 +137,8 @@ class _Summary:
             case Schema():
                 self.schemas[record.id] = record
             case ChunkIndex():
-                self.chunks.append(record)
+                self.compression = self.compression if self.chunks else record.compression
+                self.chunks.append(ChunkPlace.of(record))
             case MetadataIndex():
                 self.metadata.append(record.offset)
 
@@ -178,35 +186,74 @@ def _has_checksum(file: BinaryIO, place: ChunkPlace) -> bool:
     return head is not None and head.crc != 0
 
 
+_RUN = 2**20
+"""Bytes of messages outside chunks, from which on they are a piece."""
+
+
+class _Pieces:
+    """Makes the table of the pieces of a file from its records."""
+
+    def __init__(self) -> None:
+        self._table, self._run = ChunkTable(), list[ChunkPlace]()
+
+    def add(self, record: McapRecord, messages: list[Message], end: int) -> None:
+        """Take the next record in, which ends before the offset `end`, with the messages that it is or holds."""
+        if self._run and (not isinstance(record, Message) or end - self._run[0].chunk_start_offset > _RUN):
+            self.finish()
+        if messages:
+            times, channels = [each.log_time for each in messages], frozenset(each.channel_id for each in messages)
+            if isinstance(record, Chunk):
+                length = CHUNK_HEAD + len(record.compression.encode()) + len(record.data)
+                unpacked = record.uncompressed_size
+            else:
+                unpacked = length = PREFIX.size + MESSAGE_HEAD.size + len(messages[0].data)
+            self._run.append(ChunkPlace(min(times), max(times), end - length, length, unpacked, 0, channels))
+        if isinstance(record, Chunk):
+            self.finish()
+
+    def finish(self) -> ChunkTable:
+        """Return the table with the messages so far."""
+        if self._run:
+            starts, ends, offsets, lengths, sizes, _, channels = zip(*self._run, strict=True)
+            length, size, found = sum(lengths), sum(sizes), frozenset[int]().union(*channels)
+            self._table.append(ChunkPlace(min(starts), max(ends), offsets[0], length, size, 0, found))
+            self._run = []
+        return self._table
+
+
 def _walk(path: Path) -> McapFile:
     """Look at all of a file, and compare its statistics, if it has them, with what is there."""
     channels: dict[int, Channel] = {}
     schemas: dict[int, Schema] = {}
     notes: list[Metadata] = []
     counts: Counter[int] = Counter()
-    start, end = 2**64, 0
     told: Statistics | None = None
     is_summed, chunks_summed = False, set[bool]()
-    for record in records(path):
-        match record:
-            case Message():
-                counts[record.channel_id] += 1
-                start, end = min(start, record.log_time), max(end, record.log_time)
-            case Channel():
-                channels[record.id] = record
-            case Schema():
-                schemas[record.id] = record
-            case Metadata():
-                notes.append(record)
-            case Chunk():
-                chunks_summed.add(record.uncompressed_crc != 0)
-            case DataEnd():
-                is_summed = record.data_section_crc != 0
-            case Statistics():
-                told = record
-    start = start if counts else 0
+    pieces, budget = _Pieces(), UnpackBudget()
+    for end, record in outer_records(path):
+        inner = chunk_records(record, budget) if isinstance(record, Chunk) else [record]
+        messages = [each for each in inner if isinstance(each, Message)]
+        counts.update(each.channel_id for each in messages)
+        pieces.add(record, messages, end)
+        for each in inner:
+            match each:
+                case Channel():
+                    channels[each.id] = each
+                case Schema():
+                    schemas[each.id] = each
+                case Metadata():
+                    notes.append(each)
+                case DataEnd():
+                    is_summed = each.data_section_crc != 0
+                case Statistics():
+                    told = each
+        if isinstance(record, Chunk):
+            chunks_summed.add(record.uncompressed_crc != 0)
+    table = pieces.finish()
+    start = min((place.message_start_time for place in table), default=0)
+    end = max((place.message_end_time for place in table), default=0)
     checked = is_summed or (chunks_summed == {True} and told is not None)
-    held = McapFile(path, channels, schemas, dict(counts), start, end, checked, _notes(notes), ChunkTable())
+    held = McapFile(path, channels, schemas, dict(counts), start, end, checked, _notes(notes), table, "no index of chunks")
     if told is not None:
         held.check_counts("statistics", told.channel_message_counts, "in the file", counts)
     return held

@@ -21,7 +21,8 @@ from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
 from ..errors import BagError
 from ..messages.type_store import jazzy
 from ..system.received_files import holds_file, sha256_of
-from .integrity import compare_counts
+from ..types import NANO
+from .integrity import as_bag_error, compare_counts
 from .metadata import FILE_NAME, STORAGES, BagMetadata, read_metadata, refuse_packed
 from .session_blocks import SessionBlocks
 from .session_file import CDR, SessionFile
@@ -172,6 +173,21 @@ class Session:
     def find(self, name: str) -> TopicInfo | None:
         """The topic of that name, with or without its leading slash."""
         return next((topic for topic in self.topics if topic.name.lstrip("/") == name.lstrip("/")), None)
+
+
+def clocks_set_back(session: Session) -> list[str]:
+    """Return a sentence on every file in which the recorder's clock was set back."""
+    found = []
+    for file in session.files:
+        with as_bag_error(file.path):
+            clock = file.log_clock()
+        if clock.is_set_back:
+            times = f"{len(clock.places)} time{'s' if len(clock.places) > 1 else ''}, by {clock.total * NANO:.3f} s in all"
+            found.append(
+                f"{file.path.name}: log times step back {times}: the recorder's clock was set back. "
+                "Messages are read in the order of the file, as they came."
+            )
+    return found
 
 
 def files_sha256(session: Session) -> str:

@@ -14,6 +14,7 @@ from ..errors import BagError
 from ..messages.message_block import MessageBlock, by_log_time, joined
 from ..messages.type_store import decode, jazzy
 from .integrity import PARSE_ERRORS, REMEDY, as_bag_error
+from .log_clock import LogClock
 from .session_file import SessionFile
 from .time_window import WHOLE, TimeWindow
 
@@ -66,7 +67,13 @@ class SessionBlocks:
         return numbers
 
     def __iter__(self) -> Iterator[MessageBlock]:
-        blocks = _merged([_wanted(file, numbers) for file, numbers in self._files])
+        ahead, files = 0, []
+        for file, numbers in self._files:
+            with as_bag_error(file.path):
+                clock = file.log_clock()
+            files.append(_wanted(file, numbers, clock, ahead))
+            ahead += clock.total  # the clock stays where it was set to
+        blocks = _merged(files)
         return blocks if self._window == WHOLE else self._window.cut(blocks, self._files[0][0].path)
 
     def decoded(self, block: MessageBlock, row: int) -> Any:
@@ -79,11 +86,12 @@ class SessionBlocks:
             raise BagError(f"{place}: {error} {REMEDY}") from error
 
 
-def _wanted(file: SessionFile, numbers: Mapping[int, int]) -> Iterator[MessageBlock]:
-    """The messages of one file whose channels have a number of 0 or more, their source; all are counted."""
+def _wanted(file: SessionFile, numbers: Mapping[int, int], clock: LogClock, ahead: int) -> Iterator[MessageBlock]:
+    """The messages of one file whose channels have a number of 0 or more, their source; log times are later by `ahead` (ns)."""
     seen: Counter[int] = Counter()
+    passed = {channel for channel, number in numbers.items() if number < 0}
     with as_bag_error(file.path):
-        for block in file.blocks():
+        for block in file.blocks(passed, clock):
             counts = np.bincount(block.sources)
             channels = np.flatnonzero(counts).tolist()
             seen.update({channel: int(counts[channel]) for channel in channels})
@@ -91,13 +99,13 @@ def _wanted(file: SessionFile, numbers: Mapping[int, int]) -> Iterator[MessageBl
             end = int(np.isin(block.sources, unknown).argmax()) if unknown else len(block)
             source_of = np.full(len(counts), -1)
             source_of[channels] = [numbers.get(channel, -1) for channel in channels]
-            sources = source_of[block.sources]
-            rows = np.flatnonzero(sources[:end] >= 0)
-            if len(rows):
-                yield replace(block.chosen(rows), sources=sources[rows])
+            if end:
+                known = block.chosen(slice(0, end))
+                yield replace(known, sources=source_of[known.sources], log_times=known.log_times + np.uint64(ahead))
             if end < len(block):
                 raise KeyError(int(block.sources[end]))
-        file.check_counts("statistics", file.counts, "read", seen)
+        told = {channel: count for channel, count in file.counts.items() if channel not in passed}
+        file.check_counts("statistics", told, "read", seen)
 
 
 def _merged(files: Sequence[Iterator[MessageBlock]]) -> Iterator[MessageBlock]:

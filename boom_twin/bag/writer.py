@@ -22,7 +22,7 @@ from ..messages.type_store import jazzy
 from ..system.result_folder import UNFINISHED
 from ..twin.blocks import Integers
 from . import metadata as bagmeta
-from .mcap_records import BYTES_PER_BYTE, LARGEST
+from .mcap_records import LARGEST
 from .mcap_summary import NOTES, PROFILE
 from .mcap_writer import McapWriter
 from .metadata import Recorded, file_information, metadata_of
@@ -52,8 +52,8 @@ RESULT_CHUNK_SIZE = 512 * 1024
 LIBRARY = "boom_twin"
 LARGEST_MESSAGE = LARGEST - 2**20
 """Bytes of a message that can be read again: a chunk holds its topic and type too."""
-PACKED = BYTES_PER_BYTE // 10
-"""Bytes that a byte of the file may stand for. Readers count the packed bytes alone: at least a tenth of what a chunk adds."""
+PACKED = 100
+"""Bytes that a byte of the file may stand for: readers before 0.2.0 take 1000 for a packed one, which are a tenth at least."""
 
 
 METADATA_PAUSE = 10.0

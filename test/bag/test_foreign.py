@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 import zstandard
 from mcap.reader import make_reader
-from mcap.writer import Writer
+from mcap.writer import CompressionType, IndexType, Writer
 
+from boom_twin.bag import chunk_reader, mcap_records, mcap_summary
 from boom_twin.bag.reader import Session, read, scan
 from boom_twin.bag.writer import FILE_NAME
 from boom_twin.cli.main import main
@@ -109,6 +110,51 @@ def test_what_is_of_another_type_or_encoding_is_passed_over(
     assert "/tip_imu: 1 messages of two.mcap are sensor_msgs/msg/Imu in json and are passed over." in said
     assert "/cylinder_strokes: 1 messages of two.mcap are std_msgs/msg/String in cdr and are passed over." in said
     assert "no header.stamp" not in said and "std_msgs/msg/String and std_msgs/msg/Float64" in said
+
+
+SIZES = {"blank": bytes(70 * 2**20), "large": bytes(range(256)) * 2**18 * 2}
+
+
+@pytest.mark.parametrize("chunk", [2**16, 2**30], ids=["small chunks", "one chunk"])
+@pytest.mark.parametrize("kind", SIZES)
+def test_large_messages_of_other_topics_hold_up_nothing(
+    bag: Path, tmp_path: Path, content: Content, kind: str, chunk: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    entries = messages(bag)
+    picture = ("/camera", "sensor_msgs/msg/Image", "cdr", entries[30][3], SIZES[kind])
+    path = write(tmp_path / "other.mcap", [*entries[:31], picture, *entries[31:]], chunk_size=chunk)
+    assert content(scan(path)) == content(scan(bag))
+    assert main(["info", str(path)]) == 0
+    assert main(["recover", str(path), "--out", str(tmp_path / "out")]) == 0
+    assert scan(tmp_path / "out").find("/camera").count == 1 and content(scan(tmp_path / "out")) == content(scan(bag))
+    assert "damaged" not in (said := capsys.readouterr()).out + said.err
+
+
+def test_chunks_without_a_wanted_topic_are_passed_over(bag: Path, tmp_path: Path, content: Content) -> None:
+    """One is damaged."""
+    entries = messages(bag)
+    picture = ("/camera", "sensor_msgs/msg/Image", "cdr", entries[30][3], b"picture" * 50_000)
+    path = write(tmp_path / "o.mcap", [*entries[:31], picture, *entries[31:]], chunk_size=100, compression=CompressionType.NONE)
+    path.write_bytes(path.read_bytes().replace(b"picture", b"pictura"))
+    assert content(scan(path)) == content(scan(bag))
+
+
+def test_a_chunk_that_memory_cannot_hold_is_refused_by_its_size(
+    bag: Path, tmp_path: Path, content: Content, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mcap_records, "MOST_HELD", 10_000)
+    path = write(tmp_path / "other.mcap", messages(bag), chunk_size=2**30)
+    with pytest.raises(BagError, match=r"a chunk of \d+ bytes; at most 10000 are held in memory\. Write smaller chunks: `mcap"):
+        content(scan(path))
+
+
+def test_a_file_without_an_index_is_read_a_piece_at_a_time(
+    bag: Path, rewritten: Callable[..., Path], content: Content, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, whole = rewritten(bag, use_chunking=False, index_types=IndexType.NONE), content(scan(bag))
+    monkeypatch.setattr(mcap_summary, "_RUN", 2000)
+    monkeypatch.setattr(chunk_reader, "MOST_TOGETHER", 20)
+    assert content(scan(path)) == whole
 
 
 @pytest.mark.parametrize(
