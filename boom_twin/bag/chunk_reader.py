@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Set
+from collections.abc import Iterator, Sequence, Set
 from itertools import pairwise
 from pathlib import Path
 from typing import BinaryIO
@@ -12,16 +12,17 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
 from ..errors import BagError
-from ..messages.message_block import MessageBlock, by_log_time, gather, joined
+from ..messages.message_block import Integers, MessageBlock, by_log_time, gather, joined
 from ..system.received_files import open_received
-from .chunk_table import ChunkPlace, ChunkTable
 from .log_clock import LogClock, Piece
 from .mcap_records import (
     MESSAGE_HEAD,
     MOST_HELD,
     PREFIX,
+    ChunkPlace,
     UnpackBudget,
     bounds,
+    by_place,
     content_at,
     inner_record,
 )
@@ -44,7 +45,7 @@ _PIECE = 2**31
 _MESSAGE = int(Opcode.MESSAGE)
 
 
-def message_blocks(path: Path, chunks: ChunkTable, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
+def message_blocks(path: Path, chunks: Sequence[ChunkPlace], passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
     """All messages but of the `passed` channels by log time, at equal times in the order of the file; sources are channels.
 
     Only pieces that overlap in time are held together. Where the recorder's clock was set back, the order is that of the file.
@@ -64,20 +65,20 @@ def message_blocks(path: Path, chunks: ChunkTable, passed: Set[int], clock: LogC
         yield joined(waiting)
 
 
-def _in_order(path: Path, chunks: ChunkTable, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
+def _in_order(path: Path, chunks: Sequence[ChunkPlace], passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
     """The messages of one piece after the other, of those that overlap in time as soon as all earlier ones are read."""
     budget, held = UnpackBudget(), dict[int, MessageBlock]()
-    numbers = {place.chunk_start_offset: number for number, place in enumerate(chunks.by_place())} if clock.is_set_back else {}
-    places = chunks.by_place() if clock.is_set_back else chunks.by_time()
-    chosen = (place for place in places if not place.channels or place.channels - passed)
+    places = list(enumerate(by_place(chunks)))
+    if not clock.is_set_back:
+        places.sort(key=lambda each: each[1].message_start_time)
+    chosen = (each for each in places if not each[1].channels or each[1].channels - passed)
     with open_received(path) as file:
-        for place, after in pairwise([*chosen, None]):
+        for (number, place), (_, after) in pairwise([*chosen, (0, None)]):
             assert place is not None
             block = _messages(content_at(file, place, budget))
             block = block.chosen(np.flatnonzero(~np.isin(block.sources, list(passed))))
             if clock.is_set_back:
-                heads = block.starts - MESSAGE_HEAD.size - PREFIX.size
-                yield clock.corrected(block, _PIECE * numbers[place.chunk_start_offset] + heads)
+                yield clock.corrected(block, _PIECE * number + _places(block))
                 continue
             held[place.chunk_start_offset] = by_log_time(block)
             if sum(len(each.content) for each in held.values()) > MOST_HELD or sum(map(len, held.values())) > MOST_TOGETHER:
@@ -99,7 +100,7 @@ def _messages(content: bytes) -> MessageBlock:
     return MessageBlock(content, channels, heads["log_time"].copy(), starts + MESSAGE_HEAD.size, ends)
 
 
-def log_clock(path: Path, chunks: ChunkTable) -> LogClock:
+def log_clock(path: Path, chunks: Sequence[ChunkPlace]) -> LogClock:
     """Return the clock of a file's recorder by the indexes behind its chunks; if it was set back there, by the chunks alone.
 
     No checksum is over an index.
@@ -108,11 +109,11 @@ def log_clock(path: Path, chunks: ChunkTable) -> LogClock:
     return LogClock.of(lambda: _log_times(path, chunks, False)) if by_index.is_set_back else by_index
 
 
-def _log_times(path: Path, chunks: ChunkTable, by_index: bool) -> Iterator[Piece]:
+def _log_times(path: Path, chunks: Sequence[ChunkPlace], by_index: bool) -> Iterator[Piece]:
     """Places, channels and log times of all messages in the order of the file."""
     budget = UnpackBudget()
     with open_received(path) as file:
-        for number, place in enumerate(chunks.by_place()):
+        for number, place in enumerate(by_place(chunks)):
             found = _indexed(file, place) if by_index and place.message_index_length else None
             places, channels, times = found or _read(file, place, budget)
             order = np.argsort(places, kind="stable")
@@ -136,7 +137,11 @@ def _indexed(file: BinaryIO, place: ChunkPlace) -> Piece | None:
 
 def _read(file: BinaryIO, place: ChunkPlace, budget: UnpackBudget) -> Piece:
     block = _messages(content_at(file, place, budget))
-    return block.starts - MESSAGE_HEAD.size - PREFIX.size, block.sources, block.log_times
+    return _places(block), block.sources, block.log_times
+
+
+def _places(block: MessageBlock) -> Integers:
+    return block.starts - MESSAGE_HEAD.size - PREFIX.size
 
 
 def _bodies(content: bytes) -> list[int]:

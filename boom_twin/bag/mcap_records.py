@@ -5,11 +5,12 @@ from __future__ import annotations
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 from lz4.frame import LZ4FrameDecompressor
 from mcap import records as mcap_records
@@ -22,7 +23,6 @@ from zstandard import ZstdDecompressor
 
 from ..errors import BagError
 from ..system.received_files import open_received
-from .chunk_table import ChunkPlace, ChunkTable
 from .integrity import PARSE_ERRORS
 
 LARGEST = 64 * 2**20
@@ -70,6 +70,26 @@ def _lz4(data: bytes, limit: int) -> bytes:
 
 
 _UNPACK: dict[str, Callable[[bytes, int], bytes]] = {"": lambda data, limit: data[:limit], "zstd": _zstd, "lz4": _lz4}
+
+
+class ChunkPlace(NamedTuple):
+    """Place of a chunk, or of messages outside chunks on end; fields as in ``ChunkIndex``.
+
+    `channels` are those that have messages in it; none if that is not known.
+    """
+
+    message_start_time: int
+    message_end_time: int
+    chunk_start_offset: int
+    chunk_length: int
+    uncompressed_size: int
+    message_index_length: int
+    channels: frozenset[int]
+
+
+def by_place(chunks: Sequence[ChunkPlace]) -> list[ChunkPlace]:
+    """Return chunks in the order of the file; that of its index may be another."""
+    return sorted(chunks, key=attrgetter("chunk_start_offset"))
 
 
 class UnpackError(McapError):
@@ -210,11 +230,11 @@ def outer_records(path: Path) -> Iterator[tuple[int, McapRecord]]:
             yield file.tell(), record
 
 
-def heads(path: Path, chunks: ChunkTable) -> Iterator[tuple[int, int, bytes]]:
+def heads(path: Path, chunks: Sequence[ChunkPlace]) -> Iterator[tuple[int, int, bytes]]:
     """Channel, log time (ns) and encoded data of all messages in the order of the file, one piece in memory."""
     budget = UnpackBudget()
     with open_received(path) as file:
-        for place in chunks.by_place():
+        for place in by_place(chunks):
             for opcode, body in parts(content_at(file, place, budget)):
                 if opcode == Opcode.MESSAGE:
                     channel, _, log_time, _ = MESSAGE_HEAD.unpack_from(body)

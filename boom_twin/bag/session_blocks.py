@@ -92,16 +92,13 @@ def _wanted(file: SessionFile, numbers: Mapping[int, int], clock: LogClock, ahea
     passed = {channel for channel, number in numbers.items() if number < 0}
     with as_bag_error(file.path):
         for block in file.blocks(passed, clock):
-            counts = np.bincount(block.sources)
-            channels = np.flatnonzero(counts).tolist()
-            seen.update({channel: int(counts[channel]) for channel in channels})
-            unknown = [channel for channel in channels if channel not in numbers]
-            end = int(np.isin(block.sources, unknown).argmax()) if unknown else len(block)
-            source_of = np.full(len(counts), -1)
-            source_of[channels] = [numbers.get(channel, -1) for channel in channels]
+            seen.update(block.sources.tolist())
+            unknown = ~np.isin(block.sources, list(numbers))
+            end = int(unknown.argmax()) if unknown.any() else len(block)
             if end:
                 known = block.chosen(slice(0, end))
-                yield replace(known, sources=source_of[known.sources], log_times=known.log_times + np.uint64(ahead))
+                sources = np.array([numbers[channel] for channel in known.sources.tolist()])
+                yield replace(known, sources=sources, log_times=known.log_times + np.uint64(ahead))
             if end < len(block):
                 raise KeyError(int(block.sources[end]))
         told = {channel: count for channel, count in file.counts.items() if channel not in passed}
