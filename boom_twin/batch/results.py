@@ -13,6 +13,7 @@ from typing import Any
 from .. import __version__
 from ..errors import BagError, UsageError
 from ..system.atomic_files import DRAFT, write_atomic
+from ..system.received_files import real_path
 from ..system.result_folder import check_lasting
 from .cluster import REMEDY
 from .session_task import OK, Row
@@ -40,9 +41,9 @@ def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
         `out` holds anything else, another batch works in it, or it cannot be written.
     """
     check_lasting(out)
-    place = out.resolve()
+    place = real_path(out)
     for session in sessions:
-        path = session.resolve()
+        path = real_path(session)
         if path == place or place in path.parents or path in place.parents:
             raise BagError(f"{out}: {session} lies in it, or it in the session, and a source is never touched. Choose another.")
     try:

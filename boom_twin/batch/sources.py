@@ -10,6 +10,7 @@ from pathlib import Path
 from ..bag.session_sheet import sheet_path
 from ..bag.storages import is_session
 from ..errors import UsageError
+from ..system.received_files import real_path
 
 LIST = ".txt"
 """How the name of a file ends that lists sessions."""
@@ -32,7 +33,7 @@ def sessions_of(sources: Iterable[str]) -> list[Path]:
     found: dict[Path, Path] = {}
     for source in sources:
         for path in _listed(Path(source)) if source.endswith(LIST) else _matching(source):
-            found.setdefault(path.resolve(), path)
+            found.setdefault(real_path(path), path)
     return list(found.values())
 
 
@@ -60,7 +61,7 @@ def _matching(pattern: str) -> Iterator[Path]:
 
 def key_of(session: Path) -> str:
     """Name of a session's files among the results: its own, and a digest of its path."""
-    path = session.resolve()
+    path = real_path(session)
     name = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in path.stem)
     return f"{name[:40]}-{sha256(str(path).encode(errors='surrogateescape')).hexdigest()[:10]}"
 

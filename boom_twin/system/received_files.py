@@ -26,6 +26,14 @@ _KINDS = (
 )
 
 
+def real_path(path: Path) -> Path:
+    """Return an absolute path with its links followed; BagError if they lead in a circle."""
+    try:
+        return path.resolve()
+    except RuntimeError:
+        raise BagError(f"{path}: a symbolic link that leads to itself. Give the folder or file itself.") from None
+
+
 def holds_file(path: Path) -> bool:
     """Whether there is a file at `path` that `open_received` would open; False if nothing is there.
 

@@ -135,6 +135,17 @@ def test_messages_come_as_they_were_recorded_where_the_clock_was_set_back(
     assert f"log times step back 1 time, by {(step - 5_000_000 + 2000) * 1e-9:.3f} s in all" in said
 
 
+def test_files_after_a_clock_that_was_set_back_follow(tmp_path: Path) -> None:
+    found = samples(rows=800)
+    logs = [sample.stamp - SECOND * (row >= 600) for row, sample in enumerate(found)]
+    (folder := tmp_path / "bag").mkdir()
+    for number, part in enumerate((slice(0, 1200), slice(1200, None))):
+        recorded(folder / f"bag_{number}.mcap", found[part], logs[part], chunk_size=4000)
+    topic = load_topics().inputs[Stream.STROKES]
+    stamps = [stamp_of(message) for _, _, message in read(scan(folder), {topic.absolute: topic.type})]
+    assert stamps == [sample.stamp for sample in found if sample.stream is Stream.STROKES]
+
+
 def test_a_replay_tells_of_a_clock_that_was_set_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = samples(rows=800)
     logs = [sample.stamp - 3 * SECOND * (row >= 1200) for row, sample in enumerate(found)]
