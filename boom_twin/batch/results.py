@@ -14,6 +14,7 @@ from typing import Any
 from .. import __version__
 from ..errors import BagError
 from ..system.atomic_files import DRAFT, write_atomic
+from ..system.received_files import real_path
 from ..system.result_folder import check_lasting
 from .session_task import OK, Row
 
@@ -42,7 +43,7 @@ def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
         `out` holds anything else, another batch works in it, or it cannot be written.
     """
     check_lasting(out)
-    place = out.resolve()
+    place = real_path(out)
     for session in sessions:
         path = Path(os.path.realpath(session))
         if path == place or place in path.parents or path in place.parents:

@@ -135,14 +135,16 @@ class UpdateOutput(NamedTuple):
     raw: Array
 
 
-def keep_waiting(state: TwinState, first: int, last: int) -> None:
-    """Of the samples that wait, keep those with stamps (ns) from `first` to `last`."""
+def drop_waiting(state: TwinState, first: int, last: int, stream: int | None = None) -> int:
+    """Drop the waiting samples, of one `stream` or of all, with stamps (ns) from `first` to `last`; return their number."""
     ring = state.waiting
     count = int(ring.bounds[COUNT])
-    rows = np.flatnonzero((ring.stamps[:count] >= first) & (ring.stamps[:count] <= last))
+    stamps, streams = ring.stamps[:count], ring.streams[:count]
+    rows = np.flatnonzero((stamps < first) | (stamps > last) | (streams != (streams if stream is None else stream)))
     for column in (ring.stamps, ring.streams, ring.values):
         column[: len(rows)] = column[rows]
     ring.bounds[COUNT] = len(rows)
+    return count - len(rows)
 
 
 def new_ring(size: int, values: int, sigmas: int = 0, strokes: int = 0) -> Ring:

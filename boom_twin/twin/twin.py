@@ -37,7 +37,7 @@ from .stamp_check import (
     jerk_densities,
     largest_difference,
 )
-from .state import NEWEST, NONE, STATUS, keep_waiting, new_state
+from .state import NEWEST, NONE, STATUS, UNMATCHED, drop_waiting, new_state
 from .update import DONE, FAILED
 
 
@@ -229,7 +229,7 @@ class Twin:
         speeds = np.fmin(np.abs(self._boom.speeds), self.settings.stroke_rate)
         self._begin_anew()
         self._speeds = speeds
-        keep_waiting(self._state, stamp, -NONE)
+        drop_waiting(self._state, NONE, stamp - 1)
 
     def _begin_anew(self) -> None:
         self._run = None
@@ -467,7 +467,7 @@ class Twin:
         self._zeros.forget_past()
         self._recent.clear()
         if shift < 0:
-            keep_waiting(self._state, NONE, before)
+            drop_waiting(self._state, before + 1, -NONE)
         self._compiled.begin_health()
 
     def _zeroed(self, sample: Sample) -> Array:
@@ -548,7 +548,10 @@ class Twin:
         event = line.hold(sample, "leap")
         if not line.is_confirmed():
             return self._hold(sample, event)
-        reports = [self._compare(each, bool(np.isfinite(each.values.sum()))) for each in self._released(line)]
+        held = self._released(line)
+        gone = drop_waiting(self._state, held[0].stamp, -NONE, CODES[sample.stream])  # their time comes again: a looped bag
+        self._state.clock[UNMATCHED] += gone
+        reports = [self._compare(each, bool(np.isfinite(each.values.sum()))) for each in held]
         return replace(reports[-1], earlier=tuple(reports[:-1]))
 
     def _compare(self, sample: Sample, complete: bool) -> Report:
