@@ -14,6 +14,7 @@ from .. import __version__
 from ..errors import BagError, UsageError
 from ..system.atomic_files import DRAFT, write_atomic
 from ..system.result_folder import check_lasting
+from ..system.terminal_text import printable
 from .cluster import REMEDY
 from .session_task import OK, Row
 
@@ -132,6 +133,7 @@ def write_table(path: Path, rows: Sequence[Row]) -> None:
         "alarms": pa.list_(alarm),
         "events": pa.list_(pa.struct([("event", pa.string()), ("count", pa.int64())])),
     }
+    rows = [{name: printable(value) if isinstance(value, str) else value for name, value in row.items()} for row in rows]
     figures = sorted({name for row in rows for name in row} - types.keys())
     words = {name for row in rows for name, value in row.items() if isinstance(value, str)}
     types |= {name: pa.string() if name in words else pa.float64() for name in figures}
