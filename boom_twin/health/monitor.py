@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import partial
 from operator import is_
@@ -66,6 +66,8 @@ class HealthMonitor:
         What is known of this rig while all is well.
     on_block : callable, optional
         Is told every linear problem.
+    absent : collection of str
+        Channels without a sensor, see `boom_twin.Twin`.
     """
 
     def __init__(
@@ -75,6 +77,7 @@ class HealthMonitor:
         mounts: tuple[Mount | None, ...],
         baseline: Baseline,
         on_block: Callable[[BlockProblem], object] | None = None,
+        absent: Collection[str] = (),
     ) -> None:
         self._settings, self._channels = settings, channels_of(len(scene.joints))
         self.names = judged_channels(len(scene.joints))
@@ -85,7 +88,8 @@ class HealthMonitor:
         self._late_angles = np.ones(len(self._channels[Stream.ANGLES]), dtype=bool)
         self._trusted = {stream: np.zeros(len(names), dtype=bool) for stream, names in self._channels.items()}
         self._sensors = {
-            stream: SensorMonitor(self._channels[stream], SENSORS[stream], stream is not Stream.STROKES) for stream in CHECKED
+            stream: SensorMonitor(self._channels[stream], SENSORS[stream], stream is not Stream.STROKES, absent)
+            for stream in CHECKED
         }
         self._delays = {stream: DelayMonitor(stream, least) for stream, least in DELAYED.items()}
         self._mount, self._forces = ImuMount(), ForceReading(self._channels[Stream.FORCES])

@@ -136,7 +136,7 @@ class SampleReader:
     def __iter__(self) -> Iterator[SampleBlock | Change | None]:
         """Samples in the order of log times, changes before theirs.
 
-        After a block comes a None for every message among its own that had no usable value.
+        After a block comes a None for every message among its own of which nothing could be used.
         """
         for item in self._pipe.receive():
             if isinstance(item, Counter):
@@ -175,6 +175,8 @@ def items_of(path: Path, topics: Topics, wanted: list[str], joints: int, window:
     streams = [heard[source.name] for source in blocks.sources]
     decoder = BlockDecoder(joints, topics, streams, blocks.decoded)
     yield from _batches(_in_turn(blocks, decoder, changes, [Stream.STROKES in group for group in streams]))
+    if len((rest := decoder.rest()).stamps):
+        yield rest
     yield decoder.oddities
 
 
@@ -214,8 +216,8 @@ def _batches(found: Iterable[DecodedBlock | Change]) -> Iterator[SampleBlock | C
 def _batch(found: list[DecodedBlock]) -> Iterator[SampleBlock | int]:
     if any(len(block.rows) for block in found):
         yield together([block.samples for block in found])
-    if without := sum(block.without for block in found):
-        yield without
+    if refused := sum(len(block.refused) for block in found):
+        yield refused
 
 
 def _ready_items(task: tuple[Path, Topics, list[str], int, TimeWindow]) -> Iterator[Item]:
