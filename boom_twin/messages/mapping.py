@@ -125,11 +125,12 @@ def _sensors(values: Any) -> tuple[dict[str, Sensor], dict[str, str], list[Fault
         if stream_of(str(channel)) is None:
             faults.append(Fault(f"sensors.{channel}", given, f"channels are {_known_channels()}", "Name one of them."))
             continue
-        if given == "none" and stream_of(channel) is not Stream.STROKES:
-            names[channel] = usual(channel)["name"]
-            continue
         if given == "none":
-            faults.append(Fault(f"sensors.{channel}", given, "every cylinder's stroke drives the model", "Name its sensor."))
+            names[channel] = usual(channel)["name"]
+            if stream_of(channel) is Stream.STROKES:
+                faults.append(
+                    Fault(f"sensors.{channel}", given, "every cylinder's stroke drives the model", "Name its sensor.")
+                )
             continue
         merged = _merged(usual(channel), given or {})
         if isinstance(merged, dict):

@@ -148,16 +148,11 @@ class SampleDecoder:
 
     def samples(self, streams: Iterable[Stream], stamp_ns: int, msg: Any) -> list[Sample]:
         """Return the samples that are complete with `msg`, which came by the topic of these `streams`; see `put`."""
-        before = self.assembler.refused
-        found = [each for reading in self.readings(streams, stamp_ns, msg) for each in self.assembler.take(reading)]
-        self.refused += self.assembler.refused - before
-        return found
-
-    def readings(self, streams: Iterable[Stream], stamp_ns: int, msg: Any) -> list[Reading]:
-        """Return what `msg` holds of each of these `streams`, and count it if it is refused."""
-        before = self.oddities.total()
-        found = [reading for stream in streams if (reading := self._reading(stream, stamp_ns, msg)) is not None]
-        self.refused += not found and self.oddities.total() > before
+        odd, contested = self.oddities.total(), self.assembler.refused
+        readings = [reading for stream in streams if (reading := self._reading(stream, stamp_ns, msg)) is not None]
+        self.refused += not readings and self.oddities.total() > odd
+        found = [each for reading in readings for each in self.assembler.take(reading)]
+        self.refused += self.assembler.refused - contested
         return found
 
     def put(self, stream: Stream, stamp_ns: int, msg: Any) -> Sample | None:
@@ -197,7 +192,8 @@ class SampleDecoder:
             self.oddities["no usable value"] += 1
             return None
         frame = "" if is_by_name else msg.frame if isinstance(msg, Force) else msg.header.frame_id
-        return Reading(Sample(stream, taken, in_range(np.array(values), *channels.range)), is_whole, frame)
+        array = in_range(np.array(values), *channels.range) if stream is Stream.ANGLES else np.array(values)
+        return Reading(Sample(stream, taken, array), is_whole, frame)
 
     def _places(self, stream: Stream, names: Sequence[str], end: int) -> tuple[list[int] | None, list[str], bool]:
         """Return places of the channels among `end` readings (-1 without one), what is odd, and if all sensors are named."""
