@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..types import SECOND, Array, Sample, Stream
+from ..types import SECOND, Sample, Stream
 
 LONGEST_CYCLE = SECOND  # ns between stamps of one cycle; a twin needs several strokes a second
 CONTESTED_FOR = SECOND  # ns without a contradiction, after which a stream has one source again
@@ -30,7 +30,7 @@ class _Line:
     def __init__(self) -> None:
         self.group: Sample | None = None  # names of one cycle that came up to now
         self.started = self.first = np.zeros(0, bool)  # channels of the message that began it, and the newest complete one
-        self.newest: list[Sample] = []  # those with the newest stamp
+        self.newest: list[Sample] = []  # the first and the last one with the newest stamp
         self.before: list[Sample] = []  # those with the stamp before
         self.frame: str | None = None
         self.contested: int | None = None  # stamp of the newest contradiction, ns
@@ -102,18 +102,17 @@ class SampleAssembler:
     def _is_contested(self, line: _Line, sample: Sample, frame: str) -> bool:
         """Return True if two sources publish a stream: which of them is right cannot be told, so neither is used."""
         if line.newest and line.newest[-1].stamp == sample.stamp:
-            line.newest.append(sample)
+            line.newest = [line.newest[0], sample]
         else:
             line.before, line.newest = line.newest, [sample]
         if frame != (line.frame or frame) or _are_of_two(line.before, line.newest):
             line.contested = sample.stamp
         line.frame = frame
-        if line.contested is not None and abs(sample.stamp - line.contested) > CONTESTED_FOR:
-            line.contested = None
-        if line.contested is not None:
-            self._oddities["two sources"] += 1
-            self.refused += 1
-        return line.contested is not None
+        if line.contested is None or abs(sample.stamp - line.contested) > CONTESTED_FOR:
+            return False
+        self._oddities["two sources"] += 1
+        self.refused += 1
+        return True
 
 
 def _are_of_two(before: list[Sample], newest: list[Sample]) -> bool:
@@ -121,8 +120,5 @@ def _are_of_two(before: list[Sample], newest: list[Sample]) -> bool:
     if len(before) < 2 or len(newest) < 2:
         return False
     (a, b), (c, d) = ((pair[0].values, pair[-1].values) for pair in (before, newest))
-    return _largest(c - d) > APART * max(_largest(c - a), _largest(d - b))
-
-
-def _largest(difference: Array) -> float:
-    return float(np.fmax.reduce(np.abs(difference), initial=0.0))
+    across, *along = (np.fmax.reduce(np.abs(x - y), initial=0.0) for x, y in ((c, d), (c, a), (d, b)))
+    return bool(across > APART * max(along))

@@ -32,8 +32,7 @@ _ABSENT = float("nan")
 
 def stamp_of(msg: Any) -> int:
     """``header.stamp`` of a message in nanoseconds."""
-    stamp = msg.header.stamp
-    return int(stamp.sec) * SECOND + int(stamp.nanosec)
+    return int(msg.header.stamp.sec) * SECOND + int(msg.header.stamp.nanosec)
 
 
 def in_range(values: Array, middle: Array, half: Array) -> Array:
@@ -62,21 +61,16 @@ class _Channels:
             for i, (mount, (low, high)) in enumerate(zip(topics.mounts(joints), topics.ranges, strict=False)):
                 if mount is None:
                     self.range[:, i] = 0.5 * (low + high), 0.5 * (high - low)
-        self.usual: tuple[Sequence[str], int, list[int]] = (
-            (),
-            -1,
-            [],
-        )  # names, readings and places of a message without oddities
-        self._topics, self._stream = topics, stream
-        self._seen: Sequence[str] = ()
+        self.usual: tuple[Any, int, list[int]] = (), -1, []  # names, readings and places of a message without oddities
+        self._topics, self._stream, self._seen = topics, stream, list[str]()
         self._places = [-1] * len(self.names)
         self.beyond: list[str] = []  # names of the newest message, see `Topics.beyond`
         self.twice: set[str] = set()  # names that it has more than once
 
     def places(self, names: Sequence[str]) -> list[int]:
         """Return where the channels stand among `names`; -1 for those that are not there, or more than once."""
-        if names != self._seen:
-            self._seen, counts = names[:], Counter(names)
+        if list(names) != self._seen:
+            self._seen, counts = list(names), Counter(names)
             self.twice = {name for name in self.names if name and counts[name] > 1}
             self._places = [names.index(name) if name and counts[name] == 1 else -1 for name in self.names]
             self.beyond = self._topics.beyond(self._stream, len(self.names), counts)

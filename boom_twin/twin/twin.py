@@ -115,10 +115,8 @@ class Twin:
         self._failed: int | None = None
         self._speeds: Array | None = None
         self._lines = self._new_lines()
-        self._zeros, self._recent = (
-            SensorZeros(self._state, self._channels),
-            ResidualBuffer(self._state.recent, self._channels),
-        )
+        self._zeros = SensorZeros(self._state, self._channels)
+        self._recent = ResidualBuffer(self._state.recent, self._channels)
 
     def __repr__(self) -> str:
         return f"Twin({self.scene!r}; {len(self.mounts)} joints; {dict(self.counts) or 'nothing odd yet'})"
