@@ -27,11 +27,12 @@ def names_missing(info: BagInfo, topics: Topics, joints: int) -> list[str]:
     """Names of the channels of a scene with so many joints that are not in (all) messages, one sentence for each."""
     found: list[str] = []
     for stream, tally in _joint_states(info, topics):
-        own = _names(topics, stream, joints)
+        own = [name for name in _names(topics, stream, joints) if name not in topics.absent]
         its = {names: count for names, count in tally.names.items() if not topics.is_shared or set(own) & set(names)}
-        for name in own:
-            if lacking := sum(count for names, count in its.items() if name not in names):
-                found.append(f"{name} is not in {lacking} of {sum(its.values())} messages of {tally.name}")
+        has = {name: sum(count for names, count in its.items() if name in names) for name in own}
+        most = max(has.values(), default=0) or sum(its.values())  # messages, or cycles where each name has one of its own
+        lacking = [(name, most - count) for name, count in has.items() if count < most]
+        found += [f"{name} is not in {count} of {most} messages of {tally.name}" for name, count in lacking]
     return found
 
 

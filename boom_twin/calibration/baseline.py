@@ -105,7 +105,9 @@ def baseline_of(
     """
     paths, joints = [Path(bag) for bag in bags], len(scene.joints)
     progress(0.0, "reading")
-    topics = common_mapping(paths, Path(mapping) if mapping else None, joints).topics
+    topics = common_mapping(paths, Path(mapping) if mapping else None, joints).topics.of_joints(
+        j.range_deg for j in scene.joints
+    )
     sessions = read_sessions(paths, topics, joints, window)
     mounts = topics.mounts(joints)
     names = [f"{session.name} {session.digest}" for session in sessions]

@@ -8,7 +8,7 @@ replay makes the same model at the same sample.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from threading import Thread
@@ -53,15 +53,16 @@ def loaded_model(
     mounts: Sequence[Mount | None],
     baseline: Baseline | None,
     on_block: Callable[[BlockProblem], object] | None,
+    absent: Collection[str],
 ) -> LoadedModel:
     """The model of `scene` under the load of `settings`; for the parameters see `boom_twin.Twin`."""
     scene = loaded(scene, *settings.load)
     boom = BoomPredictor(scene)
-    judge = None if baseline is None else HealthMonitor(scene, settings, tuple(mounts), baseline, on_block)
+    judge = None if baseline is None else HealthMonitor(scene, settings, tuple(mounts), baseline, on_block, absent)
     modes = DeviationModes(scene, boom.plan, settings, mounts)
     _ = boom.held, modes.held  # made here, where no sample waits for them
     steps = choose_steps(scene, boom.plan, settings)
-    return LoadedModel(scene, limits_of(scene, boom.plan, settings, steps, mounts), boom, judge, modes, steps)
+    return LoadedModel(scene, limits_of(scene, boom.plan, settings, steps, mounts, absent), boom, judge, modes, steps)
 
 
 class ModelPreparation:

@@ -89,6 +89,7 @@ class Limits(NamedTuple):
     valid : m, how far the tip may be from the undeformed boom's.
     angle_variance : rad^2. gravity : (2,) m/s^2. inclination : rad.
     is_mounted : whether any angle sensor is no encoder. absolute, frames : (n,) whether, and in which frame of the chain.
+    absent : (c,) measured channels without a sensor.
     first, channels : (s,) first column of every stream among the measured channels, and how many it has.
     """
 
@@ -107,6 +108,7 @@ class Limits(NamedTuple):
     is_mounted: bool
     absolute: Flags
     frames: Integers
+    absent: Flags
     first: Integers
     channels: Integers
 

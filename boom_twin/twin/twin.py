@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -57,6 +56,8 @@ class Twin:
         What model and sensors are off by while all is well. With it the rig's health is judged, see `Report.health`.
     on_block : callable, optional
         Is told every linear problem that health is judged by; a baseline is learnt from them.
+    absent : collection of str
+        Channels without a sensor, such as ``joint_3``: no reading of them is missed.
 
     Attributes
     ----------
@@ -89,13 +90,15 @@ class Twin:
         mounts: Sequence[Mount | None] = (),
         baseline: Baseline | None = None,
         on_block: Callable[[BlockProblem], object] | None = None,
+        absent: Collection[str] = (),
     ) -> None:
-        self._on_block, scene = on_block, as_scene(scene)
+        self._on_block, self.absent, scene = on_block, frozenset(absent), as_scene(scene)
         self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
         self.counts: Counter[str] = Counter()
         self.shedding, self.recorded_steps = LoadShedding(), RecordedSteps()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self._channels = channels_of(len(scene.joints))
+        self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
         self._widths = [len(names) for names in self._channels.values()]
         self._edge = SampleCheck(self._channels)
         self.requests = Requests(self.settings)
@@ -112,10 +115,8 @@ class Twin:
         self._failed: int | None = None
         self._speeds: Array | None = None
         self._lines = self._new_lines()
-        self._zeros, self._recent = (
-            SensorZeros(self._state, self._channels),
-            ResidualBuffer(self._state.recent, self._channels),
-        )
+        self._zeros = SensorZeros(self._state, self._channels)
+        self._recent = ResidualBuffer(self._state.recent, self._channels)
 
     def __repr__(self) -> str:
         return f"Twin({self.scene!r}; {len(self.mounts)} joints; {dict(self.counts) or 'nothing odd yet'})"
@@ -186,7 +187,7 @@ class Twin:
             The load cannot be.
         """
         self._former: BlockUpdate | None = None
-        found = loaded_model(self.scene, settings, self.mounts, self.baseline, self._on_block)
+        found = loaded_model(self.scene, settings, self.mounts, self.baseline, self._on_block, self.absent)
         if self._state.clock[NEWEST] != NONE:
             found.modes.postures.prepare(self._state.strokes.copy())  # where the boom will be, or near
         return found
@@ -211,7 +212,7 @@ class Twin:
         events = ["load"] if before.load != self.settings.load else []
         if before.limits != self.settings.limits:
             events.append("limits")
-            self._compiled.limits = limits_of(self.scene, self.plan, self.settings, self.steps, self.mounts)
+            self._compiled.limits = limits_of(self.scene, self.plan, self.settings, self.steps, self.mounts, self.absent)
             for line in self._lines.values():
                 line.tune(self.settings)
         if asked.zeros != self._zeros.values:
@@ -347,7 +348,7 @@ class Twin:
         """Take a sample that may be out of the ordinary; of a copy, for it may be held, and the caller's may change."""
         self._compiled.make_room()
         sample = replace(sample, values=sample.values.copy())
-        complete = _are_readings(sample.values.tolist())
+        complete = self._is_complete(sample)
         if not complete:
             usable = np.abs(sample.values) <= LIMIT
             if not usable.any():
@@ -431,7 +432,7 @@ class Twin:
             self._doubt_pause(run, held[0], why)
         reports, asked = [], self._judged
         for sample in held:
-            complete, self._judged = bool(np.isfinite(sample.values.sum())), asked or sample is not held[-1]
+            complete, self._judged = self._is_complete(sample), asked or sample is not held[-1]
             reports.append(self._follow(sample, self._zeroed(sample), complete, events))
             events = []
         return replace(reports[-1], earlier=tuple(reports[:-1]))
@@ -551,7 +552,7 @@ class Twin:
         held = self._released(line)
         gone = drop_waiting(self._state, held[0].stamp, -NONE, CODES[sample.stream])  # their time comes again: a looped bag
         self._state.clock[UNMATCHED] += gone
-        reports = [self._compare(each, bool(np.isfinite(each.values.sum()))) for each in held]
+        reports = [self._compare(each, self._is_complete(each)) for each in held]
         return replace(reports[-1], earlier=tuple(reports[:-1]))
 
     def _compare(self, sample: Sample, complete: bool) -> Report:
@@ -576,7 +577,6 @@ class Twin:
         self.counts.update(events)
         return Report(sample.stamp, False, events=events, status=status)
 
-
-def _are_readings(values: list[float]) -> bool:
-    """Whether none is missing, not finite or absurd."""
-    return math.isfinite(sum(values)) and max(map(abs, values)) <= LIMIT
+    def _is_complete(self, sample: Sample) -> bool:
+        """Return True if no sensor's reading is missing, not finite or absurd."""
+        return bool((np.abs(sample.values) <= LIMIT)[self._there[sample.stream]].all())
