@@ -206,6 +206,10 @@ def sensor_kind(channel: str) -> SensorKind:
     return SENSORS[stream]
 
 
+GIVE = 5.0 * pi / 180.0
+"""What an encoder may read beyond ``range_deg`` (rad), which is of the rigid boom: at its end a joint sags and swings on."""
+
+
 LIMIT = 1e7
 """Largest magnitude that is taken for a reading: no stroke (m), angle (rad), acceleration (m/s^2) or force (N) is near it."""
 

@@ -8,12 +8,13 @@ from itertools import pairwise
 from typing import Any
 
 from ..errors import BagError
-from ..messages.topic_table import Qos, Topics
+from ..messages.topic_table import Qos, Topic, Topics
 from ..types import NANO, SENSORS, Stream
 from .inspect import BagInfo, Tally
 from .joint_names import other_names
 from .metadata import profiles
-from .reader import Session, TopicInfo, check_encoding, check_topic
+from .reader import Session, TopicInfo, check_topic, clocks_set_back, readable
+from .session_file import CDR
 from .session_model import mapping_of
 
 SKEW = 0.05
@@ -26,11 +27,12 @@ def names_missing(info: BagInfo, topics: Topics, joints: int) -> list[str]:
     """Names of the channels of a scene with so many joints that are not in (all) messages, one sentence for each."""
     found: list[str] = []
     for stream, tally in _joint_states(info, topics):
-        own = _names(topics, stream, joints)
+        own = [name for name in _names(topics, stream, joints) if name not in topics.absent]
         its = {names: count for names, count in tally.names.items() if not topics.is_shared or set(own) & set(names)}
-        for name in own:
-            if lacking := sum(count for names, count in its.items() if name not in names):
-                found.append(f"{name} is not in {lacking} of {sum(its.values())} messages of {tally.name}")
+        has = {name: sum(count for names, count in its.items() if name in names) for name in own}
+        most = max(has.values(), default=0) or sum(its.values())  # messages, or cycles where each name has one of its own
+        lacking = [(name, most - count) for name, count in has.items() if count < most]
+        found += [f"{name} is not in {count} of {most} messages of {tally.name}" for name, count in lacking]
     return found
 
 
@@ -68,7 +70,7 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
         try:
             name = check_topic(info.session, topic.name, topic.type).name
             for file in info.session.files:
-                check_encoding(file, {name})
+                readable(file, {name: topic.type})
         except BagError as error:
             reason = str(error).removeprefix(f"{info.session.path}: ")
             found.append(f"{reason} Without it {SENSORS[stream].lack}." if SENSORS[stream].lack else reason)
@@ -87,8 +89,16 @@ def remarks(info: BagInfo, topics: Topics) -> list[str]:
         found.append("No checksums: a flipped bit cannot be noticed. Record with `boom_twin record`.")
     if info.synthetic is None:
         found.append("Its origin is not noted, so whether a rig made it is unknown. Record with --origin.")
+    found += clocks_set_back(info.session)
     inputs = topics.inputs.values()
+    for topic in inputs:
+        found += _passed_over(info.session, topic)
     known = [tally for topic in inputs if (tally := info.tally(topic.name)) and tally.skewed]
+    if known and abs(skew := known[0].skews[2] / known[0].skewed * NANO) > SKEW:
+        side = "after" if skew > 0.0 else "before"
+        found.append(
+            f"Log times are on average {abs(skew):.3f} s {side} the stamps of {known[0].name}. Results go by the stamps."
+        )
     for one, other in pairwise(known):
         apart = (other.skews[2] / other.skewed - one.skews[2] / one.skewed) * NANO
         if abs(apart) > SKEW:
@@ -98,6 +108,18 @@ def remarks(info: BagInfo, topics: Topics) -> list[str]:
                 f"its log time, compared with {one.name}. Synchronise the sensors' clocks."
             )
     return found
+
+
+def _passed_over(session: Session, topic: Topic) -> Iterator[str]:
+    """Name the messages of a topic that are of another type or encoding than the one that is read."""
+    for file in session.files:
+        for channel in file.channels.values():
+            kind, encoding = file.type_of(channel), channel.message_encoding
+            if channel.topic == topic.absolute and (kind, encoding) != (topic.type, CDR) and file.counts.get(channel.id):
+                yield (
+                    f"{channel.topic}: {file.counts[channel.id]} messages of {file.path.name} are {kind or 'of no type'} in "
+                    f"{encoding or 'no encoding'} and are passed over. Record {topic.type} in {CDR} alone there."
+                )
 
 
 def _stamps(tally: Tally) -> Iterator[str]:

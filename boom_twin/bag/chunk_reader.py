@@ -1,35 +1,34 @@
-"""Read the messages of an .mcap file a chunk at a time, every checksum verified, in the order of their log times."""
+"""Read the messages of an .mcap file a piece at a time, every checksum verified, in the order of their log times."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from operator import attrgetter
+from collections.abc import Iterator, Sequence, Set
+from itertools import pairwise
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Chunk, Message
 
-from ..messages.message_block import MessageBlock, by_log_time, gather, joined
+from ..errors import BagError
+from ..messages.message_block import Integers, MessageBlock, by_log_time, gather, joined
 from ..system.received_files import open_received
-from .chunk_table import ChunkPlace, ChunkTable
+from .log_clock import LogClock, Piece
 from .mcap_records import (
     MESSAGE_HEAD,
+    MOST_HELD,
+    PREFIX,
+    ChunkPlace,
     UnpackBudget,
     bounds,
-    chunk_at,
-    fault_named_by_times,
+    by_place,
+    content_at,
     inner_record,
-    outer_records,
-    unpack,
 )
 
-TOGETHER = 2**30
-"""Bytes of messages that are held together, where the file does not keep them in order, at most."""
 MOST_TOGETHER = 2**22
-"""Messages, likewise: an empty one takes ten times its bytes."""
-
+"""Messages of pieces that overlap in time and are held together, at most: an empty one takes ten times its bytes."""
 ENOUGH = 256
 """Messages in a block, at least, where the next ones come after them."""
 
@@ -37,21 +36,23 @@ _LENGTH = 8
 """Bytes of a record's length, right before its body."""
 _HEAD = np.dtype([("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
 """`MESSAGE_HEAD` behind the length of its record."""
-
-
+_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
+"""One message in the index of a chunk, by the offset of its record."""
+_INDEX_HEAD = 6
+"""Bytes of the channel and the length of its entries, at the start of an index."""
+_PIECE = 2**31
+"""Places of messages of two pieces are so far apart: more than a piece has bytes."""
 _MESSAGE = int(Opcode.MESSAGE)
-_LOOSE, _LARGE = 256, 2**16
-"""Messages outside chunks that are put into a block, and bytes of one that ends it."""
 
 
-def message_blocks(path: Path, chunks: ChunkTable) -> Iterator[MessageBlock]:
-    """All messages by log time, at equal times in the order of the file; their sources are their channels.
+def message_blocks(path: Path, chunks: Sequence[ChunkPlace], passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
+    """All messages but of the `passed` channels by log time, at equal times in the order of the file; sources are channels.
 
-    Only chunks that overlap in time are held together, and some small ones; without an index of chunks, the whole file is.
+    Only pieces that overlap in time are held together. Where the recorder's clock was set back, the order is that of the file.
     """
     waiting: list[MessageBlock] = []
     try:
-        for block in _groups(path, chunks):
+        for block in _in_order(path, chunks, passed, clock):
             waiting.append(block)
             if sum(map(len, waiting)) >= ENOUGH:
                 yield joined(waiting)
@@ -64,81 +65,83 @@ def message_blocks(path: Path, chunks: ChunkTable) -> Iterator[MessageBlock]:
         yield joined(waiting)
 
 
-def _groups(path: Path, chunks: ChunkTable) -> Iterator[MessageBlock]:
-    """The messages of chunks that overlap in time, or of the whole file, by log time."""
-    if not chunks:
-        yield _held(_outside_and_inside(path))
-        return
-    budget = UnpackBudget()
+def _in_order(path: Path, chunks: Sequence[ChunkPlace], passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
+    """The messages of one piece after the other, of those that overlap in time as soon as all earlier ones are read."""
+    budget, held = UnpackBudget(), dict[int, MessageBlock]()
+    places = list(enumerate(by_place(chunks)))
+    if not clock.is_set_back:
+        places.sort(key=lambda each: each[1].message_start_time)
+    chosen = (each for each in places if not each[1].channels or each[1].channels - passed)
     with open_received(path) as file:
-        for group in _overlapping(chunks):
-            if (size := sum(index.uncompressed_size for index in group)) > TOGETHER:
-                raise McapError(f"{size} bytes of chunks overlap in time: at most {TOGETHER} are sorted")
-            yield _held(_inside(chunk_at(file, index), budget) for index in group)
-
-
-def _overlapping(chunks: ChunkTable) -> Iterator[list[ChunkPlace]]:
-    """Groups of chunks, each later than the one before; within a group in the order of the file.
-
-    A chunk that begins when the group ends is of the group if it stands before one of its chunks: of equal times the order of
-    the file counts.
-    """
-    group: list[ChunkPlace] = []
-    end = last = 0
-    for index in chunks.by_time():
-        start, place = index.message_start_time, index.chunk_start_offset
-        if group and (start > end or (start == end and place > last)):
-            yield sorted(group, key=attrgetter("chunk_start_offset"))
-            group, last = [], 0
-        group.append(index)
-        end, last = max(end, index.message_end_time), max(last, place)
-    yield sorted(group, key=attrgetter("chunk_start_offset"))
-
-
-def _held(found: Iterable[MessageBlock]) -> MessageBlock:
-    """Blocks in the order of the file as one by log time, as long as their messages may be held together."""
-    size = count = 0
-    blocks = []
-    for block in found:
-        size, count = size + int((block.ends - block.starts).sum()), count + len(block)
-        if size > TOGETHER or count > MOST_TOGETHER:
-            raise McapError(f"more than {TOGETHER} bytes or {MOST_TOGETHER} messages are out of order, or without an index")
-        blocks.append(block)
-    return by_log_time(joined(blocks))
-
-
-def _outside_and_inside(path: Path) -> Iterator[MessageBlock]:
-    """The messages of a file, whether in chunks or not, in its order."""
-    budget = UnpackBudget()
-    loose: list[Message] = []
-    for record in outer_records(path):
-        if isinstance(record, Message):
-            loose.append(record)
-            if len(loose) < _LOOSE and len(record.data) < _LARGE:
+        for (number, place), (_, after) in pairwise([*chosen, (0, None)]):
+            assert place is not None
+            block = _messages(content_at(file, place, budget))
+            block = block.chosen(np.flatnonzero(~np.isin(block.sources, list(passed))))
+            if clock.is_set_back:
+                yield clock.corrected(block, _PIECE * number + _places(block))
                 continue
-        if loose:
-            yield _outside(loose)
-            loose = []
-        if isinstance(record, Chunk):
-            yield _inside(record, budget)
+            held[place.chunk_start_offset] = by_log_time(block)
+            if sum(len(each.content) for each in held.values()) > MOST_HELD or sum(map(len, held.values())) > MOST_TOGETHER:
+                what = f"more than {MOST_HELD} bytes or {MOST_TOGETHER} messages are out of order"
+                raise BagError(f"{path}: {what}. Sort them by log time: `mcap sort IN.mcap -o OUT.mcap`.")
+            ends = {
+                at: len(each) if after is None else int(np.searchsorted(each.log_times, after.message_start_time))
+                for at, each in sorted(held.items())
+            }
+            yield by_log_time(joined([held[at].chosen(slice(0, end)) for at, end in ends.items() if end]))
+            held = {at: held[at].chosen(slice(end, None)) for at, end in ends.items() if end < len(held[at])}
 
 
-def _outside(messages: list[Message]) -> MessageBlock:
-    ends = np.cumsum([len(message.data) for message in messages])
-    channels = np.array([message.channel_id for message in messages])
-    times = np.array([message.log_time for message in messages], np.uint64)
-    content = b"".join(message.data for message in messages)
-    return MessageBlock(content, channels, times, np.concatenate([[0], ends[:-1]]), ends)
-
-
-def _inside(chunk: Chunk, budget: UnpackBudget) -> MessageBlock:
-    """The messages inside a chunk, its checksum verified."""
-    with fault_named_by_times(chunk):
-        content = unpack(chunk, budget)
-        starts = np.array(_bodies(content), np.int64)
+def _messages(content: bytes) -> MessageBlock:
+    """The messages among the records of a piece, in its order."""
+    starts = np.array(_bodies(content), np.int64)
     heads = gather(content, starts - _LENGTH, _HEAD.itemsize).view(_HEAD)[:, 0]
     channels, ends = heads["channel"].astype(np.int64), starts + heads["length"].astype(np.int64)
     return MessageBlock(content, channels, heads["log_time"].copy(), starts + MESSAGE_HEAD.size, ends)
+
+
+def log_clock(path: Path, chunks: Sequence[ChunkPlace]) -> LogClock:
+    """Return the clock of a file's recorder by the indexes behind its chunks; if it was set back there, by the chunks alone.
+
+    No checksum is over an index.
+    """
+    by_index = LogClock.of(lambda: _log_times(path, chunks, True))
+    return LogClock.of(lambda: _log_times(path, chunks, False)) if by_index.is_set_back else by_index
+
+
+def _log_times(path: Path, chunks: Sequence[ChunkPlace], by_index: bool) -> Iterator[Piece]:
+    """Places, channels and log times of all messages in the order of the file."""
+    budget = UnpackBudget()
+    with open_received(path) as file:
+        for number, place in enumerate(by_place(chunks)):
+            found = _indexed(file, place) if by_index and place.message_index_length else None
+            places, channels, times = found or _read(file, place, budget)
+            order = np.argsort(places, kind="stable")
+            yield _PIECE * number + places[order], channels[order], times[order]
+
+
+def _indexed(file: BinaryIO, place: ChunkPlace) -> Piece | None:
+    """The messages of a chunk by the index behind it; None if that is none."""
+    file.seek(place.chunk_start_offset + place.chunk_length)
+    content = file.read(place.message_index_length)
+    found, channels = list[np.ndarray](), list[np.ndarray]()
+    try:
+        for _, start, end in bounds(content):
+            found.append(np.frombuffer(content[start + _INDEX_HEAD : end], _ENTRY))
+            channels.append(np.full(len(found[-1]), int.from_bytes(content[start : start + 2], "little")))
+    except (McapError, ValueError):
+        return None
+    entries = np.concatenate(found)
+    return entries["offset"].astype(np.int64), np.concatenate(channels), entries["log_time"]
+
+
+def _read(file: BinaryIO, place: ChunkPlace, budget: UnpackBudget) -> Piece:
+    block = _messages(content_at(file, place, budget))
+    return _places(block), block.sources, block.log_times
+
+
+def _places(block: MessageBlock) -> Integers:
+    return block.starts - MESSAGE_HEAD.size - PREFIX.size
 
 
 def _bodies(content: bytes) -> list[int]:

@@ -6,8 +6,9 @@ The file is read some thousand rows at a time, once to check and count, and once
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from difflib import get_close_matches
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 from ..errors import BagError
 from ..messages.topic_table import load_topics
 from ..messages.type_store import jazzy
-from ..system.csv_table import CsvTable, read_csv_pieces
+from ..system.csv_table import NOTHING, CsvTable, read_csv_pieces
 from ..system.received_files import open_received
 from ..types import SECOND, SENSORS, Sample, Stream, channels_of
 from .session_file import SessionFile, channel_of, schema_of
@@ -25,8 +26,10 @@ from .session_files import samples_of, sensor_message
 
 TIME = "t_s"
 STROKE = "stroke_{}_m"
+_NUMBERED = re.compile(r"(?:stroke_(\d{1,3})_m|joint_(\d{1,3})_rad|cylinder_force_(\d{1,3})_N)")
 IMU = ("imu_x_m_s2", "imu_z_m_s2")
-FEWEST, SLOWEST = 20, 1.0  # rows; s from row to row, at least, by which times are in another unit: 1 kHz in ms
+FEWEST, SLOWEST, FASTEST = 20, 1.0, 1e-4  # rows; s from row to row, by which the unit of the times is known
+UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # of which a second has so many
 NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}
 """Channel of every stream."""
 
@@ -86,10 +89,10 @@ def _samples(path: Path) -> Iterator[Sample]:
     """All samples in the order of their stamps."""
     shift = 0
     last: int | None = None
-    for number, piece in enumerate(read_csv_pieces(path, BagError)):
+    for number, piece in enumerate(_with_equal_times_joined(read_csv_pieces(path, BagError))):
         columns = _columns_of(piece)
         stamps = _stamps(piece, last)
-        if number == 0:
+        if number == 0 or stamps[-1] >= 2**31 * SECOND:
             _refuse_other_units(piece, stamps)
             shift = max(0, SECOND - stamps[0])
         last = stamps[-1]
@@ -105,9 +108,8 @@ def _samples(path: Path) -> Iterator[Sample]:
 
 def _columns_of(table: CsvTable) -> dict[Stream, list[str]]:
     """The names of the columns that every stream may have; refuses a header that lacks one or has another."""
-    joints = 1
-    while STROKE.format(joints + 1) in table.names:
-        joints += 1
+    numbers = [max(map(int, filter(None, found.groups()))) for name in table.names if (found := _NUMBERED.fullmatch(name))]
+    joints = max(numbers, default=1)
     table.require([TIME, *(STROKE.format(number) for number in range(1, joints + 1))])
     columns = _columns(joints)
     _refuse_unknown(table, [TIME, *(name for names in columns.values() for name in names)])
@@ -150,20 +152,44 @@ def _stamps(table: CsvTable, last: int | None) -> list[int]:
         except (ArithmeticError, ValueError):
             raise BagError(f"{table.path}, line {line}: {TIME} = {text!r} is not a time in s.") from None
         if last is not None and stamp <= last:
-            raise BagError(f"{table.path}, line {line}: {TIME} = {text} is not after the row before. Sort the rows by {TIME}.")
-        if stamp >= 2**31 * SECOND:
-            remedy = "Divide it: stamps in ms or ns are no seconds."
-            raise BagError(f"{table.path}, line {line}: {TIME} = {text} is beyond {2**31} s, so not in seconds. {remedy}")
+            remedy = f"Sort the rows by {TIME}." if stamp < last else "Both have this time: give each its own, or take one out."
+            raise BagError(f"{table.path}, line {line}: {TIME} = {text} is not after the row before. {remedy}")
         found.append(stamp)
         last = stamp
     return found
 
 
 def _refuse_other_units(table: CsvTable, stamps: list[int]) -> None:
-    """Refuse times that go on as ms do."""
-    step = float(np.median(np.diff(stamps))) / SECOND if len(stamps) >= FEWEST else 0.0
-    if step >= SLOWEST:
-        raise BagError(
-            f"{table.path}: {TIME} goes on by {step:g} s from row to row, and a twin needs several rows a second. If these are "
-            f"ms, divide them by 1000: {TIME} is in seconds."
-        )
+    """Refuse times that go on as ms, us or ns do, or that no stamp can have."""
+    step = float(np.median(np.diff(stamps))) / SECOND if len(stamps) > 1 else 0.0
+    if stamps[-1] < 2**31 * SECOND and (len(stamps) < FEWEST or step < SLOWEST):
+        return
+    told = f"{TIME} goes on by {step:g} s from row to row up to {stamps[-1] / SECOND:.10g} s"
+    unit = next((unit for unit, count in UNITS.items() if FASTEST <= step / count < SLOWEST), None)
+    remedy = "Divide it by 1000 if it is in ms, by 1e6 if in us, by 1e9 if in ns." if unit is None else ""
+    if unit is not None:
+        told, remedy = f"{told}, as if in {unit}", f"Divide it by {UNITS[unit]:g}."
+    raise BagError(f"{table.path}: {told}, so not in seconds: a twin needs several rows a second. {remedy}")
+
+
+def _with_equal_times_joined(pieces: Iterable[CsvTable]) -> Iterator[CsvTable]:
+    """Yield tables in which rows of one time are one row, where no column has two values: a row for each topic is common."""
+    rows, lines = list[list[str]](), list[int]()
+    for piece in pieces:
+        place = piece.names.index(TIME) if TIME in piece.names else -1
+        for row, line in zip(piece.rows, piece.lines, strict=True):
+            pairs = list(zip(rows[-1], row, strict=False)) if rows and len(rows[-1]) == len(row) else []
+            if pairs and place >= 0 and pairs[place][0] == pairs[place][1] and _are_apart(pairs, place):
+                rows[-1] = [b if a.strip().lower() in NOTHING else a for a, b in pairs]
+            else:
+                rows.append(row)
+                lines.append(line)
+        if len(rows) > 1:
+            yield replace(piece, rows=rows[:-1], lines=lines[:-1])
+        rows, lines = rows[-1:], lines[-1:]
+    yield replace(piece, rows=rows, lines=lines)
+
+
+def _are_apart(pairs: list[tuple[str, str]], place: int) -> bool:
+    """Return True if no column but that of the time has a value in both of two rows."""
+    return all(i == place or any(cell.strip().lower() in NOTHING for cell in pair) for i, pair in enumerate(pairs))

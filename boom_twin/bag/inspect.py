@@ -10,10 +10,11 @@ from pathlib import Path
 
 from ..messages.cdr_decoder import has_header, names_in, stamp_in
 from ..messages.topic_table import TYPES
+from ..messages.type_store import jazzy
 from ..types import NANO, Stream
 from .integrity import as_bag_error
 from .reader import Session, scan
-from .session_file import SessionFile
+from .session_file import CDR, SessionFile, schema_of
 from .time_window import WHOLE, TimeWindow
 
 VARIANTS = 100
@@ -175,7 +176,7 @@ def inspect(path: Path, window: TimeWindow = WHOLE) -> BagInfo:
         There is no session, or it is damaged.
     """
     session = scan(path)
-    tallies = {topic.name: Tally(topic.name, topic.type, False, topic.type == _NAMED) for topic in session.topics}
+    tallies = {topic.name: Tally(topic.name, topic.type, False, _NAMED in topic.type) for topic in session.topics}
     files = sorted(session.files, key=attrgetter("start"))
     for file in files:
         _count(file, tallies, window.bounds(session.start))
@@ -188,13 +189,20 @@ def inspect(path: Path, window: TimeWindow = WHOLE) -> BagInfo:
 def _count(file: SessionFile, tallies: dict[str, Tally], bounds: tuple[int, int]) -> None:
     """Take in the messages of one file with log times from the first to before the second bound; all are counted."""
     own = {key: tallies[channel.topic] for key, channel in file.channels.items()}
+    passed_over = set()
     for key, channel in file.channels.items():
-        schema = file.schemas.get(channel.schema_id)
-        own[key].stamped = schema is not None and has_header(schema)
+        kind, tally = file.type_of(channel), own[key]
+        if channel.message_encoding != CDR or (tally.named and kind != _NAMED):
+            passed_over.add(key)
+        else:
+            schema = schema_of(key, kind) if kind in jazzy().types else file.schemas.get(channel.schema_id)
+            tally.stamped = schema is not None and has_header(schema)
     seen: Counter[int] = Counter()
     with as_bag_error(file.path):
         for key, log_time, data in file.heads():
             seen[key] += 1
-            if bounds[0] <= log_time < bounds[1]:
+            if bounds[0] <= log_time < bounds[1] and key not in passed_over:
                 own[key].add(log_time, data)
+    for key in passed_over:
+        own[key].count += seen[key]
     file.check_counts("statistics", file.counts, "read", seen)

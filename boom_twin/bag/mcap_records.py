@@ -5,11 +5,12 @@ from __future__ import annotations
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 from lz4.frame import LZ4FrameDecompressor
 from mcap import records as mcap_records
@@ -20,14 +21,14 @@ from mcap.records import Channel, Chunk, McapRecord, Message
 from mcap.stream_reader import StreamReader
 from zstandard import ZstdDecompressor
 
+from ..errors import BagError
 from ..system.received_files import open_received
-from .chunk_table import ChunkPlace, ChunkTable
 from .integrity import PARSE_ERRORS
 
 LARGEST = 64 * 2**20
-"""Bytes of one record, and of one chunk unpacked, that are read at most."""
-BYTES_PER_BYTE = 1000
-"""Bytes that a packed byte of a chunk may unpack to; recorded numbers give 2 to 20, an empty picture more."""
+"""Bytes of one record of a summary, and of all definitions, that are read at most."""
+MOST_HELD = 2**30
+"""Bytes of one message, and of one chunk unpacked, that are held in memory at most."""
 RECORDS_PER_BYTE = 0.5
 """Records that a packed byte may hold; a message has two times and a number, which pack to 5 bytes and more."""
 
@@ -51,8 +52,11 @@ KINDS: dict[int, Any] = {
 """Classes of all records but messages and chunks."""
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 """Channel, sequence, log time (ns), publish time (ns) of a message."""
+CHUNK_HEAD = PREFIX.size + 8 + 8 + 8 + 4 + 4 + 8
+"""Bytes of the record of a chunk beside the name of its compression and its packed content."""
 
-_TOO_MUCH = "the most that is read. Bombs pack like that, or many blank pictures"
+_TOO_MUCH = "the most that is read. Bombs pack like that"
+_START = 2**22  # bytes that are unpacked at first: they show a bomb of records
 _WINDOW = 2**27  # of zstd, as its command line allows without --long
 
 
@@ -68,49 +72,70 @@ def _lz4(data: bytes, limit: int) -> bytes:
 _UNPACK: dict[str, Callable[[bytes, int], bytes]] = {"": lambda data, limit: data[:limit], "zstd": _zstd, "lz4": _lz4}
 
 
+class ChunkPlace(NamedTuple):
+    """Place of a chunk, or of messages outside chunks on end; fields as in ``ChunkIndex``.
+
+    `channels` are those that have messages in it; none if that is not known.
+    """
+
+    message_start_time: int
+    message_end_time: int
+    chunk_start_offset: int
+    chunk_length: int
+    uncompressed_size: int
+    message_index_length: int
+    channels: frozenset[int]
+
+
+def by_place(chunks: Sequence[ChunkPlace]) -> list[ChunkPlace]:
+    """Return chunks in the order of the file; that of its index may be another."""
+    return sorted(chunks, key=attrgetter("chunk_start_offset"))
+
+
 class UnpackError(McapError):
     """A chunk unpacks to more than its `UnpackBudget` allows."""
 
 
 class UnpackBudget:
-    """What the chunks of one file may unpack to: so much for every packed byte, and a reserve for all of them together.
+    """Limit of what the chunks of one file unpack to: bytes by memory, records by the time that they take.
 
-    64 kB can hold chunks that unpack to gigabytes, or to millions of records that take seconds to go through. The reserve
-    is for small chunks that pack well; a chunk that stays within its own share is read whatever stands before it.
+    64 kB can hold chunks of millions of records that take seconds to go through. The reserve of records is for small chunks
+    that pack well; a chunk that stays within its own share is read whatever stands before it.
 
     Attributes
     ----------
-    bytes, records : int
+    records : int
         What is left of the reserve.
     """
 
     def __init__(self) -> None:
-        self.bytes, self.records = LARGEST, 20_000
+        self.records = 20_000
 
     def unpack(self, chunk: Chunk, limit: int) -> bytes:
         """The first `limit` bytes of the content of a chunk; UnpackError if that, or what is in it, is too much."""
-        packed = len(chunk.data)
-        own = BYTES_PER_BYTE * packed
-        room = min(own + self.bytes, LARGEST)
-        content = _UNPACK[chunk.compression](chunk.data, min(limit, room + 1))
-        self.bytes -= max(0, len(content) - own)
-        if len(content) > room:
-            raise UnpackError(f"{packed} bytes unpack to more than {room} bytes, {_TOO_MUCH}")
-        self._take_records(content, packed)
+        own = int(RECORDS_PER_BYTE * len(chunk.data))
+        for room in (_START, MOST_HELD + 1):
+            content = _UNPACK[chunk.compression](chunk.data, min(limit, room))
+            if (count := _records(content, own + self.records)) > own + self.records:
+                most, self.records = own + self.records, 0
+                raise UnpackError(f"{len(chunk.data)} bytes unpack to more than {most} records, {_TOO_MUCH}")
+            if len(content) < room:
+                break
+        if len(content) > MOST_HELD:
+            raise UnpackError(f"{len(chunk.data)} bytes unpack to more than {MOST_HELD} bytes, the most that memory holds")
+        self.records -= max(0, count - own)
         return content
 
-    def _take_records(self, content: bytes, packed: int) -> None:
-        own = int(RECORDS_PER_BYTE * packed)
-        most = own + self.records
-        count = place = 0
-        while place + PREFIX.size <= len(content) and count <= most:
-            opcode, length = PREFIX.unpack_from(content, place)
-            if opcode == 0:
-                break
-            place, count = place + PREFIX.size + length, count + 1
-        self.records -= max(0, min(count, most) - own)
-        if count > most:
-            raise UnpackError(f"{packed} bytes unpack to more than {most} records, {_TOO_MUCH}")
+
+def _records(content: bytes, most: int) -> int:
+    """Return the number of records in the content of a chunk, as far as they are whole, or one more than `most`."""
+    count = place = 0
+    while place + PREFIX.size <= len(content) and count <= most:
+        opcode, length = PREFIX.unpack_from(content, place)
+        if opcode == 0:
+            break
+        place, count = place + PREFIX.size + length, count + 1
+    return count
 
 
 def unpack(chunk: Chunk, budget: UnpackBudget) -> bytes:
@@ -133,8 +158,6 @@ def unpack_start(chunk: Chunk, budget: UnpackBudget) -> bytes:
     """What can be unpacked of a chunk that may be cut off, at most one byte more than it states; nothing verified."""
     if chunk.compression not in _UNPACK:
         raise McapError(f"compression = {chunk.compression!r}: only zstd, lz4 and none are known")
-    if chunk.uncompressed_size > LARGEST:
-        raise McapError(f"unpacked size = {chunk.uncompressed_size} bytes: at most {LARGEST} are read")
     return budget.unpack(chunk, chunk.uncompressed_size + 1)
 
 
@@ -199,51 +222,48 @@ def by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> Coun
     return topics
 
 
-def records(path: Path) -> Iterator[McapRecord]:
-    """All records in the order of the file; those inside a chunk follow it."""
-    budget = UnpackBudget()
-    for record in outer_records(path):
-        yield record
-        if isinstance(record, Chunk):
-            yield from _content(record, budget)
-
-
-def outer_records(path: Path) -> Iterator[McapRecord]:
-    """All records in the order of the file but those inside chunks."""
+def outer_records(path: Path) -> Iterator[tuple[int, McapRecord]]:
+    """All records in the order of the file but those inside chunks, each with the offset behind it."""
     with open_received(path) as file:
-        limit = min(LARGEST, path.stat().st_size)
-        yield from StreamReader(file, validate_crcs=True, emit_chunks=True, record_size_limit=limit).records
+        limit = min(MOST_HELD, path.stat().st_size)
+        for record in StreamReader(file, validate_crcs=True, emit_chunks=True, record_size_limit=limit).records:
+            yield file.tell(), record
 
 
-def heads(path: Path, chunks: ChunkTable) -> Iterator[tuple[int, int, bytes]]:
-    """Channel, log time (ns) and encoded data of all messages in the order of the file, one chunk in memory."""
-    if not chunks:
-        for record in records(path):
-            if isinstance(record, Message):
-                yield record.channel_id, record.log_time, record.data
-        return
+def heads(path: Path, chunks: Sequence[ChunkPlace]) -> Iterator[tuple[int, int, bytes]]:
+    """Channel, log time (ns) and encoded data of all messages in the order of the file, one piece in memory."""
     budget = UnpackBudget()
     with open_received(path) as file:
-        for index in chunks.by_place():
-            for opcode, body in parts(unpack(chunk_at(file, index), budget)):
+        for place in by_place(chunks):
+            for opcode, body in parts(content_at(file, place, budget)):
                 if opcode == Opcode.MESSAGE:
                     channel, _, log_time, _ = MESSAGE_HEAD.unpack_from(body)
                     yield channel, log_time, body[MESSAGE_HEAD.size :]
 
 
-def chunk_at(file: BinaryIO, index: ChunkPlace) -> Chunk:
-    """The chunk that `index` points at."""
-    if index.chunk_length > LARGEST:
-        raise McapError(f"chunk of {index.chunk_length} bytes: at most {LARGEST} are read")
-    file.seek(index.chunk_start_offset)
-    raw = file.read(index.chunk_length)
-    if len(raw) != index.chunk_length or raw[:9] != struct.pack("<BQ", Opcode.CHUNK, len(raw) - 9):
-        raise McapError(f"no chunk of {index.chunk_length} bytes at byte {index.chunk_start_offset}")
-    chunk: Chunk = Chunk.read(ReadDataStream(BytesIO(raw[9:])))
-    return chunk
+def content_at(file: BinaryIO, place: ChunkPlace, budget: UnpackBudget) -> bytes:
+    """The records of a piece of a file: of a chunk, its checksum verified, or of messages outside chunks.
+
+    Raises
+    ------
+    BagError
+        It is more than memory is to hold.
+    """
+    if (size := max(place.chunk_length, place.uncompressed_size)) > MOST_HELD:
+        remedy = "Write smaller chunks: `mcap compress --chunk-size 1048576 IN.mcap -o OUT.mcap`."
+        raise BagError(f"{file.name}: a chunk of {size} bytes; at most {MOST_HELD} are held in memory. {remedy}")
+    file.seek(place.chunk_start_offset)
+    raw = file.read(place.chunk_length)
+    if len(raw) != place.chunk_length or not raw.startswith(PREFIX.pack(Opcode.CHUNK, len(raw) - PREFIX.size)):
+        if len(raw) == place.chunk_length == place.uncompressed_size and raw[0] == Opcode.MESSAGE:
+            return raw
+        raise McapError(f"no chunk of {place.chunk_length} bytes at byte {place.chunk_start_offset}")
+    chunk: Chunk = Chunk.read(ReadDataStream(BytesIO(raw[PREFIX.size :])))
+    with fault_named_by_times(chunk):
+        return unpack(chunk, budget)
 
 
-def _content(chunk: Chunk, budget: UnpackBudget) -> list[McapRecord]:
+def chunk_records(chunk: Chunk, budget: UnpackBudget) -> list[McapRecord]:
     """The messages and definitions inside a chunk, its checksum verified."""
     with fault_named_by_times(chunk):
         return [record for opcode, body in parts(unpack(chunk, budget)) if (record := inner_record(opcode, body)) is not None]

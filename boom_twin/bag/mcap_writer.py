@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import BinaryIO
 
 import numpy as np
@@ -103,14 +103,8 @@ class McapWriter:
         self._chunk.add(channel, log_time, PREFIX.pack(Opcode.MESSAGE, len(head) + len(data)) + head + data)
         self._finish_full_chunk()
 
-    def add_block(self, channels: Integers, sequences: Integers, block: EncodedBlock) -> Iterator[int]:
-        """Append many messages, see `add_message`, of so many channels and sequence numbers; the publish time is the log time.
-
-        Yields
-        ------
-        int
-            Bytes of data that went into a chunk, after it was written if it is full.
-        """
+    def add_block(self, channels: Integers, sequences: Integers, block: EncodedBlock) -> None:
+        """Append many messages, see `add_message`, of so many channels and sequence numbers, published at log time."""
         lengths = np.empty(len(channels), np.int64)
         for rows in block.rows:
             lengths[rows.places] = rows.data.shape[1]
@@ -127,7 +121,6 @@ class McapWriter:
             end = int(ends[part][-1])
             self._chunk.add_block(channels[part], block.log_times[part], starts[part] - begin, records[begin:end])
             self._finish_full_chunk()
-            yield int(lengths[part].sum())
             first, begin = part.stop, end
 
     def flush(self) -> None:

@@ -6,7 +6,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError
@@ -90,9 +90,29 @@ class BagMetadata(BaseModel):
         return found
 
     @property
+    def file_names(self) -> list[str]:
+        """Names of the files, without the folders, of whatever system, before them."""
+        return [PureWindowsPath(name).name for name in self.relative_file_paths]
+
+    @property
     def notes(self) -> dict[str, str]:
         """What the writer noted, as texts."""
         return {key: str(value) for key, value in (self.custom_data or {}).items()}
+
+
+_UNPACKERS = {
+    ".zstd": "zstd -d", ".zst": "zstd -d", ".gz": "gzip -dk", ".bz2": "bzip2 -dk", ".xz": "xz -dk", ".lz4": "lz4 -d",
+    ".zip": "unzip", ".tar": "tar -xf", ".tgz": "tar -xf",
+}  # fmt: skip
+"""Programs that unpack a file, by the end of its name."""
+
+
+def refuse_packed(path: Path) -> None:
+    """Raise a BagError if the name of a file says that it is packed as a whole."""
+    if (unpacker := _UNPACKERS.get(path.suffix.lower())) is not None:
+        raise BagError(
+            f"{path}: packed as a whole. Unpack it in its folder: `{unpacker} {path.name}`, and read what comes out."
+        )
 
 
 def read_metadata(path: Path) -> BagMetadata:
@@ -112,11 +132,17 @@ def read_metadata(path: Path) -> BagMetadata:
     except ValidationError as error:
         faults = "; ".join(f"{'.'.join(map(str, fault['loc']))}: {fault['msg']}" for fault in error.errors())
         raise BagError(f"{path}: not rosbag2 metadata ({faults}). {remedy}") from error
-    if metadata.storage_identifier not in STORAGES.values():
+    if metadata.storage_identifier not in ("", *STORAGES.values()):
         raise BagError(
             f"{path}: storage_identifier = {metadata.storage_identifier!r}: only {' and '.join(STORAGES.values())} are read. "
             "Convert the bag with `ros2 bag convert` or `rosbags-convert`."
         )
+    if metadata.compression_mode.lower() == "file" and all(name.endswith(".zstd") for name in metadata.file_names):
+        for name in metadata.file_names:
+            if not (path.parent / name.removesuffix(".zstd")).exists():
+                refuse_packed(path.parent / name)
+        unpacked = [name.removesuffix(".zstd") for name in metadata.file_names]
+        metadata = metadata.model_copy(update={"relative_file_paths": unpacked, "compression_mode": ""})
     if metadata.compression_mode.lower() not in ("", "none"):
         raise BagError(
             f"{path}: compression_mode = {metadata.compression_mode!r}: only files with chunks compressed inside "

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from hashlib import sha256
@@ -16,13 +16,14 @@ from typing import Any
 
 from mcap.records import Schema
 from rosbags.interfaces.typing import Typesdict
-from rosbags.typesys import TypesysError, get_types_from_msg
+from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
 
 from ..errors import BagError
 from ..messages.type_store import jazzy
 from ..system.received_files import holds_file, sha256_of
-from .integrity import compare_counts
-from .metadata import FILE_NAME, STORAGES, BagMetadata, read_metadata
+from ..types import NANO
+from .integrity import as_bag_error, compare_counts
+from .metadata import FILE_NAME, STORAGES, BagMetadata, read_metadata, refuse_packed
 from .session_blocks import SessionBlocks
 from .session_file import CDR, SessionFile
 from .session_sheet import incompleteness, kept_origin
@@ -39,6 +40,8 @@ def stored_files(path: Path, storage: str = "") -> list[Path]:
     kinds = {suffix for suffix, kind in STORAGES.items() if kind.startswith(storage)}
     files = sorted(file for file in path.iterdir() if file.suffix in kinds)
     if not files:
+        for file in sorted(path.iterdir()):
+            refuse_packed(file)
         there = ", ".join(sorted(entry.name for entry in path.iterdir())[:8]) or "nothing"
         wanted = " or ".join(sorted(kinds, reverse=True))
         raise BagError(f"{path}: no {wanted} file and no {FILE_NAME} in it (there is: {there}). Give a rosbag2 directory.")
@@ -63,7 +66,7 @@ def sources(path: Path) -> tuple[list[Path], BagMetadata | None]:
     except BagError:
         if path.is_file():
             raise
-    named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else []
+    named = [path / name for name in metadata.file_names] if metadata else []
     there = [file for file in named if holds_file(file)]
     others = [] if there and not any(path.glob("*.mcap")) else stored_files(path, "mcap")
     return there + sorted(set(others) - set(there), key=_by_number), metadata
@@ -74,33 +77,49 @@ def _by_number(path: Path) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
-def check_encoding(file: SessionFile, topics: Container[str]) -> None:
-    """Refuse what is not CDR, or was written with another definition of a message than Jazzy's.
+def readable(file: SessionFile, asked: Mapping[str, str]) -> set[int]:
+    """Return the channels that hold CDR of the types `asked` for by topic; others of such a topic are passed over.
 
     Raises
     ------
     BagError
-        Names the file, the topic, what was found and what is read.
+        A topic is in another encoding alone, or a message is defined otherwise than in Jazzy.
     """
-    for channel in file.channels.values():
-        if channel.topic not in topics:
-            continue
-        place = f"{file.path}: topic {channel.topic}"
-        if channel.message_encoding != CDR:
-            raise BagError(f"{place}: message encoding {channel.message_encoding!r}: only cdr is read. Use ROS 2.")
-        for name, (_, fields) in _parsed(place, file.schemas[channel.schema_id]).items():
-            known = jazzy().fielddefs.get(name)
-            if known is not None and list(known[1]) != list(fields):
-                raise BagError(f"{place}: {name} is defined otherwise than in Jazzy. Convert the bag's messages.")
+    found: set[int] = set()
+    for topic, kind in asked.items():
+        typed = [each for each in file.channels.values() if each.topic == topic and file.type_of(each) == kind]
+        fitting = [each for each in typed if each.message_encoding == CDR]
+        place = f"{file.path}: topic {topic}"
+        if typed and not fitting:
+            raise BagError(f"{place}: message encoding {typed[0].message_encoding!r}: only cdr is read. Use ROS 2.")
+        for channel in fitting:
+            for name, (_, fields) in _parsed(place, file.schemas[channel.schema_id], kind).items():
+                known = jazzy().fielddefs.get(name)
+                if known is not None and list(known[1]) != list(fields):
+                    raise BagError(f"{place}: {name} is defined otherwise than in Jazzy. Convert the bag's messages.")
+        found.update(each.id for each in fitting)
+    return found
 
 
-def _parsed(place: str, schema: Schema) -> Typesdict:
-    """The types in a schema; none where the recorder did not know the definition and left it empty."""
-    if schema.encoding != "ros2msg":
-        raise BagError(f"{place}: schema encoding {schema.encoding!r}: only ros2msg is read. Record with ROS 2.")
+_PARSERS: dict[str, Callable[[str, str], Typesdict]] = {
+    "ros2msg": get_types_from_msg,
+    "ros2idl": lambda text, _: get_types_from_idl(text),
+}
+_SEPARATOR = re.compile(r"^={3,}[ \t]*$", re.MULTILINE)
+"""Line between definitions, which rosbags wants to have 80 characters."""
+
+
+def _parsed(place: str, schema: Schema, kind: str) -> Typesdict:
+    """Return the types in a schema; none where the recorder did not know the definition and left it empty."""
+    if not schema.data:
+        return {}
+    if schema.encoding not in _PARSERS:
+        encodings = " and ".join(_PARSERS)
+        raise BagError(f"{place}: schema encoding {schema.encoding!r}: only {encodings} are read. Record with ROS 2.")
+    text = re.sub(r"\r\n?", "\n", schema.data.decode("utf-8-sig", "replace"))
     try:
-        return get_types_from_msg(schema.data.decode(), schema.name) if schema.data else {}
-    except (TypesysError, UnicodeDecodeError) as error:
+        return _PARSERS[schema.encoding](_SEPARATOR.sub("=" * 80, text), kind)
+    except TypesysError as error:
         raise BagError(f"{place}: its definition cannot be parsed ({error}). Record the session again.") from error
 
 
@@ -110,7 +129,7 @@ RECOVERED = "recovered from"
 
 @dataclass(frozen=True, slots=True)
 class TopicInfo:
-    """One topic of a session: name, type (``package/msg/Name``) and number of messages."""
+    """One topic of a session: name, type (``package/msg/Name``, several joined by " and ") and number of messages."""
 
     name: str
     type: str
@@ -156,6 +175,21 @@ class Session:
         return next((topic for topic in self.topics if topic.name.lstrip("/") == name.lstrip("/")), None)
 
 
+def clocks_set_back(session: Session) -> list[str]:
+    """Return a sentence on every file in which the recorder's clock was set back."""
+    found = []
+    for file in session.files:
+        with as_bag_error(file.path):
+            clock = file.log_clock()
+        if clock.is_set_back:
+            times = f"{len(clock.places)} time{'s' if len(clock.places) > 1 else ''}, by {clock.total * NANO:.3f} s in all"
+            found.append(
+                f"{file.path.name}: log times step back {times}: the recorder's clock was set back. "
+                "Messages are read in the order of the file, as they came."
+            )
+    return found
+
+
 def files_sha256(session: Session) -> str:
     """SHA-256 over those of the files of a session, in their order."""
     return sha256(b"".join(bytes.fromhex(sha256_of(file.path)) for file in session.files)).hexdigest()
@@ -180,11 +214,11 @@ def scan(path: Path) -> Session:
 
 def _scan(path: Path, incomplete: str) -> Session:
     metadata = read_metadata(path / FILE_NAME) if holds_file(path / FILE_NAME) else None
-    named = [path / Path(name).name for name in metadata.relative_file_paths] if metadata else stored_files(path)
+    named = [path / name for name in metadata.file_names] if metadata else stored_files(path)
     files = tuple(summarise(file) for file in named)
     if metadata is not None:
         check_listed(path, named)
-    topics = _topics(path, files)
+    topics = _topics(files)
     notes = {key: value for file in files for key, value in file.notes.items()}
     if metadata is not None:
         compare_counts(path, FILE_NAME, metadata.counts, "files", {topic.name: topic.count for topic in topics})
@@ -247,28 +281,26 @@ def _one_by_one(blocks: SessionBlocks) -> Iterator[tuple[str, int, bytes, Any]]:
 def read_blocks(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE) -> SessionBlocks:
     """As `read`, many messages at a time, not decoded yet."""
     asked: dict[str, str] = {}
+    types: dict[str, str] = {}
     for name, type_name in wanted.items():
-        asked[check_topic(session, name, type_name).name] = name
-    for file in session.files:
-        check_encoding(file, asked)
-    return SessionBlocks(session.files, asked, window)
+        topic = check_topic(session, name, type_name).name
+        asked[topic], types[topic] = name, type_name
+    return SessionBlocks([(file, readable(file, types)) for file in session.files], asked, window)
 
 
-def _topics(path: Path, files: tuple[SessionFile, ...]) -> tuple[TopicInfo, ...]:
+_AND = " and "
+"""Between the types of one topic, where its messages have several."""
+
+
+def _topics(files: tuple[SessionFile, ...]) -> tuple[TopicInfo, ...]:
     """The topics of all files together."""
     counts: Counter[str] = Counter()
-    types: dict[str, str] = {}
+    types: dict[str, dict[str, None]] = {}
     for file in files:
         for channel in file.channels.values():
-            schema = file.schemas.get(channel.schema_id)
-            name = schema.name if schema else ""
-            if types.setdefault(channel.topic, name) != name:
-                raise BagError(
-                    f"{path}: topic {channel.topic} has two types, {types[channel.topic]} and {name}. "
-                    "Record it again with one of them, or split the bag with `ros2 bag convert`."
-                )
+            types.setdefault(channel.topic, {})[file.type_of(channel)] = None
             counts[channel.topic] += file.counts.get(channel.id, 0)
-    return tuple(TopicInfo(name, types[name], counts[name]) for name in sorted(types))
+    return tuple(TopicInfo(name, _AND.join(types[name]), counts[name]) for name in sorted(types))
 
 
 def check_topic(session: Session, name: str, type_name: str) -> TopicInfo:
@@ -278,8 +310,10 @@ def check_topic(session: Session, name: str, type_name: str) -> TopicInfo:
         names = [known.name for known in session.topics]
         near = get_close_matches("/" + name.lstrip("/"), names, n=1, cutoff=0.5)
         remedy = f"Did you mean {near[0]}?" if near else "Record it, or give its name in topics.yaml."
+        if (below := f"rt/{name.lstrip('/')}") in names:
+            remedy = f"Its names are those of DDS, not of ROS: give {below} as the topic's name in a mapping."
         raise BagError(f"{session.path}: no topic {name}; the session has {', '.join(names) or 'none'}. {remedy}")
-    if topic.type != type_name:
+    if type_name not in topic.type.split(_AND):
         raise BagError(f"{session.path}: topic {topic.name} has type {topic.type!r}, not {type_name}. Remap the topic.")
     if topic.count == 0:
         raise BagError(f"{session.path}: topic {topic.name} has no messages. Check that its publisher was running.")

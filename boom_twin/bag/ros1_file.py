@@ -19,7 +19,7 @@ from ..errors import BagError
 from ..messages.type_store import jazzy
 from ..system.received_files import open_received
 from .integrity import PARSE_ERRORS
-from .mcap_records import LARGEST
+from .mcap_records import MOST_HELD
 from .session_file import CDR, SessionFile, channel_of, schema_of
 
 ENCODING = "ros1"
@@ -102,16 +102,16 @@ def _compression(reader: Any) -> str:
 
 
 def _bz2(data: bytes) -> bytes:
-    return _within(BZ2Decompressor().decompress(data, LARGEST + 1))
+    return _within(BZ2Decompressor().decompress(data, MOST_HELD + 1))
 
 
 def _lz4(data: bytes) -> bytes:
-    return _within(LZ4FrameDecompressor().decompress(data, max_length=LARGEST + 1))
+    return _within(LZ4FrameDecompressor().decompress(data, max_length=MOST_HELD + 1))
 
 
 def _within(content: bytes) -> bytes:
-    if len(content) > LARGEST:
-        raise ReaderError(f"a chunk unpacks to more than {LARGEST} bytes, the most that is read")
+    if len(content) > MOST_HELD:
+        raise ReaderError(f"a chunk unpacks to more than {MOST_HELD} bytes, the most that is read")
     return content
 
 

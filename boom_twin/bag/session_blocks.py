@@ -14,6 +14,7 @@ from ..errors import BagError
 from ..messages.message_block import MessageBlock, by_log_time, joined
 from ..messages.type_store import decode, jazzy
 from .integrity import PARSE_ERRORS, REMEDY, as_bag_error
+from .log_clock import LogClock
 from .session_file import SessionFile
 from .time_window import WHOLE, TimeWindow
 
@@ -32,7 +33,8 @@ class SessionBlocks:
 
     Parameters
     ----------
-    files : sequence of SessionFile
+    files : sequence of (SessionFile, set of int)
+        With the channels that are read.
     asked : mapping of str to str
         As what each topic is asked for, by its name in the files.
     window : TimeWindow
@@ -50,23 +52,28 @@ class SessionBlocks:
         statistics say.
     """
 
-    def __init__(self, files: Sequence[SessionFile], asked: Mapping[str, str], window: TimeWindow) -> None:
+    def __init__(self, files: Sequence[tuple[SessionFile, set[int]]], asked: Mapping[str, str], window: TimeWindow) -> None:
         self.sources: list[Source] = []
         self._window = window
-        self._files = [(file, self._numbers(file, asked)) for file in files]
+        self._files = [(file, self._numbers(file, channels, asked)) for file, channels in files]
 
-    def _numbers(self, file: SessionFile, asked: Mapping[str, str]) -> dict[int, int]:
+    def _numbers(self, file: SessionFile, channels: set[int], asked: Mapping[str, str]) -> dict[int, int]:
         """Places in `sources` by channel; -1 for what was not asked for."""
         numbers = dict.fromkeys(file.channels, -1)
         for channel in file.channels.values():
-            if channel.topic in asked:
+            if channel.id in channels:
                 numbers[channel.id] = len(self.sources)
-                kind = file.schemas[channel.schema_id].name
-                self.sources.append(Source(file.path, channel.topic, asked[channel.topic], kind))
+                self.sources.append(Source(file.path, channel.topic, asked[channel.topic], file.type_of(channel)))
         return numbers
 
     def __iter__(self) -> Iterator[MessageBlock]:
-        blocks = _merged([_wanted(file, numbers) for file, numbers in self._files])
+        ahead, files = 0, []
+        for file, numbers in self._files:
+            with as_bag_error(file.path):
+                clock = file.log_clock()
+            files.append(_wanted(file, numbers, clock, ahead))
+            ahead += clock.total  # the clock stays where it was set to
+        blocks = _merged(files)
         return blocks if self._window == WHOLE else self._window.cut(blocks, self._files[0][0].path)
 
     def decoded(self, block: MessageBlock, row: int) -> Any:
@@ -79,25 +86,23 @@ class SessionBlocks:
             raise BagError(f"{place}: {error} {REMEDY}") from error
 
 
-def _wanted(file: SessionFile, numbers: Mapping[int, int]) -> Iterator[MessageBlock]:
-    """The messages of one file whose channels have a number of 0 or more, their source; all are counted."""
+def _wanted(file: SessionFile, numbers: Mapping[int, int], clock: LogClock, ahead: int) -> Iterator[MessageBlock]:
+    """The messages of one file whose channels have a number of 0 or more, their source; log times are later by `ahead` (ns)."""
     seen: Counter[int] = Counter()
+    passed = {channel for channel, number in numbers.items() if number < 0}
     with as_bag_error(file.path):
-        for block in file.blocks():
-            counts = np.bincount(block.sources)
-            channels = np.flatnonzero(counts).tolist()
-            seen.update({channel: int(counts[channel]) for channel in channels})
-            unknown = [channel for channel in channels if channel not in numbers]
-            end = int(np.isin(block.sources, unknown).argmax()) if unknown else len(block)
-            source_of = np.full(len(counts), -1)
-            source_of[channels] = [numbers.get(channel, -1) for channel in channels]
-            sources = source_of[block.sources]
-            rows = np.flatnonzero(sources[:end] >= 0)
-            if len(rows):
-                yield replace(block.chosen(rows), sources=sources[rows])
+        for block in file.blocks(passed, clock):
+            seen.update(block.sources.tolist())
+            unknown = ~np.isin(block.sources, list(numbers))
+            end = int(unknown.argmax()) if unknown.any() else len(block)
+            if end:
+                known = block.chosen(slice(0, end))
+                sources = np.array([numbers[channel] for channel in known.sources.tolist()])
+                yield replace(known, sources=sources, log_times=known.log_times + np.uint64(ahead))
             if end < len(block):
                 raise KeyError(int(block.sources[end]))
-        file.check_counts("statistics", file.counts, "read", seen)
+        told = {channel: count for channel, count in file.counts.items() if channel not in passed}
+        file.check_counts("statistics", told, "read", seen)
 
 
 def _merged(files: Sequence[Iterator[MessageBlock]]) -> Iterator[MessageBlock]:

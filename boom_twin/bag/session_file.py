@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -14,6 +14,7 @@ from mcap.records import Channel, Schema
 from ..messages.message_block import MessageBlock
 from ..messages.type_store import jazzy
 from .integrity import compare_counts
+from .log_clock import NEVER_SET_BACK, LogClock
 from .mcap_records import by_topic
 
 TOGETHER = 2000
@@ -53,6 +54,14 @@ class SessionFile(ABC):
         one, two = by_topic(counts, self.channels), by_topic(others, self.channels)
         compare_counts(self.path, source, one, other, two)
 
+    def type_of(self, channel: Channel) -> str:
+        """Return the type of a channel as ``package/msg/Name``, whose name may be in two parts or of DDS; "" without one."""
+        schema = self.schemas.get(channel.schema_id)
+        parts = schema.name.replace("::", "/").split("/") if schema else [""]
+        if parts[-2:-1] == ["dds_"]:
+            parts = [*parts[:-2], parts[-1].removesuffix("_")]
+        return "/".join([parts[0], "msg", parts[1]] if len(parts) == 2 else parts)
+
     @property
     @abstractmethod
     def storage(self) -> str:
@@ -66,14 +75,22 @@ class SessionFile(ABC):
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
         """Channel, log time (ns) and encoded data of all messages."""
 
-    def blocks(self) -> Iterator[MessageBlock]:
-        """All messages by log time, many at a time; their sources are their channels. Here `heads` must be in that order."""
-        found = self.heads()
+    def log_clock(self) -> LogClock:
+        """The clock of its recorder; here, of a storage that tells nothing but the order of log times."""
+        return NEVER_SET_BACK
+
+    def blocks(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
+        """All messages but of the `passed` channels in the order of the node, many at a time; their sources are channels.
+
+        That is by log time, or the order of the file where its `clock` was set back; log times are corrected for that.
+        Here `heads` must be in that order.
+        """
+        found = (each for each in self.heads() if each[0] not in passed)
         while group := list(islice(found, TOGETHER)):
-            channels, times, data = zip(*group, strict=True)
+            sources, times, data = zip(*group, strict=True)
             ends = np.cumsum([len(each) for each in data])
             starts = np.concatenate([[0], ends[:-1]])
-            yield MessageBlock(b"".join(data), np.array(channels), np.array(times, np.uint64), starts, ends)
+            yield MessageBlock(b"".join(data), np.array(sources), np.array(times, np.uint64), starts, ends)
 
 
 def schema_of(number: int, type_name: str, definition: str = "") -> Schema:

@@ -10,15 +10,21 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import numpy as np
+
 from ..errors import BagError
 from ..system.received_files import holds_file, open_received
-from .mcap_records import LARGEST
+from .log_clock import LogClock, Piece
+from .mcap_records import MOST_HELD
 from .session_file import SessionFile, channel_of, schema_of
 
 MAGIC = b"SQLite format 3\0"
 BESIDE = ("-wal", "-journal")
 """Ends of the names of files in which sqlite3 keeps what is not in the database yet."""
-_MESSAGES = "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
+_MESSAGES = "SELECT topic_id, timestamp, data, id FROM messages ORDER BY"
+_ARE_NUMBERS = "typeof(topic_id) = 'integer' AND typeof(timestamp) = 'integer'"
+_LOG_TIMES = f"SELECT id, topic_id, timestamp FROM messages WHERE {_ARE_NUMBERS} ORDER BY id"
+_AT_ONCE = 100_000  # log times
 _REMEDY = "The file is damaged or no rosbag2 storage: try `sqlite3 FILE .recover` on a copy, or another copy of the session."
 
 
@@ -44,12 +50,33 @@ class SqliteFile(SessionFile):
         return f"rosbag2_storage_sqlite3{f' ({self.distro})' if self.distro else ''}", "none"
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
-        """See `SessionFile`; by log time, of equal times in the order of the file."""
+        """See `SessionFile`; in the order of `blocks`.
+
+        No more bytes than the file has are read of it: columns with a default, or generated, can give any number.
+        """
+        left, clock, newest = self.path.stat().st_size, self.log_clock(), 0
         with _database(self.path) as database:
-            for channel, time, data in database.execute(_MESSAGES):
+            for channel, time, data, place in database.execute(f"{_MESSAGES} {'id' if clock.is_set_back else 'timestamp, id'}"):
                 if channel not in self.channels or not isinstance(data, bytes) or not isinstance(time, int) or time < 0:
                     raise BagError(f"{self.path}: a message of topic {channel!r} at {time!r} ns is none. {_REMEDY}")
-                yield channel, time, data
+                left -= len(data)
+                if left < 0:
+                    raise BagError(
+                        f"{self.path}: its messages have more bytes than the file, so are not stored in it. {_REMEDY}"
+                    )
+                newest = max(newest, int(clock.times(np.array([time], np.uint64), np.array([place]))[0]))
+                yield channel, newest, data
+
+    def log_clock(self) -> LogClock:
+        """See `SessionFile`."""
+        return LogClock.of(self._log_times)
+
+    def _log_times(self) -> Iterator[Piece]:
+        with _database(self.path) as database:
+            found = database.execute(_LOG_TIMES)
+            while rows := found.fetchmany(_AT_ONCE):
+                places, channels, times = np.array(rows, np.int64).T
+                yield places, channels, times.astype(np.uint64)
 
 
 def summarise(path: Path) -> SqliteFile:
@@ -118,7 +145,7 @@ def _database(path: Path) -> Iterator[sqlite3.Connection]:
                 )
         address = f"file:{quote(str(path.absolute()))}?mode=ro&immutable=1"  # immutable: no lock, no file beside it
         with closing(sqlite3.connect(address, uri=True)) as database:
-            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
+            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(path.stat().st_size, MOST_HELD))
             database.execute("PRAGMA trusted_schema = OFF")
             yield database
     except OSError as error:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from . import csv_file, mcap_summary, ros1_file, sqlite_file
-from .metadata import STORAGES
+from .metadata import STORAGES, refuse_packed
 from .session_file import SessionFile
 
 SUMMARISE: dict[str, Callable[[Path], SessionFile]] = {
@@ -26,6 +26,7 @@ def summarise(path: Path) -> SessionFile:
     BagError
         It is not there, of another kind, cut off or damaged.
     """
+    refuse_packed(path)
     return SUMMARISE.get(path.suffix.lower(), SUMMARISE[".mcap"])(path)
 
 

@@ -22,7 +22,7 @@ from ..messages.type_store import jazzy
 from ..system.result_folder import UNFINISHED
 from ..twin.blocks import Integers
 from . import metadata as bagmeta
-from .mcap_records import BYTES_PER_BYTE, LARGEST
+from .mcap_records import MOST_HELD
 from .mcap_summary import NOTES, PROFILE
 from .mcap_writer import McapWriter
 from .metadata import Recorded, file_information, metadata_of
@@ -50,10 +50,8 @@ CHUNK_SIZE = 64 * 1024
 RESULT_CHUNK_SIZE = 512 * 1024
 """The same of results, which nobody waits for: about a second of all outputs at 200 Hz. Fewer chunks make less of an index."""
 LIBRARY = "boom_twin"
-LARGEST_MESSAGE = LARGEST - 2**20
+LARGEST_MESSAGE = MOST_HELD - 2**20
 """Bytes of a message that can be read again: a chunk holds its topic and type too."""
-PACKED = BYTES_PER_BYTE // 10
-"""Bytes that a byte of the file may stand for. Readers count the packed bytes alone: at least a tenth of what a chunk adds."""
 
 
 METADATA_PAUSE = 10.0
@@ -104,7 +102,6 @@ class BagWriter:
         self._due = 0.0  # when metadata.yaml is written again at a split, s of `time.monotonic`
         self._completed = 0  # bytes of all files but the open one
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
-        self._pending = self._end = self._excess = 0  # of the open file: see `_add_excess`
         claim_directory(directory)
         self._open()
 
@@ -126,14 +123,7 @@ class BagWriter:
         return list(range(first, len(self.topics)))
 
     def write(self, key: int, log_time: int, data: bytes, publish_time: int | None = None, sequence: int = 0) -> None:
-        """Append one encoded message of at most `LARGEST_MESSAGE`; times in ns, the publish time by default the log time.
-
-        Where so much has packed so well (blank pictures) that this file could not be read with more of it, the next
-        one begins, and nothing is packed any more.
-        """
-        if not self._has_room(len(data)):
-            self._compression = CompressionType.NONE
-            self.split()
+        """Append one encoded message of at most `LARGEST_MESSAGE`; times in ns, the publish time by default the log time."""
         self.counts[key] += 1
         self._extend_span(log_time, log_time, 1)
         published = log_time if publish_time is None else publish_time
@@ -141,15 +131,10 @@ class BagWriter:
             self._writer.add_message(self._channels[key], log_time, data, published, sequence)
         except OSError as error:
             raise self.fault(error) from error
-        self._add_excess(len(data))
 
     def write_block(self, keys: Integers, block: EncodedBlock) -> None:
         """Append many messages to the topics with these keys, numbered; the same bytes as by `write` of each of them."""
         if not len(keys):
-            return
-        if not self._has_room(sum(rows.data.size for rows in block.rows)):
-            for key, log_time, data in zip(keys.tolist(), block.log_times.tolist(), block.data(), strict=True):
-                self.write(key, log_time, data, sequence=self.counts[key] + 1)
             return
         sequences = np.empty_like(keys)
         for key in set(keys.tolist()):
@@ -158,24 +143,12 @@ class BagWriter:
             self.counts[key] += len(own)
         self._extend_span(int(block.log_times.min()), int(block.log_times.max()), len(keys))
         with self._as_bag_error():
-            for size in self._writer.add_block(np.array(self._channels)[keys], sequences, block):
-                self._add_excess(size)
-
-    def _has_room(self, size: int) -> bool:
-        """Whether the open file can be read with so many bytes more, however well they pack."""
-        return self._compression == CompressionType.NONE or self._excess + self._pending + size <= LARGEST_MESSAGE
+            self._writer.add_block(np.array(self._channels)[keys], sequences, block)
 
     def _extend_span(self, start: int, end: int, count: int) -> None:
         """So many messages more, between these log times (ns)."""
         first, last, before = self._span or (start, end, 0)
         self._span = min(first, start), max(last, end), before + count
-
-    def _add_excess(self, size: int) -> None:
-        """Add up what chunks unpack to beyond `PACKED`: the reserve that a reader has for that is one for the whole file."""
-        self._pending += size
-        if (end := self._buffered.tell()) > self._end:
-            self._excess += max(0, self._pending - PACKED * (end - self._end))
-            self._pending, self._end = 0, end
 
     def flush(self) -> int:
         """Give all messages so far to the system, so that they survive the process; gives the descriptor of the open file.
@@ -234,7 +207,6 @@ class BagWriter:
             if self._notes:
                 self._writer.add_metadata(NOTES, self._notes)
             self._channels, self._schemas, self._span = [], {}, None
-            self._pending, self._end, self._excess = 0, self._buffered.tell(), 0
             self._register(self.topics)
 
     def _register(self, topics: list[Recorded]) -> None:

@@ -14,7 +14,9 @@ from typing import Any
 from .. import __version__
 from ..errors import BagError
 from ..system.atomic_files import DRAFT, write_atomic
+from ..system.received_files import real_path
 from ..system.result_folder import check_lasting
+from ..system.terminal_text import printable
 from .session_task import OK, Row
 
 MARK, TABLE, PAGE = "batch.json", "sessions.parquet", "batch.html"
@@ -42,7 +44,7 @@ def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
         `out` holds anything else, another batch works in it, or it cannot be written.
     """
     check_lasting(out)
-    place = out.resolve()
+    place = real_path(out)
     for session in sessions:
         path = Path(os.path.realpath(session))
         if path == place or place in path.parents or path in place.parents:
@@ -141,6 +143,7 @@ def write_table(path: Path, rows: Sequence[Row]) -> None:
         "alarms": pa.list_(alarm),
         "events": pa.list_(pa.struct([("event", pa.string()), ("count", pa.int64())])),
     }
+    rows = [{name: printable(value) if isinstance(value, str) else value for name, value in row.items()} for row in rows]
     figures = sorted({name for row in rows for name in row} - types.keys())
     words = {name for row in rows for name, value in row.items() if isinstance(value, str)}
     types |= {name: pa.string() if name in words else pa.float64() for name in figures}

@@ -107,7 +107,7 @@ def baseline_of(
     progress(0.0, "reading")
     mapped = common_mapping(paths, Path(mapping) if mapping else None, joints)
     refuse_lengths(paths, mapped)
-    topics = mapped.topics
+    topics = mapped.topics.of_joints(joint.range_deg for joint in scene.joints)
     sessions = read_sessions(paths, topics, joints, window)
     mounts = topics.mounts(joints)
     names = [f"{session.name} {session.digest}" for session in sessions]

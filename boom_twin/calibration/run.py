@@ -144,7 +144,7 @@ def calibrate(
     paths, joints = [Path(bag) for bag in bags], len(scene.joints)
     mapped = common_mapping(paths, Path(mapping) if mapping else None, joints)
     refuse_lengths(paths, mapped)
-    sessions = read_sessions(paths, mapped.topics, joints, window)
+    sessions = read_sessions(paths, mapped.topics.of_joints(joint.range_deg for joint in scene.joints), joints, window)
     streams = (Stream.STROKES, *_compared(sessions))
     names = choice.names or usual_names(scene, streams, choice.load, choice.damping, choice.stiffness, choice.zeros)
     unknowns = unknowns_of(scene, names)

@@ -246,11 +246,14 @@ def tell(oddities: Iterable[Fault], source: str | None) -> None:
 
 
 def warn_incomplete(session: Session) -> None:
-    """Say on stderr if a session is not whole, or what its recorder did not get."""
+    """Say on stderr if a session is not whole, its recorder's clock was set back, or what that did not get."""
+    from ..bag.reader import clocks_set_back
     from ..bag.session_sheet import missed_messages
 
     if session.incomplete:
         print(f"warning: {session.path}: {session.incomplete}", file=sys.stderr)
+    for told in clocks_set_back(session):
+        print(f"warning: {told}", file=sys.stderr)
     if missed := missed_messages(session.path):
         told = ", ".join(f"{count} of {topic}" for topic, count in missed.items()) + "; a node that got them told otherwise"
         print(f"warning: {session.path}: never reached the recorder: {told}", file=sys.stderr)

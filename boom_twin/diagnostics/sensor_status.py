@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isnan
 
@@ -84,7 +84,11 @@ SLACK = 5.0
 
 
 def sensors_of(
-    scene: Scene, settings: Settings, required: Mapping[Stream, bool], mounts: Sequence[Mount | None]
+    scene: Scene,
+    settings: Settings,
+    required: Mapping[Stream, bool],
+    mounts: Sequence[Mount | None],
+    absent: Collection[str] = (),
 ) -> dict[Stream, list[SensorSpec]]:
     """The sensors of every stream, in the order of a sample's values.
 
@@ -98,6 +102,8 @@ def sensors_of(
         Whether the twin needs the stream.
     mounts : sequence of Mount or None
         Of the sensor of each joint; an inclinometer (not None) has no range of its own.
+    absent : collection of str
+        Channels without a sensor.
     """
     found = {}
     ranges = sensor_ranges(scene, mounts)
@@ -105,6 +111,8 @@ def sensors_of(
         sigma, resolution = settings.noise(kind)
         unit, over = kind.unit_suffix, SLACK * sigma
         bounds = zip(kind.channels(len(scene.joints)), *(bound.tolist() for bound in ranges[stream]), strict=True)
-        about = sigma, resolution, required[stream]
-        found[stream] = [SensorSpec(name, unit, low - over, high + over, *about) for name, low, high in bounds]
+        found[stream] = [
+            SensorSpec(name, unit, low - over, high + over, sigma, resolution, required[stream] and name not in absent)
+            for name, low, high in bounds
+        ]
     return found

@@ -19,6 +19,7 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.even_times import BREAK
 from ..types import NANO, Array
 
 BIN = 0.05  # s
@@ -29,7 +30,6 @@ LOWEST, HIGHEST = 4.0, 3.0  # cycles in a window; Hz
 STANDS_OUT = 25.0  # power of a peak over that of its neighbourhood
 LOBE = 4  # unpadded lines to each side that belong to a peak
 PADDED = 8  # times as long with zeros
-BREAK = 1.0  # s without an estimate, or back in time, at which a window ends
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import partial
 
@@ -63,6 +63,8 @@ class HealthMonitor:
         What is known of this rig while all is well.
     on_block : callable, optional
         Is told every linear problem.
+    absent : collection of str
+        Channels without a sensor, see `boom_twin.Twin`.
     """
 
     def __init__(
@@ -72,6 +74,7 @@ class HealthMonitor:
         mounts: tuple[Mount | None, ...],
         baseline: Baseline,
         on_block: Callable[[BlockProblem], object] | None = None,
+        absent: Collection[str] = (),
     ) -> None:
         self._settings, self._channels = settings, channels_of(len(scene.joints))
         self.names = judged_channels(len(scene.joints))
@@ -80,7 +83,7 @@ class HealthMonitor:
         self._uncertain = UNCERTAIN * settings.stroke_variance
         self._stated = {stream: settings.variance(kind) for stream, kind in SENSORS.items()}
         self._sensors = {
-            stream: SensorMonitor(names, SENSORS[stream], stream is not Stream.STROKES)
+            stream: SensorMonitor(names, SENSORS[stream], stream is not Stream.STROKES, absent)
             for stream, names in self._channels.items()
         }
         self._delays = {stream: DelayMonitor(stream, least) for stream, least in DELAYED.items()}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..kernels.jit import SameTypes, hold
 from ..scene.schema import Scene
-from ..types import Array, Mount, Stream, channels_of
+from ..types import GIVE, Array, Mount, Stream, channels_of
 from .sensor_findings import NOISY as IS_NOISY
 from .sensor_findings import OUTSIDE, SILENT, SPIKE, SPIKES, STUCK, find
 from .sensor_survey import FIRST, LASTING, NOISE, ROOM, CheckWork, survey
@@ -50,8 +50,6 @@ def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> f
 
 Flags = NDArray[np.bool_]
 
-GIVE = math.radians(5.0)
-"""What an encoder may read beyond ``range_deg``, which is of the rigid boom: at its end a joint sags and swings on."""
 NOISY, NOISY_WINDOW = 2.5, 1.0  # times the noise that is usual in its stream; time (s) over which it is taken
 JERK = 3.0  # m/s^3 of a cylinder in haste, which is no noise of its sensor: 0.2 m in 1.6 s
 USUAL_WINDOW = 10.0  # s over which the noise that is usual is told

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -58,6 +58,8 @@ class SensorMonitor:
         Says which findings give an alarm.
     is_predicted : bool
         Whether a model says what the sensors should read.
+    absent : collection of str
+        Channels without a sensor, of which nothing is found.
 
     Attributes
     ----------
@@ -65,8 +67,11 @@ class SensorMonitor:
         Channels that are not to be trusted; another array once these are others.
     """
 
-    def __init__(self, names: tuple[str, ...], kind: SensorKind, is_predicted: bool = True) -> None:
+    def __init__(
+        self, names: tuple[str, ...], kind: SensorKind, is_predicted: bool = True, absent: Collection[str] = ()
+    ) -> None:
         self._names, self._sensors, self._is_predicted = names, kind, is_predicted
+        self._there = np.array([name not in absent for name in names])
         self._faults: dict[tuple[int, str], _Fault] = {}
         self._none: Flags = np.zeros(len(names), dtype=bool)
         self.masked, self._is_anew = self._none, False
@@ -115,11 +120,12 @@ class SensorMonitor:
         for kind, flags in findings.by_kind().items():
             if kind not in self._sensors.alarms or not flags.any():
                 continue
-            for channel in np.flatnonzero(flags).tolist():
+            for channel in np.flatnonzero(flags & self._there).tolist():
                 if kind == "jump" and (self._is_wild(channel) or self._comes_back(channel, findings, blamed)):
                     continue
                 jump = (float(findings.jumped[channel]), float(findings.level[channel])) if kind == "jump" else None
-                news += self._seen(channel, kind, start, end, jump)
+                told = self._offset(float(findings.level[channel])) if kind == "range" else ""
+                news += self._seen(channel, kind, start, end, jump, told)
         for key, fault in list(self._faults.items()):
             off = abs(float(newest[key[0]])) if newest is not None and self._is_predicted else math.inf
             if key[1] == "jump" and not off < abs(fault.before) + CAME_BACK * abs(fault.offset):
@@ -153,7 +159,14 @@ class SensorMonitor:
         off = float(findings.level[channel]) if self._is_predicted else blamed[cause] + jump
         return abs(off) < CAME_BACK * abs(jump)
 
-    def _seen(self, channel: int, kind: str, start: int, end: int, jump: tuple[float, float] | None) -> list[Alarm]:
+    def _offset(self, off: float) -> str:
+        """Return by how much a reading is off the model, in words; empty where no model says what it should read."""
+        if not (self._is_predicted and math.isfinite(off)):
+            return ""
+        turned = f"{math.degrees(off):+.4g} deg, " if self._sensors.unit == "rad" else ""
+        return f": an offset of {turned}{off:+.4g} {self._sensors.unit}; if it stays, give the sensor's zero in the mapping"
+
+    def _seen(self, channel: int, kind: str, start: int, end: int, jump: tuple[float, float] | None, more: str) -> list[Alarm]:
         """Begin, keep or end a fault that was found again; of a jump its step, and how far the reading is off after it."""
         key = (channel, kind)
         fault = self._faults.get(key)
@@ -166,6 +179,6 @@ class SensorMonitor:
             fault.seen = end
             return []
         name = self._names[channel]
-        told = f"{name}.sensor {TOLD[kind]}" + (f": {size:+.3g} {self._sensors.unit}" if size else "")
+        told = f"{name}.sensor {TOLD[kind]}" + (f": {size:+.3g} {self._sensors.unit}" if size else more)
         self._faults[key] = _Fault(Alarm(name, kind, start, None, f"{name}.sensor", told), end, size, level - size)
         return [self._faults[key].alarm]

@@ -10,14 +10,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-import numpy as np
 from mcap.records import Schema
-from numpy.typing import NDArray
 
-from ..types import SECOND, Array, Stream
-from .message_block import Integers, MessageBlock
+from ..types import SECOND, Stream
 from .topic_table import TYPES
-from .type_store import decode
+from .type_store import decode, text_in
 
 _ORIGIN = 4  # bytes of encapsulation, from after which CDR aligns
 _ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
@@ -69,7 +66,7 @@ def _string(data: bytes, place: int, length: struct.Struct) -> tuple[str, int]:
     end = place + 4 + size
     if end > len(data):
         raise ValueError("a string ends after the message")
-    return data[place + 4 : max(place + 4, end - 1)].decode(), end
+    return text_in(data[place + 4 : max(place + 4, end - 1)]), end
 
 
 _LITTLE = b"\x00\x01"
@@ -97,6 +94,7 @@ class Vector(NamedTuple):
 class Force(NamedTuple):
     """What is read of a sensor_msgs/Imu."""
 
+    frame: str
     linear_acceleration: Vector
     linear_acceleration_covariance: tuple[float]
 
@@ -107,8 +105,6 @@ class Layout(NamedTuple):
     size: int
     head: bytes
     end: int
-    at: int
-    numbers: struct.Struct
     stamped: struct.Struct
     later: tuple[tuple[int, bytes], ...]
     make: Callable[[tuple[float, ...]], Joints | Force]
@@ -119,32 +115,14 @@ class Layout(NamedTuple):
             return False
         return not self.later or all(data[at : at + len(part)] == part for at, part in self.later)
 
-    def read(self, data: bytes) -> Joints | Force:
-        """The message in `data`, which is laid out like this."""
-        return self.make(self.numbers.unpack_from(data, self.at))
-
     def read_stamped(self, data: bytes) -> tuple[int, Joints | Force]:
         """Its stamp (ns) and the message."""
         seconds, nanoseconds, *_ = found = self.stamped.unpack_from(data, _ORIGIN)
         return seconds * SECOND + nanoseconds, self.make(found[2:])
 
-    def are_of(self, block: MessageBlock, rows: Integers) -> NDArray[np.bool_]:
-        """Whether each of some messages of a block is laid out like this, shape (rows,)."""
-        alike = block.ends[rows] - block.starts[rows] == self.size
-        rows = rows[alike]
-        parts = [(0, _LITTLE), (_ORIGIN + _TIME, self.head), *self.later]
-        fits = [(block.cut(rows, at, len(part)) == np.frombuffer(part, np.uint8)).all(axis=1) for at, part in parts]
-        alike[alike] = np.logical_and.reduce(fits)
-        return np.asarray(alike)
 
-    def stamps_in(self, block: MessageBlock, rows: Integers) -> Integers:
-        """``header.stamp`` of messages that are laid out like this, ns, shape (rows,)."""
-        stamps = block.cut(rows, _ORIGIN, _TIME).view([("sec", "<i4"), ("nanosec", "<u4")])[:, 0]
-        return np.asarray(stamps["sec"].astype(np.int64) * SECOND + stamps["nanosec"])
-
-    def numbers_in(self, block: MessageBlock, rows: Integers) -> Array:
-        """The numbers of messages that are laid out like this, shape (rows, numbers)."""
-        return block.cut(rows, self.at, self.numbers.size).view("<f8")
+MOST_LAYOUTS = 8
+"""Layouts of one topic that are remembered: a bus may send every joint in a message of its own."""
 
 
 class CdrDecoder:
@@ -162,7 +140,7 @@ class CdrDecoder:
 
     def __init__(self, type_name: str, decode: Callable[[bytes, str], Any] = decode, field: str = _POSITION) -> None:
         self._type, self._decode, self._field = type_name, decode, field
-        self._layout: Layout | None = None
+        self._layouts: list[Layout] = []
 
     def read(self, data: bytes) -> tuple[int, Any]:
         """Stamp (ns) and message, which has the fields that `boom_twin.messages.sample_decoder.SampleDecoder` reads.
@@ -172,11 +150,12 @@ class CdrDecoder:
         ValueError, or what `decode` raises
             The message is not whole.
         """
-        layout = self._layout
-        if layout is not None and layout.is_of(data):
-            return layout.read_stamped(data)
+        for layout in self._layouts:
+            if layout.is_of(data):
+                return layout.read_stamped(data)
         msg = self._decode(data, self._type)
-        self._layout = layout_of(data, self._type, self._field)
+        if (new := layout_of(data, self._type, self._field)) is not None:
+            self._layouts = [new, *self._layouts[: MOST_LAYOUTS - 1]]
         stamp = stamp_in(data)
         if stamp is None:
             raise ValueError("the message is too short for a header")
@@ -208,15 +187,15 @@ def _joints_layout(data: bytes, field: str) -> Layout:
         place = at + 8 * count
     at, numbers = found[field]
     head, make = data[_ORIGIN + _TIME : end], partial(Joints, names) if field == _POSITION else partial(Joints, names, ())
-    return Layout(len(data), head, end, at, numbers, _stamped(at, numbers), tuple(lengths[1:]), make)
+    return Layout(len(data), head, end, _stamped(at, numbers), tuple(lengths[1:]), make)
 
 
 def _force_layout(data: bytes) -> Layout:
     """Of an Imu: after the header all has its place."""
     end = _ORIGIN + _TIME + 4 + int.from_bytes(data[_ORIGIN + _TIME : _ORIGIN + _TIME + 4], "little")
     at = end + -(end - _ORIGIN) % 8 + 8 * _BEFORE_FORCE
-    numbers = struct.Struct("<4d")
-    return Layout(len(data), data[_ORIGIN + _TIME : end], end, at, numbers, _stamped(at, numbers), (), _force)
+    numbers, frame = struct.Struct("<4d"), _string(data, _ORIGIN + _TIME, _LENGTHS["<"])[0]
+    return Layout(len(data), data[_ORIGIN + _TIME : end], end, _stamped(at, numbers), (), partial(_force, frame))
 
 
 def _stamped(at: int, numbers: struct.Struct) -> struct.Struct:
@@ -224,6 +203,6 @@ def _stamped(at: int, numbers: struct.Struct) -> struct.Struct:
     return struct.Struct(f"<iI{at - _ORIGIN - _TIME}x{numbers.format.removeprefix('<')}")
 
 
-def _force(row: tuple[float, ...]) -> Force:
+def _force(frame: str, row: tuple[float, ...]) -> Force:
     x, y, z, covariance = row
-    return Force(Vector(x, y, z), (covariance,))
+    return Force(frame, Vector(x, y, z), (covariance,))

@@ -73,7 +73,9 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
     usual_values = default_document()
     values = _merged(usual_values, document or {})
     faults = _role_faults(values, usual_values)
-    sensors, names, found = _sensors(values.pop("sensors", None) or {})
+    sensors = values.pop("sensors", None) or {}
+    absent = frozenset(channel for channel, given in sensors.items() if given == "none") if isinstance(sensors, dict) else ()
+    sensors, names, found = _sensors(sensors)
     faults += found
     topics: Topics | None = None
     try:
@@ -86,7 +88,7 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
     if faults or topics is None:
         count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
         raise UsageError("\n".join([f"{source}: {count}", *(f"  {fault}" for fault in faults)]))
-    return topics.model_copy(update={"sensors": sensors})
+    return topics.model_copy(update={"sensors": sensors, "absent": absent})
 
 
 def _merged(base: Any, own: Any) -> Any:
@@ -123,6 +125,13 @@ def _sensors(values: Any) -> tuple[dict[str, Sensor], dict[str, str], list[Fault
     for channel, given in values.items():
         if stream_of(str(channel)) is None:
             faults.append(Fault(f"sensors.{channel}", given, f"channels are {_known_channels()}", "Name one of them."))
+            continue
+        if given == "none":
+            names[channel] = usual(channel)["name"]
+            if stream_of(channel) is Stream.STROKES:
+                faults.append(
+                    Fault(f"sensors.{channel}", given, "every cylinder's stroke drives the model", "Name its sensor.")
+                )
             continue
         merged = _merged(usual(channel), given or {})
         if isinstance(merged, dict):

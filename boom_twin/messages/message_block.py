@@ -44,10 +44,6 @@ class MessageBlock:
         """One encoded message."""
         return self.content[self.starts[row] : self.ends[row]]
 
-    def cut(self, rows: Integers, place: int, size: int) -> NDArray[np.uint8]:
-        """So many bytes of each of `rows` from a place in the message on, where all of them have them; shape (rows, size)."""
-        return gather(self.content, self.starts[rows] + place, size)
-
 
 def gather(content: bytes, places: Integers, size: int) -> NDArray[np.uint8]:
     """So many bytes from each of some places on, which has them; shape (places, size)."""

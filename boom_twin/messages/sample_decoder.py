@@ -6,14 +6,16 @@ Reads attributes only, so that messages of rclpy and of rosbags give the same nu
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from math import inf, isnan, nan
+from collections.abc import Iterable, Sequence
+from math import inf, isnan, nan, tau
 from typing import Any
 
 import numpy as np
 
 from ..types import LIMIT, SECOND, SENSORS, Array, Sample, Stream
-from .topic_table import AXES, Topics, factor, load_topics
+from .cdr_decoder import Force
+from .sample_assembler import Reading, SampleAssembler
+from .topic_table import Topics, factor, load_topics
 
 LATEST = 2**31 * SECOND
 """Stamps (ns) from here on have no place in a message."""
@@ -30,8 +32,19 @@ _ABSENT = float("nan")
 
 def stamp_of(msg: Any) -> int:
     """``header.stamp`` of a message in nanoseconds."""
-    stamp = msg.header.stamp
-    return int(stamp.sec) * SECOND + int(stamp.nanosec)
+    return int(msg.header.stamp.sec) * SECOND + int(msg.header.stamp.nanosec)
+
+
+def in_range(values: Array, middle: Array, half: Array) -> Array:
+    """Return readings less the turn by which they are farther than `half` from `middle`, if that brings them there.
+
+    More than one turn is none of an encoder's: an angle in degrees looks like it.
+    """
+    outside = np.abs(values - middle) > half
+    if not outside.any():
+        return values
+    turned = values - tau * np.sign(values - middle)
+    return np.where(outside & (np.abs(turned - middle) <= half), turned, values)
 
 
 class _Channels:
@@ -39,25 +52,28 @@ class _Channels:
 
     def __init__(self, topics: Topics, stream: Stream, joints: int) -> None:
         sensors = topics.sensors_of(stream, joints)
-        self.names = [sensor.name for sensor in sensors.values()]
+        self.wanted = np.array([channel not in topics.absent for channel in sensors])
+        self.names = [sensor.name if wanted else "" for sensor, wanted in zip(sensors.values(), self.wanted, strict=True)]
         self.scales = [(sensor.zero, factor(channel, sensor)) for channel, sensor in sensors.items()]
         self.is_plain = all(scale == (0.0, 1.0) for scale in self.scales)  # readings are quantities
-        self.usual: tuple[Sequence[str], int, list[int]] = (
-            (),
-            -1,
-            [],
-        )  # names, readings and places of a message without oddities
-        self._topics, self._stream = topics, stream
-        self._seen: Sequence[str] = ()
+        self.range = np.tile([[0.0], [inf]], len(self.names))  # middle and half of an encoder's range, see `in_range`
+        if stream is Stream.ANGLES:
+            for i, (mount, (low, high)) in enumerate(zip(topics.mounts(joints), topics.ranges, strict=False)):
+                if mount is None:
+                    self.range[:, i] = 0.5 * (low + high), 0.5 * (high - low)
+        self.usual: tuple[Any, int, list[int]] = (), -1, []  # names, readings and places of a message without oddities
+        self._topics, self._stream, self._seen = topics, stream, list[str]()
         self._places = [-1] * len(self.names)
         self.beyond: list[str] = []  # names of the newest message, see `Topics.beyond`
+        self.twice: set[str] = set()  # names that it has more than once
 
     def places(self, names: Sequence[str]) -> list[int]:
-        """Where the channels stand among `names`, the first of equal ones; -1 for those that are not there."""
-        if names != self._seen:
-            self._seen, first = names[:], {name: place for place, name in reversed(list(enumerate(names)))}
-            self._places = [first.get(name, -1) for name in self.names]
-            self.beyond = self._topics.beyond(self._stream, len(self.names), first)
+        """Return where the channels stand among `names`; -1 for those that are not there, or more than once."""
+        if list(names) != self._seen:
+            self._seen, counts = list(names), Counter(names)
+            self.twice = {name for name in self.names if name and counts[name] > 1}
+            self._places = [names.index(name) if name and counts[name] == 1 else -1 for name in self.names]
+            self.beyond = self._topics.beyond(self._stream, len(self.names), counts)
         return self._places
 
     def quantities(self, readings: list[float]) -> list[float]:
@@ -68,7 +84,10 @@ class _Channels:
 
 ODDITIES = {
     "unequal arrays": "position (of forces effort) shorter or longer than name; the values that have a name are used",
-    "missing names": "some of the scene's cylinders or joints are not in the message; the others are used",
+    "missing names": "some of the scene's cylinders or joints are in no message of a cycle; the others are used",
+    "names apart": "cylinders or joints in messages of their own; those of a cycle are one sample, by the stamp of the first",
+    "name twice": "a cylinder or joint is there twice in a message; neither value is used: take one out at its source",
+    "two sources": "messages of one topic contradict each other at equal stamps or in their frame_id; none is used: end one",
     "unknown names only": "none of the scene's cylinders or joints is in the message, which is left out",
     "names of another boom": "cylinders or joints that the scene does not have; the message is left out",
     "too many names": f"more than {LONGEST} in a message, which is left out",
@@ -76,7 +95,7 @@ ODDITIES = {
     "absurd magnitude": f"above {LIMIT:g} in a message; that value is left out",
     "no measurement": "an Imu says by linear_acceleration_covariance[0] = -1 that it has none (REP-145); it is left out",
     "no usable value": "nothing of a message could be used",
-    "no stamp": "zero, which a driver leaves that does not set header.stamp; the message is left out",
+    "no stamp": "header.stamp is 0; the message is left out: let its driver set header.stamp to the time of the reading",
     "impossible stamp": "before 1970, or more seconds than a message can hold; the message is left out",
 }
 """What may be odd about a message. That a message of a topic that strokes and angles share has only one kind of them is not."""
@@ -102,6 +121,10 @@ class SampleDecoder:
         Names that the newest messages lacked, and those that they had and the scene does not, where there are both.
     delays : dict of Stream to int
         By how much stamps of messages are later than those of their samples, ns.
+    refused : int
+        Messages of which nothing could be used; one without any names and values is not counted.
+    assembler : SampleAssembler
+        Makes samples of what the messages hold.
     """
 
     def __init__(self, joints: int, topics: Topics | None = None) -> None:
@@ -110,17 +133,24 @@ class SampleDecoder:
         pair = {Stream.STROKES: Stream.ANGLES, Stream.ANGLES: Stream.STROKES}
         self._sharing = pair if topics.is_shared else {}
         self.delays = {stream: topics.delay(stream) for stream in Stream}
+        self.refused = 0
         self._by_axis = {stream for stream, kind in SENSORS.items() if kind.is_imu}
         self.oddities: Counter[str] = Counter()
+        self.assembler = SampleAssembler({s: each.wanted for s, each in self._channels.items()}, self.oddities)
         self.other_boom_names: dict[Stream, list[str]] = {}
         self.strange_names: dict[Stream, tuple[list[str], list[str]]] = {}
 
-    def samples(self, streams: Iterable[Stream], stamp_ns: int, msg: Any) -> Iterator[Sample]:
-        """Those that `msg` holds of `streams`, the roles of the topic that it came by; see `put`."""
-        return (sample for stream in streams if (sample := self.put(stream, stamp_ns, msg)) is not None)
+    def samples(self, streams: Iterable[Stream], stamp_ns: int, msg: Any) -> list[Sample]:
+        """Return the samples that are complete with `msg`, which came by the topic of these `streams`; see `put`."""
+        odd, contested = self.oddities.total(), self.assembler.refused
+        readings = [reading for stream in streams if (reading := self._reading(stream, stamp_ns, msg)) is not None]
+        self.refused += not readings and self.oddities.total() > odd
+        found = [each for reading in readings for each in self.assembler.take(reading)]
+        self.refused += self.assembler.refused - contested
+        return found
 
     def put(self, stream: Stream, stamp_ns: int, msg: Any) -> Sample | None:
-        """The sample that `msg` holds.
+        """Return the sample that `msg` holds by itself.
 
         Parameters
         ----------
@@ -136,11 +166,17 @@ class SampleDecoder:
         Sample or None
             None when no value of it can be used.
         """
-        taken = stamp_ns - self.delays[stream]
+        reading = self._reading(stream, stamp_ns, msg)
+        return None if reading is None else reading.sample
+
+    def _reading(self, stream: Stream, stamp_ns: int, msg: Any) -> Reading | None:
+        is_by_name, taken = stream not in self._by_axis, stamp_ns - self.delays[stream]
+        if is_by_name and not (len(msg.name) or len(getattr(msg, SENSORS[stream].field))):
+            return None  # a sign of life
         if not (stamp_ns and 0 < taken < LATEST):
             self.oddities["impossible stamp" if stamp_ns else "no stamp"] += 1
             return None
-        raw = self._force(msg, stream) if stream in self._by_axis else self._by_name(msg, stream)
+        raw, is_whole = self._by_name(msg, stream) if is_by_name else (self._force(msg, stream), True)
         if raw is None:
             return None
         channels = self._channels[stream]
@@ -149,75 +185,60 @@ class SampleDecoder:
         if isnan(values[0]) and all(map(isnan, values)):
             self.oddities["no usable value"] += 1
             return None
-        return Sample(stream, taken, np.array(values, dtype=np.float64))
+        frame = "" if is_by_name else msg.frame if isinstance(msg, Force) else msg.header.frame_id
+        array = in_range(np.array(values), *channels.range) if stream is Stream.ANGLES else np.array(values)
+        return Reading(Sample(stream, taken, array), is_whole, frame)
 
-    def places(self, stream: Stream, msg: Any) -> tuple[list[int] | None, list[str]]:
-        """Where the channels of a stream stand among the readings of a message, and what is odd about that.
-
-        Any other message with these names and as many readings gives the same.
-
-        Returns
-        -------
-        list of int, or None
-            Places in ``position`` or ``effort``, or in x, y, z of ``linear_acceleration``; -1 for a channel without a reading.
-            None if the message is not of this stream.
-        list of str
-            Keys of `oddities`.
-        """
-        channels = self._channels[stream]
-        if stream in self._by_axis:
-            return [AXES.index(name) for name in channels.names], []
-        names, end = msg.name, len(getattr(msg, SENSORS[stream].field))
+    def _places(self, stream: Stream, names: Sequence[str], end: int) -> tuple[list[int] | None, list[str], bool]:
+        """Return places of the channels among `end` readings (-1 without one), what is odd, and if all sensors are named."""
         if len(names) > LONGEST:
-            return None, ["too many names"]
+            return None, ["too many names"], True
+        channels, other = self._channels[stream], self._sharing.get(stream)
         places = channels.places(names)
         if channels.beyond:
             self.other_boom_names[stream] = channels.beyond
-            return None, ["names of another boom"]
-        other = self._sharing.get(stream)
-        if -1 in places and stream not in self.strange_names and (other is None or max(places) >= 0):
-            self._note_strange(stream, names, places)
-        if max(places) < 0:
+            return None, ["names of another boom"], True
+        lacking = [name for name, place in zip(channels.names, places, strict=True) if name and place < 0]
+        if lacking and stream not in self.strange_names and (other is None or max(places) >= 0):
+            self._note_strange(stream, names, lacking)
+        odd = ["name twice"] if channels.twice else []
+        if max(places) < 0 and not odd:
             is_unknown = other is None or max(self._channels[other].places(names)) < 0
-            return None, ["unknown names only"] if is_unknown else []
-        odd = ["unequal arrays"] if end != len(names) else []
-        if -1 in places:
-            odd.append("missing names")
-        return [place if place < end else -1 for place in places] if end < len(names) else places, odd
+            return None, ["unknown names only"] if is_unknown else [], True
+        if end != len(names):
+            odd.append("unequal arrays")
+            places = [place if place < end else -1 for place in places]
+        return places, odd, channels.twice.issuperset(lacking)
 
-    def _note_strange(self, stream: Stream, names: Sequence[str], places: list[int]) -> None:
+    def _note_strange(self, stream: Stream, names: Sequence[str], lacking: list[str]) -> None:
         """Note names that the scene does not have, beside those that are not there: they may be meant."""
         known = {
             name for each in (stream, self._sharing.get(stream)) if each is not None for name in self._channels[each].names
         }
         strange = [name for name in names if name not in known]
-        lacking = [name for name, place in zip(self._channels[stream].names, places, strict=True) if place < 0]
         if strange:
             self.strange_names[stream] = lacking, strange
 
-    def scales(self, stream: Stream) -> Array:
-        """What is taken off a reading, and by what it is then multiplied, shape (2, channels)."""
-        return np.array(self._channels[stream].scales).T
-
-    def _by_name(self, msg: Any, stream: Stream) -> list[float] | None:
-        """Readings in the scene's order, `_ABSENT` where there is none; None if there is none at all."""
+    def _by_name(self, msg: Any, stream: Stream) -> tuple[list[float] | None, bool]:
+        """Return readings in the scene's order, `_ABSENT` where there is none, or None, and whether all names are there."""
         found, channels = getattr(msg, SENSORS[stream].field), self._channels[stream]
         names, end, usual = channels.usual
         if msg.name is names and len(found) == end:  # the decoder hands out the same names again
-            return [float(found[place]) for place in usual]
-        places, odd = self.places(stream, msg)
+            return [float(found[place]) if place >= 0 else _ABSENT for place in usual], True
+        places, odd, is_whole = self._places(stream, msg.name, len(found))
         for name in odd:
             self.oddities[name] += 1
-        if places is not None and not odd and isinstance(msg.name, tuple):
+        if places is not None and is_whole and not odd and isinstance(msg.name, tuple):
             channels.usual = msg.name, len(found), places
-        return None if places is None else [float(found[place]) if place >= 0 else _ABSENT for place in places]
+        return None if places is None else [float(found[place]) if place >= 0 else _ABSENT for place in places], is_whole
 
     def _force(self, msg: Any, stream: Stream) -> list[float] | None:
         """Specific force along the axes that are taken for the tip's x and z."""
         if msg.linear_acceleration_covariance[0] == NO_MEASUREMENT:
             self.oddities["no measurement"] += 1
             return None
-        return [float(getattr(msg.linear_acceleration, axis)) for axis in self._channels[stream].names]
+        force = msg.linear_acceleration
+        return [float(getattr(force, axis)) if axis else _ABSENT for axis in self._channels[stream].names]
 
     def _reject(self, value: float) -> float:
         """NaN, and a count of why; a channel that is absent has been counted before."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from functools import cache
+from math import radians
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -13,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
-from ..types import NUMBER, SECOND, SENSORS, Mount, Stream, StrokeReading, channels_of, sensor_kind
+from ..types import GIVE, NUMBER, SECOND, SENSORS, Mount, Stream, StrokeReading, channels_of, sensor_kind
 
 AXES = ("x", "y", "z")
 
@@ -184,6 +185,10 @@ class Topics(_Entry):
     outputs: dict[Output, Topic]
     events: EventTopic
     sensors: dict[str, Sensor] = {}
+    absent: frozenset[str] = frozenset()
+    """Channels without a sensor, which the mapping says by ``none``."""
+    ranges: tuple[tuple[float, float], ...] = ()
+    """Lowest and highest angle of every joint, rad; empty where the scene is not known."""
 
     @property
     def is_shared(self) -> bool:
@@ -212,6 +217,10 @@ class Topics(_Entry):
         space = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
         return self.renamed(lambda topic: topic.name if topic.name.startswith("/") else f"{space}{topic.absolute}")
 
+    def of_joints(self, ranges: Iterable[Sequence[float]]) -> Topics:
+        """Return these topics with the `ranges` (deg) of a scene's joints, by which an encoder's whole turns are known."""
+        return self.model_copy(update={"ranges": tuple((radians(low) - GIVE, radians(high) + GIVE) for low, high in ranges)})
+
     def delay(self, stream: Stream) -> int:
         """By how much the stamps of a stream are later than its readings, ns."""
         return round(self.inputs[stream].delay * SECOND)
@@ -227,7 +236,7 @@ class Topics(_Entry):
         whoever wrote the mapping has said which of the names are the boom's.
         """
         kind = SENSORS[stream]
-        if kind.ends or all(channel in self.sensors for channel in kind.channels(joints)):
+        if kind.ends or all(channel in self.sensors or channel in self.absent for channel in kind.channels(joints)):
             return []
         used = {sensor.name for sensor in self.sensors_of(stream, joints).values()}
         numbered = re.compile(rf"{kind.named}_{NUMBER.pattern}")

@@ -31,6 +31,18 @@ def jazzy() -> Typestore:
     return get_typestore(Stores.ROS2_JAZZY)
 
 
+MOST_TEXTS = 100
+"""Texts of a message that may be in another encoding than UTF-8."""
+
+
+def text_in(data: bytes) -> str:
+    """Return a text in UTF-8, or with a question mark for every byte beyond ASCII if it is in another encoding."""
+    try:
+        return data.decode()
+    except UnicodeDecodeError:
+        return data.decode("ascii", "replace").replace("\ufffd", "?")
+
+
 def decode(data: bytes, type_name: str) -> Any:
     """The message in `data`, which may have as much behind its end as Fast DDS leaves there, see `PADDING`.
 
@@ -53,10 +65,15 @@ def decode(data: bytes, type_name: str) -> Any:
     store = jazzy()
     kind = store.get_msgdef(type_name)
     read = kind.deserialize_cdr_le if data[1] else kind.deserialize_cdr_be
-    try:
-        message, size = read(data[_ENCAPSULATION:], 0, kind.cls, store)
-    except (struct.error, ValueError) as error:
-        raise SerdeError(f"{type_name} of {len(data)} bytes is not whole: {error}") from error
+    for left in reversed(range(MOST_TEXTS)):
+        try:
+            message, size = read(data[_ENCAPSULATION:], 0, kind.cls, store)
+            break
+        except (struct.error, ValueError) as error:
+            if not isinstance(error, UnicodeDecodeError) or not left:
+                raise SerdeError(f"{type_name} of {len(data)} bytes is not whole: {error}") from error
+            old = struct.pack("<I" if data[1] else ">I", len(error.object) + 1) + error.object
+            data = data.replace(old, old[:4] + text_in(error.object).encode(), 1)
     end = _ENCAPSULATION + size
     if len(data) > end + PADDING:
         behind = f"{len(data) - end} bytes stand behind its last field, which ends at byte {end}"

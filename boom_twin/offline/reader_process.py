@@ -6,20 +6,19 @@ import pickle
 import sys
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator
-from itertools import chain, repeat
+from itertools import repeat
 from pathlib import Path
 
-import numpy as np
-
+from ..bag.integrity import PARSE_ERRORS
 from ..bag.reader import Session, read, read_blocks, scan
 from ..bag.time_window import WHOLE, TimeWindow
 from ..errors import BoomTwinError
-from ..messages.block_decoder import BlockDecoder, DecodedBlock, together
-from ..messages.message_block import MessageBlock
+from ..messages.cdr_decoder import CdrDecoder
 from ..messages.report_encoder import decode_changes
-from ..messages.topic_table import Output, Topics
-from ..messages.type_store import jazzy
-from ..twin.blocks import SampleBlock, samples_in
+from ..messages.sample_decoder import SampleDecoder
+from ..messages.topic_table import TYPES, Output, Topics
+from ..messages.type_store import decode, jazzy
+from ..twin.blocks import SampleBlock, block_of, samples_in
 from ..types import SENSORS, Change, Sample, Stream
 from .process_pipe import END, Pipe, post, say_ready
 
@@ -82,8 +81,6 @@ Item = SampleBlock | Change | int | Counter[str]
 """What goes up the pipe, see `items_of`."""
 BATCH = 400
 """Messages in one block up the pipe, at least."""
-MOST = 1200
-"""Messages that are decoded at once, at most."""
 
 
 class SampleReader:
@@ -136,7 +133,7 @@ class SampleReader:
     def __iter__(self) -> Iterator[SampleBlock | Change | None]:
         """Samples in the order of log times, changes before theirs.
 
-        After a block comes a None for every message among its own that had no usable value.
+        After a block comes a None for every message among its own of which nothing could be used.
         """
         for item in self._pipe.receive():
             if isinstance(item, Counter):
@@ -169,53 +166,41 @@ def items_of(path: Path, topics: Topics, wanted: list[str], joints: int, window:
         The session cannot be read.
     """
     heard: dict[str, list[Stream]] = topics.heard
-    session = scan(path)
+    session, decoder = scan(path), SampleDecoder(joints, topics)
     changes = recorded_changes(session, topics)
     blocks = read_blocks(session, {name: topics.inputs[heard[name][0]].type for name in wanted}, window)
     streams = [heard[source.name] for source in blocks.sources]
-    decoder = BlockDecoder(joints, topics, streams, blocks.decoded)
-    yield from _batches(_in_turn(blocks, decoder, changes, [Stream.STROKES in group for group in streams]))
+    wires = [CdrDecoder(TYPES[group[0]], decode, SENSORS[group[0]].field) for group in streams]
+    waiting, count, told = list[Sample](), 0, 0
+
+    def batch() -> Iterator[Item]:
+        """Yield the samples that wait, and how many messages were refused since the last batch."""
+        nonlocal count, told
+        if waiting:
+            yield block_of(waiting, joints)
+            waiting.clear()
+        if refused := decoder.refused - told:
+            yield refused
+        count, told = 0, decoder.refused
+
+    for block in blocks:
+        for row, source in enumerate(block.sources.tolist()):
+            try:
+                stamp, message = wires[source].read(block.data(row))
+            except PARSE_ERRORS:
+                blocks.decoded(block, row)  # raises it with its place
+                raise
+            if changes.are_left and Stream.STROKES in streams[source]:
+                for change in changes.due(int(block.log_times[row]), stamp):
+                    yield from batch()
+                    yield change
+            waiting += decoder.samples(streams[source], stamp, message)
+            count += 1
+            if count >= BATCH:
+                yield from batch()
+    waiting += decoder.assembler.rest()
+    yield from batch()
     yield decoder.oddities
-
-
-def _in_turn(
-    blocks: Iterable[MessageBlock], decoder: BlockDecoder, changes: Changes, are_strokes: list[bool]
-) -> Iterator[DecodedBlock | Change]:
-    """What was found in blocks, and the changes that begin with messages of some sources."""
-    for block in chain.from_iterable(map(_parts, blocks)):
-        found, done = decoder.decode(block), 0
-        for row in np.flatnonzero(np.array(are_strokes)[block.sources]).tolist() if changes.are_left else ():
-            if due := tuple(changes.due(int(block.log_times[row]), int(found.stamps[row]))):
-                yield found.part(done, row)
-                yield from due
-                done = row
-        yield found.part(done, len(block))
-
-
-def _parts(block: MessageBlock) -> Iterator[MessageBlock]:
-    return (block.chosen(slice(first, first + MOST)) for first in range(0, len(block), MOST))
-
-
-def _batches(found: Iterable[DecodedBlock | Change]) -> Iterator[SampleBlock | Change | int]:
-    """What was found, samples of at least `BATCH` messages together if no change comes between."""
-    waiting: list[DecodedBlock] = []
-    for each in found:
-        if isinstance(each, DecodedBlock):
-            waiting.append(each)
-            if sum(len(block.stamps) for block in waiting) < BATCH:
-                continue
-        yield from _batch(waiting)
-        waiting = []
-        if isinstance(each, Change):
-            yield each
-    yield from _batch(waiting)
-
-
-def _batch(found: list[DecodedBlock]) -> Iterator[SampleBlock | int]:
-    if any(len(block.rows) for block in found):
-        yield together([block.samples for block in found])
-    if without := sum(block.without for block in found):
-        yield without
 
 
 def _ready_items(task: tuple[Path, Topics, list[str], int, TimeWindow]) -> Iterator[Item]:

@@ -25,6 +25,7 @@ class RefusedStrokes:
     def __init__(self, scene: Scene, source: str = "") -> None:
         self._is_default = source == DEFAULT_NAME
         self._names = channels_of(len(scene.joints))[Stream.STROKES]
+        self._closed = np.array([joint.cylinder.closed_length for joint in scene.joints])
         self._travel = np.array([joint.cylinder.max_stroke for joint in scene.joints])
         self._first: Array | None = None
 
@@ -44,15 +45,26 @@ class RefusedStrokes:
             return ""
         i = int(np.flatnonzero((self._first < 0.0) | (self._first > self._travel))[0])
         said = f" The first refused value: {self._names[i]} = {self._first[i]:.6g} m, its travel is 0 to {self._travel[i]:g} m."
+        if self._fits(1.0, self._closed):
+            return f"{said} {self._remedy(1.0, 'm', self._closed)}"
         if self._fits_in_other_order():
             return f"{said} In another order the strokes would fit: look for cylinders whose names or columns are swapped."
         if self._is_default and self._first[i] < NEAR * self._travel[i]:
             return f"{said} The session names no scene and was read with the {DEFAULT_NAME}: for another boom give --scene."
-        unit = next((unit for unit, factor in self._by_size() if self._fits(factor)), None)
-        if unit is None:
-            return said
-        remedy = f"give by --mapping `sensors: {{{self._names[i]}: {{unit: {unit}}}}}`, .."
-        return f"{said} With the unit `{unit}` it would fit: {remedy}"
+        units = sorted(SENSORS[Stream.STROKES].units.items(), key=lambda pair: -pair[1])[1:]
+        fits = ((factor, unit, closed) for closed in (0.0, self._closed) for unit, factor in units[:-1])
+        for factor, unit, closed in (*fits, (units[-1][1], units[-1][0], 0.0)):
+            if self._fits(factor, closed):
+                return f"{said} {self._remedy(factor, unit, closed)}"
+        return said
+
+    def _remedy(self, factor: float, unit: str, closed: Array | float) -> str:
+        """Return what the values fit as, and the mapping by which they do."""
+        if np.ndim(closed):
+            zeros = zip(self._names, np.asarray(closed) / factor, strict=True)
+            sensors = ", ".join(f"{name}: {{unit: {unit}, zero: {zero:g}}}" for name, zero in zeros)
+            return f"They fit as lengths from pin to pin: take closed_length off, by --mapping `sensors: {{{sensors}}}`."
+        return f"With the unit `{unit}` it would fit: give by --mapping `sensors: {{{self._names[0]}: {{unit: {unit}}}}}`, .."
 
     def _fits_in_other_order(self) -> bool:
         """Whether every stroke is within the travel of a cylinder of its own, if not of the one that it is named after."""
@@ -60,13 +72,8 @@ class RefusedStrokes:
         known = np.isfinite(self._first)
         return bool(known.all() and self._first.min() >= 0.0 and (np.sort(self._first) <= np.sort(self._travel)).all())
 
-    @staticmethod
-    def _by_size() -> list[tuple[str, float]]:
-        """Units of strokes below 1 m, the largest first."""
-        units = SENSORS[Stream.STROKES].units.items()
-        return sorted(((unit, factor) for unit, factor in units if factor < 1.0), key=lambda pair: -pair[1])
-
-    def _fits(self, factor: float) -> bool:
+    def _fits(self, factor: float, closed: Array | float = 0.0) -> bool:
+        """Return True if the values times `factor`, less the lengths `closed` (m), are within the travel."""
         assert self._first is not None
-        known = np.isfinite(self._first)
-        return bool(((self._first >= 0.0) & (factor * self._first <= self._travel))[known].all())
+        strokes, known = factor * self._first - closed, np.isfinite(self._first)
+        return bool(((strokes >= 0.0) & (strokes <= self._travel))[known].all())

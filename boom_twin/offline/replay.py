@@ -10,6 +10,7 @@ import gc
 import json
 import math
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
@@ -31,7 +32,7 @@ from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
 from ..estimation.load_spectrum import TipLoad
 from ..health.baseline import Baseline
-from ..messages.sample_decoder import stamp_of
+from ..messages.sample_decoder import ODDITIES, stamp_of
 from ..messages.topic_table import Topics
 from ..scene.edit import anew
 from ..scene.schema import Scene
@@ -221,7 +222,8 @@ def replay_into(
         taken = scene_for(session.path, scene)
         scene, joints = taken.scene, len(taken.scene.joints)
         mapped = mapping_of(session.path, Path(mapping) if mapping else None, joints, namespace)
-        topics, wanted, strokes = mapped.topics, _wanted(session, mapped.topics), strokes_of(session.path, mapped)
+        topics, wanted = mapped.topics.of_joints(joint.range_deg for joint in scene.joints), _wanted(session, mapped.topics)
+        strokes = strokes_of(session.path, mapped)
         refuse_other_names(session, topics, joints, taken.source)
         usual = baseline_of(session.path, Path(baseline) if baseline else None) if health else None
         truth = _truth_in(window, session, topics, wanted)
@@ -272,15 +274,14 @@ def replay_into(
         if recording.is_empty:
             raise BagError(
                 f"{session.path}: no stroke sample could be used ({_told(twin)}){_never_read(read)}. "
-                f"It needs names cylinder_1..{twin.plan.joints}, or those of a mapping, all in one message, values within the "
-                f"cylinders' travel, and stamps.{refused.told}"
+                f"It needs names cylinder_1..{twin.plan.joints}, or those of a mapping, values within the cylinders' travel, "
+                f"and stamps.{_explained(ahead.oddities)}{refused.told}"
             )
         recording.close()
         if recording.totals.samples == 1 < recording.refused:
-            most = max(twin.counts, key=lambda name: twin.counts[name])
             raise BagError(
-                f"{session.path}: of {1 + recording.refused} stroke samples only the first could be used ({_told(twin)}); "
-                f"{most}: {EVENTS.get(most, 'see the counts')}."
+                f"{session.path}: of {1 + recording.refused} stroke samples only the first could be used ({_told(twin)})."
+                f"{_explained(twin.counts)}"
             )
         if with_bag:
             SessionSheet(__version__, taken.text).write(out / "bag")
@@ -392,14 +393,14 @@ def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Base
     """A twin with its compiled model; its modules are imported here, while the other processes start."""
     from ..twin.twin import Twin
 
-    twin = Twin(scene, settings, topics.mounts(len(scene.joints)), baseline, reads=reads)
+    twin = Twin(scene, settings, topics.mounts(len(scene.joints)), baseline, reads=reads, absent=topics.absent)
     twin.warm_up()
     return twin
 
 
 def _stepping_twin(twin: Twin) -> Twin:
     """One of the same boom and settings, without health."""
-    return type(twin)(twin.scene, twin.settings, twin.mounts, reads=twin.reads)
+    return type(twin)(twin.scene, twin.settings, twin.mounts, reads=twin.reads, absent=twin.absent)
 
 
 @contextmanager
@@ -418,6 +419,11 @@ def _never_read(read: NDArray[np.bool_]) -> str:
     """Which cylinders never had a value, if others had."""
     silent = [name for name, came in zip(channels_of(len(read))[Stream.STROKES], read, strict=True) if not came]
     return f", because {', '.join(silent)} never had a value" if silent and read.any() else ""
+
+
+def _explained(counts: Counter[str]) -> str:
+    """Return a sentence on what was met most often; empty if nothing was."""
+    return "".join(f" Most often {name}: {(EVENTS | ODDITIES)[name]}." for name, _ in counts.most_common(1))
 
 
 def _told(twin: Twin) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.column_statistics import ColumnStatistics
+from ..analysis.even_times import spacing, unbroken
 from ..types import Array
 from .history import Density, History, ResidualDistribution, SessionTotals
 
@@ -77,13 +78,14 @@ def totals_of(history: History) -> SessionTotals:
     return builder.totals
 
 
+_UNKNOWN = Density(np.array([1.0]), np.array([np.nan]), 0.0, 0)
+
+
 def _averaged(earlier: list[Density], stamps: Array, values: Array) -> list[Density]:
     """Densities of both columns of `values`, averaged with those of earlier parts as by Welch over all segments."""
-    found = []
-    for i in range(2):
-        before = earlier[i] if earlier else None
-        own = density(stamps, values[:, i], before.interval if before and before.segments else None)
-        found.append(own if before is None else _mean(before, own))
+    found = earlier or [_UNKNOWN, _UNKNOWN]
+    for part in unbroken(stamps):
+        found = [_mean(each, density(stamps[part], values[part, i], each.interval)) for i, each in enumerate(found)]
     return found
 
 
@@ -96,7 +98,7 @@ def _mean(one: Density, other: Density) -> Density:
     return replace(one, power=(one.segments * one.power + other.segments * other.power) / count, segments=count)
 
 
-def density(stamps: Array, values: Array, interval: float | None = None) -> Density:
+def density(stamps: Array, values: Array, interval: float = 0.0) -> Density:
     """One-sided power spectral density of `values` (k,), put on even times first; what is NaN is bridged.
 
     Parameters
@@ -104,12 +106,12 @@ def density(stamps: Array, values: Array, interval: float | None = None) -> Dens
     stamps, values : ndarray, shape (k,)
         s.
     interval : float, optional
-        Between the even times, s; by default the median of `stamps`.
+        Between the even times, s; 0: the usual one of `stamps`.
     """
     known = np.isfinite(values)
     if known.sum() < 16:
-        return Density(np.array([1.0]), np.array([np.nan]), 0.0, 0)
-    interval = interval or float(np.median(np.diff(stamps[known])))
+        return _UNKNOWN
+    interval = interval or spacing(stamps[known])
     even = np.arange(stamps[known][0], stamps[known][-1], interval)
     from scipy.signal import welch  # takes longer to import than all else that a replay starts with
 

@@ -7,6 +7,7 @@ from math import inf
 
 import numpy as np
 
+from ..analysis.even_times import spacing, unbroken
 from ..analysis.free_vibration import ORDER, Vibration, free_vibrations, is_free
 from ..monitor.data.present_posture import ModeList
 from ..plots import History
@@ -30,7 +31,7 @@ def _thinned(times: Array, values: Array) -> tuple[float, Array]:
     columns = [column for column in values.T if 2 * np.isfinite(column).sum() > len(column)]
     if len(times) < 2 or not columns:
         return 1.0, np.zeros((0, 1))
-    interval = float(np.median(np.diff(times)))
+    interval = spacing(times)
     even = np.arange(times[0], times[-1], interval)
     rows = np.stack([np.interp(even, times[np.isfinite(c)], c[np.isfinite(c)]) for c in columns], axis=1)
     step = max(1, round(1.0 / (RATE * interval)))
@@ -109,7 +110,7 @@ class HoldFinder:
         if not len(times):
             return 0.0
         waits_from = float(times[-1]) - OVER
-        for start, stop in still(times, strokes, 0.0):
+        for start, stop in [span for part in unbroken(times) for span in still(times[part], strokes[part], 0.0)]:
             is_open = not is_last and stop > times[-1] - OVER
             if start <= self._told_to:
                 self._told_to = stop

@@ -35,7 +35,7 @@ def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] =
     ----------
     path : Path
     content : str or bytes
-        Text is encoded as UTF-8.
+        Text is encoded as UTF-8, what is no character in it (a path's bytes) as an escape.
     sync : callable, optional
         Puts on the disk what has the descriptor that it is given.
 
@@ -44,7 +44,7 @@ def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] =
     BagError
         It cannot be written; `path` is then as it was.
     """
-    data = content.encode() if isinstance(content, str) else content
+    data = content.encode(errors="backslashreplace") if isinstance(content, str) else content
     try:
         if path.exists() and not path.is_file():
             with path.open("wb") as stream:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +18,12 @@ from ..types import Array
 
 LONGEST_LINE = 2**16
 """Characters of a line that are read."""
+
+NOTHING = {"", "-", "nan", "null", "none", "na", "n/a", "#n/a"}
+"""Cells without a value, in small letters."""
+
+_MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+"""Encodings by the byte order mark that a file begins with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +69,7 @@ class CsvTable:
                 "If the file was cut off there, remove the line."
             )
         text = row[place].strip()
-        if not text and blank is not None:
+        if blank is not None and text.lower() in NOTHING:
             return blank
         try:
             return float(text)
@@ -86,7 +93,10 @@ def read_csv_pieces(path: Path, error: type[BoomTwinError], together: int = 4096
         As `error`: the file cannot be read, a line is longer than `LONGEST_LINE`, or there is no row below the header.
     """
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
+        with path.open("rb") as file:
+            head = file.read(3)
+        encoding = next((encoding for mark, encoding in _MARKS.items() if head.startswith(mark)), "utf-8")
+        with path.open(encoding=encoding, newline="") as file:
             reader = csv.reader(_lines(file))
             found = ((reader.line_num, row) for row in reader if row)
             _, header = next(found, (1, []))
@@ -96,7 +106,9 @@ def read_csv_pieces(path: Path, error: type[BoomTwinError], together: int = 4096
             yield CsvTable(path, names, [row for _, row in some], [line for line, _ in some], error)
             while some := list(islice(found, together)):
                 yield CsvTable(path, names, [row for _, row in some], [line for line, _ in some], error)
-    except (OSError, UnicodeDecodeError, csv.Error) as reason:
+    except UnicodeError as reason:
+        raise error(f"{path}: its encoding cannot be read ({reason}). Save it as UTF-8.") from None
+    except (OSError, csv.Error) as reason:
         raise error(f"{path}: {getattr(reason, 'strerror', None) or reason}. Give a CSV file.") from None
 
 
@@ -104,6 +116,8 @@ def _lines(file: TextIO) -> Iterator[str]:
     number = 0
     while line := file.readline(LONGEST_LINE):
         number += 1
+        if "\0" in line:
+            raise UnicodeError(f"a NUL in line {number}: UTF-16 or UTF-32 without a byte order mark?")
         if len(line) == LONGEST_LINE and not line.endswith("\n"):
             raise csv.Error(f"line {number} is longer than {LONGEST_LINE} characters")
         yield line

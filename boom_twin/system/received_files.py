@@ -26,6 +26,14 @@ _KINDS = (
 )
 
 
+def real_path(path: Path) -> Path:
+    """Return an absolute path with its links followed; BagError if they lead in a circle."""
+    try:
+        return path.resolve()
+    except RuntimeError:
+        raise BagError(f"{path}: a symbolic link that leads to itself. Give the folder or file itself.") from None
+
+
 def holds_file(path: Path) -> bool:
     """Whether there is a file at `path` that `open_received` would open; False if nothing is there.
 
@@ -71,7 +79,8 @@ def _without_links(path: str, flags: int) -> int:
 def _check_regular(path: Path, mode: int) -> None:
     if not stat.S_ISREG(mode):
         kind = next((name for is_kind, name in _KINDS if is_kind(mode)), "no regular file")
-        raise BagError(f"{path}: {kind}, not opened in a session's folder. Put the file itself there, or move it away.")
+        remedy = "Copy the folder with its links followed, `cp -rL FOLDER COPY`, and read the copy."
+        raise BagError(f"{path}: {kind}, not opened in a session's folder. {remedy if stat.S_ISLNK(mode) else 'Move it away.'}")
 
 
 def sha256_of(path: Path) -> str:

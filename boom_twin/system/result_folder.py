@@ -22,6 +22,7 @@ from pathlib import Path
 
 from ..errors import BagError
 from .atomic_files import DRAFT, sync_folder, write_atomic
+from .received_files import real_path
 
 MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
 BUILDING, REPLACED = ".unfinished", ".replaced"
@@ -117,7 +118,7 @@ def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Itera
     BagError
         `out` holds anything else, another command is at work on it, or it cannot be written.
     """
-    place = out.resolve()
+    place = real_path(out)
     check_lasting(out)
     if not place.name or os.path.ismount(place):
         raise BagError(f"{out}: results are built beside it, and it cannot be renamed. Name a folder inside it.")
@@ -157,7 +158,7 @@ def check_lasting(out: Path) -> None:
     ------
     BagError
     """
-    place = out.resolve()
+    place = real_path(out)
     if (found := next(filter(is_unfinished, (place, *place.parents)), None)) is not None:
         told = f"lies in an unfinished result, which its command removes when it runs again ({found / UNFINISHED})"
         raise BagError(f"{out}: {told}. Choose another folder.")
@@ -169,7 +170,7 @@ def check_lasting(out: Path) -> None:
 def _check_apart(out: Path, folder: Path, sources: Sequence[Path]) -> None:
     """Refuse a folder that is, holds, or lies in what is read; by identity, whatever the spelling."""
     for source in sources:
-        real = source.resolve()
+        real = real_path(source)
         session = real if real.is_dir() else real.parent
         is_session = real.is_dir() or (session / "metadata.yaml").is_file()
         if is_session and any(session.samefile(each) for each in (folder, *folder.parents) if each.exists()):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
@@ -43,9 +43,12 @@ from .update_lengths import measure_beside_lengths, update_lengths
 CAPACITY = 4096  # samples that one call of the compiled update takes at most
 
 
-def limits_of(scene: Scene, plan: Plan, settings: Settings, steps: StepChoice, mounts: Sequence[Mount | None]) -> Limits:
-    """What the compiled update judges and steps by: of a scene, compiled as `plan` with its load, and its angle sensors."""
-    counts = np.array([len(names) for names in channels_of(plan.joints).values()])
+def limits_of(
+    scene: Scene, plan: Plan, settings: Settings, steps: StepChoice, mounts: Sequence[Mount | None], absent: Collection[str]
+) -> Limits:
+    """Return what the compiled update judges and steps by, of a scene compiled as `plan` with its load, and of its sensors."""
+    channels = list(channels_of(plan.joints).values())
+    counts = np.array([len(names) for names in channels])
     mounting, far = Mounting(plan, scene.base.inclination, mounts), FAR * settings.stroke_variance**0.5
     strokes = filter_tuning(settings.stroke_variance, settings.stroke_agility)
     tuning = Tuning(strokes, 0.0, steps.step, steps.look_step, settings.rho)
@@ -65,6 +68,7 @@ def limits_of(scene: Scene, plan: Plan, settings: Settings, steps: StepChoice, m
         is_mounted=mounting.has_any,
         absolute=mounting.absolute,
         frames=mounting.frames,
+        absent=np.array([name in absent for names in channels[1:] for name in names]),
         first=np.concatenate([[0], np.cumsum(counts[1:]) - counts[1:]]),
         channels=counts,
     )

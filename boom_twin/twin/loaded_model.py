@@ -8,7 +8,7 @@ replay makes the same model at the same sample.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from threading import Thread
@@ -65,15 +65,16 @@ def loaded_model(
     baseline: Baseline | None,
     on_block: Callable[[BlockProblem], object] | None,
     reads: StrokeReading,
+    absent: Collection[str],
 ) -> LoadedModel:
-    """The model of `scene` under the load of `settings`; for the parameters see `boom_twin.Twin`."""
+    """Return the model of `scene` under the load of `settings`; for the parameters see `boom_twin.Twin`."""
     scene = loaded(scene, *settings.load)
     boom = _predictor(scene, settings, mounts, reads)
-    judge = None if baseline is None else HealthMonitor(scene, settings, tuple(mounts), baseline, on_block)
+    judge = None if baseline is None else HealthMonitor(scene, settings, tuple(mounts), baseline, on_block, absent)
     modes = boom if isinstance(boom, LengthPredictor) else DeviationModes(scene, boom.plan, settings, mounts)
     _ = boom.held, modes.held  # made here, where no sample waits for them
     steps = choose_steps(scene, boom.plan, settings)
-    return LoadedModel(scene, limits_of(scene, boom.plan, settings, steps, mounts), boom, judge, modes, steps)
+    return LoadedModel(scene, limits_of(scene, boom.plan, settings, steps, mounts, absent), boom, judge, modes, steps)
 
 
 def _predictor(scene: Scene, settings: Settings, mounts: Sequence[Mount | None], reads: StrokeReading) -> BoomPredictor:

@@ -89,6 +89,7 @@ class Limits(NamedTuple):
     valid : m, how far the tip may be from the undeformed boom's.
     angle_variance : rad^2. gravity : (2,) m/s^2. inclination : rad.
     is_mounted : whether any angle sensor is no encoder. absolute, frames : (n,) whether, and in which frame of the chain.
+    absent : (c,) measured channels without a sensor.
     first, channels : (s,) first column of every stream among the measured channels, and how many it has.
     """
 
@@ -107,6 +108,7 @@ class Limits(NamedTuple):
     is_mounted: bool
     absolute: Flags
     frames: Integers
+    absent: Flags
     first: Integers
     channels: Integers
 
@@ -135,14 +137,16 @@ class UpdateOutput(NamedTuple):
     raw: Array
 
 
-def keep_waiting(state: TwinState, first: int, last: int) -> None:
-    """Of the samples that wait, keep those with stamps (ns) from `first` to `last`."""
+def drop_waiting(state: TwinState, first: int, last: int, stream: int | None = None) -> int:
+    """Drop the waiting samples, of one `stream` or of all, with stamps (ns) from `first` to `last`; return their number."""
     ring = state.waiting
     count = int(ring.bounds[COUNT])
-    rows = np.flatnonzero((ring.stamps[:count] >= first) & (ring.stamps[:count] <= last))
+    stamps, streams = ring.stamps[:count], ring.streams[:count]
+    rows = np.flatnonzero((stamps < first) | (stamps > last) | (streams != (streams if stream is None else stream)))
     for column in (ring.stamps, ring.streams, ring.values):
         column[: len(rows)] = column[rows]
     ring.bounds[COUNT] = len(rows)
+    return count - len(rows)
 
 
 def new_ring(size: int, values: int, sigmas: int = 0, strokes: int = 0) -> Ring:

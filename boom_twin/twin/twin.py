@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -38,7 +37,7 @@ from .stamp_check import (
     jerk_densities,
     largest_difference,
 )
-from .state import NEWEST, NONE, STATUS, keep_waiting, new_state
+from .state import NEWEST, NONE, STATUS, UNMATCHED, drop_waiting, new_state
 from .update import DONE, FAILED
 
 
@@ -61,6 +60,8 @@ class Twin:
     reads : StrokeReading
         What the stroke transducers read: the lengths of the cylinders, oil compressed, or, of sessions that were made before
         version 0.2.0, their drives.
+    absent : collection of str
+        Channels without a sensor, such as ``joint_3``: no reading of them is missed.
 
     Attributes
     ----------
@@ -94,13 +95,15 @@ class Twin:
         baseline: Baseline | None = None,
         on_block: Callable[[BlockProblem], object] | None = None,
         reads: StrokeReading = StrokeReading.LENGTH,
+        absent: Collection[str] = (),
     ) -> None:
-        self._on_block, scene, self.reads = on_block, as_scene(scene), reads
+        self._on_block, self.reads, self.absent, scene = on_block, reads, frozenset(absent), as_scene(scene)
         self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
         self.counts: Counter[str] = Counter()
         self.shedding, self.recorded_steps = LoadShedding(), RecordedSteps()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self._channels = channels_of(len(scene.joints))
+        self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
         self._widths = [len(names) for names in self._channels.values()]
         self._edge = SampleCheck(self._channels)
         self.requests = Requests(self.settings)
@@ -117,10 +120,8 @@ class Twin:
         self._failed: int | None = None
         self._speeds: Array | None = None
         self._lines = self._new_lines()
-        self._zeros, self._recent = (
-            SensorZeros(self._state, self._channels),
-            ResidualBuffer(self._state.recent, self._channels),
-        )
+        self._zeros = SensorZeros(self._state, self._channels)
+        self._recent = ResidualBuffer(self._state.recent, self._channels)
 
     def __repr__(self) -> str:
         return f"Twin({self.scene!r}; {len(self.mounts)} joints; {dict(self.counts) or 'nothing odd yet'})"
@@ -191,7 +192,8 @@ class Twin:
             The load cannot be.
         """
         self._former: BlockUpdate | None = None
-        found = loaded_model(self.scene, settings, self.mounts, self.baseline, self._on_block, self.reads)
+        sensors = self._on_block, self.reads, self.absent
+        found = loaded_model(self.scene, settings, self.mounts, self.baseline, *sensors)
         if self._state.clock[NEWEST] != NONE:
             found.prepare(self._state.strokes.copy())  # where the boom will be, or near
         return found
@@ -217,7 +219,7 @@ class Twin:
         events = ["load"] if before.load != self.settings.load else []
         if before.limits != self.settings.limits:
             events.append("limits")
-            self._compiled.limits = limits_of(self.scene, self.plan, self.settings, self.steps, self.mounts)
+            self._compiled.limits = limits_of(self.scene, self.plan, self.settings, self.steps, self.mounts, self.absent)
             for line in self._lines.values():
                 line.tune(self.settings)
         if asked.zeros != self._zeros.values:
@@ -235,7 +237,7 @@ class Twin:
         speeds = np.fmin(np.abs(self._boom.speeds), self.settings.stroke_rate)
         self._begin_anew()
         self._speeds = speeds
-        keep_waiting(self._state, stamp, -NONE)
+        drop_waiting(self._state, NONE, stamp - 1)
 
     def _begin_anew(self) -> None:
         self._run = None
@@ -353,7 +355,7 @@ class Twin:
         """Take a sample that may be out of the ordinary; of a copy, for it may be held, and the caller's may change."""
         self._compiled.make_room()
         sample = replace(sample, values=sample.values.copy())
-        complete = _are_readings(sample.values.tolist())
+        complete = self._is_complete(sample)
         if not complete:
             usable = np.abs(sample.values) <= LIMIT
             if not usable.any():
@@ -437,7 +439,7 @@ class Twin:
             self._doubt_pause(run, held[0], why)
         reports, asked = [], self._judged
         for sample in held:
-            complete, self._judged = bool(np.isfinite(sample.values.sum())), asked or sample is not held[-1]
+            complete, self._judged = self._is_complete(sample), asked or sample is not held[-1]
             reports.append(self._follow(sample, self._zeroed(sample), complete, events))
             events = []
         return replace(reports[-1], earlier=tuple(reports[:-1]))
@@ -479,7 +481,7 @@ class Twin:
         self._zeros.forget_past()
         self._recent.clear()
         if shift < 0:
-            keep_waiting(self._state, NONE, before)
+            drop_waiting(self._state, before + 1, -NONE)
         self._compiled.begin_health()
 
     def _zeroed(self, sample: Sample) -> Array:
@@ -567,7 +569,10 @@ class Twin:
         event = line.hold(sample, "leap")
         if not line.is_confirmed():
             return self._hold(sample, event)
-        reports = [self._compare(each, bool(np.isfinite(each.values.sum()))) for each in self._released(line)]
+        held = self._released(line)
+        gone = drop_waiting(self._state, held[0].stamp, -NONE, CODES[sample.stream])  # their time comes again: a looped bag
+        self._state.clock[UNMATCHED] += gone
+        reports = [self._compare(each, self._is_complete(each)) for each in held]
         return replace(reports[-1], earlier=tuple(reports[:-1]))
 
     def _compare(self, sample: Sample, complete: bool) -> Report:
@@ -592,7 +597,6 @@ class Twin:
         self.counts.update(events)
         return Report(sample.stamp, False, events=events, status=status)
 
-
-def _are_readings(values: list[float]) -> bool:
-    """Whether none is missing, not finite or absurd."""
-    return math.isfinite(sum(values)) and max(map(abs, values)) <= LIMIT
+    def _is_complete(self, sample: Sample) -> bool:
+        """Return True if no sensor's reading is missing, not finite or absurd."""
+        return bool((np.abs(sample.values) <= LIMIT)[self._there[sample.stream]].all())

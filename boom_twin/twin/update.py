@@ -299,7 +299,7 @@ def is_due(limits, state, stream, stamp, values):
         return False
     complete = True
     for i in range(limits.channels[stream]):
-        complete = complete and abs(values[i]) <= LIMIT
+        complete = complete and (abs(values[i]) <= LIMIT or limits.absent[limits.first[stream] + i])
     return complete
 
 

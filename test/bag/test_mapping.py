@@ -94,6 +94,7 @@ def test_the_example_of_the_default_file_is_good(write: Any) -> None:
         (EXAMPLE.replace("incl_2", "cylinder_3"), "sensors.joint_2.name = 'cylinder_3'"),
         ("sensors: {tip_imu_x: {name: z}}", "sensors.tip_imu_z.name = 'z': tip_imu_x has this name too"),
         ("sensors: {tip_imu_x: {name: up}}", "sensors.tip_imu_x.name = 'up': it must be x, y or z."),
+        ("sensors: {cylinder_1: none}", "sensors.cylinder_1 = 'none': every cylinder's stroke drives the model"),
         ("sensors: [1]", "sensors = [1]: a block of channels is needed"),
         ("[1, 2]", "keys inputs, outputs, sensors are needed"),
         ("inputs: [", "not a readable YAML file"),
@@ -105,6 +106,11 @@ def test_what_cannot_be_used_is_refused_with_its_place(write: Any, text: str, wo
     with pytest.raises(UsageError) as caught:
         load_mapping(path, 4)
     assert words in str(caught.value) and str(path) in str(caught.value)
+
+
+def test_a_sensor_that_is_not_there_is_said_to_be_none(write: Any) -> None:
+    topics = load_mapping(write("sensors: {joint_3: none, tip_imu_z: none, joint_1: {sign: -1}}"), 4)
+    assert topics.absent == {"joint_3", "tip_imu_z"} and set(topics.sensors) == {"joint_1"}
 
 
 def test_all_faults_are_told_at_once(write: Any) -> None:

@@ -133,3 +133,16 @@ def test_a_file_that_is_exchanged_for_a_link_meanwhile(tmp_path: Path, monkeypat
     monkeypatch.setattr("boom_twin.system.received_files.holds_file", lambda path: True)  # as it was when it was looked at
     with pytest.raises(OSError, match="symbolic links"):
         open_received(tmp_path / "a")
+
+
+@pytest.mark.parametrize(
+    "command", [["info"], ["replay", "--out", "out"], ["recover", "--out", "out"], ["batch", "--out", "out"]]
+)
+def test_links_that_lead_in_a_circle_are_told(
+    command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a").symlink_to("b")
+    (tmp_path / "b").symlink_to("a")
+    assert main([command[0], "a", *command[1:]]) == 1
+    assert "symbolic link" in (said := capsys.readouterr().err) and "Traceback" not in said

@@ -140,6 +140,12 @@ CSV = "t_s,stroke_1_m,stroke_2_m,joint_1_rad\n0,0.1,0.2,0.3\n0.1,0.1,0.2,\n"
         (CSV.replace(",", ";"), "no column t_s, stroke_1_m"),
         (CSV.replace("\n0.1,", "\nnan,"), "line 3: t_s = 'nan' is not a time"),
         ("t_s,stroke_1_m\n" + "".join(f"{5 * k},0.1\n" for k in range(30)), "goes on by 5 s from row to row"),
+        ("t_s,stroke_1_m\n" + "".join(f"{10**12 + 5 * k},0.1\n" for k in range(30)), "as if in ms"),
+        ("t_s,stroke_1_m\n" + "".join(f"{5000 * k},0.1\n" for k in range(30)), "as if in us"),
+        ("t_s,stroke_1_m\n" + "".join(f"{17 * 10**17 + 5 * 10**6 * k},0.1\n" for k in range(3)), "as if in ns"),
+        (CSV.replace("\n0.1,", "\n0,"), "Both have this time: give each its own, or take one out."),
+        (CSV.replace("joint_1_rad", "joint_3_rad"), "no column stroke_3_m in its first line"),
+        (CSV.replace("joint_1_rad", "stroke_4_m"), "no column stroke_3_m in its first line"),
     ],
 )
 def test_a_csv_that_cannot_be_read_is_refused_by_line_and_column(tmp_path: Path, text: str, words: str) -> None:
@@ -148,6 +154,28 @@ def test_a_csv_that_cannot_be_read_is_refused_by_line_and_column(tmp_path: Path,
     with pytest.raises(BagError, match=r"s\.csv") as error:
         scan(file)
     assert words in str(error.value) and file.read_text() == text
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "latin-1"])
+def test_a_csv_is_read_in_the_encoding_that_its_mark_says_or_refused_because_of_it(tmp_path: Path, encoding: str) -> None:
+    text = CSV if encoding != "latin-1" else CSV.replace("joint_1_rad", "Druck_für_1")
+    (tmp_path / "s.csv").write_bytes(text.encode(encoding))
+    if encoding in ("utf-8", "utf-8-sig", "utf-16"):
+        assert [topic.count for topic in scan(tmp_path / "s.csv").topics] == [2, 1]
+        return
+    with pytest.raises(BagError, match=r"its encoding cannot be read .* Save it as UTF-8"):
+        scan(tmp_path / "s.csv")
+
+
+def test_rows_of_one_time_with_other_columns_are_one_row(tmp_path: Path) -> None:
+    """A plot program exports a row for each topic; cells without a value are written in many ways."""
+    rows = "".join(f"{k},0.1,,NaN\n{k},-,0.2,null\n{k},,,0.3\n" for k in range(3000))
+    (tmp_path / "s.csv").write_text("t_s,stroke_1_m,stroke_2_m,joint_1_rad\n" + rows.replace(",", ".5,", 0))
+    with pytest.raises(BagError, match="goes on by 1 s"):
+        scan(tmp_path / "s.csv")
+    rows = "".join(f"{0.005 * k:.3f},0.1,,NaN\n{0.005 * k:.3f},-,0.2,null\n{0.005 * k:.3f},,,0.3\n" for k in range(3000))
+    (tmp_path / "s.csv").write_text("t_s,stroke_1_m,stroke_2_m,joint_1_rad\n" + rows)
+    assert [topic.count for topic in scan(tmp_path / "s.csv").topics] == [3000, 3000]
 
 
 def long_csv(file: Path, rows: int) -> Path:

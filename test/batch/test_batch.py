@@ -26,6 +26,7 @@ from distributed import Client, LocalCluster  # noqa: E402
 
 from boom_twin import load_scene, replay  # noqa: E402
 from boom_twin.batch import cluster  # noqa: E402
+from boom_twin.batch.results import write_table  # noqa: E402
 from boom_twin.batch.session_task import SessionTask, row_of  # noqa: E402
 from boom_twin.calibration import calibrate  # noqa: E402
 from boom_twin.cli.main import main  # noqa: E402
@@ -303,3 +304,8 @@ def test_without_the_extra_one_line_tells_what_to_install(sessions: Path, tmp_pa
     found = subprocess.run(command, capture_output=True, text=True, check=False)
     assert found.returncode == 1 and len(found.stderr.splitlines()) == 1
     assert 'pip install "boom_twin[batch]"' in found.stderr
+
+
+def test_a_path_that_is_not_utf_8_is_in_the_table_with_its_bytes_as_escapes(tmp_path: Path) -> None:
+    write_table(tmp_path / "t.parquet", [{"path": "b\udcfcg", "status": "ok", "key": "1"}])
+    assert parquet.read_table(tmp_path / "t.parquet").column("path").to_pylist() == ["b\\udcfcg"]

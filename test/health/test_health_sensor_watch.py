@@ -59,6 +59,16 @@ def test_begins_once_lasts_and_ends():
         assert watched.watch.alarms == () and not watched.watch.masked.any()
 
 
+def test_a_range_alarm_tells_the_offset():
+    (began,) = Watched().take(findings(1, "range", level=3.14159))
+    assert "an offset of +180 deg, +3.142 rad" in began.told and "zero in the mapping" in began.told
+
+
+def test_nothing_is_found_of_a_sensor_that_is_not_there():
+    watch = SensorMonitor(NAMES, SENSORS[Stream.ANGLES], absent={NAMES[1]})
+    assert watch.take(findings(1, "dropout"), 0, BLOCK) == [] and not watch.masked.any()
+
+
 def test_spikes_do_not_mask():
     """Outliers are left out of means as they are."""
     watched = Watched()

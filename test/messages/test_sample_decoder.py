@@ -72,8 +72,8 @@ def test_what_is_left_is_right_and_the_rest_is_nan(values: list[float], present:
     ("names", "positions", "expected", "oddities"),
     [
         (["cylinder_1", "cylinder_2"], [0.1], [0.1, nan], {"unequal arrays": 1}),
-        (["cylinder_1"], [0.1, 0.2], [0.1, nan], {"unequal arrays": 1, "missing names": 1}),
-        (["cylinder_2"], [0.2], [nan, 0.2], {"missing names": 1}),
+        (["cylinder_1"], [0.1, 0.2], [0.1, nan], {"unequal arrays": 1}),
+        (["cylinder_2"], [0.2], [nan, 0.2], {}),
         (["cylinder_1", "cylinder_2"], [nan, 0.2], [nan, 0.2], {"not finite": 1}),
         (["cylinder_1", "cylinder_2"], [0.1, -inf], [0.1, nan], {"not finite": 1}),
         (["cylinder_1", "cylinder_2"], [0.1, 2e7], [0.1, nan], {"absurd magnitude": 1}),
@@ -84,9 +84,10 @@ def test_what_is_left_is_right_and_the_rest_is_nan(values: list[float], present:
             {"not finite": 1, "absurd magnitude": 1, "no usable value": 1},
         ),
         (["joint_1", "joint_2"], [0.1, 0.2], None, {"unknown names only": 1}),
-        ([], [], None, {"unknown names only": 1}),
+        ([], [], None, {}),
         (["cylinder_1", "cylinder_2"], [], None, {"unequal arrays": 1, "no usable value": 1}),
-        (["cylinder_2", "cylinder_1", "cylinder_2"], [0.2, 0.1, 0.9], [0.1, 0.2], {}),
+        (["cylinder_2", "cylinder_1", "cylinder_2"], [0.2, 0.1, 0.9], [0.1, nan], {"name twice": 1}),
+        (["cylinder_2", "cylinder_2"], [0.2, 0.2], None, {"name twice": 1, "no usable value": 1}),
     ],
 )
 def test_oddities_are_counted_by_name(
@@ -227,3 +228,94 @@ def test_one_topic_for_both_kinds() -> None:
     found = [None if sample is None else sample.values.tolist() for sample in samples]
     assert found == [[0.2], [0.1], None, [0.3], [0.4], None] and not decoder.oddities
     assert decoder.put(Stream.STROKES, 1, neither) is None and decoder.oddities == {"unknown names only": 1}
+
+
+MS = 1_000_000
+
+
+def cycles(decoder: SampleDecoder, messages: list[tuple[int, dict[str, float]]], stream: Stream = Stream.ANGLES) -> list[Any]:
+    """What samples are made of messages, each a stamp and values by name: stamps and values."""
+    found = [decoder.samples([stream], t, joint_state(list(m), list(m.values()))) for t, m in messages]
+    return [(sample.stamp, sample.values.tolist()) for each in found for sample in each]
+
+
+@pytest.mark.parametrize("gap", [0, MS])
+def test_names_in_messages_of_their_own_are_one_sample_of_each_cycle(gap: int) -> None:
+    decoder = SampleDecoder(3)
+    apart = [(5 * MS * k + i * gap + 1, {f"joint_{i + 1}": k + 0.1 * i}) for k in range(3) for i in range(3)]
+    whole = [(100 * MS, {"joint_3": 3.0, "joint_1": 1.0, "joint_2": 2.0})]
+    expected = [(5 * MS * k + 1, [k, k + 0.1, k + 0.2]) for k in range(3)]
+    assert cycles(decoder, apart + whole) == [*expected, (100 * MS, [1.0, 2.0, 3.0])]
+    assert decoder.oddities == {"names apart": 6} and decoder.refused == 0
+
+
+@pytest.mark.parametrize("gap", [0, MS])
+@pytest.mark.parametrize("lost", [0, 1, 2])
+def test_a_cycle_that_lacks_a_name_does_not_mix_with_the_next(gap: int, lost: int) -> None:
+    decoder = SampleDecoder(3)
+    messages = [(5 * MS * k + i * gap + 1, {f"joint_{i + 1}": 10.0 * k + i}) for k in range(4) for i in range(3)]
+    found = cycles(decoder, [each for place, each in enumerate(messages) if place != 3 + lost])
+    begin = 5 * MS + 1 + (gap if lost == 0 else 0)
+    assert [stamp for stamp, _ in found] == [1, begin, 10 * MS + 1, 15 * MS + 1]
+    np.testing.assert_array_equal(found[1][1], [nan if i == lost else 10.0 + i for i in range(3)])
+    assert found[2:] == [(10 * MS + 1, [20.0, 21.0, 22.0]), (15 * MS + 1, [30.0, 31.0, 32.0])]
+    assert decoder.oddities["missing names"] == 1
+
+
+def test_messages_that_always_lack_a_name_are_samples_once_the_next_one_comes() -> None:
+    decoder = SampleDecoder(2)
+    found = cycles(decoder, [(t, {"joint_1": 0.1 * t}) for t in (1, 2, 3)])
+    assert [(stamp, values[0], isnan(values[1])) for stamp, values in found] == [(1, 0.1, True), (2, 0.2, True)]
+    (left,) = decoder.assembler.rest()
+    assert left.stamp == 3 and not list(decoder.assembler.rest())
+
+
+def test_a_sensor_that_is_not_there_is_not_waited_for() -> None:
+    decoder = SampleDecoder(2, load_topics().model_copy(update={"absent": frozenset({"joint_2"})}))
+    ((stamp, values),) = cycles(decoder, [(1, {"joint_1": 0.1})])
+    assert (stamp, values[0], isnan(values[1])) == (1, 0.1, True) and not decoder.oddities
+
+
+@pytest.mark.parametrize(
+    ("reading", "expected"),
+    [(-41.0, -41.0), (319.0, -41.0), (-401.0, -41.0), (139.0, 139.0), (679.0, 679.0), (-41.0 * 57.3, -41.0 * 57.3)],
+)
+def test_an_encoder_a_turn_off_is_taken_modulo_a_turn_where_its_range_decides(reading: float, expected: float) -> None:
+    """Half a turn off is an offset, and what is many turns off is in degrees: neither is hidden."""
+    decoder = SampleDecoder(2, load_topics().of_joints([(-165.0, 10.0), (-5.0, 85.0)]))
+    ((_, values),) = cycles(decoder, [(1, {"joint_1": np.radians(reading), "joint_2": np.radians(60.0)})])
+    np.testing.assert_allclose(np.degrees(values), [expected, 60.0], atol=1e-9)
+
+
+def test_an_inclinometer_has_no_range() -> None:
+    decoder = SampleDecoder(1, mapped({"joint_1": {"absolute": "root"}}).of_joints([(-165.0, 10.0)]))
+    assert cycles(decoder, [(1, {"joint_1": 5.0})]) == [(1, [5.0])]
+
+
+def test_a_sign_of_life_without_names_is_nothing_odd() -> None:
+    decoder = SampleDecoder(2)
+    assert decoder.samples([Stream.STROKES], 0, joint_state([], [])) == [] and not decoder.oddities and not decoder.refused
+
+
+def test_two_sources_of_one_topic_are_told_and_neither_is_used() -> None:
+    """Zeros of a joint_state_publisher beside the encoders, with the same names and stamps; when they end, the encoders are."""
+    decoder, encoders = SampleDecoder(2), np.random.default_rng(1).normal(0.5, 1e-4, (400, 2))
+    both = [(5 * MS * (k + 1), {"joint_1": a, "joint_2": b}) for k, (a, b) in enumerate(encoders.tolist())]
+    zeros = [(t, {"joint_1": 0.0, "joint_2": 0.0}) for t, _ in both[:100]]
+    mixed = [each for pair in zip(zeros, both, strict=False) for each in pair] + both[100:]
+    found = cycles(decoder, mixed)
+    assert len(found) < 4 + 100 and found[-1][0] == both[-1][0] and decoder.oddities["two sources"] == decoder.refused > 300
+
+
+def test_coarse_stamps_of_one_source_are_no_second_source() -> None:
+    decoder, values = SampleDecoder(1), np.random.default_rng(1).normal(0.5, 1e-4, 100).tolist()
+    assert len(cycles(decoder, [(10 * MS * (1 + k // 2), {"joint_1": value}) for k, value in enumerate(values)])) == 100
+
+
+def test_two_frames_of_imus_on_one_topic_are_told_and_neither_is_used() -> None:
+    decoder, found = SampleDecoder(1), []
+    for k in range(200):
+        message = imu(0.0, 9.8)
+        message.header.frame_id = "tip" if k % 2 == 0 else "base"
+        found += decoder.samples([Stream.IMU], 5 * MS * (k + 1), message)
+    assert len(found) == 1 and decoder.oddities == {"two sources": 199}

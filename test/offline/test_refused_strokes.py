@@ -24,6 +24,14 @@ def test_strokes_in_another_unit(unit: str, factor: float) -> None:
     assert f"With the unit `{unit}` it would fit: give by --mapping" in told(0.9 * factor * TRAVEL)
 
 
+@pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("mm", 1e3)])
+def test_lengths_from_pin_to_pin(unit: str, factor: float) -> None:
+    closed = np.array([joint.cylinder.closed_length for joint in load_scene().joints])
+    said = told(factor * (closed + 0.5 * TRAVEL))
+    assert "lengths from pin to pin: take closed_length off" in said
+    assert f"cylinder_1: {{unit: {unit}, zero: {factor * closed[0]:g}}}" in said
+
+
 def test_swapped_strokes_are_no_other_unit() -> None:
     assert strokes_of_posture(load_scene(), "arch").max() < TRAVEL.max()
     said = told(np.array(0.9 * TRAVEL)[::-1])

@@ -90,3 +90,14 @@ def test_an_inclinometer_at_the_tip_of_the_bundled_session(scene):
         found += [residuals.normalised[3] for residuals in twin.update(Sample(Stream.ANGLES, stamp, angles)).residuals]
     assert len(found) == rows
     assert abs(np.mean(found)) < 0.3 and 0.6 < np.std(found) < 1.15
+
+
+def test_a_sensor_that_is_not_there_is_no_event(scene):
+    """Its value is missing in every sample: neither partial nor left out, and the others have their residuals."""
+    strokes, values = strokes_of_posture(scene, "arch"), np.array([1.0, -0.7, np.nan, -0.9])
+    for absent, events in (((), {"partial"}), (("joint_3",), set())):
+        twin = drive_twin(scene, absent=absent)
+        reports = [twin.update(Sample(Stream.STROKES, k * 5 * MS, strokes)) for k in range(1, 4)]
+        reports += [twin.update(Sample(Stream.ANGLES, k * 5 * MS, values)) for k in range(1, 4)]
+        assert all(report.accepted for report in reports) and set(twin.counts) == events
+        assert np.isfinite(reports[-1].residuals[0].values).tolist() == [True, True, False, True]

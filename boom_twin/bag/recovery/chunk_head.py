@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 from mcap.records import Chunk
 
 from ..integrity import PARSE_ERRORS
-from ..mcap_records import LARGEST, PREFIX, UnpackBudget, UnpackError, unpack_start, whole_parts
+from ..mcap_records import MOST_HELD, PREFIX, UnpackBudget, UnpackError, unpack_start, whole_parts
 
 _FIELDS = struct.Struct("<BQQQQII")
 _SIZE = struct.Struct("<Q")
@@ -103,10 +103,10 @@ def sound_content(file: BinaryIO, head: ChunkHead, size: int, budget: UnpackBudg
     if head.crc == 0:
         return _fitting_content(file, head, budget), head.after
     reason, start = "its checksum does not fit its content", b""
-    if head.is_certain and head.size > LARGEST:
-        reason = f"{head.size} bytes: at most {LARGEST} are read"
+    if head.is_certain and head.size > MOST_HELD:
+        reason = f"{head.size} bytes: at most {MOST_HELD} are read"
     for packed, compression in _readings(head, size):
-        for limit in dict.fromkeys((min(head.unpacked, LARGEST), LARGEST)):
+        for limit in dict.fromkeys((min(head.unpacked, MOST_HELD), MOST_HELD)):
             try:
                 content = _unpacked(file, head, packed, compression, limit, budget)
             except PARSE_ERRORS as error:
@@ -146,7 +146,7 @@ def unverified_start(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> b
         It unpacks to more than `budget` allows.
     """
     try:
-        content = _unpacked(file, head, min(head.size, LARGEST), head.compression, min(head.unpacked, LARGEST), budget)
+        content = _unpacked(file, head, min(head.size, MOST_HELD), head.compression, min(head.unpacked, MOST_HELD), budget)
     except UnpackError:
         raise
     except PARSE_ERRORS:
@@ -156,15 +156,15 @@ def unverified_start(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> b
 
 def _readings(head: ChunkHead, size: int) -> Iterator[tuple[int, str]]:
     """Packed size and compression that are possible, those that the head states first."""
-    room = min(size - head.offset - head.head, LARGEST)
+    room = min(size - head.offset - head.head, MOST_HELD)
     packed = dict.fromkeys(each for each in (head.size, PREFIX.size + head.length - head.head) if 0 < each <= room)
     known = [head.compression] if head.compression in _COMPRESSIONS else list(_COMPRESSIONS)
     yield from product(packed, known)
 
 
 def _unpacked(file: BinaryIO, head: ChunkHead, packed: int, compression: str, unpacked: int, budget: UnpackBudget) -> bytes:
-    if packed > LARGEST:
-        raise McapError(f"{packed} bytes: at most {LARGEST} are read")
+    if packed > MOST_HELD:
+        raise McapError(f"{packed} bytes: at most {MOST_HELD} are read")
     file.seek(head.offset + head.head)
     chunk = Chunk(
         compression=compression,

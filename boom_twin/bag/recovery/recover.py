@@ -212,7 +212,7 @@ def _counts_told(
     counts = [definitions.told for definitions in all_definitions]
     if None not in counts:
         yield sum((each for each in counts if each is not None), Counter[str]())
-    if metadata is not None and {file.name for file in files} <= {Path(name).name for name in metadata.relative_file_paths}:
+    if metadata is not None and {file.name for file in files} <= set(metadata.file_names):
         yield metadata.counts
 
 

@@ -13,7 +13,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from ...system.received_files import open_received
 from ..integrity import BLOCK, PARSE_ERRORS
-from ..mcap_records import KINDS, LARGEST, MESSAGE_HEAD, PREFIX, UnpackBudget, UnpackError, record_of, whole_parts
+from ..mcap_records import KINDS, MESSAGE_HEAD, MOST_HELD, PREFIX, UnpackBudget, UnpackError, record_of, whole_parts
 from .chunk_head import ChunkHead, UnsoundError, head_at, sound_content, unverified_start
 
 _START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)
@@ -118,7 +118,7 @@ def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:
     if len(raw) < PREFIX.size:
         return b""
     opcode, length = PREFIX.unpack(raw)
-    if length > min(LARGEST, size - offset - PREFIX.size):
+    if length > min(MOST_HELD, size - offset - PREFIX.size):
         return b""
     body = file.read(length)
     if opcode == Opcode.MESSAGE:
@@ -144,7 +144,7 @@ def _may_begin(file: BinaryIO, offset: int, size: int) -> bool:
     if len(raw) < PREFIX.size:
         return raw[:1] in (b"", MCAP0_MAGIC[:1]) or raw[0] in {Opcode.MESSAGE, *KINDS}
     opcode, length = PREFIX.unpack(raw)
-    return opcode in (Opcode.MESSAGE, Opcode.CHUNK, *KINDS) and length <= LARGEST
+    return opcode in (Opcode.MESSAGE, Opcode.CHUNK, *KINDS) and length <= MOST_HELD
 
 
 def _ends(file: BinaryIO, offset: int) -> bool:

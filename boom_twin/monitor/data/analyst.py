@@ -113,11 +113,13 @@ class Analyst:
 
     async def spectrogram_between(self, after: float, until: float) -> tuple[float, bytes] | None:
         """Time (s) of the newest column of the spectrogram after one time and up to another, and the block of them all."""
-        ends = STEP * np.arange(floor(after / STEP) + 1.0, floor(until / STEP) + 1.0)
-        ends = ends[ends > SEGMENT]
-        signal = self._signal(ends[-1]) if len(ends) else PREDICTION
+        signal = self._signal(until := STEP * floor(until / STEP))
         table = self._feed.store.tables.get(signal.table)
-        if table is None or not len(ends):
+        if table is None:
+            return None
+        ends = STEP * np.unique(np.ceil(table.rows(table.until(after), table.until(until))[0] / STEP))
+        ends = ends[(ends > max(after, SEGMENT)) & (ends <= until)]  # none in a pause, which may last for days
+        if not len(ends):
             return None
         times, values = table.rows(table.until(ends[0] - SEGMENT), table.until(ends[-1]))
         found = await asyncio.to_thread(spectrogram, times, values[:, signal.columns].astype(float), ends)

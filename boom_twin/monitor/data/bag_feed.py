@@ -121,7 +121,7 @@ def bag_feed(
     session, usual, taken = scan(path), baseline_of(path, baseline).baseline, scene_for(path, scene)
     scene = taken.scene
     mapped = mapping_of(path, mapping, len(scene.joints), namespace)
-    topics, reads = mapped.topics, strokes_of(path, mapped).reading
+    topics, reads = mapped.topics.of_joints(joint.range_deg for joint in scene.joints), strokes_of(path, mapped).reading
     refuse_other_names(session, topics, len(scene.joints), taken.source)
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
     is_published = topics.outputs[ENOUGH].absolute in counts
@@ -188,10 +188,11 @@ class _Twin:
     ) -> None:
         self._feed, self._time = feed, 0.0
         mounts = topics.mounts(len(scene.joints))
-        self.twin, self._encoder = Twin(scene, settings, mounts, usual, reads=reads), ReportEncoder(scene, settings)
+        self.twin = Twin(scene, settings, mounts, usual, reads=reads, absent=topics.absent)
+        self._encoder = ReportEncoder(scene, settings)
         self._names = {key: topic.absolute for key, topic in topics.outputs.items() if topic.absolute in feed.topic_rows.names}
         required = {stream: topic.required for stream, topic in topics.inputs.items()}
-        sensors = sensors_of(scene, settings, required, mounts)
+        sensors = sensors_of(scene, settings, required, mounts, topics.absent)
         names = {stream: topic.name for stream, topic in topics.inputs.items()}
         self._watch = TwinWatch(sensors, names, Thresholds(), lambda: self._time)
         self._other_boom = OtherBoom()

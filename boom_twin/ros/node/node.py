@@ -26,7 +26,7 @@ from ...messages.topic_table import NODE, Output
 from ...twin.driver import drive_one
 from ...twin.loaded_model import ModelPreparation
 from ...twin.twin import Twin
-from ...types import SENSORS, Report, Stream
+from ...types import SENSORS, Report, Sample, Stream
 from ..log import Log
 from ..runtime import message_class, one_line, qos_profile
 from .diagnostics import Diagnostics
@@ -139,6 +139,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Listen no more."""
         self.queue.catch_up()
+        for sample in self._decoder.assembler.rest():
+            self._take(sample)
         self._stop_listening()
         return super().on_deactivate(state)
 
@@ -172,8 +174,9 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         for oddity in found.oddities:
             self._log.warning(str(oddity))
         settings, joints = current(self, Settings), len(scene.joints)
-        topics = load_mapping(path_of(self, "mapping"), joints)
-        twin = Twin(scene, settings, topics.mounts(joints), baseline_of(self), reads=topics.stroke_reading)
+        topics = load_mapping(path_of(self, "mapping"), joints).of_joints(joint.range_deg for joint in scene.joints)
+        mounts, baseline = topics.mounts(joints), baseline_of(self)
+        twin = Twin(scene, settings, mounts, baseline, reads=topics.stroke_reading, absent=topics.absent)
         self._log.info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
         import_module("scipy.special")  # of the first alarm and the first pause, whose samples would wait for it for 0.3 s
@@ -219,20 +222,21 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     def _receive(self, streams: list[Stream], decoder: CdrDecoder, data: bytes) -> None:
         """Take one message; whatever it holds, the node lives on."""
-        for stream in streams:
-            try:
-                self._take(stream, *decoder.read(data))
-            except Exception as error:  # the last resort, such as a message that is not whole
-                self._diagnostics.broken(stream, error)
+        try:
+            (stamp, msg), refused = decoder.read(data), self._decoder.refused
+            samples = self._decoder.samples(streams, stamp, msg)
+            for stream in streams if self._decoder.refused > refused else ():
+                self._diagnostics.seen(stream, stamp - self._decoder.delays[stream])
+            for sample in samples:
+                self._take(sample)
+        except Exception as error:  # the last resort, such as a message that is not whole
+            self._diagnostics.broken(streams[0], error)
 
-    def _take(self, stream: Stream, stamp: int, msg: Any) -> None:
+    def _take(self, sample: Sample) -> None:
         assert self._twin is not None
+        self._diagnostics.seen(sample.stream, sample.stamp)
         self._preparation.take_in()
         self._twin.shedding.filled(self.queue.share)
-        self._diagnostics.seen(stream, stamp - self._decoder.delays[stream])
-        sample = self._decoder.put(stream, stamp, msg)
-        if sample is None:
-            return
         step = drive_one(self._twin, sample, judged=False)
         self._diagnostics.took(*step)
         for each in step.report.all:

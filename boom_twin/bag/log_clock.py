@@ -1,0 +1,108 @@
+"""Clock of a recorder: whether it was set back within a file, which then tells the order of messages better than it."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..messages.message_block import Integers, MessageBlock
+
+Piece = tuple[Integers, Integers, NDArray[np.uint64]]
+"""Places, channels and log times (ns) of many messages in the order of the file."""
+OUT_OF_ORDER = 0.25
+"""Share of steps back among a file's messages, from which on they were not written as they came: half are at random."""
+MOST = 0.5
+"""Share of messages that are of topics that step back, from which on it is the clock: it is that of all topics."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LogClock:
+    """Steps back of the clock that log times are from, in the order of a file.
+
+    A recorder writes a topic's messages as they come. Where the log times of one step back and go on from there, its clock was
+    set back; where they step back all the time, or for one message, the file was not written in order, and log times are sound.
+
+    Attributes
+    ----------
+    places : ndarray of int64, shape (k,)
+        Of the first message after every step.
+    shifts : ndarray of int64, shape (k,)
+        Nanoseconds that log times are behind those before all steps.
+    """
+
+    places: Integers
+    shifts: Integers
+
+    @property
+    def is_set_back(self) -> bool:
+        """Return True if the order of the file counts, not that of its log times."""
+        return len(self.places) > 0
+
+    @classmethod
+    def of(cls, pieces: Callable[[], Iterable[Piece]]) -> LogClock:
+        """Look at a file, whose `pieces` can be gone through twice."""
+        counts, steps, lasting = Counter[int](), Counter[int](), Counter[int]()
+        newest: defaultdict[int, NDArray[np.int64]] = defaultdict(lambda: np.zeros(0, np.int64))
+        for _, channels, times in pieces():
+            for channel in np.unique(channels).tolist():
+                own = np.concatenate([newest[channel], times[channels == channel].astype(np.int64)])
+                back = own[1:-1] < own[:-2]
+                counts[channel] += len(own) - len(newest[channel])
+                steps[channel] += int(back.sum())
+                lasting[channel] += int((back & (own[2:] < own[:-2])).sum())
+                newest[channel] = own[-2:]
+        known = {channel for channel, count in lasting.items() if count and steps[channel] < OUT_OF_ORDER * counts[channel]}
+        is_set_back = sum(counts[channel] for channel in known) > MOST * counts.total()
+        return cls(*_steps(pieces(), known)) if is_set_back else NEVER_SET_BACK
+
+    @property
+    def total(self) -> int:
+        """Nanoseconds that the clock was set back in all."""
+        return int(self.shifts[-1]) if self.is_set_back else 0
+
+    def corrected(self, block: MessageBlock, places: Integers) -> MessageBlock:
+        """Return the block with log times of a clock that was not set back: they rise in the order of the file."""
+        return replace(block, log_times=np.maximum.accumulate(self.times(block.log_times, places)))
+
+    def times(self, log_times: NDArray[np.uint64], places: Integers) -> NDArray[np.uint64]:
+        """Return the log times of messages at `places` by a clock that was not set back."""
+        shifts = np.concatenate([[0], self.shifts])[np.searchsorted(self.places, places, "right")]
+        return np.asarray(log_times + shifts.astype(np.uint64))
+
+
+NEVER_SET_BACK = LogClock(np.zeros(0, np.int64), np.zeros(0, np.int64))
+
+
+def _steps(pieces: Iterable[Piece], known: set[int]) -> tuple[Integers, Integers]:
+    """Places and shifts of all steps back: at the first message of a known channel that is earlier than its last one."""
+    places, shifts, newest, shift = list[int](), list[int](), 0, 0
+    last: dict[int, int] = {}
+    for at, channels, times in pieces:
+        shifted, row = times.astype(np.int64) + shift, 0
+        while row < len(shifted):
+            ends = [
+                row + _step_in(shifted[row:], channels[row:] == key, last.get(key, 0)) for key in set(channels[row:].tolist())
+            ]
+            end = min(ends)
+            for key in set(channels[row:end].tolist()):
+                last[key] = int(shifted[row:end][channels[row:end] == key][-1])
+            newest = max(newest, int(shifted[row:end].max(initial=0)))
+            if end < len(shifted):
+                step = newest - int(shifted[end])
+                shifted[end:] += step
+                shift += step
+                places.append(int(at[end]))
+                shifts.append(shift)
+            row = end
+    return np.array(places, np.int64), np.array(shifts, np.int64)
+
+
+def _step_in(times: Integers, is_own: NDArray[np.bool_], before: int) -> int:
+    """Return the row of the first of a channel's times that is less than the one before; the number of rows without."""
+    rows = np.flatnonzero(is_own)
+    back = np.flatnonzero(np.diff(times[rows], prepend=before) < 0)
+    return int(rows[back[0]]) if len(back) else len(times)

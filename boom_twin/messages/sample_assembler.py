@@ -1,0 +1,124 @@
+"""Put together names that come in messages of their own, and leave out streams that two sources publish."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types import SECOND, Sample, Stream
+
+LONGEST_CYCLE = SECOND  # ns between stamps of one cycle; a twin needs several strokes a second
+CONTESTED_FOR = SECOND  # ns without a contradiction, after which a stream has one source again
+APART = 10.0  # difference of two sources at one stamp, over the change of each of them since the stamp before
+
+
+class Reading(NamedTuple):
+    """The sample in one message, whether all names are in the message, and the frame of an Imu (empty of a JointState)."""
+
+    sample: Sample
+    is_whole: bool
+    frame: str
+
+
+class _Line:
+    """Newest samples of one stream."""
+
+    def __init__(self) -> None:
+        self.group: Sample | None = None  # names of one cycle that came up to now
+        self.started = self.first = np.zeros(0, bool)  # channels of the message that began it, and the newest complete one
+        self.newest: list[Sample] = []  # the first and the last one with the newest stamp
+        self.before: list[Sample] = []  # those with the stamp before
+        self.frame: str | None = None
+        self.contested: int | None = None  # stamp of the newest contradiction, ns
+
+
+class SampleAssembler:
+    """Samples of all streams from what single messages hold, for the live node and the replay alike.
+
+    A sample has the stamp of the first message of its cycle. A cycle ends when it has all names, or when a name comes again
+    that it has, or the one that began the cycle before.
+
+    Parameters
+    ----------
+    wanted : dict of Stream to ndarray of bool, shape (channels,)
+        Channels that have a sensor.
+    oddities : Counter
+        Where ``names apart``, ``missing names`` and ``two sources`` are counted.
+
+    Attributes
+    ----------
+    refused : int
+        Samples left out because of two sources.
+    """
+
+    def __init__(self, wanted: Mapping[Stream, NDArray[np.bool_]], oddities: Counter[str]) -> None:
+        self._wanted, self._oddities, self.refused = wanted, oddities, 0
+        self._lines = {stream: _Line() for stream in Stream}
+
+    def take(self, reading: Reading) -> Iterator[Sample]:
+        """Yield the samples that are complete with this message, in their order."""
+        sample, line = reading.sample, self._lines[reading.sample.stream]
+        found = [*self._ended(line), sample] if reading.is_whole else [*self._gathered(line, sample)]
+        for each in found:
+            if each.stream is Stream.STROKES or not self._is_contested(line, each, reading.frame):
+                yield each
+
+    def rest(self) -> Iterator[Sample]:
+        """Yield what is left of every stream's newest cycle: no more messages come."""
+        for line in self._lines.values():
+            yield from self._ended(line)
+
+    def _gathered(self, line: _Line, sample: Sample) -> Iterator[Sample]:
+        """Yield the cycle that ends before a message with some of the names, and the one that is complete with it."""
+        has = np.isfinite(sample.values)
+        if line.group is not None and not self._is_of_cycle(line, line.group, sample, has):
+            yield from self._ended(line)
+        if line.group is None:
+            line.group, line.started = sample, has
+        else:
+            self._oddities["names apart"] += 1
+            line.group = Sample(sample.stream, line.group.stamp, np.where(has, sample.values, line.group.values))
+        if np.isfinite(line.group.values[self._wanted[sample.stream]]).all():
+            group, line.group, line.first = line.group, None, line.started
+            yield group
+
+    @staticmethod
+    def _is_of_cycle(line: _Line, group: Sample, sample: Sample, has: NDArray[np.bool_]) -> bool:
+        """Return True if a message with the channels `has` goes on with a cycle."""
+        if (has & np.isfinite(group.values)).any() or abs(sample.stamp - group.stamp) > LONGEST_CYCLE:
+            return False
+        return sample.stamp == group.stamp or not (len(line.first) and (has & line.first).any())
+
+    def _ended(self, line: _Line) -> Iterator[Sample]:
+        if line.group is not None:
+            group, line.group = line.group, None
+            self._oddities["missing names"] += 1
+            yield group
+
+    def _is_contested(self, line: _Line, sample: Sample, frame: str) -> bool:
+        """Return True if two sources publish a stream: which of them is right cannot be told, so neither is used."""
+        if line.newest and line.newest[-1].stamp == sample.stamp:
+            line.newest = [line.newest[0], sample]
+        else:
+            line.before, line.newest = line.newest, [sample]
+        if frame != (line.frame or frame) or _are_of_two(line.before, line.newest):
+            line.contested = sample.stamp
+        line.frame = frame
+        if line.contested is None or abs(sample.stamp - line.contested) > CONTESTED_FOR:
+            return False
+        self._oddities["two sources"] += 1
+        self.refused += 1
+        return True
+
+
+def _are_of_two(before: list[Sample], newest: list[Sample]) -> bool:
+    """Return True if pairs of samples at two stamps are of two sources, and not of one whose stamps are coarse."""
+    if len(before) < 2 or len(newest) < 2:
+        return False
+    (a, b), (c, d) = ((pair[0].values, pair[-1].values) for pair in (before, newest))
+    across, *along = (np.fmax.reduce(np.abs(x - y), initial=0.0) for x, y in ((c, d), (c, a), (d, b)))
+    return bool(across > APART * max(along))
