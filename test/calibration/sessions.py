@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from drive_twin import drive_readings, note_drives
 from oracle import booms
 
 from boom_twin.bag.session_files import write_session
@@ -27,7 +28,8 @@ class Made(NamedTuple):
         """A session of it with the sensors' noise of `seed`, encoders reading `zeros` (rad) too much."""
         seen = rig.observe(self.truth, self.programme, self.rows, rig.Sensors(), seed)
         force, joints = seen.imu[cut] if imu else None, seen.joints[cut] + zeros
-        write_session(path, seen.stamps[cut], seen.strokes[cut], joints, force, {"origin": "synthetic, a test"})
+        write_session(path, seen.stamps[cut], drive_readings(seen)[cut], joints, force, {"origin": "synthetic, a test"})
+        note_drives(path)
         return path
 
 

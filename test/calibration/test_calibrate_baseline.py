@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drive_twin import ARCH_DRIVES, PUMP_DRIVES
 
 from boom_twin import load_scene
 from boom_twin.calibration.baseline import baseline_of
@@ -14,13 +15,11 @@ from boom_twin.health.baseline import load_baseline
 from boom_twin.health.inference.fault_catalogue import parameters
 from boom_twin.health.learning import BOUNDS
 
-BAG = Path(__file__).parents[2] / "bags" / "arch_session"
-
 
 @pytest.fixture(scope="module")
 def learnt(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("learnt") / "rig.yaml"
-    assert main(["calibrate", "--baseline", str(path), str(BAG), "--date", "2026-01-02"]) == 0
+    assert main(["calibrate", "--baseline", str(path), str(ARCH_DRIVES), "--date", "2026-01-02"]) == 0
     return path
 
 
@@ -37,16 +36,16 @@ def test_a_right_model_is_off_by_nothing(learnt: Path) -> None:
 @pytest.mark.slow
 def test_a_load_is_not_taken_for_errors_of_the_model() -> None:
     """Pump and wind of the bundled session, taken twice to be long enough; without their level the error is 1.3 mrad."""
-    learnt = baseline_of([BAG.with_name("pump_session")] * 2, load_scene())
+    learnt = baseline_of([PUMP_DRIVES] * 2, load_scene())
     assert learnt.angle_error < 0.5 * BOUNDS["angle_error"][1]
 
 
 def test_it_is_not_overwritten(learnt: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["calibrate", "--baseline", str(learnt), str(BAG)]) == 1
+    assert main(["calibrate", "--baseline", str(learnt), str(ARCH_DRIVES)]) == 1
     assert "is there already. Give another name, or --force." in capsys.readouterr().err
 
 
 def test_either_a_scene_or_a_baseline_is_made(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:
-        main(["calibrate", str(BAG)])
+        main(["calibrate", str(ARCH_DRIVES)])
     assert stop.value.code == 2 and "--out --baseline" in capsys.readouterr().err

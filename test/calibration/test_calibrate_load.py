@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calibration.sessions import ENCODERS, off
+from drive_twin import drive_readings, note_drives
 from scipy.linalg import solve_discrete_lyapunov
 
 from boom_twin import load_scene
@@ -42,7 +43,9 @@ def shaken(path, truth, posture, duration, seed, zeros=0.0):
     programme = rig.random_programme(truth, posture, duration, seed)
     load = loads.tip_load(truth, [loads.parse(text) for text in SHAKEN], duration, seed)
     session = rig.record(truth, programme, duration, seed=seed, load=load)
-    write_session(path, session.stamps, session.strokes, session.joints + zeros, session.imu, {"origin": "synthetic, a test"})
+    strokes, joints = drive_readings(session), session.joints + zeros
+    write_session(path, session.stamps, strokes, joints, session.imu, {"origin": "synthetic, a test"})
+    note_drives(path)
     return path
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from drive_twin import drive_readings, note_drives
 
 from boom_twin import load_scene
 from boom_twin.bag.session_files import write_session
@@ -11,6 +12,7 @@ from boom_twin.bag.session_sheet import SessionSheet
 from boom_twin.calibration import Choice, calibrate
 from boom_twin.errors import BagError, UsageError
 from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.types import StrokeReading
 from boom_twin.validation import rig
 
 SECOND = 200  # rows
@@ -40,6 +42,7 @@ def test_a_session_without_moves(two_sections, tmp_path):
     stamps = 10**18 + 5_000_000 * np.arange(30 * SECOND)
     strokes = np.tile(strokes_of_posture(two_sections, "arch"), (len(stamps), 1))
     write_session(tmp_path / "bag", stamps, strokes, np.zeros_like(strokes), None, {})
+    note_drives(tmp_path / "bag")
     with pytest.raises(BagError, match=r"no stroke moves by more than 10 mm.*Record moves"):
         calibrate([tmp_path / "bag"], two_sections)
 
@@ -60,13 +63,14 @@ def test_a_session_that_never_rests(two_sections, tmp_path):
     swing = 0.02 * np.sin(np.arange(len(stamps)) / 30.0)
     strokes = strokes_of_posture(two_sections, "arch") + swing[:, None]
     write_session(tmp_path / "bag", stamps, strokes, np.zeros_like(strokes), None, {})
+    note_drives(tmp_path / "bag")
     with pytest.raises(BagError, match="never rests for 1 s"):
         calibrate([tmp_path / "bag"], two_sections)
 
 
 def test_sessions_with_different_mappings(short, two_sections, tmp_path):
     bags = [short.write(tmp_path / name, 0) for name in ("a", "b")]
-    SessionSheet("test", "", "", "sensors: {joint_1: {zero: 0.1}}", {}).write(bags[1])
+    SessionSheet("test", mapping="sensors: {joint_1: {zero: 0.1}}", strokes=StrokeReading.DRIVE).write(bags[1])
     with pytest.raises(UsageError, match=r"another mapping than .*--mapping"):
         calibrate(bags, two_sections)
 
@@ -89,7 +93,8 @@ def test_what_cannot_be_told_apart_is_named_and_left(short, two_sections, tmp_pa
     first = strokes_of_posture(two_sections, "arch")
     programme = rig.Programme(tuple(first), (rig.Move(1, 5.0, 2.0, first[1] + 0.015),))
     session = rig.record(short.truth, programme, 24.0, seed=1, step=1e-3, elements=8)
-    write_session(tmp_path / "bag", session.stamps, session.strokes, session.joints, None, {})
+    write_session(tmp_path / "bag", session.stamps, drive_readings(session), session.joints, None, {})
+    note_drives(tmp_path / "bag")
     found = calibrate([tmp_path / "bag"], two_sections)
     assert {"joint_1.zero", "cylinder_1.zero"} <= {name for group in found.groups for name in group.names}
     assert all(not e.told for e in found.estimates if e.unknown.name in ("joint_1.zero", "cylinder_1.zero"))

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drive_twin import ARCH_DRIVES
 from ruamel.yaml import YAML
 
 pytest.importorskip("exudyn")
@@ -21,7 +22,6 @@ from boom_twin.cli.main import main
 from boom_twin.offline.ground_truth import load_truth
 from boom_twin.scene.load import default_text
 
-BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 SECTION = {"length": 3.0, "root": {"mass": 40.0, "com": [1.4, 0.1], "inertia": 30.0}, "rod_pin": [0.60, -0.12]}
 CYLINDER = {"k": 2.0e6, "closed_length": 1.08, "max_stroke": 0.79}
 
@@ -73,7 +73,7 @@ def test_sessions_of_lengths_and_of_drives_are_told(scene: Path, tmp_path: Path,
     assert YAML(typ="safe").load((bag / "session.yaml").read_text())["strokes"] == "length"
     drives = tmp_path / "drives.yaml"
     drives.write_text("inputs: {cylinder_strokes: {reads: drive}}\n")
-    for session, more, reading in ((bag, [], "length"), (bag, ["--mapping", str(drives)], "drive"), (BUNDLED, [], "drive")):
+    for session, more, reading in ((bag, [], "length"), (bag, ["--mapping", str(drives)], "drive"), (ARCH_DRIVES, [], "drive")):
         capsys.readouterr()
         assert main(["info", str(session), *more, "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["strokes"] == reading

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from drive_twin import drive_twin
+from drive_twin import ARCH_DRIVES, drive_twin
 
 from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.bag.reader import read, scan
@@ -18,13 +18,12 @@ from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import Baseline
 from boom_twin.types import Alarm, Health, Report
 
-SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 NANO = 1e-9
 TYPES = {Stream.STROKES: "JointState", Stream.ANGLES: "JointState", Stream.IMU: "Imu"}
 
 
 @lru_cache
-def session(seconds: float = 12.0, folder: Path = SESSION) -> tuple[Sample, ...]:
+def session(seconds: float = 12.0, folder: Path = ARCH_DRIVES) -> tuple[Sample, ...]:
     """Its samples."""
     streams, found = {stream.value: stream for stream in TYPES}, []
     wanted = {stream.value: f"sensor_msgs/msg/{kind}" for stream, kind in TYPES.items()}
@@ -46,7 +45,7 @@ def written(folder: Path, seconds: float) -> int:
     stamps = np.array([sample.stamp for sample in found[Stream.STROKES][:count]])
     values = [np.array([sample.values for sample in found[stream][:count]]) for stream in TYPES]
     write_session(folder, stamps, *values, {"origin": "synthetic, the beginning of the bundled session"})
-    shutil.copy(SESSION / "session.yaml", folder)
+    shutil.copy(ARCH_DRIVES / "session.yaml", folder)
     return count
 
 

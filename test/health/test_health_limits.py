@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from drive_twin import drive_twin
-from health.recorded import SESSION, Outcome, run, session
+from drive_twin import PUMP_DRIVES, drive_twin
+from health.recorded import Outcome, run, session
 
 from boom_twin import load_scene
 from boom_twin.health.alarm_text import limits_as_text
@@ -24,7 +24,7 @@ def shaken(softer: float) -> Outcome:
     """The bundled session with a pump; its cylinder 2 is softer than the twin's scene has it."""
     scene = load_scene()
     stiff = with_parameters(scene, {"cylinder_2.k": parameter(scene, "cylinder_2.k") / (1.0 - softer)})
-    return run(session(SPAN, SESSION.parent / "pump_session"), twin=drive_twin(stiff, baseline=Baseline()))
+    return run(session(SPAN, PUMP_DRIVES), twin=drive_twin(stiff, baseline=Baseline()))
 
 
 def limits() -> list[float]:

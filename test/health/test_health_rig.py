@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from drive_twin import drive_twin
+from drive_twin import drive_readings, drive_twin
 from health.recorded import run
 
 from boom_twin import load_scene
@@ -41,7 +41,7 @@ def session(
     load = tip_load(boom, loads, seconds, seed) if loads else None
     rows, _ = move(resting, programme, seconds, STEP, STEP, SCHEME, load)
     seen = observe(boom, programme, rows, Sensors(), seed, load)
-    return samples_of(seen.stamps, seen.strokes, seen.joints, seen.imu, seen.angle_stamps)
+    return samples_of(seen.stamps, drive_readings(seen), seen.joints, seen.imu, seen.angle_stamps)
 
 
 @pytest.fixture(scope="module")

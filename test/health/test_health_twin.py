@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import pytest
-from drive_twin import drive_twin
+from drive_twin import PUMP_DRIVES, drive_twin
 from health.recorded import NANO, Outcome, run, session, spoilt
 
 from boom_twin import Sample, Settings, Stream, load_scene
@@ -167,18 +166,15 @@ def test_the_order_of_arrival_does_not_matter():
     assert [health.levels.tobytes() for health in one.health] == [health.levels.tobytes() for health in other.health]
 
 
-PUMPED = Path(__file__).parents[2] / "bags" / "pump_session"
-
-
 def test_pump_and_wind_are_no_fault():
     """The bundled session that pulses of 130 N and gusts shake, which no twin knows of: no alarm."""
-    outcome = run(session(40.0, PUMPED))
+    outcome = run(session(40.0, PUMP_DRIVES))
     assert len(outcome.health) >= 38 and outcome.states() == []
 
 
 def test_a_fault_under_pump_and_wind():
     """An encoder that reads 0.5 degrees too much all of a sudden while the boom is shaken: told, and no other is accused."""
-    outcome = run(spoilt(session(25.0, PUMPED), Stream.ANGLES, 2, lambda v, t: v + 0.5 * DEGREE * min(1.0, t / 2.0), 8.0))
+    outcome = run(spoilt(session(25.0, PUMP_DRIVES), Stream.ANGLES, 2, lambda v, t: v + 0.5 * DEGREE * min(1.0, t / 2.0), 8.0))
     assert outcome.told() and outcome.told()[0][0] >= 8.0
     assert outcome.causes() <= {"joint_3.sensor"}
     assert "joint_3.sensor" in [rank.cause for rank in outcome.states()[-1][1].ranked[:2]]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from pathlib import Path
+
+from drive_twin import PUMP_DRIVES
 
 ONCE = [1] * 17
 """Each kernel is compiled for one set of types."""
-SESSION = Path(__file__).parents[2] / "bags" / "pump_session"
 CODE = """
 import sys
 from pathlib import Path
@@ -46,5 +46,5 @@ print(ready, [len(kernel.dispatcher.signatures) for kernel in kernels], told)
 
 
 def test_nothing_is_compiled_while_a_session_runs():
-    found = subprocess.run([sys.executable, "-c", CODE, str(SESSION)], capture_output=True, text=True, check=True)
+    found = subprocess.run([sys.executable, "-c", CODE, str(PUMP_DRIVES)], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == f"{ONCE} {ONCE} 3"

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drive_twin import ARCH_DRIVES, note_drives
 from made_once import MadeOnce
 
 from boom_twin.bag.reader import read, scan
@@ -21,7 +22,6 @@ from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene
 from boom_twin.types import Stream
 
-BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 SECONDS, WRONG_FROM, GAP = 40.0, 15.0, (30.0, 30.6)
 OFFSET = 0.02  # rad, by which joint 3's encoder is wrong from WRONG_FROM on
 DRIFT = 5e-4  # rad/s
@@ -56,7 +56,7 @@ def spoilt(path: Path, spoil: Callable[[Any, Any], None]) -> Path:
     values: dict[Stream, list[Any]] = {stream: [] for stream in topics}
     names = {topic.absolute: stream for stream, topic in topics.items()}
     stamps = []
-    for name, _, message in read(scan(BUNDLED), {topic.absolute: topic.type for topic in topics.values()}):
+    for name, _, message in read(scan(ARCH_DRIVES), {topic.absolute: topic.type for topic in topics.values()}):
         sample = decoder.put(names[name], stamp_of(message), message)
         assert sample is not None
         values[names[name]].append(sample.values)
@@ -69,6 +69,7 @@ def spoilt(path: Path, spoil: Callable[[Any, Any], None]) -> Path:
     spoil(time, joints)
     arrays = (np.array(values[Stream.STROKES])[kept], joints[kept], np.array(values[Stream.IMU])[kept])
     write_session(path, stamps_ns[kept], *arrays, {"origin": "synthetic, encoder 3 made wrong"})
+    note_drives(path)
     return path
 
 

@@ -30,16 +30,19 @@ def scene_text(sections: int, closed_longer: float = 0.0) -> str:
     return anew(booms.scene_of(spec))
 
 
-def session(path: Path, text: str, *, keep: bool, rows: int = 300, bias: float = 0.0) -> Path:
-    """A session at rest of the boom of a scene's text, which it keeps or not; joint_1 reads `bias` (rad) too much."""
+def session(path: Path, text: str, *, keep: bool, rows: int = 300, bias: float = 0.0, strokes: str = "lengths") -> Path:
+    """Write a session at rest of the boom of a scene's text, which it keeps or not; joint_1 reads `bias` (rad) too much.
+
+    Its strokes are ``lengths``, or the drives, by the name ``strokes`` of `statics`.
+    """
     file = path.with_suffix(".scene.yaml")
     file.write_text(text)
     scene, noise = load_scene(file), np.random.default_rng(1)
     rest = statics(scene, posture="arch")
-    strokes, joints = (np.tile(values, (rows, 1)) for values in (rest.strokes, rest.joints))
+    read, joints = (np.tile(values, (rows, 1)) for values in (getattr(rest, strokes), rest.joints))
     joints[:, 0] += bias
     joints += noise.normal(0.0, 2e-4, joints.shape)
-    write_session(path, START + np.arange(rows) * STEP, strokes, joints, None, {"origin": "synthetic, a test"})
+    write_session(path, START + np.arange(rows) * STEP, read, joints, None, {"origin": "synthetic, a test"})
     if keep:
         SessionSheet("0", text).write(path)
     return path

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from drive_twin import drive_twin
+from drive_twin import drive_twin, note_drives
 from matplotlib.axes import Axes
 
 from boom_twin import Sample, Settings, Stream, load_scene, replay
@@ -56,6 +56,7 @@ def samples(scene):
 def bag(samples, tmp_path_factory):
     path = tmp_path_factory.mktemp("forces") / "bag"
     write_samples(path, samples, (Stream.STROKES, Stream.ANGLES, FORCES), {"origin": "synthetic, a test"})
+    note_drives(path)
     return path
 
 
@@ -146,7 +147,7 @@ def test_names_signs_and_units_of_a_rig(scene, samples, bag, tmp_path):
     write_samples(tmp_path / "rig", mapped, (Stream.STROKES, Stream.ANGLES, FORCES), {"origin": "synthetic, a test"})
     mapping = tmp_path / "mapping.yaml"
     rows = "\n".join(f"  {name}: {{unit: kN, sign: -1}}" for name in CHANNELS)
-    mapping.write_text(f"sensors:\n{rows}\n")
+    mapping.write_text(f"inputs: {{cylinder_strokes: {{reads: drive}}}}\nsensors:\n{rows}\n")
     usual = replay(bag, scene, tmp_path / "usual", health=False)
     found = replay(tmp_path / "rig", scene, tmp_path / "found", mapping=mapping, health=False)
     expected = usual.recording.of(FORCES).values

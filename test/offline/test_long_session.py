@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drive_twin import drive_twin
+from drive_twin import ARCH_DRIVES, drive_twin
 from health.recorded import written
 
 from boom_twin import Settings, Stream, load_scene
@@ -18,8 +18,6 @@ from boom_twin.report.evaluation import Evaluation, Evaluator
 from boom_twin.report.quantities import read
 from boom_twin.system.result_folder import REPLAY, result_folder
 from boom_twin.twin.blocks import CODES, ReportBlock, SampleBlock
-
-SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 
 
 def replayed(session: Path, out: Path) -> tuple[dict, Evaluation, list[Stretch]]:
@@ -80,7 +78,7 @@ def test_the_history_is_that_of_the_whole(both: tuple) -> None:
 
 def blocks(seconds: float) -> list[ReportBlock]:
     """What a twin says of the first seconds of the bundled session's true strokes, and angles."""
-    truth = np.genfromtxt(SESSION / "truth.csv.gz", delimiter=",", names=True)[: round(200 * seconds)]
+    truth = np.genfromtxt(ARCH_DRIVES / "truth.csv.gz", delimiter=",", names=True)[: round(200 * seconds)]
     strokes, stamps = np.column_stack([truth[f"stroke_{i}_m"] for i in range(1, 5)]), np.round(truth["t_s"] * 1e9)
     rows, streams = np.repeat(strokes, 2, axis=0), np.tile([CODES[Stream.STROKES], CODES[Stream.ANGLES]], len(strokes))
     found = drive_twin(load_scene()).update_block(SampleBlock(streams, np.repeat(stamps.astype(np.int64), 2), rows))

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from drive_twin import note_drives
 from offline.booms_apart import as_document, scene_text, session
 
 from boom_twin import load_scene, replay
@@ -94,6 +95,7 @@ def test_without_its_scene_it_is_refused(five, tmp_path, capsys):
     assert "scene      default scene" in told and "missing    /cylinder_strokes names cylinder_5" in told
     with pytest.raises(BagError, match="names cylinder_5"):
         bag_feed(bag, None, Settings())
+    note_drives(bag)
     assert main(["calibrate", str(bag), "--out", str(tmp_path / "scene.yaml")]) == 1
     assert "names cylinder_5; the scene has 4 cylinders" in capsys.readouterr().err
     scene = tmp_path / "five.yaml"
@@ -160,7 +162,8 @@ def test_a_boom_of_as_many_joints_that_does_not_fit_is_refused(four, tmp_path, c
 
 
 def test_an_encoder_five_degrees_off_is_a_fault_to_be_found(tmp_path):
-    bag = session(tmp_path / "bag", scene_text(4), keep=False, rows=1000, bias=np.radians(5.0))
+    bag = session(tmp_path / "bag", scene_text(4), keep=False, rows=1000, bias=np.radians(5.0), strokes="strokes")
+    note_drives(bag)
     alarms = replay(bag, load_scene(), tmp_path / "out").summary["alarms"]
     assert {alarm["channel"] for alarm in alarms} == {"joint_1"}
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drive_twin import drive_twin
+from drive_twin import PUMP_DRIVES, drive_twin
 
 from boom_twin import Sample, Stream
 from boom_twin.bag.session_files import write_session
@@ -24,7 +24,6 @@ from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.system.result_folder import REPLAY, result_folder
 from boom_twin.twin.blocks import SampleBlock, block_of
 
-PUMP = Path(__file__).parents[2] / "bags" / "pump_session"
 VARYING = {"wall_s", "realtime_factor"}
 
 
@@ -53,9 +52,9 @@ def repeats(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 def test_one_core_and_two_give_the_same(tmp_path: Path, repeats: list[int]) -> None:
     window = TimeWindow(5.0, 10.0)
-    alone = replayed(PUMP, tmp_path / "alone", 1, window).summary
+    alone = replayed(PUMP_DRIVES, tmp_path / "alone", 1, window).summary
     assert not repeats
-    apart = replayed(PUMP, tmp_path / "apart", 2, window).summary
+    apart = replayed(PUMP_DRIVES, tmp_path / "apart", 2, window).summary
     assert sum(repeats) > 500 * alone["samples"] / 2
     assert alone["output_sha256"] is not None
     assert {**alone, **dict.fromkeys(VARYING)} == {**apart, **dict.fromkeys(VARYING)}

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from drive_twin import ARCH_DRIVES
 from oracle import booms
 from oracle.clearance.scenes import RODS, with_pins
 
 from boom_twin import replay
 
-SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
-
 
 @pytest.mark.slow
 def test_no_sample_is_lost_and_every_pin_is_told(tmp_path):
     """The lightly loaded pin of cylinder 4 travels round its bush twice, within the long steps of the look ahead."""
-    found = replay(SESSION, with_pins(booms.document(), RODS), tmp_path)
+    found = replay(ARCH_DRIVES, with_pins(booms.document(), RODS), tmp_path)
     assert found.summary["samples"] == 12000 and found.summary["dropped"] == 0
     assert "model" not in found.summary["events"]
     pins = found.recording.predictions.clearances

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drive_twin import ARCH_DRIVES, note_drives
 from made_once import MadeOnce
 
 from boom_twin import Stream
@@ -15,7 +16,6 @@ from boom_twin.cli.main import main
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import load_topics
 
-SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 SECONDS, WRONG_FROM, WRONG_BY = 24.0, 12.0, 0.0035
 
 RECORDED = (Stream.STROKES, Stream.ANGLES, Stream.IMU)
@@ -26,7 +26,7 @@ def samples() -> dict[Stream, tuple[np.ndarray, np.ndarray]]:
     inputs, intake = load_topics().inputs, SampleDecoder(4)
     roles = {inputs[stream].name: stream for stream in RECORDED}
     found: dict[Stream, list] = {stream: [] for stream in RECORDED}
-    for name, _, message in read(scan(SESSION), {inputs[stream].name: inputs[stream].type for stream in RECORDED}):
+    for name, _, message in read(scan(ARCH_DRIVES), {inputs[stream].name: inputs[stream].type for stream in RECORDED}):
         sample = intake.put(roles[name], stamp_of(message), message)
         found[sample.stream].append(sample)
         if sample.stamp - found[Stream.STROKES][0].stamp > SECONDS * 1e9:
@@ -46,6 +46,8 @@ def write_sessions(folder: Path) -> None:
     write_session(folder / "healthy", stamps, strokes, joints, imu, notes)
     wrong = joints + WRONG_BY * np.array([0.0, 0.0, 1.0, 0.0]) * (stamps - stamps[0] > WRONG_FROM * 1e9)[:, None]
     write_session(folder / "faulty", stamps, strokes, wrong, imu, notes)
+    for name in ("healthy", "faulty"):
+        note_drives(folder / name)
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 from drive_twin import drive_twin
@@ -87,7 +88,8 @@ def grown() -> dict[str, int]:
 
 def test_as_many_objects_live_after_more_samples() -> None:
     # In a process of its own, for blocks of memory are counted for all that a process does.
-    done = subprocess.run([sys.executable, __file__], capture_output=True, text=True, check=True, timeout=500)
+    command = [sys.executable, "-m", "twin.test_growth"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=500, cwd=Path(__file__).parents[1])
     found = json.loads(done.stdout)
     blocks = found.pop("blocks")
     assert not found

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import pickle
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, load_scene
+from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.config.settings import Settings
 from boom_twin.errors import UsageError
 from boom_twin.health.baseline import load_baseline
@@ -20,11 +22,11 @@ MS, N = 1_000_000, 4
 START = 1_700_000_000_000 * MS
 
 
-def stream(seed: int, count: int = 900, strange: float = 0.02) -> list[Sample]:
+def stream(seed: int, count: int = 900, strange: float = 0.02, new: Callable[..., Twin] = drive_twin) -> list[Sample]:
     """All streams at 200 Hz of a boom that moves: late, missing, doubled, far off, of other times."""
     rng, scene = np.random.default_rng(seed), load_scene()
     still = strokes_of_posture(scene, "arch")
-    twin, found, shift = drive_twin(scene), [], 0
+    twin, found, shift = new(scene), [], 0
     for k in range(count):
         stamp = START + 5 * k * MS + int(rng.normal() * 0.05 * MS)
         strokes = still + 0.01 * np.sin(0.004 * k) * np.array([1.0, 0.0, 1.0, 0.5]) + rng.normal(size=N) * 2e-5
@@ -64,20 +66,22 @@ def told(reports: list[Report]) -> list[tuple[object, ...]]:
     return found
 
 
+@pytest.mark.parametrize("new", [drive_twin, Twin], ids=["drives", "lengths"])
 @pytest.mark.parametrize("seed", range(6))
-def test_blocks_of_any_size_give_what_single_samples_give(seed: int) -> None:
+def test_blocks_of_any_size_give_what_single_samples_give(seed: int, new: Callable[..., Twin]) -> None:
     rng = np.random.default_rng(100 + seed)
-    samples = stream(seed, strange=0.0 if seed == 0 else 0.02)
+    samples = stream(seed, strange=0.0 if seed == 0 else 0.02, new=new)
     mounts = ("root", None, "head", "root") if seed == 1 else ()
     usual = load_baseline() if seed < 3 else None
-    one, many = (drive_twin(load_scene(), Settings(), mounts, usual) for _ in range(2))
+    one, many = (new(load_scene(), Settings(), mounts, usual) for _ in range(2))
     first, blocks = 0, 0
     while first < len(samples):
         part = samples[first : first + int(rng.integers(1, 500))]
         if rng.random() < 0.2:
-            asked = {"payload": float(rng.integers(0, 60))}
-            one.requests.tune(asked)
-            many.requests.tune(asked)
+            asked, zeros = {"payload": float(rng.integers(0, 60))}, {"joint_2": float(rng.normal() * 1e-3)}
+            for twin in (one, many):
+                twin.requests.tune(asked)
+                twin.requests.zero(zeros)
         found = many.update_block(block_of(part, N))
         reports = [each for item in found for each in (item.reports(N) if isinstance(item, ReportBlock) else [item])]
         assert told(reports) == told([one.update(sample) for sample in part])
@@ -85,6 +89,37 @@ def test_blocks_of_any_size_give_what_single_samples_give(seed: int) -> None:
         first += len(part)
     assert one.counts == many.counts and blocks
     assert seed == 0 or len(one.counts) > 5
+
+
+def test_blocks_of_lengths_give_the_same_estimates_too() -> None:
+    samples, one, many = stream(3, 300, new=Twin), Twin(load_scene()), Twin(load_scene())
+    single = [each.estimate for sample in samples for each in one.update(sample).all]
+    found = [
+        item for first in range(0, len(samples), 37) for item in many.update_block(block_of(samples[first : first + 37], N))
+    ]
+    reports = [each for item in found for each in (item.reports(N) if isinstance(item, ReportBlock) else [item])]
+    together = [each.estimate for report in reports for each in report.all]
+    assert sum(each is not None for each in single) > 200
+    assert [each and pickle.dumps(each) for each in together] == [each and pickle.dumps(each) for each in single]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_predictions_from_lengths_know_nothing_of_what_else_is_measured(seed: int) -> None:
+    """Late, early, lost, doubled or absurd: angles, accelerations and forces change no number of the prediction."""
+    rng, samples = np.random.default_rng(seed), stream(seed, 300, strange=0.0, new=Twin)
+    alone = [sample for sample in samples if sample.stream is Stream.STROKES]
+    keys = [sample.stamp + 0.5 * MS + (sample.stream is not Stream.STROKES) * rng.normal() * 20 * MS for sample in samples]
+    mixed = [sample for _, sample in sorted(zip(keys, samples, strict=True), key=lambda each: each[0])]
+    others = [sample for sample in mixed if sample.stream is Stream.STROKES or rng.random() < 0.9]
+    others = [
+        each for sample in others for each in [sample] * (1 + (sample.stream is not Stream.STROKES and rng.random() < 0.1))
+    ]
+
+    def predictions(given: list[Sample]) -> list[object]:
+        twin = Twin(load_scene(), baseline=load_baseline())
+        return [row[4] for row in told([twin.update(sample) for sample in given]) if row[4]]
+
+    assert predictions(alone) == predictions(samples) == predictions(mixed) == predictions(others)
 
 
 def test_blocks_keep_samples_and_reports_as_they_are() -> None:
