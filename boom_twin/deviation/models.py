@@ -51,6 +51,7 @@ IMU_ZERO, IMU_DRIFT = 0.05, 1e-3  # m/s^2; m/s^2 in a root second
 ANGLE_ZERO, ANGLE_DRIFT = 2e-4, 1e-5  # rad; rad in a root second: sensors' zeros, and the error of the model's statics
 FORCE_ZERO, FORCE_DRIFT = 1.0, 0.03  # share of the force; in a root second
 INEXACT = 0.03  # share of the tip's acceleration that modes left out and those there are wrong by
+DEAF_WAY, DEAF_RATE = 0.05, 0.02  # m, m/s: how far a drive is, and how fast, whose transducer fails
 DOF = 4.0  # degrees of freedom of Student's t, by which innovations of the estimate are weighed
 PATIENCE = 1_000_000_000  # ns without readings after which the estimate is the prediction again
 OLDEST = 0.1  # s, most that a reading may be late
@@ -78,7 +79,7 @@ class Filters(NamedTuple):
     mean, spread : (2, s), (2, s, s) of the mixtures. load2 : (2,) variance of the fast load, N^2, of prediction and estimate.
     jerk : (n,) m^2/s^5. is_open : (n,) 1 where a valve is believed open. still : (n,) s since its drive began to stand still.
     status : (3,) whether it has begun, whether the estimate has readings of its own, stamp of the newest of these.
-    masked : (c,) measured channels that are not to be used. noise : variances.
+    masked, deaf : (c,), (n,) measured channels, and strokes, that the estimate is not to use. noise : variances.
     places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
     felt : (2,) specific force predicted at the tip, m/s^2. shaking : (1,) mean square of its acceleration, m^2/s^4.
     angle : (1,) of the tip, rad. strokes : (n, 3) predicted lengths (m), their rates and accelerations.
@@ -96,6 +97,7 @@ class Filters(NamedTuple):
     still: Array
     status: NDArray[np.int64]
     masked: NDArray[np.bool_]
+    deaf: NDArray[np.bool_]
     noise: SensorNoise
     places: NDArray[np.int64]
     weights: Array
@@ -123,7 +125,8 @@ def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> F
     return Filters(
         x=np.zeros((5, states)), p=np.zeros((5, states, states)), chances=np.zeros(5), mean=np.zeros((2, states)),
         spread=np.zeros((2, states, states)), load2=np.zeros(2), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
-        still=np.zeros(n), status=np.zeros(3, np.int64), masked=np.zeros(channels, np.bool_), noise=noise,
+        still=np.zeros(n), status=np.zeros(3, np.int64), masked=np.zeros(channels, np.bool_),
+        deaf=np.zeros(n, np.bool_), noise=noise,
         places=np.zeros((states, 6 + n), np.int64), weights=np.zeros((states, 6 + n)), counts=np.zeros(states, np.int64),
         variances=np.zeros(states), felt=np.zeros(2), pulls=np.zeros(n), half=np.zeros((states, states)),
         turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)), mixed_p=np.zeros((3, states, states)),
@@ -380,7 +383,7 @@ def hold_still(p, f, k, size):
     """Take the readings of model `k` that drives behind closed valves stand still."""
     n, drive = p.drives.shape[0], drive_place(p)
     for i in range(n):
-        if f.is_open[i] == 0:
+        if f.is_open[i] == 0 and not (k >= ALL_VALVES and f.deaf[i]):
             for order in (1, 2):
                 at = drive + order * n + i
                 clear(f.row, size)
@@ -394,7 +397,7 @@ def take_lengths(p, f, k, size, y):
     """Take lengths `y` (n, m; NaN = missing) into model `k`; returns the logarithm of their likelihood."""
     total = 0.0
     for i in range(y.shape[0]):
-        if math.isfinite(y[i]):
+        if math.isfinite(y[i]) and not (k >= ALL_VALVES and f.deaf[i]):
             length_row(p, i, f.row)
             rest = p.drives[i] + p.compliance[i] * p.pulled[i]
             innovation = y[i] - rest - about_rest(p, f.row, f.x[k], size)
@@ -652,6 +655,9 @@ def follow_prediction(p, f):
         for i in range(n):
             covariance[size + 2 + i, size + 2 + i] = ANGLE_ZERO * ANGLE_ZERO
             covariance[size + 2 + n + i, size + 2 + n + i] = (FORCE_ZERO * (abs(f.pulls[i]) + 0.1 * largest)) ** 2
+            if f.deaf[i]:
+                covariance[drive_place(p) + i, drive_place(p) + i] += DEAF_WAY * DEAF_WAY
+                covariance[drive_place(p) + n + i, drive_place(p) + n + i] += DEAF_RATE * DEAF_RATE
     f.chances[ALL_VALVES], f.chances[ALL_OPEN] = f.chances[VALVES] + f.chances[BURST], f.chances[OPEN]
     mix(f, ESTIMATE, every)
 

@@ -78,7 +78,6 @@ class LengthPredictor(BoomPredictor):
         channels = sum(len(names) for stream, names in channels_of(n).items() if stream is not Stream.STROKES)
         self.filters = new_filters(n, MODES, channels, SensorNoise(*variances, *(size * weight for size in sizes)))
         self._struts = compile_scene(with_rigid_cylinders(scene))
-        self._masked: NDArray[np.bool_] | None = None
 
     @cached_property
     def held(self) -> tuple[Any, ...]:
@@ -169,14 +168,12 @@ class LengthPredictor(BoomPredictor):
 
     # -- what a run tells the filters
 
-    def mask(self, masked: NDArray[np.bool_]) -> None:
-        """Leave the measured channels (c,) that are masked out of the estimate, and forget what a new one has told it."""
-        if masked is self._masked:
-            return
-        self._masked = masked
-        if (masked & ~self.filters.masked).any():
-            self.filters.status[FED] = 0
-        self.filters.masked[:] = masked
+    def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_]) -> None:
+        """Leave masked channels (c,) and strokes (n,) out of the estimate, and forget what a new one of them has told it."""
+        f = self.filters
+        if (masked & ~f.masked).any() or (strokes != f.deaf).any():
+            f.status[FED] = 0
+        f.masked[:], f.deaf[:] = masked, strokes
 
     def rebase(self, shift: int) -> None:
         """All stamps are later by `shift` (ns) from now on."""

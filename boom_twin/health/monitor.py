@@ -148,6 +148,11 @@ class HealthMonitor:
             found.append(self._masked(stream) | is_out | np.array([f"{name}.sensor" in causes for name in names]))
         return np.concatenate(found)
 
+    @property
+    def failing_strokes(self) -> NDArray[np.bool_]:
+        """Return which stroke transducers are known to fail, each by itself, shape (n,)."""
+        return self._sensors[Stream.STROKES].masked
+
     def _masked(self, stream: Stream) -> NDArray[np.bool_]:
         """Return which channels of a stream are not judged by residuals."""
         masked = self._sensors[stream].masked

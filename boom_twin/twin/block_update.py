@@ -315,9 +315,10 @@ class BlockUpdate:
             return None
         self._tell_health(run.newest // SLOT * SLOT)
         health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, partial(self._tip_deviation, run))
-        self._modes.mask(self._judge.suspected)
         if isinstance(self._modes, LengthPredictor):
+            self._modes.leave_out(self._judge.suspected, self._judge.failing_strokes)
             return health and replace(health, tip_sigmas=self._modes.tip_sigmas)
+        self._modes.mask(self._judge.suspected)
         self._modes.expect_noise(*self._judge.noise)
         return health
 

@@ -20,8 +20,8 @@ from typing import NamedTuple
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
-from drive_twin import drive_twin
 
+from boom_twin import Twin
 from boom_twin.config.settings import Settings
 from boom_twin.estimation.load_spectrum import tip_load as pulses_of
 from boom_twin.estimation.tip_estimate import ACCELERATION, ACCELERATION_COVARIANCE, FORCE, TIP, TIP_COVARIANCE
@@ -183,7 +183,7 @@ def block_of(session: Session, streams: list[Stream]) -> SampleBlock:
 
 def measured(session: Session, case: Case, sensors: str, skip: float = 0.0) -> dict[str, float | str]:
     """Errors of prediction and estimate from `skip` (s) on; see the module's text."""
-    twin = drive_twin(scene_of(case), Settings(**dict(case.settings)))
+    twin = Twin(scene_of(case), Settings(**dict(case.settings)), reads=StrokeReading.DRIVE)
     parts = [
         part for part in twin.update_block(block_of(session, [Stream[each.upper()] for each in sensors.split(",")]))
         if isinstance(part, ReportBlock)

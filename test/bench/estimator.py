@@ -17,16 +17,16 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from drive_twin import drive_twin
 from estimation.motions import measured
 from estimation.test_motions import error, followed
 
-from boom_twin import Settings, Stream, load_scene
+from boom_twin import Settings, Stream, Twin, load_scene
 from boom_twin.bag.reader import read, scan
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.offline.ground_truth import load_truth
 from boom_twin.offline.recording import Recording
 from boom_twin.twin.blocks import SampleBlock
+from boom_twin.types import StrokeReading
 
 ROOT = Path(__file__).parents[2]
 SESSION = ROOT / "bags" / "arch_session"
@@ -53,7 +53,7 @@ def strokes_of_session() -> tuple[list[int], np.ndarray, np.ndarray]:
 
 def errors(stamps, strokes, **tuning) -> tuple[float, float, float]:
     """Tip error (mm rms), acceleration error (m/s^2 rms), microseconds per sample."""
-    twin, truth = drive_twin(load_scene(), Settings(**tuning)), load_truth(SESSION)
+    twin, truth = Twin(load_scene(), Settings(**tuning), reads=StrokeReading.DRIVE), load_truth(SESSION)
     start = time.perf_counter()
     recording = Recording(strokes.shape[1])
     for part in twin.update_block(SampleBlock(np.zeros(len(stamps), np.int64), np.array(stamps), strokes)):
@@ -113,7 +113,7 @@ def compare_rates() -> None:
 
 
 if __name__ == "__main__":
-    drive_twin(load_scene()).warm_up()
+    Twin(load_scene(), reads=StrokeReading.DRIVE).warm_up()
     sweep("agility", [{"stroke_agility": value} for value in AGILITIES])
     sweep("steps", [{"step": step, "look_step": look} for step, look in STEPS])
     compare_rates()

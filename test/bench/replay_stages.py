@@ -21,8 +21,8 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in a replay
 
 import numpy as np
-from drive_twin import drive_twin
 
+from boom_twin import Twin
 from boom_twin.bag.reader import scan
 from boom_twin.bag.session_model import baseline_of, mapping_of, scene_of, settings_of
 from boom_twin.bag.writer import RESULT_CHUNK_SIZE, SessionWriter
@@ -37,8 +37,7 @@ from boom_twin.twin.block_update import BlockUpdate
 from boom_twin.twin.blocks import SampleBlock
 from boom_twin.twin.driver import drive_blocks
 from boom_twin.twin.expected_readings import Deviations
-from boom_twin.twin.twin import Twin
-from boom_twin.types import Change, Report
+from boom_twin.types import Change, Report, StrokeReading
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 STAGES = {
@@ -77,7 +76,7 @@ def run(session: Path, durations: Durations) -> str:
     following, items = timed(lambda: next(read, None), durations["reading, decoding"]), list[SampleBlock | Change]()
     while (item := following()) is not None:
         items += [item] if isinstance(item, SampleBlock | Change) else []
-    twin, digest = drive_twin(scene, settings, topics.mounts(joints), usual.baseline), hashlib.sha256()
+    twin, digest = Twin(scene, settings, topics.mounts(joints), usual.baseline, reads=StrokeReading.DRIVE), hashlib.sha256()
     twin.warm_up()
     for name in STAGES:
         durations[name].clear()

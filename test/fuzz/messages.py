@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from drive_twin import drive_twin
 from numpy.random import Generator
 
-from boom_twin import Sample, Stream, load_scene
+from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.bag.integrity import PARSE_ERRORS
 from boom_twin.bag.session_files import sensor_message
 from boom_twin.config.settings import Settings
@@ -32,7 +31,7 @@ from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import alarms, dump, layout, state
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.types import SENSORS
+from boom_twin.types import SENSORS, StrokeReading
 
 from .mutate import damaged, pick
 from .verdict import Kind, Verdict
@@ -79,7 +78,11 @@ def _encoded(sample: Sample, little_endian: bool = True) -> bytes:
 def _outputs() -> dict[str, list[bytes]]:
     """What a twin publishes, by role."""
     random, scene = np.random.default_rng(3), load_scene()
-    twin, encoder, found = drive_twin(scene, baseline=load_baseline(None)), ReportEncoder(scene, Settings()), {}
+    twin, encoder, found = (
+        Twin(scene, baseline=load_baseline(None), reads=StrokeReading.DRIVE),
+        ReportEncoder(scene, Settings()),
+        {},
+    )
     for number in range(400):
         for stream in Stream:
             for key, data in encoder.fill(twin.update(_true(random, number, stream))):
@@ -177,7 +180,10 @@ class _Listener:
     def __init__(self) -> None:
         self.odd = 0
         scene, topics = load_scene(), load_topics()
-        self._twin, self._decoder = drive_twin(scene, baseline=load_baseline(None)), SampleDecoder(4, topics)
+        self._twin, self._decoder = (
+            Twin(scene, baseline=load_baseline(None), reads=StrokeReading.DRIVE),
+            SampleDecoder(4, topics),
+        )
         self._wires = {stream: CdrDecoder(TYPES[stream], field=kind.field) for stream, kind in SENSORS.items()}
         self._feed, self._topics = Feed("fuzz", Store(2000), topics, scene), topics
 

@@ -17,11 +17,12 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import stored
-from drive_twin import drive_twin
 from scenarios import scenario
 
+from boom_twin import Twin
 from boom_twin.health.baseline import Baseline
 from boom_twin.health.monitor import HealthMonitor
+from boom_twin.types import StrokeReading
 
 START = 2_000_000_000  # ns
 
@@ -38,7 +39,11 @@ def cost(number: int, sessions: Path) -> tuple[float, float, float]:
         return found
 
     HealthMonitor.judge = watched  # type: ignore[method-assign]
-    twin, samples, longest = drive_twin(each.model, baseline=Baseline()), stored.load_samples(sessions, each), 0.0
+    twin, samples, longest = (
+        Twin(each.model, baseline=Baseline(), reads=StrokeReading.DRIVE),
+        stored.load_samples(sessions, each),
+        0.0,
+    )
     warm = next(i for i, sample in enumerate(samples) if sample.stamp >= stored.EPOCH + START)
     for sample in samples[:warm]:
         twin.update(sample)

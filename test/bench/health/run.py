@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import stored
-from drive_twin import drive_twin
 from scenarios import Scenario, learning, nominal, scenario
 
 from boom_twin import Twin
@@ -26,7 +25,7 @@ from boom_twin.calibration.baseline import learn_baseline
 from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import Baseline, load_baseline
 from boom_twin.twin.blocks import ReportBlock, block_of
-from boom_twin.types import NANO, Alarm, Health, Sample
+from boom_twin.types import NANO, Alarm, Health, Sample, StrokeReading
 
 AT_ONCE = 400  # samples
 
@@ -69,7 +68,7 @@ def outcome(sessions: Path, out: Path, each: Scenario, shipped: bool = False) ->
     By the baseline of its rig, or by the one that ships.
     """
     baseline = load_baseline(baseline_file(out, each.rig, each.scene)) if each.rig and not shipped else Baseline()
-    twin = drive_twin(each.model, baseline=baseline)
+    twin = Twin(each.model, baseline=baseline, reads=StrokeReading.DRIVE)
     told: list[dict[str, Any]] = []
     last: dict[tuple[str, int, str], tuple[Any, ...]] = {}
     newest: dict[tuple[str, int, str], dict[str, Any]] = {}

@@ -21,9 +21,8 @@ import numpy as np
 import run
 import sections
 import stored
-from drive_twin import drive_twin
 
-from boom_twin import load_scene
+from boom_twin import Twin, load_scene
 from boom_twin.health.baseline import load_baseline
 from boom_twin.health.hold_test import HoldTest
 from boom_twin.health.residual_monitor import HELD
@@ -40,7 +39,7 @@ def smallest(number: int, out: Path) -> list[float]:
 
     HoldTest.take = watched  # type: ignore[method-assign]
     try:
-        twin = drive_twin(load_scene(), baseline=load_baseline(run.baseline_file(out, each.rig)))
+        twin = Twin(load_scene(), baseline=load_baseline(run.baseline_file(out, each.rig)), reads=StrokeReading.DRIVE)
         samples = stored.load_samples(out / "section_sessions", each)
         for first in range(0, len(samples), run.AT_ONCE):
             run._health(twin, samples[first : first + run.AT_ONCE])
