@@ -14,7 +14,7 @@ def files(folder: str) -> list[str]:
 
 setup(
     name="boom_twin",
-    version="0.1.0",
+    version="0.2.0",
     description="Digital twin of a concrete placing boom: transfer-matrix model, ROS 2 node, replay of MCAP sessions",
     long_description=(HERE / "README.md").read_text(encoding="utf-8") if (HERE / "README.md").exists() else "",
     long_description_content_type="text/markdown",

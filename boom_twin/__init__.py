@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .twin.twin import Twin
     from .types import Report, Sample, Stream
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "Report": "types",

@@ -31,7 +31,7 @@ from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.load import examine_text, example_text
 from boom_twin.scene.schema import Scene
 from boom_twin.twin.blocks import CODES, ReportBlock, SampleBlock
-from boom_twin.types import NANO, Array, Stream
+from boom_twin.types import NANO, Array, Stream, StrokeReading
 from boom_twin.validation.rig import Programme, Scheme, Sensors, at_rest, move, observe, random_programme
 from boom_twin.validation.rig.faults import RigFault
 from boom_twin.validation.rig.faulty_boom import changes as changes_by

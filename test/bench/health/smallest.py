@@ -26,6 +26,7 @@ from boom_twin import Twin, load_scene
 from boom_twin.health.baseline import load_baseline
 from boom_twin.health.hold_test import HoldTest
 from boom_twin.health.residual_monitor import HELD
+from boom_twin.types import StrokeReading
 
 
 def smallest(number: int, out: Path) -> list[float]:
