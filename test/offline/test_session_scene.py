@@ -153,12 +153,12 @@ def test_a_boom_of_as_many_joints_that_does_not_fit_is_refused(four, tmp_path, c
     other.write_text(scene_text(4, closed_longer=0.05))
     assert main(arguments(four, tmp_path / "out", "--scene", str(other))) == 1
     told = capsys.readouterr().err
-    assert "joint_2 by +19.9 deg" in told and f"The scene ({other}) is of another boom" in told and "--scene" in told
+    assert "joint_2 by +20.0 deg" in told and f"The scene ({other}) is of another boom" in told and "--scene" in told
     assert not (tmp_path / "out" / "summary.json").exists()
     feed = bag_feed(four, scene_of(four, other), Settings())
     while feed.is_reading:
         feed.poll()
-    assert "joint_2 by +19.9 deg" in feed.trouble and "of another boom" in feed.trouble
+    assert "joint_2 by +20.0 deg" in feed.trouble and "of another boom" in feed.trouble
 
 
 def test_an_encoder_five_degrees_off_is_a_fault_to_be_found(tmp_path):
