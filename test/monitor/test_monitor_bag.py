@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drive_twin import note_drives
 from monitor.conftest import read_all
 from rosbags.rosbag2 import StoragePlugin, Writer
 
@@ -76,10 +77,11 @@ def test_estimates_are_those_of_the_replay_and_the_load_is_told_in_words(feed: F
 
 
 def test_without_an_estimate_there_is_no_table_of_it(tmp_path: Path) -> None:
-    """A session of strokes alone: what is published as estimate is the prediction."""
+    """A session of drives alone: what is published as estimate is the prediction."""
     strokes = np.tile(strokes_of_posture(load_scene(), "arch"), (100, 1))
     stamps = 10**18 + 5_000_000 * np.arange(100)
     write_session(tmp_path / "strokes", stamps, strokes, np.full((100, 4), np.nan), None, {})
+    note_drives(tmp_path / "strokes")
     feed = read_all(bag_feed(tmp_path / "strokes", load_scene(), Settings()))
     assert feed.store.tables["displacement"].count == 100 and "estimate" not in feed.store.tables
     assert asyncio.run(Analyst(feed, ResponseCompiler()).load_at(0.5)) is None
