@@ -22,7 +22,7 @@ from ..scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton
 from ..scene.schema import Scene
 from ..scene.source import SceneSource, as_scene
 from ..system.summary_display import SummaryDisplay, numbers
-from ..types import Array
+from ..types import Array, StrokeReading
 from .modal import Mode, constraints, natural_modes, negative_pivots
 
 CLAMP = 1e12  # N/m, a pin that is as good as ideal
@@ -206,14 +206,7 @@ def statics(
         No stable equilibrium was found.
     """
     scene = as_scene(scene)
-    if lengths is None:
-        strokes, angles = strokes_and_angles(scene, strokes, posture)
-    elif strokes is None and posture is None:
-        lengths = checked_strokes(scene, np.asarray(lengths, dtype=float), "length")
-        angles = joint_angles_of_strokes(scene, lengths, name="length")
-        strokes = drives_at_rest(scene, lengths, angles)
-    else:
-        raise UsageError("give one of strokes, posture and lengths, not two.")
+    strokes, angles = strokes_and_angles(scene, strokes, posture, lengths)
     plan, state, work = rest_at(scene, strokes, angles)
     found = taken_apart(plan, first_row(plan, state))
     undeformed, tip = skeleton(scene, angles).pivots[-1], state.frames[-1, :2].copy()
@@ -230,27 +223,27 @@ def statics(
     )
 
 
-def strokes_and_angles(scene: Scene, strokes: ArrayLike | str | None, posture: str | None) -> tuple[Array, Array]:
-    """Strokes (m) and joint angles (rad) of the undeformed boom, both (n,), at `strokes` or in a `posture` of the scene.
+def strokes_and_angles(
+    scene: Scene, strokes: ArrayLike | str | None, posture: str | None, lengths: ArrayLike | None = None
+) -> tuple[Array, Array]:
+    """Return drives (m) and joint angles (rad), both (n,), of the undeformed boom; arguments and errors as of `statics`.
 
     A name given for `strokes` is that of a posture.
-
-    Raises
-    ------
-    UsageError
-        Unknown posture, strokes outside the cylinders, not exactly one of strokes and posture.
     """
-    if isinstance(strokes, str):
-        strokes, posture = None, strokes if posture is None else None
-    if (strokes is None) == (posture is None):
-        raise UsageError("give either strokes or a posture, not both and not neither.")
-    if posture is not None:
-        return strokes_of_posture(scene, posture), posture_angles(scene, posture)
-    found = checked_strokes(scene, np.asarray(strokes, dtype=float))
-    return found, joint_angles_of_strokes(scene, found)
+    if (strokes is not None) + (posture is not None) + (lengths is not None) != 1:
+        raise UsageError("give one of strokes, posture and lengths, not two and not none.")
+    if posture is not None or isinstance(strokes, str):
+        name = str(posture or strokes)
+        return strokes_of_posture(scene, name), posture_angles(scene, name)
+    if lengths is None:
+        found = checked_strokes(scene, strokes)
+        return found, joint_angles_of_strokes(scene, found)
+    found = checked_strokes(scene, lengths, "length")
+    angles = joint_angles_of_strokes(scene, found, name="length")
+    return drives_at_rest(scene, found, angles), angles
 
 
-def checked_strokes(scene: Scene, strokes: Array, name: str = "stroke") -> Array:
+def checked_strokes(scene: Scene, strokes: ArrayLike | None, name: str = "stroke") -> Array:
     """Return `strokes` as an array, shape (n,); UsageError, by `name`, unless each cylinder has one within its travel."""
     values = np.asarray(strokes, dtype=float)
     n = len(scene.joints)
@@ -274,17 +267,29 @@ def drives_at_rest(scene: Scene, lengths: Array, angles: Array) -> Array:
 
 
 def spring_free(plan: Plan, lengths: Array, forces: Array) -> Array:
-    """Return the drives (m), shape (n,), of cylinders that are `lengths` (m) long at rest under `forces` (N).
+    """Return the drives (m) of cylinders that are `lengths` (m) long under `forces` (N); all of shape (.., n).
 
     The compliance of `oil` is that at the drive. A pass leaves the share of the error that the oil's pressure is of its bulk
-    modulus, a few percent.
+    modulus, a few percent. The oil's damping is left out: its lag is some milliseconds.
     """
     drives = lengths
     for _ in range(PASSES):
         before, drives = drives, lengths - plan.compliances_and_lags(plan.closed_lengths + drives)[0] * forces
-        if np.abs(drives - before).max() < CLOSE:
+        if (np.abs(drives - before) < CLOSE).all():
             return drives
-    raise SolverError(f"no drives for cylinder forces of {numbers(forces)} N: the oil gives too much. Check bulk_modulus.")
+    told = f"no drives for cylinder forces of up to {np.abs(forces).max():.4g} N"
+    raise SolverError(f"{told}: the oil gives too much. Check bulk_modulus.")
+
+
+def drives_as_read(plan: Plan, strokes: Array, forces: Array, reads: StrokeReading) -> Array:
+    """Return the drives (m) where transducers read `strokes` (m) under `forces` (N), all (.., n); NaN if there are none.
+
+    At work lengths swing with the forces in the oil. Drives show how the boom is driven, and in which posture it would rest.
+    """
+    try:
+        return strokes if reads is StrokeReading.DRIVE else spring_free(plan, strokes, forces)
+    except SolverError:
+        return np.full_like(strokes, np.nan)
 
 
 def travel_words(i: int, most: float) -> str:

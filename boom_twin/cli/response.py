@@ -17,7 +17,7 @@ from ..scene import Scene
 from ..system.csv_table import columns_text, read_csv
 from ..types import Array
 from .main import add_json, add_scene, open_scene, print_result
-from .statics import numbers
+from .statics import add_place, numbers
 
 if TYPE_CHECKING:
     from ..analysis.frequency_response import FrequencyResponse
@@ -44,9 +44,7 @@ class Answer:
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    where = parser.add_mutually_exclusive_group(required=True)
-    where.add_argument("--posture", metavar="NAME", help="a posture of the scene")
-    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes, m")
+    where = add_place(parser)
     told = "resonance map over these postures, or `all` of the scene's; needs --pump, whose rate it varies"
     where.add_argument("--map", metavar="P1,P2,..", help=told)
     load = parser.add_mutually_exclusive_group()
@@ -131,7 +129,10 @@ def _check_options(args: Namespace) -> None:
 
 
 def _place(args: Namespace) -> str:
-    return f"posture {args.posture}" if args.posture else "strokes " + ", ".join(f"{s:g}" for s in args.strokes) + " m"
+    if args.posture:
+        return f"posture {args.posture}"
+    name, values = ("strokes", args.strokes) if args.strokes else ("lengths", args.lengths)
+    return f"{name} {', '.join(f'{value:g}' for value in values)} m"
 
 
 def _response(scene: Scene, args: Namespace) -> Answer:
@@ -145,10 +146,10 @@ def _response(scene: Scene, args: Namespace) -> Answer:
             f"--from {args.low:g} --to {args.high:g} --points {args.points}: frequencies must be above 0 Hz and ascend, with "
             "2 to 1000000 points. Give such."
         )
-    rest = statics(with_all_shapes(scene), strokes=args.strokes, posture=args.posture, modes=MODES)
+    rest = statics(with_all_shapes(scene), strokes=args.strokes, posture=args.posture, modes=MODES, lengths=args.lengths)
     natural = rest.frequencies[(rest.frequencies > args.low) & (rest.frequencies < args.high)]
     force = None if args.drive is not None else tuple(args.tip or UPWARD)
-    place = args.strokes, args.posture, force, args.drive
+    place = args.strokes, args.posture, force, args.drive, args.lengths
     at, beside = (frequency_response(scene, frequencies, *place).tip for frequencies in (natural, BESIDE * natural))
     bounded = np.linalg.norm(at, axis=1) < SHARP * np.linalg.norm(beside, axis=1)
     frequencies = np.unique(np.concatenate([np.geomspace(args.low, args.high, args.points), natural[bounded]]))
@@ -221,7 +222,7 @@ def _steady(scene: Scene, args: Namespace) -> Answer:
         times, *components = (np.array(table.column(name)) for name in wanted)
         load = load_of_rows(times, np.column_stack(components))
         told = f"{Path(args.load).name}, {1.0 / load.period:.4g} Hz"
-    found = steady_state(scene, load, args.strokes, args.posture)
+    found = steady_state(scene, load, args.strokes, args.posture, args.lengths)
     title = f"Steady state: {told}, {_place(args)}"
     acceleration = float(np.linalg.norm(found.tip_acceleration, axis=1).max())
     forces = np.ptp(found.cylinder_forces, axis=0)
