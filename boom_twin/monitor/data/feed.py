@@ -85,7 +85,7 @@ class Feed:
             return np.zeros((0, 0))
         rows, names = table.rows(first, end)[1].astype(float), table.columns
         strokes, forces = (rows[:, [name.startswith(kind) for name in names]] for kind in ("stroke_", "force_"))
-        if scene is None or len(scene.joints) != strokes.shape[1]:
+        if scene is None or not strokes.shape[1] == forces.shape[1] == len(scene.joints):
             return strokes
         self._plan = self._plan or compile_scene(scene)
         return drives_as_read(self._plan, strokes, forces, self._reads)
