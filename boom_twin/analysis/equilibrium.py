@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,9 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError, UsageError
+from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.elements.linkage import link_angles
 from ..kernels.elements.pin_contact import APPROACH, CLOSED, DAMPER, FORCE, NEAR, SEAT_X, SEAT_Y, SLOWEST, SPRING, penetration
 from ..kernels.integrators import REST, X, prepare
+from ..kernels.jit import kernel
 from ..kernels.tables import OK, Z_LINK_L, Z_LINK_R, Z_SECTION, State, Work
 from ..kernels.transfer.clearance_pins import axis_of
 from ..kernels.transfer.time_step import ANEW, advance
@@ -232,9 +236,10 @@ def strokes_and_angles(
     """
     if (strokes is not None) + (posture is not None) + (lengths is not None) != 1:
         raise UsageError("give one of strokes, posture and lengths, not two and not none.")
-    if posture is not None or isinstance(strokes, str):
-        name = str(posture or strokes)
-        return strokes_of_posture(scene, name), posture_angles(scene, name)
+    if isinstance(strokes, str):
+        posture = strokes
+    if posture is not None:
+        return strokes_of_posture(scene, posture), posture_angles(scene, posture)
     if lengths is None:
         found = checked_strokes(scene, strokes)
         return found, joint_angles_of_strokes(scene, found)
@@ -267,29 +272,42 @@ def drives_at_rest(scene: Scene, lengths: Array, angles: Array) -> Array:
 
 
 def spring_free(plan: Plan, lengths: Array, forces: Array) -> Array:
-    """Return the drives (m) of cylinders that are `lengths` (m) long under `forces` (N); all of shape (.., n).
-
-    The compliance of `oil` is that at the drive. A pass leaves the share of the error that the oil's pressure is of its bulk
-    modulus, a few percent. The oil's damping is left out: its lag is some milliseconds.
-    """
-    drives = lengths
-    for _ in range(PASSES):
-        before, drives = drives, lengths - plan.compliances_and_lags(plan.closed_lengths + drives)[0] * forces
-        if (np.abs(drives - before) < CLOSE).all():
-            return drives
-    told = f"no drives for cylinder forces of up to {np.abs(forces).max():.4g} N"
-    raise SolverError(f"{told}: the oil gives too much. Check bulk_modulus.")
+    """Return the drives (m), shape (n,), of cylinders that are `lengths` (m) long at rest under `forces` (N)."""
+    drives = drives_as_read(plan, lengths, forces, StrokeReading.LENGTH)
+    if np.isfinite(drives).all():
+        return drives
+    raise SolverError(f"no drives for cylinder forces of {numbers(forces)} N: the oil gives too much. Check bulk_modulus.")
 
 
 def drives_as_read(plan: Plan, strokes: Array, forces: Array, reads: StrokeReading) -> Array:
     """Return the drives (m) where transducers read `strokes` (m) under `forces` (N), all (.., n); NaN if there are none.
 
     At work lengths swing with the forces in the oil. Drives show how the boom is driven, and in which posture it would rest.
+    The oil's damping is left out: its lag is some milliseconds.
     """
-    try:
-        return strokes if reads is StrokeReading.DRIVE else spring_free(plan, strokes, forces)
-    except SolverError:
-        return np.full_like(strokes, np.nan)
+    drives = np.array(strokes)
+    if reads is StrokeReading.LENGTH:
+        write_drives(
+            plan.tables.cylinders, plan.tables.oils, np.ascontiguousarray(np.atleast_2d(forces)), np.atleast_2d(drives)
+        )
+    return drives
+
+
+@kernel
+def write_drives(cylinders: Any, oils: Any, forces: Array, lengths: Array) -> None:
+    """Turn lengths (m) of cylinders under `forces` (N), both (k, n), into their drives; NaN if there are none.
+
+    The compliance of `oil` is that at the drive. A pass leaves the share of the error that the oil's pressure is of its bulk
+    modulus, a few percent.
+    """
+    for i in range(cylinders.shape[0]):
+        closed = cylinders[i].closed_length
+        for row in range(lengths.shape[0]):
+            drive, change, passes = lengths[row, i], 1.0, 0
+            while abs(change) >= CLOSE and passes < PASSES:
+                change = lengths[row, i] - compliance_and_lag(cylinders[i], oils, closed + drive)[0] * forces[row, i] - drive
+                drive, passes = drive + change, passes + 1
+            lengths[row, i] = drive if abs(change) < CLOSE else math.nan
 
 
 def travel_words(i: int, most: float) -> str:

@@ -97,11 +97,10 @@ class Plan:
         return len(self.tables.joints)
 
     def compliances_and_lags(self, drives: Array) -> tuple[Array, Array]:
-        """Return 1/k (m/N; 0 if incompressible) and d/k (s) of cylinders with `drives` so long (m); all of shape (.., n)."""
-        found = np.empty((2, *drives.shape))
-        for i, row in enumerate(self.tables.cylinders):
-            found[0, ..., i], found[1, ..., i] = compliance_and_lag(row, self.tables.oils, drives[..., i])
-        return found[0], found[1]
+        """1/k (m/N; 0 if incompressible) and d/k (s) of the cylinders with their `drives` so long (m); all of shape (n,)."""
+        t = self.tables
+        found = [compliance_and_lag(row, t.oils, drive) for row, drive in zip(t.cylinders, drives, strict=True)]
+        return np.array([compliance for compliance, _ in found]), np.array([lag for _, lag in found])
 
     def state(self, depth: int = DEPTH) -> State:
         """A fresh state, all zero; `depth` rows of history."""

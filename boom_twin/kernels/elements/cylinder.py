@@ -65,7 +65,7 @@ def oil_compliance(oil, stroke):
 
     Beyond the end stops, which noise of the strokes may reach, it stays as it is there.
     """
-    travel = np.minimum(np.maximum(stroke.real, 0.0), oil.max_stroke)
+    travel = min(max(stroke.real, 0.0), oil.max_stroke)
     cap = (oil.cap_line + oil.cap_area * travel) / (oil.cap_area * oil.cap_area)
     rod = (oil.rod_line + oil.rod_area * (oil.max_stroke - travel)) / (oil.rod_area * oil.rod_area)
     return cap * rod / ((cap + rod) * oil.bulk_modulus)
