@@ -58,11 +58,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--points", type=int, default=POINTS, metavar="N", help="frequencies, evenly in their logarithm (300)")
     parser.add_argument("--rates", type=_rates, default=RATES, metavar="F:F:N", help="of a map (default 0.2:1.2:201)")
     parser.add_argument(
-        "--steps",
-        type=int,
-        default=STEPS,
-        metavar="N",
-        help="of a map, from each posture to the next (default 1)",
+        "--steps", type=int, default=STEPS, metavar="N", help="of a map, from each posture to the next (default 1)"
     )
     out = "folder for table and picture: new, empty, or of an earlier response"
     parser.add_argument("--out", metavar="DIR", help=out)
