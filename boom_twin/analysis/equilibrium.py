@@ -210,7 +210,14 @@ def statics(
         No stable equilibrium was found.
     """
     scene = as_scene(scene)
-    strokes, angles = strokes_and_angles(scene, strokes, posture, lengths)
+    if lengths is None:
+        strokes, angles = strokes_and_angles(scene, strokes, posture)
+    elif strokes is None and posture is None:
+        lengths = checked_strokes(scene, np.asarray(lengths, dtype=float), "length")
+        angles = joint_angles_of_strokes(scene, lengths, name="length")
+        strokes = drives_at_rest(scene, lengths, angles)
+    else:
+        raise UsageError("give one of strokes, posture and lengths, not two.")
     plan, state, work = rest_at(scene, strokes, angles)
     found = taken_apart(plan, first_row(plan, state))
     undeformed, tip = skeleton(scene, angles).pivots[-1], state.frames[-1, :2].copy()
@@ -227,28 +234,27 @@ def statics(
     )
 
 
-def strokes_and_angles(
-    scene: Scene, strokes: ArrayLike | str | None, posture: str | None, lengths: ArrayLike | None = None
-) -> tuple[Array, Array]:
-    """Return drives (m) and joint angles (rad), both (n,), of the undeformed boom; arguments and errors as of `statics`.
+def strokes_and_angles(scene: Scene, strokes: ArrayLike | str | None, posture: str | None) -> tuple[Array, Array]:
+    """Strokes (m) and joint angles (rad) of the undeformed boom, both (n,), at `strokes` or in a `posture` of the scene.
 
     A name given for `strokes` is that of a posture.
+
+    Raises
+    ------
+    UsageError
+        Unknown posture, strokes outside the cylinders, not exactly one of strokes and posture.
     """
-    if (strokes is not None) + (posture is not None) + (lengths is not None) != 1:
-        raise UsageError("give one of strokes, posture and lengths, not two and not none.")
     if isinstance(strokes, str):
-        posture = strokes
+        strokes, posture = None, strokes if posture is None else None
+    if (strokes is None) == (posture is None):
+        raise UsageError("give either strokes or a posture, not both and not neither.")
     if posture is not None:
         return strokes_of_posture(scene, posture), posture_angles(scene, posture)
-    if lengths is None:
-        found = checked_strokes(scene, strokes)
-        return found, joint_angles_of_strokes(scene, found)
-    found = checked_strokes(scene, lengths, "length")
-    angles = joint_angles_of_strokes(scene, found, name="length")
-    return drives_at_rest(scene, found, angles), angles
+    found = checked_strokes(scene, np.asarray(strokes, dtype=float))
+    return found, joint_angles_of_strokes(scene, found)
 
 
-def checked_strokes(scene: Scene, strokes: ArrayLike | None, name: str = "stroke") -> Array:
+def checked_strokes(scene: Scene, strokes: Array, name: str = "stroke") -> Array:
     """Return `strokes` as an array, shape (n,); UsageError, by `name`, unless each cylinder has one within its travel."""
     values = np.asarray(strokes, dtype=float)
     n = len(scene.joints)

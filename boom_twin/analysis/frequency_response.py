@@ -256,14 +256,11 @@ class LinearisedBoom:
 
 
 def linearised_boom(
-    scene: SceneSource = None,
-    strokes: ArrayLike | str | None = None,
-    posture: str | None = None,
-    lengths: ArrayLike | None = None,
+    scene: SceneSource = None, strokes: ArrayLike | str | None = None, posture: str | None = None
 ) -> LinearisedBoom:
-    """Return the `LinearisedBoom` at absolute `strokes`, in a `posture` or at `lengths`; takes and raises as `statics`."""
+    """The `LinearisedBoom` at absolute `strokes` (m), shape (n,), or at a named posture; takes and raises as `statics`."""
     scene = as_scene(scene)
-    return LinearisedBoom(scene, *strokes_and_angles(scene, strokes, posture, lengths))
+    return LinearisedBoom(scene, *strokes_and_angles(scene, strokes, posture))
 
 
 def frequency_response(
@@ -273,7 +270,6 @@ def frequency_response(
     posture: str | None = None,
     tip_force: Sequence[float] | None = None,
     drive: int | None = None,
-    lengths: ArrayLike | None = None,
 ) -> FrequencyResponse:
     """Answer to a harmonic force at the tip, or to a harmonic stroke of one cylinder, about the equilibrium under gravity.
 
@@ -284,15 +280,13 @@ def frequency_response(
     frequencies : array_like, shape (k,)
         Hz, at least 0; 0 gives the static limit.
     strokes : array_like, shape (n,), or str, optional
-        Absolute strokes of the drives at rest, m; or the name of a posture.
+        Absolute strokes at rest, m; or the name of a posture.
     posture : str, optional
-        A posture of the scene; just one of strokes, posture and lengths is given.
+        A posture of the scene; just one of strokes and posture is given.
     tip_force : sequence of two numbers, optional
         Amplitude of the force at the tip in x and y, N; by default 1 N in y.
     drive : int, optional
         Instead of a force: the cylinder, counted from 1, whose drive moves with an amplitude of 1 m (the answer is linear).
-    lengths : array_like, shape (n,), optional
-        Cylinder lengths at rest less `closed_length`, m, instead of `strokes`.
 
     Returns
     -------
@@ -327,7 +321,7 @@ def frequency_response(
         raise UsageError(f"tip_force = {tip_force}: give two numbers, the force in x and y (N).")
     if tip_force is not None and not np.any(tip_force):
         raise UsageError("tip_force = (0, 0) N moves nothing. Give a force, such as 0,1, or the drive of a cylinder.")
-    boom = linearised_boom(scene, strokes, posture, lengths)
+    boom = linearised_boom(scene, strokes, posture)
     force = tip_force if tip_force is not None else UPWARD
     return boom.respond(frequencies, boom.load(force) if drive is None else boom.load(drive=drive - 1))
 

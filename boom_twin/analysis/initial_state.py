@@ -102,7 +102,7 @@ def undeflected(
         To be given to `boom_twin.simulate`.
     """
     scene = as_scene(scene)
-    strokes = checked_strokes(scene, strokes)
+    strokes = checked_strokes(scene, np.asarray(strokes, float))
     found = joint_angles_of_strokes(scene, strokes, near=angles)
     rates = np.zeros(len(found)) if joint_rates is None else np.asarray(joint_rates, float)
     if rates.shape != found.shape or not np.isfinite(rates).all():

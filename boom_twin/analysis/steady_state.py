@@ -208,9 +208,7 @@ def swing_of(path: Array) -> float:
     return float(np.max(along.max(axis=0) - along.min(axis=0)))
 
 
-def steady_state(
-    scene: Scene, load: PeriodicLoad, strokes: Array | None = None, posture: str | None = None, lengths: Array | None = None
-) -> SteadyState:
+def steady_state(scene: Scene, load: PeriodicLoad, strokes: Array | None = None, posture: str | None = None) -> SteadyState:
     """Motion under a periodic load at the tip, when all that began with it has died away.
 
     Parameters
@@ -220,11 +218,9 @@ def steady_state(
     load : PeriodicLoad
         See `pump_load`, `load_of_rows`.
     strokes : ndarray, shape (n,), optional
-        Absolute strokes of the drives, m.
+        Absolute strokes, m.
     posture : str, optional
-        A posture of the scene; just one of strokes, posture and lengths is given.
-    lengths : ndarray, shape (n,), optional
-        Cylinder lengths at rest less `closed_length`, m.
+        A posture of the scene; just one of strokes and posture is given.
 
     Returns
     -------
@@ -237,7 +233,7 @@ def steady_state(
     SolverError
         No stable equilibrium was found.
     """
-    return steady_state_of(linearised_boom(scene, strokes, posture, lengths), load)
+    return steady_state_of(linearised_boom(scene, strokes, posture), load)
 
 
 def steady_state_of(boom: LinearisedBoom, load: PeriodicLoad) -> SteadyState:

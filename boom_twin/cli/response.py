@@ -17,7 +17,7 @@ from ..scene import Scene
 from ..system.csv_table import columns_text, read_csv
 from ..types import Array
 from .main import add_json, add_scene, open_scene, print_result
-from .statics import add_place, numbers
+from .statics import numbers
 
 if TYPE_CHECKING:
     from ..analysis.frequency_response import FrequencyResponse
@@ -44,7 +44,10 @@ class Answer:
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    where = add_place(parser)
+    where = parser.add_mutually_exclusive_group(required=True)
+    where.add_argument("--posture", metavar="NAME", help="a posture of the scene")
+    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes of the drives, m")
+    where.add_argument("--lengths", type=numbers, metavar="L1,..,LN", help="cylinder lengths at rest less closed_length, m")
     told = "resonance map over these postures, or `all` of the scene's; needs --pump, whose rate it varies"
     where.add_argument("--map", metavar="P1,P2,..", help=told)
     load = parser.add_mutually_exclusive_group()
@@ -58,7 +61,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--points", type=int, default=POINTS, metavar="N", help="frequencies, evenly in their logarithm (300)")
     parser.add_argument("--rates", type=_rates, default=RATES, metavar="F:F:N", help="of a map (default 0.2:1.2:201)")
     parser.add_argument(
-        "--steps", type=int, default=STEPS, metavar="N", help="of a map, from each posture to the next (default 1)"
+        "--steps",
+        type=int,
+        default=STEPS,
+        metavar="N",
+        help="of a map, from each posture to the next (default 1)",
     )
     out = "folder for table and picture: new, empty, or of an earlier response"
     parser.add_argument("--out", metavar="DIR", help=out)
@@ -90,11 +97,13 @@ def _rates(text: str) -> tuple[float, float, int]:
 
 def run(args: Namespace) -> int:
     """Compute, print, and write what was asked for."""
+    from ..analysis.equilibrium import statics
     from ..system.atomic_files import write_atomic
     from ..system.result_folder import RESPONSE, result_folder
 
     scene = open_scene(args.scene)
     _check_options(args)
+    args.strokes = args.strokes if args.lengths is None else statics(scene, lengths=args.lengths).strokes
     if args.map is not None:
         answer = _map(scene, args)
     elif args.pump or args.load:
@@ -125,10 +134,7 @@ def _check_options(args: Namespace) -> None:
 
 
 def _place(args: Namespace) -> str:
-    if args.posture:
-        return f"posture {args.posture}"
-    name, values = ("strokes", args.strokes) if args.strokes else ("lengths", args.lengths)
-    return f"{name} {', '.join(f'{value:g}' for value in values)} m"
+    return f"posture {args.posture}" if args.posture else "strokes " + ", ".join(f"{s:g}" for s in args.strokes) + " m"
 
 
 def _response(scene: Scene, args: Namespace) -> Answer:
@@ -142,10 +148,10 @@ def _response(scene: Scene, args: Namespace) -> Answer:
             f"--from {args.low:g} --to {args.high:g} --points {args.points}: frequencies must be above 0 Hz and ascend, with "
             "2 to 1000000 points. Give such."
         )
-    rest = statics(with_all_shapes(scene), strokes=args.strokes, posture=args.posture, modes=MODES, lengths=args.lengths)
+    rest = statics(with_all_shapes(scene), strokes=args.strokes, posture=args.posture, modes=MODES)
     natural = rest.frequencies[(rest.frequencies > args.low) & (rest.frequencies < args.high)]
     force = None if args.drive is not None else tuple(args.tip or UPWARD)
-    place = args.strokes, args.posture, force, args.drive, args.lengths
+    place = args.strokes, args.posture, force, args.drive
     at, beside = (frequency_response(scene, frequencies, *place).tip for frequencies in (natural, BESIDE * natural))
     bounded = np.linalg.norm(at, axis=1) < SHARP * np.linalg.norm(beside, axis=1)
     frequencies = np.unique(np.concatenate([np.geomspace(args.low, args.high, args.points), natural[bounded]]))
@@ -218,7 +224,7 @@ def _steady(scene: Scene, args: Namespace) -> Answer:
         times, *components = (np.array(table.column(name)) for name in wanted)
         load = load_of_rows(times, np.column_stack(components))
         told = f"{Path(args.load).name}, {1.0 / load.period:.4g} Hz"
-    found = steady_state(scene, load, args.strokes, args.posture, args.lengths)
+    found = steady_state(scene, load, args.strokes, args.posture)
     title = f"Steady state: {told}, {_place(args)}"
     acceleration = float(np.linalg.norm(found.tip_acceleration, axis=1).max())
     forces = np.ptp(found.cylinder_forces, axis=0)

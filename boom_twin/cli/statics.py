@@ -10,26 +10,18 @@ from typing import TYPE_CHECKING
 from .main import add_json, add_scene, open_scene, print_result
 
 if TYPE_CHECKING:
-    from argparse import _MutuallyExclusiveGroup
-
     from ..analysis.equilibrium import Equilibrium
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    add_place(parser)
-    add_json(parser)
-
-
-def add_place(parser: ArgumentParser) -> _MutuallyExclusiveGroup:
-    """Declare where the boom rests, just one of the group that is returned."""
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument("--posture", metavar="NAME", help="a posture of the scene")
     where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes of the drives, m")
     read = "cylinder lengths less closed_length, m: what stroke transducers read of the boom at rest"
     where.add_argument("--lengths", type=numbers, metavar="L1,..,LN", help=read)
-    return where
+    add_json(parser)
 
 
 def numbers(text: str) -> list[float]:

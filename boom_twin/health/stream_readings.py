@@ -13,7 +13,6 @@ from ..types import Array
 from .inference.block_problem import MeasuredRows, PredictionRows
 from .sensor_survey import (
     COUNTS,
-    EVENED,
     MEASURED,
     NEAR,
     NEAR_COUNTS,
@@ -107,11 +106,6 @@ class StreamReadings(NamedTuple):
     def rates(self) -> Array:
         """Of what the model expects from the first reading to the last, per s; NaN of fewer than two; shape (channels,)."""
         return np.asarray(self.numbers[RATES])
-
-    @property
-    def evened(self) -> Array:
-        """Of how many with the stated noise `near` would be as sure, as noisy as they are; shape (channels,)."""
-        return np.asarray(self.numbers[EVENED])
 
 
 class StreamSurvey:

@@ -258,7 +258,7 @@ def test_one_section():
     "given, told",
     [
         ({"posture": "nowhere"}, "posture = 'nowhere'"),
-        ({}, "give one of strokes, posture and lengths"),
+        ({}, "give either strokes or a posture"),
         ({"posture": "arch", "drive": 5}, "cylinders 1 to 4"),
         ({"posture": "arch", "drive": 0}, "cylinders 1 to 4"),
         ({"posture": "arch", "drive": 1, "tip_force": (0.0, 1.0)}, "give one of them"),
