@@ -15,9 +15,9 @@ import numpy as np
 from ..compiler.compile import compile_scene
 from ..errors import BoomTwinError, UsageError
 from ..scene.schema import Scene
-from ..types import Array, Estimate, Prediction
+from ..types import Array, Estimate, Prediction, StrokeReading
 from .bending_moments import Station, increments_by_tip_force, moments_by_unknowns, stations
-from .equilibrium import settle
+from .equilibrium import drives_as_read, settle
 
 BOX = 2.4
 """Height over radius of gyration of a thin-walled box, for sections whose height is not given."""
@@ -68,6 +68,8 @@ class BendingStressModel:
     scene : Scene
     heights : ndarray, shape (n,), optional
         See `section_moduli`.
+    reads : StrokeReading
+        Of the strokes of predictions.
 
     Attributes
     ----------
@@ -76,12 +78,12 @@ class BendingStressModel:
         Section modulus at every station, m^3.
     """
 
-    def __init__(self, scene: Scene, heights: Array | None = None) -> None:
+    def __init__(self, scene: Scene, heights: Array | None = None, reads: StrokeReading = StrokeReading.LENGTH) -> None:
         self.stations: tuple[Station, ...] = stations(scene)
         if not self.stations:
             raise UsageError("sections: none of the scene is flexible, so it has no bending moments. Give a section a beam.")
         self.moduli = section_moduli(scene, heights)[[station.section for station in self.stations]]
-        self._plan = compile_scene(scene)
+        self._plan, self._reads = compile_scene(scene), reads
         self._by_unknowns = moments_by_unknowns(self._plan)
         self._state, self._work = self._plan.state(), self._plan.work()
         self._at, self._influence = np.full(len(scene.joints), np.inf), np.zeros((len(self.stations), 2))
@@ -92,7 +94,7 @@ class BendingStressModel:
         Parameters
         ----------
         strokes, joints : ndarray, shape (n,)
-            m; joint angles near those of the equilibrium, rad.
+            Of the drives, m; joint angles near those of the equilibrium, rad.
         """
         if float(np.max(np.abs(strokes - self._at))) > POSTURE_STEP:
             self._at = strokes.copy()
@@ -109,7 +111,8 @@ class BendingStressModel:
         assert prediction.moments is not None
         influence = np.full((len(self.stations), 2), np.nan)
         if estimate is not None and estimate.load.any():  # until anything is measured it is exactly zero
-            influence = self.influence(prediction.strokes, prediction.joints)
+            drives = drives_as_read(self._plan, prediction.strokes, prediction.cylinder_forces, self._reads)
+            influence = self.influence(drives, prediction.joints)
         if estimate is None or np.isnan(influence).any():
             nothing = np.full(len(self.stations), np.nan)
             return BendingStresses(prediction.moments, nothing, prediction.moments / self.moduli, nothing)

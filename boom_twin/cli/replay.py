@@ -86,16 +86,8 @@ def run(args: Namespace) -> int:
     out, given = Path(args.out), (args.bag, args.scene, args.params, args.mapping, args.baseline)
     with result_folder(out, REPLAY, [Path(each) for each in given if each]) as building:
         progress = partial(progress_of, unit="messages", name="replay")
-        options = (
-            settings,
-            progress,
-            args.mapping,
-            not args.no_changes,
-            not args.no_health,
-            args.baseline,
-            window,
-            args.namespace,
-        )
+        asked = args.mapping, not args.no_changes, not args.no_health, args.baseline
+        options = settings, progress, *asked, window, args.namespace
         evaluator = Evaluator(scene.scene, settings, args.baseline, heights, args.fatigue)
         joints, name = len(scene.scene.joints), f"samples.{args.table}"
         table = SampleTable(table_file(building.folder / name, joints), joints) if args.table else None

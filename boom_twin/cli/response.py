@@ -47,7 +47,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser)
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument("--posture", metavar="P", help="a posture of the scene, or section angles, deg: 60,-20,-30")
-    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes, m")
+    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes of the drives, m")
+    where.add_argument("--lengths", type=numbers, metavar="L1,..,LN", help="cylinder lengths at rest less closed_length, m")
     told = "resonance map over these postures (angles in brackets), or `all` of the scene's; needs --pump, whose rate it varies"
     where.add_argument("--map", metavar="P1,P2,..", help=told)
     load = parser.add_mutually_exclusive_group()
@@ -97,11 +98,13 @@ def _rates(text: str) -> tuple[float, float, int]:
 
 def run(args: Namespace) -> int:
     """Compute, print, and write what was asked for."""
+    from ..analysis.equilibrium import statics
     from ..system.atomic_files import write_atomic
     from ..system.result_folder import RESPONSE, result_folder
 
     scene = open_scene(args.scene)
     _check_options(args)
+    args.strokes = args.strokes if args.lengths is None else statics(scene, lengths=args.lengths).strokes
     if args.map is not None:
         answer = _map(scene, args)
     elif args.pump or args.load:

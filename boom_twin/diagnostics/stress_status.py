@@ -7,15 +7,15 @@ import math
 from ..analysis.bending_moments import stations
 from ..analysis.bending_stress import BendingStressModel
 from ..scene.schema import Scene
-from ..types import Estimate, Prediction
+from ..types import Estimate, Prediction, StrokeReading
 from .levels import ComponentJudge, Evaluation, Status
 
 MEGA = 1e6
 
 
-def stress_watch(scene: Scene) -> StressWatch | None:
-    """Of a boom, if any of its sections bends."""
-    return StressWatch(BendingStressModel(scene)) if stations(scene) else None
+def stress_watch(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> StressWatch | None:
+    """Return the watch of a boom whose predictions have strokes that are so read; None if no section bends."""
+    return StressWatch(BendingStressModel(scene, reads=reads)) if stations(scene) else None
 
 
 class StressWatch:

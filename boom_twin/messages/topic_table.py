@@ -242,6 +242,11 @@ class Topics(_Entry):
         numbered = re.compile(rf"{kind.named}_{NUMBER.pattern}")
         return [name for name in names if numbered.fullmatch(name) and number_of(name) > joints and name not in used]
 
+    def reading(self, reads: StrokeReading) -> Topics:
+        """Return these topics with strokes that are so read."""
+        strokes = self.inputs[Stream.STROKES].model_copy(update={"reads": reads})
+        return self.model_copy(update={"inputs": {**self.inputs, Stream.STROKES: strokes}})
+
     @property
     def stroke_reading(self) -> StrokeReading:
         """What stroke transducers read: as the mapping says, else lengths."""

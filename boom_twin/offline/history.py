@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.equilibrium import drives_as_read
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..estimation.tip_estimate import VARIANCES
@@ -72,7 +73,7 @@ class HistoryBuilder:
 
     def add(self, stretch: Stretch) -> History:
         """Take the next stretch in; returns the history of it alone, with all its rows."""
-        own = _stretch_history(stretch, self._scene)
+        own = _stretch_history(stretch, self._scene, self._plan)
         self._note_peak(own)
         self._totals.add(own)
         slow = np.stack([slow_part(own, i) for i in range(own.moments.shape[1])], 1) if own.moments.size else own.moments
@@ -170,7 +171,7 @@ class _Shapes:
         return [shape for _, shape in self._chosen] + ([] if is_last else self._newest)
 
 
-def _stretch_history(stretch: Stretch, scene: Scene) -> History:
+def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan) -> History:
     """Everything predicted in a stretch, with all its rows; gaps, alarms and orbits are not in it."""
     predictions = stretch.predictions
     found = [rows for stream in Stream if len((rows := stretch.of(stream)).stamps)]
@@ -185,7 +186,7 @@ def _stretch_history(stretch: Stretch, scene: Scene) -> History:
         tip_acceleration=predictions.tip_acceleration,
         joints=predictions.joints,
         cylinder_forces=predictions.cylinder_forces,
-        strokes=predictions.strokes,
+        strokes=drives_as_read(plan, predictions.strokes, predictions.cylinder_forces, stretch.reads),
         residual_stamps_s=times,
         residual_names=tuple(name for group in groups for name in group.names),
         residual_values=values,

@@ -13,7 +13,7 @@ from ..analysis.column_statistics import ColumnStatistics
 from ..estimation.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms
 from ..twin.blocks import CODES, EstimateBlock, PredictionBlock, ReportBlock, SampleBlock, joined, report_block
-from ..types import HELD, NANO, Alarm, Array, Health, Report, Stream, channels_of
+from ..types import HELD, NANO, Alarm, Array, Health, Report, Stream, StrokeReading, channels_of
 from .ground_truth import TipErrors
 
 STRETCH = 2**14
@@ -58,6 +58,8 @@ class Stretch:
         Stamp of the first prediction of the session, ns.
     samples : list of SampleBlock
         That were read meanwhile.
+    reads : StrokeReading
+        Of the strokes of the predictions.
     """
 
     joints: int
@@ -65,6 +67,7 @@ class Stretch:
     health: list[Health]
     first: int
     samples: list[SampleBlock]
+    reads: StrokeReading
 
     @property
     def predictions(self) -> PredictionBlock:
@@ -148,6 +151,8 @@ class Recording:
         Is given every `Stretch` of the session, which is then let go; without it, the whole session is one, and kept.
     errors : TipErrors, optional
         Told of all predictions for which the truth is known.
+    reads : StrokeReading
+        Of the twin's strokes.
 
     Attributes
     ----------
@@ -163,8 +168,14 @@ class Recording:
         Of all stretches that are complete.
     """
 
-    def __init__(self, joints: int, take: Callable[[Stretch], None] | None = None, errors: TipErrors | None = None) -> None:
-        self._joints, self._take, self._errors = joints, take, errors
+    def __init__(
+        self,
+        joints: int,
+        take: Callable[[Stretch], None] | None = None,
+        errors: TipErrors | None = None,
+        reads: StrokeReading = StrokeReading.LENGTH,
+    ) -> None:
+        self._joints, self._take, self._errors, self._reads = joints, take, errors, reads
         self._parts: list[ReportBlock] = []
         self._single: list[Report] = []
         self._health: list[Health] = []
@@ -271,7 +282,8 @@ class Recording:
     def _stretch(self) -> Stretch | None:
         self._close_single()
         parts = [part for part in self._parts if len(part.predictions.stamps) or len(part.residuals.stamps)]
-        return Stretch(self._joints, joined(parts), self._health, self._first, self._samples) if parts else None
+        own = self._health, self._first, self._samples, self._reads
+        return Stretch(self._joints, joined(parts), *own) if parts else None
 
     @property
     def whole(self) -> Stretch:

@@ -229,7 +229,8 @@ def replay_into(
         truth = _truth_in(window, session, topics, wanted)
         errors = None if truth is None else TipErrors(truth)
         taking = None if take is None else _Timed(take)
-        recording, other_boom, read = Recording(joints, taking, errors), OtherBoom(), np.zeros(joints, dtype=bool)
+        recording = Recording(joints, taking, errors, strokes.reading)
+        other_boom, read = OtherBoom(), np.zeros(joints, dtype=bool)
         refused = RefusedStrokes(scene, taken.source)
         expected = _expected(session, wanted, window)
         ahead = SampleReader(session.path, topics, wanted, joints, window, reader)
@@ -284,7 +285,7 @@ def replay_into(
                 f"{_explained(twin.counts)}"
             )
         if with_bag:
-            SessionSheet(__version__, taken.text).write(out / "bag")
+            SessionSheet(__version__, taken.text, strokes=strokes.reading).write(out / "bag")
         summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME if with_bag else None) | {
             "scene": taken.source,
             "scene_sha256": taken.sha256,

@@ -161,7 +161,7 @@ class History:
     tip_displacement, tip_position, tip_acceleration : ndarray, shape (m, 2)
         m, m, m/s^2; x forward, y up.
     joints, cylinder_forces, strokes : ndarray, shape (m, n)
-        rad; N, positive in tension; m.
+        rad; N, positive in tension; m, of the drives.
     residual_stamps_s : ndarray, shape (k,)
     residual_names : tuple of str
         ``joint_<i>`` (rad) or ``tip_imu_x``, ``tip_imu_z`` (m/s^2).

@@ -267,16 +267,9 @@ class SectionLoads:
             column = columns[int(best)]
             moment = float(history.moments[row, column])
             if section not in self._largest or abs(moment) > abs(self._largest[section].moment):
-                static = float(slow_part(history, column)[row])
-                about = (
-                    float(history.stamps_s[row]),
-                    static,
-                    history.strokes[row].copy(),
-                    history.joints[row].copy(),
-                    load[row].copy(),
-                    variance[row].copy(),
-                )
-                self._largest[section] = _Largest(column, moment, *about)
+                when, static = float(history.stamps_s[row]), float(slow_part(history, column)[row])
+                about = (each[row].copy() for each in (history.strokes, history.joints, load, variance))
+                self._largest[section] = _Largest(column, moment, when, static, *about)
 
     def loads(self, heights: Array | None) -> list[Load]:
         """One for every flexible section; `heights` (n,) of the sections, m, or None for the scene's or thin-walled boxes'."""

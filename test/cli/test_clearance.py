@@ -50,7 +50,7 @@ def test_simulate_tells_lost_contacts_and_draws_orbits(
     assert picture.read_bytes()[:4] == b"\x89PNG"
     header, *rows = out.read_text().splitlines()
     names = [f"cylinder_{i}_rod_{what}" for i in range(1, 5) for what in ("dx_m", "dy_m", "force_N", "contact")]
-    assert header.split(",")[-16:] == names and len(rows) == 6
+    assert header.split(",")[-20:] == [*names, *(f"length_{i}_m" for i in range(1, 5))] and len(rows) == 6
     still = dict(zip(header.split(","), map(float, rows[-1].split(",")), strict=True))
     assert still["cylinder_1_rod_contact"] == 1.0
     assert np.hypot(still["cylinder_1_rod_dx_m"], still["cylinder_1_rod_dy_m"]) > 1e-4

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin import frequency_response, load_scene
+from boom_twin import frequency_response, load_scene, statics
 from boom_twin.cli.main import main
 
 Capture = pytest.CaptureFixture[str]
@@ -45,6 +45,17 @@ def test_drive_in_words(capsys: Capture) -> None:
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "Frequency response: drive of cylinder 2, 1 m, posture arch"
     assert [line.split()[0] for line in lines[3:]] == ["0.0000", "1.0618", "2.3006"]
+
+
+@pytest.mark.parametrize("load", [("--drive", "2", "--points", "5"), ("--pump", "0.43:130")])
+def test_lengths_are_those_of_the_boom_at_rest(load: tuple[str, ...], capsys: Capture) -> None:
+    rest = statics(None, "arch")
+    places = ("--strokes", rest.strokes), ("--lengths", rest.lengths)
+    drives, lengths = (answer(capsys, f"{name}={','.join(map(repr, each.tolist()))}", *load) for name, each in places)
+    for key, values in drives.items():
+        assert key in ("load", "warnings") or lengths[key] == pytest.approx(values, rel=1e-6, abs=1e-9)
+    assert main(["response", "--lengths", "0.6,0.1", *load]) == 1
+    assert "lengths = 2 values: the scene has 4 cylinders" in capsys.readouterr().err
 
 
 def test_steady_state_of_pump_and_of_its_rows(capsys: Capture, tmp_path: Path) -> None:

@@ -174,7 +174,7 @@ def test_every_command_is_helped_in_its_line(capsys: pytest.CaptureFixture[str])
 def test_statics_as_json_has_the_keys_of_the_reference(capsys: pytest.CaptureFixture[str], where: list[str]) -> None:
     assert main(["statics", *where, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert list(found) == ["stroke_m", "tip_rigid_m", "tip_m", "joint_rad", "cylinder_force_N", "frequencies_Hz"]
+    assert list(found) == ["stroke_m", "length_m", "tip_rigid_m", "tip_m", "joint_rad", "cylinder_force_N", "frequencies_Hz"]
 
 
 def test_a_summary_as_json_is_flat_and_has_its_alarms() -> None:

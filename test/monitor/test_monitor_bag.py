@@ -10,11 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from drive_twin import note_drives
 from monitor.conftest import read_all
 from rosbags.rosbag2 import StoragePlugin, Writer
 
+from boom_twin import statics
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_session
+from boom_twin.bag.session_sheet import SessionSheet
 from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError, UsageError
 from boom_twin.estimation.load_spectrum import tip_load
@@ -23,12 +26,13 @@ from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.monitor.data.analyst import Analyst
 from boom_twin.monitor.data.bag_feed import ENOUGH, bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
-from boom_twin.monitor.data.present_posture import ResponseCompiler
+from boom_twin.monitor.data.present_posture import ModeList, ResponseCompiler, ResponseList
 from boom_twin.monitor.data.status import ListedAlarm, Severity, overall
 from boom_twin.monitor.protocol import dump, state
 from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.types import StrokeReading
 
 
 def test_rows_are_those_of_the_replay(feed: Feed, replayed: Path) -> None:
@@ -76,13 +80,33 @@ def test_estimates_are_those_of_the_replay_and_the_load_is_told_in_words(feed: F
 
 
 def test_without_an_estimate_there_is_no_table_of_it(tmp_path: Path) -> None:
-    """A session of strokes alone: what is published as estimate is the prediction."""
+    """A session of drives alone: what is published as estimate is the prediction."""
     strokes = np.tile(strokes_of_posture(load_scene(), "arch"), (100, 1))
     stamps = 10**18 + 5_000_000 * np.arange(100)
     write_session(tmp_path / "strokes", stamps, strokes, np.full((100, 4), np.nan), None, {})
+    note_drives(tmp_path / "strokes")
     feed = read_all(bag_feed(tmp_path / "strokes", load_scene(), Settings()))
     assert feed.store.tables["displacement"].count == 100 and "estimate" not in feed.store.tables
     assert asyncio.run(Analyst(feed, ResponseCompiler()).load_at(0.5)) is None
+
+
+@pytest.mark.parametrize("reads", list(StrokeReading))
+def test_the_posture_is_that_of_the_drives_whatever_transducers_read(reads: StrokeReading, tmp_path: Path) -> None:
+    """Through the twin, and from what a twin published; a result says itself what its strokes are."""
+    scene, session, stamps = load_scene(), tmp_path / "session", 10**18 + 5_000_000 * np.arange(100)
+    rest = statics(scene, "arch")
+    strokes = np.tile(rest.strokes if reads is StrokeReading.DRIVE else rest.lengths, (100, 1))
+    write_session(session, stamps, strokes, None, None, {})
+    SessionSheet("1.0", strokes=reads).write(session)
+    replay(session, scene, tmp_path / "out", health=False)
+    for source in (session, tmp_path / "out" / "bag"):
+        feed = read_all(bag_feed(source, scene, Settings()))
+        drives = feed.strokes(0.4)
+        assert drives == pytest.approx(rest.strokes, abs=1e-5)
+        assert feed.strokes_between(0.0, 0.4)[-1] == pytest.approx(drives, abs=1e-5)
+        assert ModeList(scene).at(drives) == pytest.approx(rest.frequencies, rel=2e-4)
+    response, expected = (ResponseList(scene).at(each).accelerations for each in (drives, rest.strokes))
+    assert np.linalg.norm(response - expected) < 1e-3 * np.linalg.norm(expected)
 
 
 def test_numbers_are_those_of_the_summary(feed: Feed, replayed: Path) -> None:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from boom_twin.report.vibration import SURE, HoldFinder, vibrations
+from boom_twin import Twin, simulate, statics
+from boom_twin.offline.history import HistoryBuilder
+from boom_twin.offline.recording import Recording
+from boom_twin.report.vibration import SURE, HoldFinder, course, still, vibrations
 from boom_twin.scene import load_scene
 from boom_twin.scene.edit import with_parameters
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.types import Array
+from boom_twin.types import SECOND, Array, Sample, Stream, StrokeReading
 
 TIMES = np.arange(0.0, 5.0, 0.005)
 
@@ -85,3 +89,31 @@ def test_where_a_load_shakes_the_boom_no_frequency_is_told(load: float, payload:
     finder.add(history, load * np.sin(2.7 * TIMES)[:, None] * np.array([0.0, 1.0]))  # type: ignore[arg-type]
     (hold,) = finder.finish()
     assert hold.is_shaken == is_shaken and (0 in hold.measured) == (not is_shaken and not payload)
+
+
+@pytest.fixture(scope="module")
+def swung():
+    """Boom that a fast move of cylinder 1 leaves swinging: lengths swing with the force in the oil, drives rest."""
+    times, drives = np.arange(0.0, 4.5, 0.005), np.tile(strokes_of_posture(load_scene(), "arch"), (900, 1))
+    drives[:, 0] += 0.008 * np.clip(times / 0.4, 0.0, 1.0)
+    return simulate(load_scene(), times, drives, dt=5e-3, estimate_errors=False)
+
+
+@pytest.mark.parametrize("reads", list(StrokeReading))
+def test_a_boom_on_locked_drives_rests_with_the_frequencies_of_its_drives(swung, reads: StrokeReading) -> None:
+    """Whatever the transducers read; lengths that are taken for drives never rest, and give other frequencies."""
+    scene, found = load_scene(), []
+    twin, recording, finder = Twin(scene, reads=reads), Recording(4, found.append, reads=reads), HoldFinder(scene)
+    for time, row in zip(swung.times, swung.strokes if reads is StrokeReading.DRIVE else swung.lengths, strict=True):
+        recording.add(twin.update(Sample(Stream.STROKES, SECOND + round(SECOND * float(time)), row)))
+    recording.close()
+    (stretch,) = found
+    finder.add(own := HistoryBuilder(scene).add(stretch), stretch.estimates.load)
+    (hold,) = finder.finish()
+    assert hold.start < 1.0 and hold.stop > 4.3
+    assert reads is StrokeReading.DRIVE or not still(own.stamps_s, stretch.predictions.strokes)
+    expected = statics(scene, swung.strokes[-1]).frequencies
+    assert hold.model == pytest.approx(expected, rel=5e-4)
+    resting = replace(own, stamps_s=own.stamps_s[400:], strokes=own.strokes[400:])
+    assert course(resting, scene)[1] == pytest.approx(np.tile(expected, (60, 1)), rel=1e-3)
+    assert statics(scene, statics(scene, swung.strokes[-1]).lengths).frequencies != pytest.approx(expected, rel=3e-3)

@@ -28,7 +28,7 @@ from ...offline.replay import scene_for
 from ...scene.schema import Scene
 from ...twin.driver import Step, drive
 from ...twin.twin import Twin
-from ...types import NANO, Stream, StrokeReading
+from ...types import NANO, Stream
 from .feed import Feed
 from .store import Store
 
@@ -121,7 +121,7 @@ def bag_feed(
     session, usual, taken = scan(path), baseline_of(path, baseline).baseline, scene_for(path, scene)
     scene = taken.scene
     mapped = mapping_of(path, mapping, len(scene.joints), namespace)
-    topics, reads = mapped.topics.of_joints(joint.range_deg for joint in scene.joints), strokes_of(path, mapped).reading
+    topics = mapped.topics.of_joints(joint.range_deg for joint in scene.joints).reading(strokes_of(path, mapped).reading)
     refuse_other_names(session, topics, len(scene.joints), taken.source)
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
     is_published = topics.outputs[ENOUGH].absolute in counts
@@ -133,7 +133,7 @@ def bag_feed(
     if is_published:
         feed.begin(_take_published(session, feed, topics, counts, window))
     else:
-        twin = _Twin(feed, topics, scene, settings, usual, reads)
+        twin = _Twin(feed, topics, scene, settings, usual)
         feed.begin(_take_predicted(session, topics, counts, twin, window))
     return feed
 
@@ -183,12 +183,10 @@ def _take_predicted(
 class _Twin:
     """A twin beside the session, watched as the node watches its own; its time is that of the stamps."""
 
-    def __init__(
-        self, feed: Feed, topics: Topics, scene: Scene, settings: Settings, usual: Baseline, reads: StrokeReading
-    ) -> None:
+    def __init__(self, feed: Feed, topics: Topics, scene: Scene, settings: Settings, usual: Baseline) -> None:
         self._feed, self._time = feed, 0.0
         mounts = topics.mounts(len(scene.joints))
-        self.twin = Twin(scene, settings, mounts, usual, reads=reads, absent=topics.absent)
+        self.twin = Twin(scene, settings, mounts, usual, reads=topics.stroke_reading, absent=topics.absent)
         self._encoder = ReportEncoder(scene, settings)
         self._names = {key: topic.absolute for key, topic in topics.outputs.items() if topic.absolute in feed.topic_rows.names}
         required = {stream: topic.required for stream, topic in topics.inputs.items()}

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...analysis.equilibrium import drives_as_read
+from ...compiler.compile import compile_scene
+from ...compiler.plan import Plan
 from ...messages.topic_table import Topics
 from ...scene import load_scene
 from ...scene.load import DEFAULT_NAME
 from ...scene.schema import Scene
+from ...types import Array
 from .store import Store
 from .topic_rows import TopicRows
-
-STROKE = "stroke_"
 
 
 class Feed:
@@ -40,7 +41,8 @@ class Feed:
         self.title, self.store, self.end = title, store, end
         self.topic_rows = TopicRows(store, topics)
         self.trouble = ""
-        self._scene = scene
+        self._scene, self._reads = scene, topics.stroke_reading
+        self._plan: Plan | None = None
 
     def poll(self) -> None:
         """Take what has come; called often."""
@@ -67,23 +69,26 @@ class Feed:
         return self._scene
 
     def strokes(self, time: float) -> list[float]:
-        """The strokes (m) at `time` (s); empty if they are not known."""
+        """Return the strokes (m) of the drives at `time` (s); empty if they are not known."""
         table = self.store.tables.get("shape")
-        row = 0 if table is None else table.until(time)
-        values = self._strokes_of(row - 1, row)
-        return [float(value) for value in values[0]] if len(values) else []
+        end = 0 if table is None else table.until(time)
+        return [stroke for row in self._strokes_of(end - 1, end).tolist() for stroke in row]
 
-    def strokes_between(self, first: float, last: float) -> NDArray[np.float32]:
-        """The strokes (m) from one time to another (s), a row for each shape that is known, shape (k, n)."""
+    def strokes_between(self, first: float, last: float) -> Array:
+        """Return the strokes (m) of the drives from one time to another (s), a row for each known shape, shape (k, n)."""
         table = self.store.tables.get("shape")
         return self._strokes_of(0, 0) if table is None else self._strokes_of(table.until(first), table.until(last))
 
-    def _strokes_of(self, first: int, end: int) -> NDArray[np.float32]:
-        table = self.store.tables.get("shape")
+    def _strokes_of(self, first: int, end: int) -> Array:
+        table, scene = self.store.tables.get("shape"), self.scene()
         if table is None:
-            return np.zeros((0, 0), np.float32)
-        places = [place for place, name in enumerate(table.columns) if name.startswith(STROKE)]
-        return table.rows(first, end)[1][:, places]
+            return np.zeros((0, 0))
+        rows, names = table.rows(first, end)[1].astype(float), table.columns
+        strokes, forces = (rows[:, [name.startswith(kind) for name in names]] for kind in ("stroke_", "force_"))
+        if scene is None or not strokes.shape[1] == forces.shape[1] == len(scene.joints):
+            return strokes
+        self._plan = self._plan or compile_scene(scene)
+        return drives_as_read(self._plan, strokes, forces, self._reads)
 
 
 SLOWEST, FASTEST = 0.1, 10.0

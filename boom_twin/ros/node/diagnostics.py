@@ -215,7 +215,7 @@ class Diagnostics:
     def watch(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
         """The node is configured with these."""
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts, twin.absent)
-        stress = stress_watch(twin.scene)
+        stress = stress_watch(twin.scene, twin.reads)
         self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds, stress=stress)
         self._counts, self._shedding = {"samples": twin.counts, "messages": decoder.oddities}, twin.shedding
         self._queue.oddities.clear()
