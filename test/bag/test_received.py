@@ -135,9 +135,7 @@ def test_a_file_that_is_exchanged_for_a_link_meanwhile(tmp_path: Path, monkeypat
         open_received(tmp_path / "a")
 
 
-@pytest.mark.parametrize(
-    "command", [["info"], ["replay", "--out", "out"], ["recover", "--out", "out"], ["batch", "--out", "out"]]
-)
+@pytest.mark.parametrize("command", [["info"], ["replay", "--out", "out"], ["recover", "--out", "out"]])
 def test_links_that_lead_in_a_circle_are_told(
     command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
