@@ -208,7 +208,7 @@ def remote(domain: None) -> Iterator[Remote]:
 
 @pytest.fixture(scope="session")
 def motion(made_once: MadeOnce) -> dict[str, Any]:
-    """Two cylinders of the default boom move; stamps (ns), strokes (m), joints (rad), imu (m/s^2, made up)."""
+    """Two cylinders of the default boom move; stamps (ns), lengths (m), joints (rad), imu (m/s^2, made up)."""
     return made_once.value("ros_motion", two_cylinders_move)
 
 
@@ -221,7 +221,7 @@ def two_cylinders_move() -> dict[str, Any]:
     strokes[:, 2] += 0.01 * (1.0 - np.cos(2.0 * time_s))
     few = np.arange(0, len(time_s), 20)  # slow enough for equilibria, and for sag to be interpolated
     rigid = np.array([joint_angles_of_strokes(scene, row) for row in strokes])
-    at_rest = np.array([statics(scene, strokes[k], modes=0).joints - rigid[k] for k in few])
+    at_rest = np.array([statics(scene, lengths=strokes[k], modes=0).joints - rigid[k] for k in few])
     joints = rigid + np.column_stack([np.interp(time_s, time_s[few], column) for column in at_rest.T])
     return {
         "stamps_ns": stamps,

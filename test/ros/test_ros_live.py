@@ -13,8 +13,6 @@ import pytest
 
 pytest.importorskip("rclpy")
 
-from drive_twin import drive_twin
-
 from boom_twin.bag.reader import read, scan
 from boom_twin.config.settings import load_settings
 from boom_twin.health.baseline import load_baseline
@@ -24,6 +22,7 @@ from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.messages.type_store import jazzy
 from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene
+from boom_twin.twin.twin import Twin
 from boom_twin.types import Stream
 
 PARAMETERS = Path(__file__).parents[2] / "msg_config" / "twin.yaml"
@@ -96,7 +95,7 @@ def expected(
     answered = {stamp for stamp, _ in outputs[Output.TIP_POSITION]}
     inputs = {topic.absolute: stream for stream, topic in load_topics().inputs.items()}
     scene, settings = load_scene(), load_settings(PARAMETERS)
-    twin = drive_twin(scene, settings, baseline=load_baseline())
+    twin = Twin(scene, settings, baseline=load_baseline())
     decoder, encoder = SampleDecoder(twin.plan.joints), ReportEncoder(scene, settings)
     made: dict[Output, list[tuple[int, bytes]]] = {key: [] for key in outputs}
     changed = load_topics().outputs[Output.CHANGES]

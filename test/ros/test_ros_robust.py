@@ -15,15 +15,13 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
-from drive_twin import drive_twin
 from geometry_msgs.msg import PointStamped
 from lifecycle_msgs.msg import Transition
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
-from boom_twin import Sample, Stream, load_scene
+from boom_twin import load_scene, statics
 from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.scene.kinematics import strokes_of_posture
 
 RATE = 100.0
 SOON = 2.0  # s
@@ -35,10 +33,8 @@ class Rig:
 
     def __init__(self, namespace: str = "", posture: str = "arch") -> None:
         self.node = rclpy.create_node("rig", namespace=namespace)
-        self.strokes = strokes_of_posture(load_scene(), posture)
-        prediction = drive_twin(load_scene()).update(Sample(Stream.STROKES, 0, self.strokes)).prediction
-        assert prediction is not None
-        self.tip, self.joints = prediction.tip_position, prediction.joints
+        rest = statics(load_scene(), posture=posture, modes=0)
+        self.strokes, self.tip, self.joints = rest.lengths, rest.tip, rest.joints
         self.shift = BEGIN - time.monotonic()
         self.answers: list[tuple[int, float]] = []
         self.residuals: list[float] = []
