@@ -47,10 +47,15 @@ COMES, STAYS = 0.2, 1.0  # 1/s, rates at which a load comes, and is usual again
 OPENED, SHUT = 4.0, 3.0  # standard deviations of a drive's rate: beyond the one it moves, below the other it may stand still
 SHUT_TIME = 0.15  # s below the second before its valve is believed closed
 LONGEST_STEP = 0.02  # s of one transition
-IMU_ZERO, IMU_DRIFT = 0.05, 1e-3  # m/s^2; m/s^2 in a root second
+IMU_ZERO, IMU_DRIFT = 0.3, 3e-3  # m/s^2; m/s^2 in a root second
+IMU_TURN, IMU_SCALE = 0.1, 0.1  # rad, by which it may be mounted askew; share by which it may read too much
 ANGLE_ZERO, ANGLE_DRIFT = 2e-4, 1e-5  # rad; rad in a root second: sensors' zeros, and the error of the model's statics
 FORCE_ZERO, FORCE_DRIFT = 1.0, 0.03  # share of the force; in a root second
 INEXACT = 0.03  # share of the tip's acceleration that modes left out and those there are wrong by
+LEARN_NOISE = 0.02  # of a reading, by which the noise of its channel is learnt
+CONTRADICTION = 5.0  # standard deviations of the predicted tip, by which the estimate may be off it
+MOST_EXCESS = 1e6  # times the variance that a channel is stated to have
+LEARN_LENGTH = 0.02  # likewise of a length's noise, by third differences
 DEAF_WAY, DEAF_RATE = 0.05, 0.02  # m, m/s: how far a drive is, and how fast, whose transducer fails
 DOF = 4.0  # degrees of freedom of Student's t, by which innovations of the estimate are weighed
 PATIENCE = 1_000_000_000  # ns without readings after which the estimate is the prediction again
@@ -80,6 +85,8 @@ class Filters(NamedTuple):
     jerk : (n,) m^2/s^5. is_open : (n,) 1 where a valve is believed open. still : (n,) s since its drive began to stand still.
     status : (3,) whether it has begun, whether the estimate has readings of its own, stamp of the newest of these.
     masked, deaf : (c,), (n,) measured channels, and strokes, that the estimate is not to use. noise : variances.
+    excess : (c,) times the variance that channels are stated to have. length2, before : (n,), (n, 3) variances of lengths (m^2)
+    as learnt, and the three lengths before.
     places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
     felt : (2,) specific force predicted at the tip, m/s^2. shaking : (1,) mean square of its acceleration, m^2/s^4.
     angle : (1,) of the tip, rad. strokes : (n, 3) predicted lengths (m), their rates and accelerations.
@@ -98,6 +105,9 @@ class Filters(NamedTuple):
     status: NDArray[np.int64]
     masked: NDArray[np.bool_]
     deaf: NDArray[np.bool_]
+    excess: Array
+    length2: Array
+    before: Array
     noise: SensorNoise
     places: NDArray[np.int64]
     weights: Array
@@ -121,12 +131,13 @@ class Filters(NamedTuple):
 
 def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> Filters:
     """Return filters of a boom with so many joints, modes at most, and measured channels."""
-    n, states = joints, 2 * modes + 4 + 3 * joints + 2 + 2 * joints
+    n, states = joints, 2 * modes + 4 + 3 * joints + 4 + 2 * joints
     return Filters(
         x=np.zeros((5, states)), p=np.zeros((5, states, states)), chances=np.zeros(5), mean=np.zeros((2, states)),
         spread=np.zeros((2, states, states)), load2=np.zeros(2), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
         still=np.zeros(n), status=np.zeros(3, np.int64), masked=np.zeros(channels, np.bool_),
-        deaf=np.zeros(n, np.bool_), noise=noise,
+        deaf=np.zeros(n, np.bool_), excess=np.ones(channels), length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan),
+        noise=noise,
         places=np.zeros((states, 6 + n), np.int64), weights=np.zeros((states, 6 + n)), counts=np.zeros(states, np.int64),
         variances=np.zeros(states), felt=np.zeros(2), pulls=np.zeros(n), half=np.zeros((states, states)),
         turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)), mixed_p=np.zeros((3, states, states)),
@@ -152,14 +163,14 @@ def drive_place(p):
 
 @inner
 def zero_place(p):
-    """Return the number of states of the prediction; zeros of IMU (2), angles (n) and forces (n) follow."""
+    """Return how many states the prediction has; zeros (2), mount, scale of the IMU, zeros of angles and forces follow."""
     return 2 * p.modes[0] + 4 + 3 * p.drives.shape[0]
 
 
 @inner
 def all_states(p):
     """Return the number of states of the estimate."""
-    return zero_place(p) + 2 + 2 * p.drives.shape[0]
+    return zero_place(p) + 4 + 2 * p.drives.shape[0]
 
 
 # -- rows: what is read of the states -----------------------------------------------------------------------------------------
@@ -313,14 +324,13 @@ def make_transition(p, f, h):
         put_weight(f, drive + 2 * n + i, drive + 2 * n + i, kept)
         f.variances[drive + i], f.variances[drive + 2 * n + i] = LEAK * h, f.jerk[i] * h
     zero = zero_place(p)
+    for k in range(zero, all_states(p)):
+        put_weight(f, k, k, 1.0)
     for a in range(2):
-        put_weight(f, zero + a, zero + a, 1.0)
         f.variances[zero + a] = IMU_DRIFT * IMU_DRIFT * h
     for i in range(n):
-        put_weight(f, zero + 2 + i, zero + 2 + i, 1.0)
-        put_weight(f, zero + 2 + n + i, zero + 2 + n + i, 1.0)
-        f.variances[zero + 2 + i] = ANGLE_DRIFT * ANGLE_DRIFT * h
-        f.variances[zero + 2 + n + i] = (FORCE_DRIFT * f.pulls[i]) ** 2 * h
+        f.variances[zero + 4 + i] = ANGLE_DRIFT * ANGLE_DRIFT * h
+        f.variances[zero + 4 + n + i] = (FORCE_DRIFT * f.pulls[i]) ** 2 * h
 
 
 @inner
@@ -401,7 +411,7 @@ def take_lengths(p, f, k, size, y):
             length_row(p, i, f.row)
             rest = p.drives[i] + p.compliance[i] * p.pulled[i]
             innovation = y[i] - rest - about_rest(p, f.row, f.x[k], size)
-            expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, f.noise.length2, size)
+            expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, f.length2[i], size)
             total -= 0.5 * (innovation * innovation / expected + math.log(expected))
     return total
 
@@ -440,11 +450,14 @@ def start_models(p, f, speeds, swing):
         covariance[drive + i, drive + i] = f.noise.length2
         covariance[drive + n + i, drive + n + i] = CLOSED_RATE * CLOSED_RATE + speeds[i] * speeds[i]
         f.jerk[i], f.is_open[i], f.still[i] = JERK, 0, 0.0
+        f.length2[i] = noise.length2
+        f.before[i, 0] = f.before[i, 1] = f.before[i, 2] = math.nan
         if speeds[i] > 0.0:
             f.is_open[i] = 1
     copy_model(f, VALVES, OPEN, size)
     copy_model(f, VALVES, BURST, size)
     f.chances[VALVES], f.chances[OPEN], f.chances[BURST] = 0.8, 0.1, 0.1
+    f.excess[:] = 1.0
     mix(f, PREDICTION, zero_place(p))
     follow_prediction(p, f)
     f.status[STARTED], f.status[FED] = 1, 0
@@ -535,6 +548,7 @@ def mix(f, mixture, size):
 def step_models(p, f, h, y):
     """Take all models `h` (s) on to lengths `y` (n, m; NaN = missing)."""
     size, every = zero_place(p), all_states(p)
+    learn_length_noise(f, y)
     usual2 = f.load2[0]
     burst2 = max(f.noise.burst_load * f.noise.burst_load, usual2)
     if h > 0.0:
@@ -563,12 +577,30 @@ def step_models(p, f, h, y):
             f.likely[ALL_VALVES + k] = take_lengths(p, f, ALL_VALVES + k, every, y)
         weigh_models(f, ESTIMATE)
         mix(f, ESTIMATE, every)
+        leave_contradiction(p, f, size)
     if h > 0.0:
         watch_valves(p, f, h, size)
         learn_jerk(p, f, h)
         learn_load(p, f, h)
     if f.status[FED] == 0:
         follow_prediction(p, f)
+
+
+@inner
+def leave_contradiction(p, f, size):
+    """Begin the estimate anew where its tip is far outside what the lengths allow; channels that surprised count for less.
+
+    The difference of an estimate and one with fewer readings has at most the variance of the latter.
+    """
+    n = p.drives.shape[0]
+    for a in range(2):
+        column_row(p, p.readings, n + a, 1.0, f.row)
+        apart = read(f.row, f.mean[ESTIMATE], size) - read(f.row, f.mean[PREDICTION], size)
+        if apart * apart > CONTRADICTION * CONTRADICTION * variance_of(f.row, f.spread[PREDICTION], f.gain, size):
+            f.status[FED] = 0
+    if f.status[FED] == 0:
+        for c in range(f.excess.shape[0]):
+            f.excess[c] = min(f.excess[c] * f.excess[c], MOST_EXCESS)
 
 
 @inner
@@ -618,6 +650,17 @@ def learn_jerk(p, f, h):
 
 
 @inner
+def learn_length_noise(f, y):
+    """Learn the noise of lengths from third differences, 20 times its variance; no cylinder moves so unevenly."""
+    for i in range(y.shape[0]):
+        third = y[i] - 3.0 * f.before[i, 0] + 3.0 * f.before[i, 1] - f.before[i, 2]
+        if math.isfinite(third):
+            found = f.length2[i] + LEARN_LENGTH * (third * third / 20.0 - f.length2[i])
+            f.length2[i] = max(found, f.noise.length2)
+        f.before[i, 2], f.before[i, 1], f.before[i, 0] = f.before[i, 1], f.before[i, 0], y[i]
+
+
+@inner
 def learn_load(p, f, h):
     """Learn the variance of the fast load, of the prediction and of the estimate."""
     for k in range(2):
@@ -652,9 +695,11 @@ def follow_prediction(p, f):
         covariance = f.p[ALL_VALVES + k]
         for a in range(2):
             covariance[size + a, size + a] = IMU_ZERO * IMU_ZERO
+        covariance[size + 2, size + 2] = IMU_TURN * IMU_TURN
+        covariance[size + 3, size + 3] = IMU_SCALE * IMU_SCALE
         for i in range(n):
-            covariance[size + 2 + i, size + 2 + i] = ANGLE_ZERO * ANGLE_ZERO
-            covariance[size + 2 + n + i, size + 2 + n + i] = (FORCE_ZERO * (abs(f.pulls[i]) + 0.1 * largest)) ** 2
+            covariance[size + 4 + i, size + 4 + i] = ANGLE_ZERO * ANGLE_ZERO
+            covariance[size + 4 + n + i, size + 4 + n + i] = (FORCE_ZERO * (abs(f.pulls[i]) + 0.1 * largest)) ** 2
             if f.deaf[i]:
                 covariance[drive_place(p) + i, drive_place(p) + i] += DEAF_WAY * DEAF_WAY
                 covariance[drive_place(p) + n + i, drive_place(p) + n + i] += DEAF_RATE * DEAF_RATE
@@ -666,8 +711,11 @@ def follow_prediction(p, f):
 
 
 @inner
-def take_reading(p, f, residual, zero, variance, age):
-    """Take a residual against the prediction, of the quantity in `f.row` with its zero at place `zero`, `age` s ago."""
+def take_reading(p, f, channel, residual, zero, variance, age):
+    """Take a residual of a channel, of the quantity in `f.row` with its zero at place `zero`, `age` s ago.
+
+    Its noise is learnt: innovations that are larger than expected raise it until they are as expected.
+    """
     if not math.isfinite(residual):
         return
     size, every, m = zero_place(p), all_states(p), p.modes[0]
@@ -679,14 +727,19 @@ def take_reading(p, f, residual, zero, variance, age):
         for i in range(n):
             f.row[drive + n + i] -= age * f.row[drive + i]
     f.row[zero] = 1.0
+    variance *= max(f.excess[channel], 1.0)
+    shown = 0.0
     for k in range(ALL_VALVES, ALL_OPEN + 1):
-        innovation = residual - f.x[k, zero]
-        for i in range(size):
-            innovation -= f.row[i] * (f.x[k, i] - f.mean[PREDICTION, i])
+        innovation = residual
+        for i in range(every):
+            known = f.mean[PREDICTION, i] if i < size else 0.0
+            innovation -= f.row[i] * (f.x[k, i] - known)
         expected = variance + variance_of(f.row, f.p[k], f.gain, every)
+        shown += f.chances[k] * innovation * innovation / expected
         weight = min((DOF + 1.0) / (DOF + innovation * innovation / expected), 1.0)
         expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, variance / weight, every)
         f.likely[k] -= 0.5 * (innovation * innovation / expected + math.log(expected))
+    f.excess[channel] = max(f.excess[channel] * (1.0 + LEARN_NOISE * (min(shown, SURPRISE) - 1.0)), 1.0)
 
 
 @inner
@@ -703,8 +756,10 @@ def specific_force_row(p, f, axis, c, s, row):
     acceleration_row(p, 1, f.rows[1])
     column_row(p, p.readings, n + 2, f.felt[1] if axis == 0 else -f.felt[0], row)
     along, across = (c, s) if axis == 0 else (-s, c)
-    for k in range(zero_place(p)):
+    zero = zero_place(p)
+    for k in range(zero):
         row[k] += along * f.rows[0, k] + across * f.rows[1, k]
+    row[zero + 2], row[zero + 3] = f.felt[1] if axis == 0 else -f.felt[0], f.felt[axis]
 
 
 @kernel
@@ -737,13 +792,13 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
             continue
         if stream == ANGLES:
             angle_row(p, i, f.row)
-            take_reading(p, f, residuals[i], zero + 2 + i, f.noise.angle2, age)
+            take_reading(p, f, first + i, residuals[i], zero + 4 + i, f.noise.angle2, age)
         elif stream == IMU:
             specific_force_row(p, f, i, c, s, f.row)
             inexact2 = INEXACT * INEXACT * f.shaking[0]
-            take_reading(p, f, residuals[i], zero + i, f.noise.acceleration2 + inexact2, age)
+            take_reading(p, f, first + i, residuals[i], zero + i, f.noise.acceleration2 + inexact2, age)
         else:
             column_row(p, p.forces, i, 1.0, f.row)
-            take_reading(p, f, residuals[i], zero + 2 + n + i, f.noise.force2, age)
+            take_reading(p, f, first + i, residuals[i], zero + 4 + n + i, f.noise.force2, age)
     weigh_models(f, ESTIMATE)
     mix(f, ESTIMATE, all_states(p))
