@@ -17,7 +17,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from drive_twin import drive_twin
+from drive_twin import ARCH_DRIVES, drive_twin
 from estimation.motions import measured
 from estimation.test_motions import error, followed
 
@@ -29,7 +29,6 @@ from boom_twin.offline.recording import Recording
 from boom_twin.twin.blocks import SampleBlock
 
 ROOT = Path(__file__).parents[2]
-SESSION = ROOT / "bags" / "arch_session"
 AGILITIES = (0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0)
 RATES = (50.0, 100.0, 200.0, 1000.0)
 SHOWN = ("rests", "sweep", "stops")
@@ -41,9 +40,9 @@ STEPS = ((0.0025, 0.013), (0.005, 0.013), (0.005, 0.026), (0.005, 0.05), (0.0101
 
 def strokes_of_session() -> tuple[list[int], np.ndarray, np.ndarray]:
     """Stamps, measured strokes and true strokes."""
-    scene, truth = load_scene(), np.genfromtxt(SESSION / "truth.csv.gz", delimiter=",", names=True)
+    scene, truth = load_scene(), np.genfromtxt(ARCH_DRIVES / "truth.csv.gz", delimiter=",", names=True)
     decoder, stamps, measured = SampleDecoder(len(scene.joints)), [], []
-    for _, _, message in read(scan(SESSION), {"cylinder_strokes": "sensor_msgs/msg/JointState"}):
+    for _, _, message in read(scan(ARCH_DRIVES), {"cylinder_strokes": "sensor_msgs/msg/JointState"}):
         sample = decoder.put(Stream.STROKES, stamp_of(message), message)
         stamps.append(sample.stamp)
         measured.append(sample.values)
@@ -53,7 +52,7 @@ def strokes_of_session() -> tuple[list[int], np.ndarray, np.ndarray]:
 
 def errors(stamps, strokes, **tuning) -> tuple[float, float, float]:
     """Tip error (mm rms), acceleration error (m/s^2 rms), microseconds per sample."""
-    twin, truth = drive_twin(load_scene(), Settings(**tuning)), load_truth(SESSION)
+    twin, truth = drive_twin(load_scene(), Settings(**tuning)), load_truth(ARCH_DRIVES)
     start = time.perf_counter()
     recording = Recording(strokes.shape[1])
     for part in twin.update_block(SampleBlock(np.zeros(len(stamps), np.int64), np.array(stamps), strokes)):

@@ -21,7 +21,7 @@ from typing import Any
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in a replay
 
 import numpy as np
-from drive_twin import drive_twin
+from drive_twin import ARCH_DRIVES, drive_twin
 
 from boom_twin.bag.reader import scan
 from boom_twin.bag.session_model import baseline_of, mapping_of, scene_of, settings_of
@@ -40,7 +40,6 @@ from boom_twin.twin.expected_readings import Deviations
 from boom_twin.twin.twin import Twin
 from boom_twin.types import Change, Report
 
-SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 STAGES = {
     "all of the twin": (Twin, "update_block"),
     "health, all of it": (BlockUpdate, "judge"),
@@ -99,7 +98,7 @@ def run(session: Path, durations: Durations) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("session", type=Path, nargs="?", default=SESSION)
+    parser.add_argument("session", type=Path, nargs="?", default=ARCH_DRIVES)
     parser.add_argument("--runs", type=int, default=8)
     args = parser.parse_args()
     durations: Durations = defaultdict(list)

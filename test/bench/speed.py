@@ -12,9 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from drive_twin import drive_twin
 
-from boom_twin import load_scene, replay, simulate
+from boom_twin import Twin, load_scene, replay, simulate
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.validation.study.error.problem import at_rest, load_rig
 
@@ -47,7 +46,7 @@ def main() -> None:
     scene = load_scene()
     times = np.arange(0.0, SPAN + STEP / 2, STEP)
     strokes = move(scene, times)
-    drive_twin(scene).warm_up()
+    Twin(scene).warm_up()
     ours = median(lambda: timed(lambda: simulate(scene, times, strokes, STEP))) / (len(times) - 1)
     print("| what | measured |\n|---|---|")
     print(f"| a step of {1e3 * STEP:g} ms, start-up of `simulate` included | {1e6 * ours:.1f} us |")
