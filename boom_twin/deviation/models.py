@@ -29,7 +29,7 @@ from ..kernels.jit import by_reference, inner, kernel
 from ..types import Array, Stream
 
 VALVES, OPEN, BURST, ALL_VALVES, ALL_OPEN = range(5)  # models: three of the prediction, two of the estimate
-ANGLES, IMU = list(Stream).index(Stream.ANGLES), list(Stream).index(Stream.IMU)  # codes of these streams
+ANGLES, IMU, FORCES = map(list(Stream).index, (Stream.ANGLES, Stream.IMU, Stream.FORCES))  # codes of these streams
 PREDICTION, ESTIMATE = range(2)  # mixtures of these
 STARTED, FED, FED_STAMP = range(3)  # of `status`
 
@@ -769,7 +769,7 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
     Parameters
     ----------
     stream : int
-        By `boom_twin.twin.blocks.CODES`: angles (rad), IMU (m/s^2) or forces (N).
+        By `boom_twin.twin.blocks.CODES`: angles (rad), IMU (m/s^2) or forces (N); the estimate leaves out all others.
     first : int
         First of its channels among the measured ones.
     residuals : ndarray, shape (k,)
@@ -778,6 +778,8 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         Of the sample, and of the newest lengths, ns.
     """
     n, zero, age = p.drives.shape[0], zero_place(p), (newest - stamp) * 1e-9
+    if stream != ANGLES and stream != IMU and stream != FORCES:
+        return
     channels = 2 if stream == IMU else n
     usable = False
     for i in range(channels):

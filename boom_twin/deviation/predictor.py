@@ -74,7 +74,8 @@ class LengthPredictor(BoomPredictor):
         lengths = np.array([section.length for section in scene.sections])
         self.posture = new_posture(self.plan, MODES, lengths, mounting.frames, mounting.absolute)
         sizes = (USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)
-        variances = (settings.variance(kind) for kind in SENSORS.values())
+        used = Stream.STROKES, Stream.ANGLES, Stream.IMU, Stream.FORCES
+        variances = (settings.variance(SENSORS[stream]) for stream in used)
         channels = sum(len(names) for stream, names in channels_of(n).items() if stream is not Stream.STROKES)
         self.filters = new_filters(n, MODES, channels, SensorNoise(*variances, *(size * weight for size in sizes)))
         self._struts = compile_scene(with_rigid_cylinders(scene))

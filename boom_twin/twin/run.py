@@ -19,7 +19,7 @@ class Run:
 
     def __init__(self, state: TwinState, deviations: Deviations | LengthPredictor, stamp: int, is_again: bool) -> None:
         self.deviations, self.is_again, self._state = deviations, is_again, state
-        self.plausible = StrokeCheck(state.clock)
+        self.plausible = StrokeCheck(state.clock, not isinstance(deviations, LengthPredictor))
         self.is_predicted = False
         state.clock[EPOCH] = state.clock[NEWEST] = stamp
         state.clock[IN_SLOT] = -1

@@ -25,10 +25,12 @@ class StrokeCheck:
     ----------
     clock : ndarray of int64
         Where it keeps CHECKED, TRUSTED and OTHERS, see `boom_twin.twin.state.TwinState`.
+    holds : bool
+        Whether a stroke that is silent is held at its estimate; else it stays missing.
     """
 
-    def __init__(self, clock: NDArray[np.int64]) -> None:
-        self._clock = clock
+    def __init__(self, clock: NDArray[np.int64], holds: bool) -> None:
+        self._clock, self._holds = clock, holds
         self._before = 0
         self._jumped = np.zeros(0, np.int64)  # stamp (ns) since when a stroke is where it jumped; NEVER
 
@@ -120,7 +122,8 @@ class StrokeCheck:
         silent = np.isnan(taken) & (stamp - self._seen > SILENT)
         events = ["implausible"] if implausible.any() else []
         if silent.any():
-            taken = np.where(silent, estimate, taken)
+            if self._holds:
+                taken = np.where(silent, estimate, taken)
             events.append("held")
         return taken, events
 

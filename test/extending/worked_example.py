@@ -16,6 +16,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = Path(__file__).parent
+DRIVES = ROOT / "test" / "data" / "drives" / "arch_session"
 PACKAGE = ("boom_twin", "msg_config")
 BEING_WRITTEN = shutil.ignore_patterns("*.pyc.*")  # byte code, by another process
 TOUCHED = re.compile(r"^\+\+\+ b/(\S+)$", re.MULTILINE)
@@ -73,7 +74,7 @@ class WorkedExample:
     def check(self, copy: Path, **variables: str) -> None:
         """Run ``check.py`` on the copy; AssertionError with all that it printed if it fails."""
         environment = os.environ | {"PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"} | variables
-        command = [sys.executable, "-c", RUN, str(self.folder / "check.py"), str(ROOT / "bags" / "arch_session")]
+        command = [sys.executable, "-c", RUN, str(self.folder / "check.py"), str(DRIVES)]
         done = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True, check=False, timeout=600)
         assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
 

@@ -156,7 +156,7 @@ def test_what_kernels_pass_on_often_goes_by_reference(kind):
 def test_a_twin_starts_without_the_slow_parts_of_scipy():
     """They took longer to import than all else."""
     program = (
-        "import sys; from boom_twin import Twin, load_scene; drive_twin(load_scene()).warm_up();"
+        "import sys; from boom_twin import Twin, load_scene; Twin(load_scene()).warm_up();"
         "print([name for name in ('scipy.special', 'scipy.optimize', 'scipy.stats') if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", program], env=os.environ, capture_output=True, text=True, check=True)

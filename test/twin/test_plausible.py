@@ -17,7 +17,7 @@ class Run:
     """Readings every 5 ms; the estimate is the last that was taken, as the model's own nearly is."""
 
     def __init__(self) -> None:
-        self.plausible, self.stamp, self.estimate = StrokeCheck(new_state(2, np.array([2, 2, 2])).clock), 0, None
+        self.plausible, self.stamp, self.estimate = StrokeCheck(new_state(2, np.array([2, 2, 2])).clock, True), 0, None
         self.before = np.full(2, np.nan)
         self.take(0.3, 0.4)
 

@@ -1,4 +1,4 @@
-"""The fault is put on the (synthetic) bundled session by the virtual rig, and named by the health monitor, no other one."""
+"""The fault is put on a (synthetic) session of drives by the virtual rig, and named by the health monitor, no other one."""
 
 import math
 import sys
@@ -11,6 +11,7 @@ from boom_twin.bag.reader import read, scan
 from boom_twin.health.baseline import Baseline
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import load_topics
+from boom_twin.types import StrokeReading
 from boom_twin.validation.rig.faults import parse, spoil
 from boom_twin.validation.rig.session import RigSession
 
@@ -36,7 +37,7 @@ assert np.allclose(spoilt.imu[-1], [c * imu[-1, 0] + s * imu[-1, 1], c * imu[-1,
 
 def alarms(readings):
     """First time (s) of every cause that was ever ranked first, with its last estimate."""
-    twin, named = Twin(scene, baseline=Baseline()), {}
+    twin, named = Twin(scene, baseline=Baseline(), reads=StrokeReading.DRIVE), {}
     for stamp, *rows in zip(stamps.tolist(), strokes, joints, readings, strict=True):
         for stream, values in zip(RECORDED, rows, strict=True):
             health = twin.update(Sample(stream, stamp, values)).health

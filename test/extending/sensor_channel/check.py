@@ -30,7 +30,7 @@ from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.load import default_text
 from boom_twin.types import channels_of
 
-CHANNEL, WRONG, SLOPE, NANO = "tip_inclination", 0.01, 0.02, 1e-9
+CHANNEL, WRONG, SLOPE, NANO = "tip_inclination", 0.05, 0.02, 1e-9
 INCLINATION, count = Stream.TIP_INCLINATION, 400
 scene = load_scene()
 scene = scene.model_copy(update={"base": scene.base.model_copy(update={"inclination": SLOPE})})
