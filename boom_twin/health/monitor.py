@@ -143,7 +143,7 @@ class HealthMonitor:
             if stream is Stream.STROKES:
                 continue
             is_unknown = stream is Stream.IMU and self._surveys[stream].slow.weight.max() < KNOWN
-            is_out = is_unknown or self._delays[stream].alarm is not None
+            is_out = is_unknown or (stream in self._delays and self._delays[stream].alarm is not None)
             is_out |= not causes.isdisjoint((f"{SENSORS[stream].stem}.sensor", delay_cause(stream)))
             found.append(self._masked(stream) | is_out | np.array([f"{name}.sensor" in causes for name in names]))
         return np.concatenate(found)
