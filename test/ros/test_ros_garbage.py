@@ -43,17 +43,19 @@ def test_garbage_is_counted_and_survived(node: Any, bench: Any, motion: dict[str
     for msg in garbage:
         (bench.imu if isinstance(msg, Imu) else bench.strokes).publish(msg)
     bench.strokes.publish(b"\x00\x01\x00\x00" + b"\xff" * 40)
-    bench.until(lambda: bench.values("boom_twin: cylinder_strokes").get("messages") == str(len(garbage) - 1))
+    bench.until(
+        lambda: bench.values("boom_twin: cylinder_strokes").get("messages") == str(len(garbage) - 2)
+    )  # a sign of life is none
     bench.answers.clear()
     for k in range(20):
         bench.strokes.publish(_strokes((100, k * 5_000_000), NAMES, start))
     bench.until(lambda: len(bench.answers) >= 20)
     assert bench.answers == [100_000_000_000 + k * 5_000_000 for k in range(20)]
 
-    bench.until(lambda: bench.values("boom_twin: cylinder_strokes").get("messages") == str(len(garbage) + 19))
+    bench.until(lambda: bench.values("boom_twin: cylinder_strokes").get("messages") == str(len(garbage) + 18))
     values = bench.values("boom_twin: model")
     for name, count in [
-        ("messages: unknown names only", 2),
+        ("messages: unknown names only", 1),
         ("messages: no usable value", 2),
         ("messages: absurd magnitude", 2),
         ("messages: not finite", 6),
