@@ -34,6 +34,7 @@ from .inference.evidence_kernels import Faults, fit_faults
 from .inference.hypotheses import Evidence, Regression
 from .inference.innovation_filter import InnovationFilter, ModalStates
 from .inference.normal_distribution import log_normal_below
+from .length_residuals import LengthResiduals
 from .residual_monitor import ResidualMonitor
 from .sensor_check import NOISE_OVER, SensorCheck, sensor_ranges
 from .sensor_monitor import SensorMonitor
@@ -88,6 +89,8 @@ class HealthMonitor:
         }
         self._delays = {stream: DelayMonitor(stream, least) for stream, least in DELAYED.items()}
         self._mount, self._forces = ImuMount(), ForceReading(self._channels[Stream.FORCES])
+        lengths = np.array([section.length for section in scene.sections])
+        self._lengths = LengthResiduals(self._channels[Stream.ANGLES], lengths)
         self._angles = AngleReading(scene, mounts)
         self._ended: list[Alarm] = []
         self._told = 0
@@ -192,6 +195,7 @@ class HealthMonitor:
         alarms += self._angles.alarms
         alarms += [self._mount.alarm] if self._mount.alarm is not None else []
         alarms += self._forces.alarms
+        alarms += self._lengths.alarms
         lags = {each.cause: each for each in (monitor.alarm for monitor in self._delays.values()) if each is not None}
         for alarm in self.residuals.alarms:  # which take vibration for a load: the size is the other's
             lag = lags.get(alarm.cause)
@@ -225,6 +229,8 @@ class HealthMonitor:
             angles = readings[Stream.ANGLES]
             news += self._void(self._angles.take(angles, predicted.strokes, BLOCK * NANO, start, block.end), block.end)
             news += self._forces.take(readings[Stream.FORCES], start, block.end)
+            if self._noise is None:
+                news += self._lengths.take(angles, self._masked(Stream.ANGLES), start, block.end)
             for stream, monitor in self._delays.items():
                 found = self._judge_delay(stream, monitor, block, readings[stream])
                 news += self._void(found, block.end) if stream is Stream.ANGLES else found
