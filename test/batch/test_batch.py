@@ -17,6 +17,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from drive_twin import ARCH_DRIVES
 from health.recorded import written
 
 psutil, parquet = pytest.importorskip("psutil"), pytest.importorskip("pyarrow.parquet")
@@ -227,7 +228,7 @@ def test_a_session_that_tells_no_parameters_costs_these_only(sessions: Path, tmp
 
 @pytest.mark.slow
 def test_parameters_of_a_session_are_those_of_a_calibration(tmp_path: Path) -> None:
-    bag = Path(__file__).parents[2] / "bags" / "arch_session"
+    bag = ARCH_DRIVES
     row, found = row_of(task_of(bag, tmp_path / "out")), calibrate([bag], load_scene())
     told = {each.unknown.name: each for each in found.estimates if each.told}
     names = {name.removeprefix("calibrated_") for name in row if name.startswith("calibrated_") and not name.endswith("_sigma")}

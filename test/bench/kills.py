@@ -278,10 +278,12 @@ class Calibrate(Target):
     def prepare(self) -> None:
         command = ["rig", str(self.scene), "--out", str(self.sources / "bag"), "--random", "up", "--duration", "24"]
         Run(command, self.place / "log").finish()
+        (self.sources / "drives.yaml").write_text("inputs:\n  cylinder_strokes: {reads: drive}\n")  # what the fit knows
         self.out = self.place / "new.yaml"
 
     def arguments(self) -> list[str]:
         names = ["--parameters", "cylinder_1.k", "--zeros", "none", "--date", "2026-01-02", "--no-pictures", "--force"]
+        names += ["--mapping", str(self.sources / "drives.yaml")]
         return ["calibrate", str(self.sources / "bag"), "--scene", str(self.scene), "--out", str(self.out), *names]
 
     def sign(self) -> Path:
