@@ -216,12 +216,18 @@ def respond_statically(t, boom, work, p):
 
 
 @inner
+def nudge_of(t, increments):
+    """Return how many of these increments of the unknowns turn none of them by more than `NUDGE`."""
+    largest = 1e-300
+    for i in range(increments.shape[0]):
+        largest = max(largest, t.scale[i] * abs(increments[i]))
+    return NUDGE / largest
+
+
+@inner
 def change_readings(t, boom, work, p, k):
     """Write the derivative of the sensors' readings along column `k`, by central differences about rest."""
-    largest = 1e-300
-    for i in range(boom.z.shape[0]):
-        largest = max(largest, t.scale[i] * abs(p.columns[k, i]))
-    size = NUDGE / largest
+    size = nudge_of(t, p.columns[k])
     for side in range(2):
         for i in range(boom.z.shape[0]):
             boom.z[i] = p.rest[i] + (size - 2.0 * size * side) * p.columns[k, i]
@@ -334,10 +340,7 @@ def respond_to_inertia(t, boom, work, p, j, shift2):
 @inner
 def move_along(t, boom, work, p, j):
     """Write how all mass points move with the unknowns of response `j`."""
-    largest = 1e-300
-    for i in range(boom.z.shape[0]):
-        largest = max(largest, t.scale[i] * abs(p.response[j, i]))
-    size = NUDGE / largest
+    size = nudge_of(t, p.response[j])
     for sign in (1.0, -1.0):
         for i in range(boom.z.shape[0]):
             boom.z[i] = p.rest[i] + sign * size * p.response[j, i]
