@@ -63,8 +63,7 @@ OLDEST = 0.1  # s, most that a reading may be late
 
 
 class SensorNoise(NamedTuple):
-    """Variances of sensors, and sizes of loads (N): the usual one, the least, that which a session may
-    start with, and one that has just come."""
+    """Variances of sensors, and sizes of loads (N): usual, least, at the start of a session, just come."""
 
     length2: float
     angle2: float
