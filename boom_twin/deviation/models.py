@@ -4,6 +4,8 @@ A transducer reads the length of its cylinder, oil compressed. Its drive, the le
 
     length_i = d_i + c_i F_i - tau_i (length_i' - d_i'),    F_i, its force, linear in drives, load and modes (`posture`).
 
+Recordings of drives themselves are the case c_i = 0 of that reading; the boom keeps its oil.
+
 States: modal coordinates and rates of the vibration about static equilibrium; a fast and a slow part of the force at the tip
 that the model does not know (Gauss-Markov, `FAST` and `SLOW` seconds); length, rate and acceleration of the drives. The
 estimate adds zeros of IMU, angle sensors and force sensors.
@@ -89,7 +91,8 @@ class Filters(NamedTuple):
     places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
     felt : (2,) specific force predicted at the tip, m/s^2. shaking : (1,) mean square of its acceleration, m^2/s^4.
     angle : (1,) of the tip, rad. strokes : (n, 3) predicted lengths (m), their rates and accelerations.
-    pulls : (n,) predicted forces, N. The others are scratch.
+    pulls : (n,) predicted forces, N. evidence : (1,) logarithm of the likelihood of all that was read, up to a constant.
+    The others are scratch.
     """
 
     x: Array
@@ -114,6 +117,7 @@ class Filters(NamedTuple):
     variances: Array
     felt: Array
     pulls: Array
+    evidence: Array
     half: Array
     turned: Array
     mixed_x: Array
@@ -138,7 +142,7 @@ def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> F
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan),
         noise=noise,
         places=np.zeros((states, 6 + n), np.int64), weights=np.zeros((states, 6 + n)), counts=np.zeros(states, np.int64),
-        variances=np.zeros(states), felt=np.zeros(2), pulls=np.zeros(n), half=np.zeros((states, states)),
+        variances=np.zeros(states), felt=np.zeros(2), pulls=np.zeros(n), evidence=np.zeros(1), half=np.zeros((states, states)),
         turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)), mixed_p=np.zeros((3, states, states)),
         row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((8, states)), likely=np.zeros(5),
         switch=np.zeros((3, 3)), shaking=np.zeros(1), angle=np.zeros(1), strokes=np.zeros((n, 3)),
@@ -198,12 +202,12 @@ def column_row(p, columns, at, scale, row):
 
 @inner
 def length_row(p, i, row):
-    """Write the row of the length of cylinder `i`."""
+    """Write the row of what the stroke transducer of cylinder `i` reads."""
     n, m = p.drives.shape[0], p.modes[0]
-    column_row(p, p.forces, i, p.compliance[i], row)
+    column_row(p, p.forces, i, p.oil_read[i], row)
     row[drive_place(p) + i] += 1.0
     for j in range(m):
-        row[m + j] = -p.lag[i] * p.compliance[i] * p.forces[2 + n + j, i]
+        row[m + j] = -p.lag[i] * p.oil_read[i] * p.forces[2 + n + j, i]
 
 
 @inner
@@ -408,7 +412,7 @@ def take_lengths(p, f, k, size, y):
     for i in range(y.shape[0]):
         if math.isfinite(y[i]) and not (k >= ALL_VALVES and f.deaf[i]):
             length_row(p, i, f.row)
-            rest = p.drives[i] + p.compliance[i] * p.pulled[i]
+            rest = p.drives[i] + p.oil_read[i] * p.pulled[i]
             innovation = y[i] - rest - about_rest(p, f.row, f.x[k], size)
             expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, f.length2[i], size)
             total -= 0.5 * (innovation * innovation / expected + math.log(expected))
@@ -614,6 +618,8 @@ def weigh_models(f, mixture):
         total += f.chances[first + k]
     for k in range(count):
         f.chances[first + k] /= total
+    if mixture == ESTIMATE or f.status[FED] == 0:
+        f.evidence[0] += most + math.log(total)
 
 
 @inner

@@ -55,6 +55,7 @@ class Posture(NamedTuple):
     sections' chords, from pivot to pivot. forces : (c, n) of the
     cylinders, N. read, pulled : (2 n + 3,), (n,) the same at rest.
     omega, decay : (m,) rad/s and 2 zeta omega, 1/s. compliance, lag : (n,) 1/k (m/N; 0 if rigid) and d/k (s).
+    oil_read : (n,) the compliance where stroke transducers read lengths (`reads_length`), 0 where they read drives.
     slope, curvature : (n,) change of a joint's angle by its stroke, rad/m, and of that, rad/m^2.
     frames : (n,) of the chain that inclinometers are fixed to. absolute : (n,) which angle sensors are such. roots : (n + 1,)
     frames of the pivots and of the tip. masses : (h,) kg, kg m^2. lengths : (n,) of the sections, m. closed : (n,) m.
@@ -75,6 +76,8 @@ class Posture(NamedTuple):
     decay: Array
     compliance: Array
     lag: Array
+    oil_read: Array
+    reads_length: bool
     slope: Array
     curvature: Array
     frames: NDArray[np.int64]
@@ -94,10 +97,12 @@ class Posture(NamedTuple):
     rate: Array
 
 
-def new_posture(plan: Plan, most: int, lengths: Array, frames: NDArray[np.int64], absolute: NDArray[np.bool_]) -> Posture:
+def new_posture(
+    plan: Plan, most: int, lengths: Array, frames: NDArray[np.int64], absolute: NDArray[np.bool_], reads_length: bool
+) -> Posture:
     """Return room for a boom whose sections are `lengths` (m) long, with `most` modes at most.
 
-    `frames` and `absolute` (n,) are those of `boom_twin.estimation.sensor_model.Mounting`.
+    `frames` and `absolute` (n,) are those of `boom_twin.estimation.sensor_model.Mounting`; `reads_length`: see `Posture`.
     """
     n, unknowns, histories = plan.joints, len(plan.names), len(plan.masses)
     kinds, columns = plan.tables.operations.kind, 2 + n + most
@@ -106,7 +111,8 @@ def new_posture(plan: Plan, most: int, lengths: Array, frames: NDArray[np.int64]
         modes=np.zeros(1, np.int64), drives=np.full(n, np.inf), angles=np.zeros(n), rest=np.zeros(unknowns),
         columns=np.zeros((columns, unknowns)), motions=np.zeros((most, histories)), readings=np.zeros((columns, 2 * n + TIP)),
         forces=np.zeros((columns, n)), read=np.zeros(2 * n + TIP), pulled=np.zeros(n), omega=np.zeros(most),
-        decay=np.zeros(most), compliance=np.zeros(n), lag=np.zeros(n), slope=np.zeros(n), curvature=np.zeros(n),
+        decay=np.zeros(most), compliance=np.zeros(n), lag=np.zeros(n),
+        oil_read=np.zeros(n), reads_length=reads_length, slope=np.zeros(n), curvature=np.zeros(n),
         frames=np.array(frames, np.int64), absolute=np.array(absolute), roots=roots.astype(np.int64), masses=plan.masses,
         lengths=lengths, closed=plan.closed_lengths, still=np.zeros(histories), position=np.zeros(histories),
         hat=np.zeros(histories), response=np.zeros((most, unknowns)), sides=np.zeros((2, 2 * n + TIP)),
@@ -150,6 +156,7 @@ def linearise(t, boom, work, p, drives, follow):
         cylinder = t.cylinders[i]
         p.pulled[i] = boom.z[cylinder.z]
         p.compliance[i], p.lag[i] = compliance_and_lag(cylinder, t.oils, p.closed[i] + drives[i])
+        p.oil_read[i] = p.compliance[i] if p.reads_length else 0.0
     note_linkages(t, p)
     respond_statically(t, boom, work, p)
     if follow:

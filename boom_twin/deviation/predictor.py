@@ -24,7 +24,7 @@ from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
-from ..types import SENSORS, Array, Mount, Prediction, Stream, channels_of
+from ..types import SENSORS, Array, Mount, Prediction, Stream, StrokeReading, channels_of
 from .models import FED, FED_STAMP, PREDICTION, Filters, SensorNoise, new_filters, start_models
 from .posture import Posture, linearise, new_posture
 
@@ -58,6 +58,8 @@ class LengthPredictor(BoomPredictor):
     settings : Settings
     mounts : sequence of Mount or None
         Of the angle sensors.
+    reads : StrokeReading
+        What the stroke transducers read.
 
     Attributes
     ----------
@@ -67,12 +69,19 @@ class LengthPredictor(BoomPredictor):
 
     noise = None  # of strokes through the model: the filters' covariance has it
 
-    def __init__(self, scene: Scene, settings: Settings, mounts: Sequence[Mount | None]) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        settings: Settings,
+        mounts: Sequence[Mount | None] = (),
+        reads: StrokeReading = StrokeReading.LENGTH,
+    ) -> None:
         super().__init__(scene)
         mounting = Mounting(self.plan, scene.base.inclination, mounts)
         n, weight = self.plan.joints, weight_of(scene)
         lengths = np.array([section.length for section in scene.sections])
-        self.posture = new_posture(self.plan, MODES, lengths, mounting.frames, mounting.absolute)
+        self._reads_length = reads is StrokeReading.LENGTH
+        self.posture = new_posture(self.plan, MODES, lengths, mounting.frames, mounting.absolute, self._reads_length)
         sizes = (USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)
         used = Stream.STROKES, Stream.ANGLES, Stream.IMU, Stream.FORCES
         variances = (settings.variance(SENSORS[stream]) for stream in used)
@@ -93,7 +102,7 @@ class LengthPredictor(BoomPredictor):
         return hold(self.posture), hold(self.filters)
 
     def start(self, strokes: Array, speeds: Array | None = None) -> None:
-        """Forget all; at rest in equilibrium at lengths `strokes` (m), shape (n,).
+        """Forget all; at rest in equilibrium where transducers read `strokes` (m), shape (n,).
 
         Parameters
         ----------
@@ -107,9 +116,11 @@ class LengthPredictor(BoomPredictor):
         """
         p, f, boom, held = self.posture, self.filters, self._anchor, self._struts.state()
         rigid = joint_angles_of_strokes(self._scene, strokes)
-        settle(self._struts, held, self._struts.work(), strokes, rigid)
-        forces = taken_apart(self._struts, first_row(self._struts, held)).cylinder_forces
-        drives = spring_free(self.plan, strokes, forces)
+        drives = strokes
+        if self._reads_length:
+            settle(self._struts, held, self._struts.work(), strokes, rigid)
+            forces = taken_apart(self._struts, first_row(self._struts, held)).cylinder_forces
+            drives = spring_free(self.plan, strokes, forces)
         settle(self.plan, boom, self._work, drives, rigid)
         p.angles[:] = rigid
         modes = natural_modes(self.plan, boom, self._work, MODES, WIDTH, 2.0 * math.pi * HIGHEST)
@@ -191,6 +202,11 @@ class LengthPredictor(BoomPredictor):
         for covariance in self.filters.p:
             covariance[0, 0] += amplitude2 / max(motion2, 1e-300)
             covariance[m, m] += p.omega[0] ** 2 * amplitude2 / max(motion2, 1e-300)
+
+    @property
+    def evidence(self) -> float:
+        """Logarithm of the likelihood of all that was read since the twin was made, up to a constant of the session."""
+        return float(self.filters.evidence[0])
 
     @property
     def tip_sigmas(self) -> Array:

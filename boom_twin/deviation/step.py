@@ -132,10 +132,10 @@ def write_prediction(t, live, p, f, h, gravity, out):
         found.joints[i] = live.frames[root, FRAME_ANGLE] - live.frames[root - 1, FRAME_ANGLE]
         f.pulls[i] = found.cylinder_forces[i] = live.z[t.cylinders[i].z]
         length_row(p, i, f.row)
-        estimates.strokes[i] = p.drives[i] + p.compliance[i] * p.pulled[i] + about_rest(p, f.row, f.mean[PREDICTION], size)
+        estimates.strokes[i] = p.drives[i] + p.oil_read[i] * p.pulled[i] + about_rest(p, f.row, f.mean[PREDICTION], size)
         estimates.variances[i] = variance_of(f.row, f.spread[PREDICTION], f.gain, size)
-        found.lengths[i] = f.strokes[i, 0] = estimates.strokes[i]
-        f.strokes[i, 1] = length_rate(p, f, i)
+        f.strokes[i, 0], f.strokes[i, 1] = estimates.strokes[i], stroke_rate(p, f, i)
+        found.lengths[i] = estimates.strokes[i] + (p.compliance[i] - p.oil_read[i]) * f.pulls[i]
         f.strokes[i, 2] = f.mean[PREDICTION, drive_place(p) + 2 * n + i]
     for k in range(pins):
         row = t.clearances[k]
@@ -159,14 +159,14 @@ def write_prediction(t, live, p, f, h, gravity, out):
 
 
 @inner
-def length_rate(p, f, i):
-    """Return the rate of the length of cylinder `i`, m/s: of the drives, and of the oil's extension."""
+def stroke_rate(p, f, i):
+    """Return the rate of what the stroke transducer of cylinder `i` reads, m/s."""
     n, m, drive = p.drives.shape[0], p.modes[0], drive_place(p)
     rate = f.mean[PREDICTION, drive + n + i]
     for k in range(n):
-        rate += p.compliance[i] * p.forces[2 + k, i] * f.mean[PREDICTION, drive + n + k]
+        rate += p.oil_read[i] * p.forces[2 + k, i] * f.mean[PREDICTION, drive + n + k]
     for j in range(m):
-        rate += p.compliance[i] * p.forces[2 + n + j, i] * f.mean[PREDICTION, m + j]
+        rate += p.oil_read[i] * p.forces[2 + n + j, i] * f.mean[PREDICTION, m + j]
     return rate
 
 

@@ -78,9 +78,7 @@ def loaded_model(
 
 
 def _predictor(scene: Scene, settings: Settings, mounts: Sequence[Mount | None], reads: StrokeReading) -> BoomPredictor:
-    if reads is StrokeReading.DRIVE:
-        return BoomPredictor(scene)
-    return LengthPredictor(scene, settings, mounts)
+    return LengthPredictor(scene, settings, mounts, reads)
 
 
 class ModelPreparation:
