@@ -178,7 +178,7 @@ SENSORS: dict[Stream, SensorKind] = {
         alarms=("stuck", "dropout"),
     ),
 }
-"""What they should read is in `boom_twin.twin.expected_readings.write_expected`, their topics are in ``topics.yaml``."""
+"""What they should read is in `boom_twin.deviation.step.write_expected_readings`, their topics are in ``topics.yaml``."""
 
 
 def channels_of(joints: int) -> dict[Stream, tuple[str, ...]]:
@@ -490,8 +490,6 @@ class Report(_MadeWhenAsked):
         ``ok``, or one sentence on a failure of the model.
     change : Change or None
         Set where the model began from rest, or something that was asked for took effect.
-    passes : int
-        Newton passes that the prediction took, with those of what was stepped for good.
     health : Health or None
         Set once a second, and where an alarm began, changed or ended.
     estimate : Estimate or None
@@ -507,13 +505,12 @@ class Report(_MadeWhenAsked):
     events: tuple[str, ...] = ()
     status: str = "ok"
     change: Change | None = None
-    passes: int = 0
     health: Health | None = None
     estimate: Estimate | None = None
     earlier: tuple[Report, ...] = ()
 
     @classmethod
-    def of_rows(cls, stamp: int, rows: _Rows, events: tuple[str, ...], passes: int, health: Health | None) -> Report:
+    def of_rows(cls, stamp: int, rows: _Rows, events: tuple[str, ...], health: Health | None) -> Report:
         """A report whose prediction, estimate and residuals are made of `rows` when they are asked for.
 
         Few look at them where messages are encoded straight from the rows; it is the same in every other way.
@@ -524,7 +521,6 @@ class Report(_MadeWhenAsked):
         put(report, "events", events)
         put(report, "status", "ok")
         put(report, "change", None)
-        put(report, "passes", passes)
         put(report, "health", health)
         put(report, "earlier", ())
         put(report, "rows", rows)

@@ -125,8 +125,8 @@ def row_of(task: SessionTask) -> Row:
     evaluator = Evaluator(scene.scene, settings, baseline)
     with result_folder(Path(task.out), REPLAY, [session]) as building:
         result = replay_into(
-            building, session, scene, settings, mapping=mapping, baseline=baseline, window=window, take=evaluator.add, cores=1
-        )  # one core: the others have sessions of their own
+            building, session, scene, settings, mapping=mapping, baseline=baseline, window=window, take=evaluator.add
+        )
         found = evaluator.finish(result, building.folder)
         if task.report:
             draw(result, found.history, building.folder)

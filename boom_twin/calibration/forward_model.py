@@ -10,8 +10,8 @@ from ..analysis.batch import Batch
 from ..compiler.compile import compile_scene
 from ..compiler.plan import taken_apart
 from ..config.settings import Settings
+from ..deviation.sensor_model import specific_force
 from ..errors import BagError, SolverError
-from ..estimation.sensor_model import specific_force
 from ..kernels.result_row import Results
 from ..scene.edit import with_parameters
 from ..scene.kinematics import gravity_in_base, joint_angles_of_strokes

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares, lsq_linear
 
+from ..deviation.load_spectrum import TipLoad
 from ..errors import BoomTwinError
-from ..estimation.load_spectrum import TipLoad
 from ..scene.kinematics import strokes_of_posture
 from ..types import Array
 from .forward_model import CalibrationProblem

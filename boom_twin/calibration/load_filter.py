@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_lyapunov
 
-from ..estimation.sensor_model import specific_force
+from ..deviation.sensor_model import specific_force
 from ..kernels.jit import kernel
 from ..types import Array
 from .load_modes import ModesAlong

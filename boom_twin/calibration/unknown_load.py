@@ -22,8 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..deviation.load_spectrum import TipLoad, TipLoadFinder
 from ..errors import SolverError
-from ..estimation.load_spectrum import TipLoad, TipLoadFinder
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
 from ..system.cores import usable_cores

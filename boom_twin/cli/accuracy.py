@@ -6,8 +6,8 @@ from argparse import ArgumentParser
 from itertools import combinations
 from typing import Any
 
+from ..deviation.accuracy import TipAccuracy, accuracy_at
 from ..errors import BoomTwinError, UsageError
-from ..estimation.accuracy import TipAccuracy, accuracy_at
 from ..scene.kinematics import strokes_of_posture
 from ..scene.schema import Scene
 from ..types import Stream
@@ -49,7 +49,7 @@ def words(chosen: tuple[Stream, ...]) -> str:
 def table(scene: Scene, sensors: list[Stream]) -> tuple[dict[str, Any], list[str]]:
     """The accuracy at every posture: as values for ``--json``, and as lines."""
     values: dict[str, Any] = {}
-    acting = "an unknown load of 1 % of the boom's weight acts at the tip"
+    acting = "an unknown load of 0.25 % of the boom's weight comes and goes at the tip"
     lines = ["", f"Accuracy of the estimate at rest, while {acting} (standard deviations)"]
     titles = f"{'tip x, y mm':>16} {'pitch mrad':>11} {'acceleration':>13} {'load N':>14}"
     lines.append(f"  {'posture':12} {'sensors beside strokes':24} {titles}")

@@ -8,9 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..config.settings import load_settings
 from ..errors import Fault, SceneError
-from ..estimation.stroke_filter import filter_band
 from ..scene import Scene
 from ..scene.load import DEFAULT_NAME, examine
 from ..scene.oil_spring import STATIONS
@@ -18,12 +16,10 @@ from ..scene.schema import Clearance
 from ..scene.segmentation import LEAST
 from ..scene.summary import UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from ..system.atomic_files import check_target
-from ..types import Array
 from . import accuracy
 from . import reduce as need
 from .main import add_json, add_scene, open_scene, print_result
 
-RATES = (50.0, 100.0, 200.0, 1000.0)
 """Sample rates (Hz) of strokes."""
 PNG = b"\x89PNG"
 """How a picture begins; one that is there is replaced."""
@@ -98,11 +94,6 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
         "joint_unknowns": [joint.unknowns for joint in joints],
         "clearance_pins": [pin.at for pin in account.pins],
         "unknowns": account.unknowns,
-        "stroke_rate_Hz": list(RATES),
-        "stroke_band_Hz": [float(bands[-1]) for bands, _ in _bands()],
-        "stroke_lag_s": [float(lags[-1]) for _, lags in _bands()],
-        "stroke_band_at_rest_Hz": [float(bands[0]) for bands, _ in _bands()],
-        "stroke_lag_at_rest_s": [float(lags[0]) for _, lags in _bands()],
         "stroke_low_m": [joint.stroke_low for joint in joints],
         "stroke_high_m": [joint.stroke_high for joint in joints],
         "lever_least_m": [joint.linkage.lever[0] for joint in joints],
@@ -143,8 +134,6 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
         lines += ["", _clearance_title(scene.clearance), *_indent(_pins(account))]
     lines += ["", "Left out of the model (absent from the scene, zero or false)", *_indent(_left_out(account))]
     lines += ["", "Unknowns per step", *_indent(_unknowns(account))]
-    lines += ["", "Strokes that a twin follows, by their sample rate (sensors and stroke_agility as in twin.yaml)"]
-    lines += _indent(_filter())
     warnings = [oddity for oddity in oddities if not oddity.is_note]
     lines += ["", *(f"Note: {oddity}" for oddity in oddities if oddity.is_note)]
     lines += [f"Warnings: {len(warnings) or 'none'}", *(f"  {warning}" for warning in warnings)]
@@ -255,20 +244,6 @@ def _unknowns(account: Account) -> list[str]:
     rows.append(["total", str(account.unknowns), ""])
     width = max(len(row[1]) for row in rows)
     return _table([[name, number.rjust(width), words] for name, number, words in rows], left=3)
-
-
-def _bands() -> list[tuple[Array, Array]]:
-    """Frequencies (Hz) that the stroke filter follows, and its lags (s), at each of `RATES`."""
-    settings = load_settings()
-    return [filter_band(settings.stroke_variance, rate, settings.stroke_agility) for rate in RATES]
-
-
-def _filter() -> list[str]:
-    rows = [["", "in haste, within 1 % up to", "smoothed for", "at rest up to", "smoothed for"]]
-    for rate, (bands, lags) in zip(RATES, _bands(), strict=True):
-        haste, rest = ([f"{bands[k]:.1f} Hz", f"{1e3 * lags[k]:.1f} ms"] for k in (-1, 0))
-        rows.append([f"{rate:g} Hz", *haste, *rest])
-    return _table(rows)
 
 
 def _table(rows: list[list[str]], left: int = 1) -> list[str]:

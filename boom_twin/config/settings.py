@@ -17,7 +17,10 @@ from ..types import SensorKind
 from .yaml_text import read_plain
 
 Table = TypeVar("Table", bound=BaseModel)
-RETIRED = dict.fromkeys(("jerk_density", "lag"), "the stroke filter adapts by itself: leave it out, or set stroke_agility")
+_GONE = ("jerk_density", "lag", "stroke_agility", "step", "look_step", "step_tip_error", "step_acceleration_error", "rho")
+RETIRED = dict.fromkeys(
+    (*_GONE, "section_deviation"), "without effect since 0.2.0, whose filter adapts by itself: leave it out"
+)
 """Parameters of earlier versions, and what takes their place."""
 
 
@@ -150,10 +153,6 @@ Load = Annotated[float, Field(ge=-1, le=1e5, allow_inf_nan=False), LIVE]
 Limit = Annotated[float, Field(ge=1e-6, le=1e9, allow_inf_nan=False), LIVE]
 
 
-Step = Annotated[float, Field(ge=1e-5, le=1.0, allow_inf_nan=False)]
-Agility = Annotated[float, Field(ge=1e-3, le=1e3, allow_inf_nan=False)]
-
-
 class Settings(BaseModel):
     """Numbers of the twin; SI units. Defaults are those of ``msg_config/twin.yaml``, which tells what each one does."""
 
@@ -166,15 +165,6 @@ class Settings(BaseModel):
     imu_sigma: Positive = Field(default=0.05, description="noise of the tip IMU, m/s^2")
     force_sigma: Positive = Field(default=100.0, description="noise of a cylinder's force, N")
     force_resolution: NotNegative = Field(default=20.0, description="resolution of a cylinder's force, N")
-    section_deviation: NotNegative = Field(
-        default=0.01, description="standard deviation of what sections may be softer by, as a share; the estimate follows it"
-    )
-    stroke_agility: Agility = Field(default=1.0, description="more follows strokes sooner, lets more noise through")
-    step: Step = Field(default=0.005, description="longest step of the remembered boom, s; halved by its error")
-    look_step: Step = Field(default=0.026, description="longest step of the look ahead to now, s; halved by its error")
-    step_tip_error: Positive = Field(default=2.0e-4, description="error of the tip that steps may make, rms, m")
-    step_acceleration_error: Positive = Field(default=0.15, description="likewise of the tip's acceleration, m/s^2")
-    rho: Annotated[float, Field(ge=0, lt=1)] = Field(default=0.8, description="spectral radius at infinite frequency")
     payload: Load = Field(default=-1.0, description="mass at the tip, kg; below 0: that of the scene")
     line_fill: Load = Field(default=-1.0, description="concrete in the pipe line, kg/m; below 0: that of the scene")
     stroke_rate: Limit = Field(default=STROKE_RATE, description="no cylinder is faster, m/s; such a stroke is left out")

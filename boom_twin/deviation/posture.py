@@ -102,7 +102,7 @@ def new_posture(
 ) -> Posture:
     """Return room for a boom whose sections are `lengths` (m) long, with `most` modes at most.
 
-    `frames` and `absolute` (n,) are those of `boom_twin.estimation.sensor_model.Mounting`; `reads_length`: see `Posture`.
+    `frames` and `absolute` (n,) are those of `boom_twin.deviation.sensor_model.Mounting`; `reads_length`: see `Posture`.
     """
     n, unknowns, histories = plan.joints, len(plan.names), len(plan.masses)
     kinds, columns = plan.tables.operations.kind, 2 + n + most

@@ -1,4 +1,4 @@
-"""Predict the boom from cylinder lengths, and estimate its tip from all sensors: the filters of `models`, kept by a run."""
+"""Predict a boom by its stroke transducers and estimate its tip by all sensors: the filters of `models` in a run."""
 
 from __future__ import annotations
 
@@ -10,23 +10,25 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.equilibrium import settle, spring_free
+from ..analysis.bending_moments import moments_by_unknowns
+from ..analysis.equilibrium import outline, settle, spring_free
 from ..analysis.modal import natural_modes
+from ..analysis.undeflected import UndeflectedBoom
 from ..compiler.compile import compile_scene
 from ..compiler.plan import first_row, taken_apart
 from ..config.settings import Settings
 from ..errors import SolverError
-from ..estimation.boom_predictor import BoomPredictor
-from ..estimation.sensor_model import Mounting
 from ..kernels.jit import hold
-from ..kernels.tables import OK, SENTENCES
+from ..kernels.result_row import PIN, places_in, prediction_width
+from ..kernels.tables import OK, SENTENCES, State, Tables, Work
 from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
-from ..types import SENSORS, Array, Mount, Prediction, Stream, StrokeReading, channels_of
+from ..types import SENSORS, Array, Mount, Outline, Prediction, Stream, StrokeReading, channels_of
 from .models import FED, FED_STAMP, PREDICTION, Filters, SensorNoise, new_filters, start_models
 from .posture import Posture, linearise, new_posture
+from .sensor_model import Mounting
 
 MODES = 6  # at most
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
@@ -35,21 +37,38 @@ USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD = 2.5e-3, 1e-4, 2e-3, 2e-2  # sha
 SWING = 0.3  # of the tip's deflection: how far a boom at work swings
 
 
-class CompiledLengths(NamedTuple):
-    """Fields of a boom as `boom_twin.twin.update_lengths` takes them."""
+class Drawn(NamedTuple):
+    """A boom at one instant, as far as its outline needs it.
 
-    tables: Any
-    boom: Any
-    live: Any
-    work: Any
+    frames, positions : of `State` and `Work`. angles : (n,) joint angles of the rigid boom, rad. pins : (n, 4) of `State`.
+    """
+
+    frames: Array
+    positions: Array
+    angles: Array
+    pins: Array
+
+
+class CompiledBoom(NamedTuple):
+    """A boom as `boom_twin.twin.update` takes it.
+
+    tables : of the scene. anchor : the boom at rest at the posture. live : the boom as predicted. work : scratch.
+    bending : (stations, unknowns) bending moments by the unknowns, N m. row : the newest prediction, see
+    `boom_twin.kernels.result_row`.
+    """
+
+    tables: Tables
+    anchor: State
+    live: State
+    work: Work
     posture: Posture
     filters: Filters
     bending: Array
     row: Array
 
 
-class LengthPredictor(BoomPredictor):
-    """A boom followed by the lengths of its cylinders.
+class BoomPredictor:
+    """A boom that is followed by what its stroke transducers read.
 
     Parameters
     ----------
@@ -63,11 +82,17 @@ class LengthPredictor(BoomPredictor):
 
     Attributes
     ----------
+    plan : Plan
+    live : State
+        The boom as predicted by the newest sample.
     posture : Posture
     filters : Filters
+    compiled : CompiledBoom
+    places : Places
+        Where everything stands in a row of a prediction.
+    pins : int
+        Pins with clearance.
     """
-
-    noise = None  # of strokes through the model: the filters' covariance has it
 
     def __init__(
         self,
@@ -76,11 +101,15 @@ class LengthPredictor(BoomPredictor):
         mounts: Sequence[Mount | None] = (),
         reads: StrokeReading = StrokeReading.LENGTH,
     ) -> None:
-        super().__init__(scene)
+        self._scene, self.plan = scene, compile_scene(scene)
+        self.live: State = self.plan.state()
+        self._anchor, self._work = self.plan.state(), self.plan.work()
+        self._undeflected = UndeflectedBoom(scene, self.plan)
+        n, self.pins, weight = self.plan.joints, len(self.plan.pins), weight_of(scene)
+        self._row, self.places = np.zeros(prediction_width(n, self.pins)), places_in(n, self.pins)
+        self._bending = moments_by_unknowns(self.plan)
         mounting = Mounting(self.plan, scene.base.inclination, mounts)
-        n, weight = self.plan.joints, weight_of(scene)
-        lengths = np.array([section.length for section in scene.sections])
-        self._reads_length = reads is StrokeReading.LENGTH
+        lengths, self._reads_length = np.array([each.length for each in scene.sections]), reads is StrokeReading.LENGTH
         self.posture = new_posture(self.plan, MODES, lengths, mounting.frames, mounting.absolute, self._reads_length)
         sizes = (USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)
         used = Stream.STROKES, Stream.ANGLES, Stream.IMU, Stream.FORCES
@@ -88,18 +117,33 @@ class LengthPredictor(BoomPredictor):
         channels = sum(len(names) for stream, names in channels_of(n).items() if stream is not Stream.STROKES)
         self.filters = new_filters(n, MODES, channels, SensorNoise(*variances, *(size * weight for size in sizes)))
         self._struts = compile_scene(with_rigid_cylinders(scene))
+        own = self.plan.tables, self._anchor, self.live, self._work, self.posture, self.filters, self._bending, self._row
+        self.compiled = CompiledBoom(*own)
 
     @cached_property
     def held(self) -> tuple[Any, ...]:
-        """Fields as compiled code takes them with every call, see `boom_twin.kernels.jit.hold`."""
-        boom = self.compiled
-        own = boom.tables, boom.anchor, boom.live, boom.work, self.posture, self.filters, boom.bending, boom.row
-        return tuple(map(hold, CompiledLengths(*own)))
+        """Fields of `compiled` as compiled code takes them with every call, see `boom_twin.kernels.jit.hold`."""
+        return tuple(map(hold, self.compiled))
 
     @cached_property
     def filters_held(self) -> tuple[Any, ...]:
         """Posture and filters alone, likewise."""
         return hold(self.posture), hold(self.filters)
+
+    @property
+    def stations(self) -> int:
+        """Number of stations that have a bending moment."""
+        return len(self._bending)
+
+    @property
+    def width(self) -> int:
+        """Numbers in a row of a prediction."""
+        return len(self._row)
+
+    @property
+    def variances(self) -> Array:
+        """Variances of the strokes as predicted, m^2, shape (n,)."""
+        return self._row[self.places.variances]
 
     def start(self, strokes: Array, speeds: Array | None = None) -> None:
         """Forget all; at rest in equilibrium where transducers read `strokes` (m), shape (n,).
@@ -134,29 +178,17 @@ class LengthPredictor(BoomPredictor):
         sag = float(np.hypot(*(boom.frames[-1, :2] - self._undeflected.at(rigid)[-1])))
         start_models(p, f, np.zeros_like(drives) if speeds is None else speeds, 0.0 if speeds is None else SWING * sag)
 
-    # -- strokes: what is expected of the lengths
-
     @property
     def angles(self) -> Array:
         """Joint angles (rad) of the rigid boom at the newest lengths, shape (n,)."""
         return joint_angles_of_strokes(self._scene, self.estimate, near=self.posture.angles)
 
     def slope(self, joint: int) -> float:
-        """Stroke over angle of joint `joint` (0-based), m/rad, by rigid geometry."""
+        """Return stroke over angle of joint `joint` (0-based), m/rad, by rigid geometry."""
         return 1.0 / float(self.posture.slope[joint])
 
-    @property
-    def passes(self) -> int:
-        """One: the filters do not iterate."""
-        return 1
-
-    @property
-    def is_lost(self) -> bool:
-        """False: the filters follow any motion of a cylinder."""
-        return False
-
     def extrapolated(self, span: float) -> Array:
-        """Lengths (m) `span` s after the newest sample; shape (n,)."""
+        """Return strokes (m) `span` s after the newest sample; shape (n,)."""
         x = self.filters.strokes
         return np.asarray(x[:, 0] + span * (x[:, 1] + 0.5 * span * x[:, 2]))
 
@@ -178,7 +210,7 @@ class LengthPredictor(BoomPredictor):
         braking = np.maximum(-mean[accelerations] * np.sign(mean[rates]), 0.0) + sure * deviations[accelerations]
         return float(np.minimum(speeds * span, speeds**2 / (2.0 * np.maximum(braking, 1e-12))).max())
 
-    # -- what a run tells the filters
+    # -- changes by the twin
 
     def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_]) -> None:
         """Leave masked channels (c,) and strokes (n,) out of the estimate, and forget what a new one of them has told it."""
@@ -218,3 +250,50 @@ class LengthPredictor(BoomPredictor):
         rows[:, 2 * m + 2 : 2 * m + 4], rows[:, 2 * m + 4 : 2 * m + 4 + n] = columns[:, :2], columns[:, 2 : 2 + n]
         spread = self.filters.spread[PREDICTION, : rows.shape[1], : rows.shape[1]]
         return np.asarray(np.sqrt(np.einsum("ai,ij,aj->a", rows, spread, rows)))
+
+    # -- what a prediction has
+
+    @property
+    def estimate(self) -> Array:
+        """Strokes (m) as predicted at the newest sample, shape (n,)."""
+        return self._row[self.places.strokes]
+
+    @property
+    def drawn(self) -> Drawn:
+        """Return what an outline at the newest sample needs: to be kept, and made `outlines` of with others."""
+        return Drawn(self.live.frames.copy(), self._work.position.copy(), self.angles.copy(), self.live.pins.copy())
+
+    def outlines(self, drawn: Sequence[Drawn]) -> list[Outline]:
+        """Return centre lines and cylinder pins at several samples, at least one."""
+        frames, positions, angles, _ = map(np.array, zip(*drawn, strict=True))
+        lines = outline(self.plan, frames, positions), self._undeflected.at(angles)
+        return [Outline(shape, undeflected, each.pins) for shape, undeflected, each in zip(*lines, drawn, strict=True)]
+
+    def prediction(self, stamp: int, drawn: Outline | None = None, moments: Array | None = None) -> Prediction:
+        """Return what the newest sample gave, with an outline and bending moments (N m) if they are given."""
+        return self.prediction_in(self._row.copy(), stamp, drawn, moments)
+
+    def prediction_in(self, row: Array, stamp: int, drawn: Outline | None = None, moments: Array | None = None) -> Prediction:
+        """Return the prediction in a row, with views of it; see `boom_twin.kernels.result_row`."""
+        at = self.places
+        tip = row[at.tip].reshape(3, 3)
+        angle, angular_velocity, angular_acceleration = tip[:, 2].tolist()
+        position = tip[0, :2]
+        return Prediction(
+            stamp=stamp,
+            tip_position=position,
+            tip_displacement=position - row[at.rigid_tip],
+            tip_velocity=tip[1, :2],
+            tip_acceleration=tip[2, :2],
+            tip_angle=angle,
+            tip_angular_velocity=angular_velocity,
+            tip_angular_acceleration=angular_acceleration,
+            joints=row[at.joints],
+            strokes=row[at.strokes],
+            cylinder_forces=row[at.cylinder_forces],
+            shape=None if drawn is None else drawn.shape,
+            undeflected=None if drawn is None else drawn.undeflected,
+            pins=None if drawn is None else drawn.pins,
+            clearances=row[at.pins].reshape(-1, PIN),
+            moments=moments,
+        )

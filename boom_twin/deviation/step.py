@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 
-from ..estimation.sensor_model import specific_force
-from ..estimation.tip_estimate import ACCELERATION, ACCELERATION_COVARIANCE, FORCE, FORCE_VARIANCE, TIP_COVARIANCE
-from ..estimation.tip_estimate import TIP as TIP_AT
 from ..kernels.elements.linkage import angle_of_length
 from ..kernels.integrators import X
 from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, NOT_FINITE, OK
 from ..kernels.transfer.forward_kinematics import place
+from .estimate_row import ACCELERATION, ACCELERATION_COVARIANCE, FORCE, FORCE_VARIANCE, TIP_COVARIANCE
+from .estimate_row import TIP as TIP_AT
 from .models import (
     ESTIMATE,
     FED,
@@ -25,7 +24,6 @@ from .models import (
     angle_row,
     column_row,
     drive_place,
-    follow_prediction,
     force_place,
     length_row,
     rate_row,
@@ -37,6 +35,7 @@ from .models import (
     zero_place,
 )
 from .posture import WIDEST, linearise
+from .sensor_model import specific_force
 
 SHAKEN_TIME = 0.5  # s, over which the mean square of the tip's acceleration is taken
 ANGLE_STEP = 0.01  # rad that a joint turns by before the boom is linearised anew
@@ -236,10 +235,8 @@ def write_expected_readings(p, f, live, results, inclination, values, sigmas):
 
 @inner
 def write_tip_estimate(p, f, results, out):
-    """Write the estimate beside the newest prediction; see `boom_twin.estimation.tip_estimate.WIDTH`."""
+    """Write the estimate beside the newest prediction; see `boom_twin.deviation.estimate_row.WIDTH`."""
     n, size, every, load = p.drives.shape[0], zero_place(p), all_states(p), force_place(p)
-    if f.status[FED] == 0:
-        follow_prediction(p, f)
     for a in range(3):
         column_row(p, p.readings, n + a, 1.0, f.rows[a])
         acceleration_row(p, a, f.rows[3 + a])

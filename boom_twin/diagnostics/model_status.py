@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..config.settings import Thresholds
-from ..estimation.load_spectrum import TipLoadFinder
+from ..deviation.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms, repeated, values_of
 from ..health.sensor_monitor import noise_as_text
 from ..types import SECOND, Alarm, Array, Estimate, Health, Report
@@ -43,14 +43,13 @@ class ModelWatch:
         self._is_deflected = False
         self._failure, self._failed_at, self._new = "", -HOLD, False
         self._looked, self._steps = now, 0
-        self._passes, self._busy, self._longest = 0, 0.0, 0.0
+        self._busy, self._longest = 0.0, 0.0
 
     def took(self, report: Report, duration: float) -> None:
         """The twin made `report` of a sample in so many seconds."""
         self._busy += duration
         if report.is_predicted:
             self._steps += 1
-            self._passes += report.passes
             self._is_deflected = "deflected" in report.events
             if duration > self._longest:
                 self._longest = duration
@@ -132,14 +131,13 @@ class ModelWatch:
         self.predictions += steps
         load = self._busy / span if span > 0.0 else nan
         judge.note("step_mean_s", self._busy / steps if steps else nan)
-        judge.note("passes_mean", self._passes / steps if steps else nan)
         judge.note("step_longest_s", self._longest if steps else nan)
         judge.note("step_budget_s", span / steps if steps else nan)
-        told = f"the model takes {load:.0%} of the time there is: end other work of this computer, or raise step or look_step"
+        told = f"the model takes {load:.0%} of the time there is: end other work of this computer, or lower the strokes' rate"
         judge.check("load", load, Bounds(thresholds.load_warn, thresholds.load_error), told)
         if steps:
             self._predicted_at = now
-        self._looked, self._steps, self._passes, self._busy, self._longest = now, 0, 0, 0.0, 0.0
+        self._looked, self._steps, self._busy, self._longest = now, 0, 0.0, 0.0
 
 
 class LoadWatch:

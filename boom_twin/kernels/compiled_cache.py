@@ -25,8 +25,8 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNEL_SOURCES = (
-    "kernels", "analysis/equilibrium.py", "deviation", "estimation", "twin/update.py", "twin/update_lengths.py",
-    "twin/state.py", "twin/expected_readings.py", "twin/stamp_check.py", "twin/sample_check.py", "twin/blocks.py",
+    "kernels", "analysis/equilibrium.py", "deviation", "estimation", "twin/update.py",
+    "twin/state.py", "twin/stamp_check.py", "twin/sample_check.py", "twin/blocks.py",
     "twin/health_rows.py",
     "calibration/load_filter.py",
     "health/inference/kalman_update.py", "health/inference/block_kernels.py", "health/inference/evidence_kernels.py",

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..estimation.tip_estimate import FORCE_VARIANCE
+from ..deviation.estimate_row import FORCE_VARIANCE
 from ..kernels.jit import by_reference, inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..twin.blocks import EstimateBlock, PredictionBlock
@@ -35,7 +35,7 @@ ESTIMATED_NUMBERS = (
     "acceleration_variance_xx", "acceleration_covariance_xy", "acceleration_covariance_xa",
     "acceleration_variance_yy", "acceleration_covariance_ya", "acceleration_variance_aa",
 )  # fmt: skip
-"""As in a row of an estimate, see `boom_twin.estimation.tip_estimate.WIDTH`, up to its variances of the load."""
+"""As in a row of an estimate, see `boom_twin.deviation.estimate_row.WIDTH`, up to its variances of the load."""
 TURN = ("sine_of_half", "cosine_of_half")
 """Of half the angle of the estimate, for a quaternion."""
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ..analysis.equilibrium import drives_as_read
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
-from ..estimation.tip_estimate import VARIANCES
+from ..deviation.estimate_row import VARIANCES
+from ..deviation.sensor_model import specific_force
 from ..plots import AlarmSpan, EstimateTrace, History, ImuTrace, Truth, replay_pictures
 from ..plots.extreme_rows import ExtremeRows
 from ..plots.health import slow_part
@@ -22,7 +23,6 @@ from ..plots.session_totals import SessionTotalsBuilder
 from ..plots.tip import WINDOW
 from ..scene.kinematics import gravity_in_base
 from ..scene.schema import Scene
-from ..twin.expected_readings import tip_specific_force
 from ..types import NANO, Array, Stream, channels_of
 from .ground_truth import TipTruth
 from .recording import Recording, ResidualRows, Stretch
@@ -178,7 +178,8 @@ def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan) -> History:
     groups = [_ChannelGroup(rows.names, _seconds(rows.stamps, stretch.first), (rows.values, rows.sigmas)) for rows in found]
     times, values, sigmas = _channels(groups, 2)
     stamps = _seconds(predictions.stamps, stretch.first)
-    felt = tip_specific_force(predictions.tip_acceleration, predictions.tip_angle, gravity_in_base(scene))
+    x, y = (predictions.tip_acceleration - gravity_in_base(scene)).T
+    felt = np.stack(specific_force(x, y, np.cos(predictions.tip_angle), np.sin(predictions.tip_angle)), axis=1)
     return History(
         stamps_s=stamps,
         tip_displacement=predictions.tip_displacement,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.column_statistics import ColumnStatistics
-from ..estimation.load_spectrum import TipLoadFinder
+from ..deviation.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms
 from ..twin.blocks import CODES, EstimateBlock, PredictionBlock, ReportBlock, SampleBlock, joined, report_block
 from ..types import HELD, NANO, Alarm, Array, Health, Report, Stream, StrokeReading, channels_of

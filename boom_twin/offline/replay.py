@@ -1,18 +1,16 @@
 """Replay: run the twin over a recorded session, message by message as the node would.
 
-Reading and writing run in processes of their own (`boom_twin.offline.reader_process`, `boom_twin.offline.writer_process`), and
-of a long session the boom is stepped in a thread (`boom_twin.offline.stepping_thread`).
+Reading and writing run in processes of their own (`boom_twin.offline.reader_process`, `boom_twin.offline.writer_process`).
 """
 
 from __future__ import annotations
 
 import gc
 import json
-import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -28,9 +26,9 @@ from ..bag.session_sheet import SessionSheet
 from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
+from ..deviation.load_spectrum import TipLoad
 from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
-from ..estimation.load_spectrum import TipLoad
 from ..health.baseline import Baseline
 from ..messages.sample_decoder import ODDITIES, stamp_of
 from ..messages.topic_table import Topics
@@ -38,7 +36,6 @@ from ..scene.edit import anew
 from ..scene.schema import Scene
 from ..scene.source import SceneSource, as_scene
 from ..system.atomic_files import write_atomic
-from ..system.cores import usable_cores
 from ..system.received_files import sha256_of
 from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
 from ..system.summary_display import SummaryDisplay, data_frame
@@ -52,7 +49,6 @@ from .reader_process import SampleReader
 from .recording import Recording, Stretch
 from .refused_strokes import RefusedStrokes
 from .sample_table import RowsInMemory, SampleTable, columns_of
-from .stepping_thread import stepped_ahead
 from .writer_process import ReportWriter
 
 if TYPE_CHECKING:
@@ -70,8 +66,6 @@ class ProgressBar(Protocol):
 
 
 Progress = Callable[[int], ProgressBar]
-MANY = 20_000
-"""Messages of a session, below which another twin, to step the boom in a thread, takes longer to make than it saves."""
 GIVEN = "given as a Scene"
 """Source of a scene that came by no file."""
 
@@ -210,12 +204,10 @@ def replay_into(
     namespace: str = "",
     take: Callable[[Stretch], None] | None = None,
     with_bag: bool = True,
-    cores: int | None = None,
 ) -> Replay:
     """As `replay`, into a folder that is being built, for more to be added to it.
 
     With `take`, memory stays the same however long the session is: it is given one `Stretch` after the other, and none is kept.
-    Of so many `cores` (all that this process may use, if not given) it makes use; the result is the same.
     """
     with _processes(building, with_bag) as (reader, writer):
         session, out, settings = scan(Path(bag)), building.folder, settings or settings_of(Path(bag)).settings
@@ -235,10 +227,8 @@ def replay_into(
         expected = _expected(session, wanted, window)
         ahead = SampleReader(session.path, topics, wanted, joints, window, reader)
         behind = None if writer is None else ReportWriter(writer, session.notes, topics, scene, settings)
-        with _unhurried_collector(), ExitStack() as ended:
+        with _unhurried_collector():
             twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline, strokes.reading)
-            can_step = strokes.reading is StrokeReading.DRIVE and expected >= MANY
-            stepping = _stepping_twin(twin) if can_step and (cores or usable_cores()) > 1 else None
             ahead.wait_ready()
             if behind is not None:
                 behind.wait_ready()
@@ -247,8 +237,6 @@ def replay_into(
             began = time.perf_counter()
             if not changes:
                 samples = (sample for sample in samples if not isinstance(sample, Change))
-            if stepping is not None:
-                samples = ended.enter_context(closing(stepped_ahead(samples, twin, stepping)))
             for step in drive_blocks(twin, samples):
                 if bar is not None:
                     bar.update(1 if step is None else len(step[0].stamps))
@@ -399,11 +387,6 @@ def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Base
     return twin
 
 
-def _stepping_twin(twin: Twin) -> Twin:
-    """One of the same boom and settings, without health."""
-    return type(twin)(twin.scene, twin.settings, twin.mounts, reads=twin.reads, absent=twin.absent)
-
-
 @contextmanager
 def _unhurried_collector() -> Iterator[None]:
     """Keep the garbage collector away: a replay makes many small objects that last."""
@@ -448,22 +431,9 @@ def _summary(recording: Recording, twin: Twin, wall: float, file: Path | None) -
         "tip_acceleration_max_m_s2": totals.acceleration,
         **_load(totals.load.load),
         **_pins(recording, twin),
-        **_steps(twin),
         **recording.noise,
         "output_sha256": None if file is None else sha256_of(file),
         "alarms": _alarms(recording, recording.first),
-    }
-
-
-def _steps(twin: Twin) -> dict[str, float | None]:
-    """How the boom was stepped, and how far that may be off; null where it could not be estimated."""
-    found = twin.steps
-    errors = [None if math.isnan(error) else error for error in (found.tip_error, found.acceleration_error)]
-    return {
-        "step_s": found.step,
-        "look_step_s": found.look_step,
-        "step_tip_error_m": errors[0],
-        "step_acceleration_error_m_s2": errors[1],
     }
 
 

@@ -13,8 +13,8 @@ from typing import IO, Any, Protocol
 
 import numpy as np
 
+from ..deviation.estimate_row import VARIANCES
 from ..errors import UsageError
-from ..estimation.tip_estimate import VARIANCES
 from ..twin.blocks import CODES, Integers, SampleBlock
 from ..types import NANO, SENSORS, Array, Stream, channels_of
 from .recording import Stretch

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..analysis.equilibrium import Equilibrium
+from ..analysis.undeflected import UndeflectedBoom
 from ..compiler.compile import compile_scene
-from ..estimation.boom_predictor import UndeflectedPredictor
 from ..scene.kinematics import Skeleton, joint_angles_of_strokes, skeleton
 from ..scene.schema import Scene, section_depth
 from ..types import Array
@@ -115,7 +115,7 @@ def boom_picture(scene: Scene, equilibrium: Equilibrium, path: Path, title: str 
 
 def undeformed_outline(scene: Scene, angles: Array) -> Array:
     """Points (k, 2) of the centre line with nothing bent, those of `Equilibrium.outline`; joint `angles` in rad."""
-    return UndeflectedPredictor(scene, compile_scene(scene)).at(angles)
+    return UndeflectedBoom(scene, compile_scene(scene)).at(angles)
 
 
 def draw_boom(axes: Axes, scene: Scene, bones: Skeleton, alpha: float = 0.55) -> None:

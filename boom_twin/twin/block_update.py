@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from math import inf
 from typing import Any
 
@@ -15,14 +14,8 @@ from numpy.typing import NDArray
 from ..analysis.equilibrium import SHARE
 from ..compiler.plan import Plan
 from ..config.settings import Settings
-from ..deviation.predictor import LengthPredictor
-from ..estimation.boom_predictor import BoomPredictor, Drawn
-from ..estimation.deviation_modes import DeviationModes
-from ..estimation.look_ahead import Tuning
-from ..estimation.recorded_steps import RecordedSteps
-from ..estimation.sensor_model import Mounting
-from ..estimation.step_choice import StepChoice
-from ..estimation.stroke_filter import filter_tuning
+from ..deviation.predictor import BoomPredictor, Drawn
+from ..deviation.sensor_model import Mounting
 from ..health.inference.block_problem import MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
 from ..kernels.jit import SameTypes, hold
@@ -30,31 +23,23 @@ from ..kernels.result_row import PIN
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, Array, Health, Mount, Outline, Report, Stream, channels_of
 from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
-from .expected_readings import Deviations
 from .health_rows import copy_predictions, copy_residuals, count_residuals
 from .load_shedding import LoadShedding
 from .report_rows import ReportRows
 from .run import Run
 from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .stroke_check import FAR
-from .update import AFTER_PAUSE, DONE, LOOK, ODD, REFRESH, UNRECORDED, measure, update
-from .update_lengths import measure_beside_lengths, update_lengths
+from .update import DONE, LOOK, ODD, measure, update
 
 CAPACITY = 4096  # samples that one call of the compiled update takes at most
 
 
-def limits_of(
-    scene: Scene, plan: Plan, settings: Settings, steps: StepChoice, mounts: Sequence[Mount | None], absent: Collection[str]
-) -> Limits:
-    """Return what the compiled update judges and steps by, of a scene compiled as `plan` with its load, and of its sensors."""
+def limits_of(scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mount | None], absent: Collection[str]) -> Limits:
+    """Return what the compiled update judges samples by, of a scene compiled as `plan` with its load, and of its sensors."""
     channels = list(channels_of(plan.joints).values())
     counts = np.array([len(names) for names in channels])
     mounting, far = Mounting(plan, scene.base.inclination, mounts), FAR * settings.stroke_variance**0.5
-    strokes = filter_tuning(settings.stroke_variance, settings.stroke_agility)
-    tuning = Tuning(strokes, 0.0, steps.step, steps.look_step, settings.rho)
     return Limits(
-        tuning=tuning,
-        patient=tuning._replace(least_lag=AFTER_PAUSE),
         gap=round(settings.gap * SECOND),
         leap=settings.leap / NANO,
         far=far,
@@ -62,7 +47,6 @@ def limits_of(
         shortest=np.full(plan.joints, -far),
         longest=np.array([joint.cylinder.max_stroke for joint in scene.joints]) + far,
         valid=SHARE * scene.reach,
-        angle_variance=settings.angle_variance,
         gravity=np.array(plan.tables.gravity),
         inclination=scene.base.inclination,
         is_mounted=mounting.has_any,
@@ -91,7 +75,7 @@ NO_EXTRAS = _UpdateExtras()
 _Code = tuple[Callable[..., tuple[int, int]], Callable[..., bool]]
 """`update` and `measure`, compiled for a scene's types."""
 _Held = tuple[_Code, tuple[tuple[Any, ...], tuple[Any, ...], Any]]
-"""With fields of a boom; limits, state and filter of the estimate; output: see `boom_twin.kernels.jit.hold`."""
+"""With what `update` and `measure` take of boom, limits and state; output: see `boom_twin.kernels.jit.hold`."""
 
 
 class BlockUpdate:
@@ -104,17 +88,11 @@ class BlockUpdate:
     state : TwinState
     channels : dict of Stream to tuple of str
         See `boom_twin.types.channels_of`.
-    step : float
-        What the time between strokes is taken for until there are two, s.
-    modes : DeviationModes
-        Of the estimate.
     judge : HealthMonitor or None
     counts : Counter
-        Of events; ``deflected``, ``not followed`` and ``unmatched`` are counted here.
+        Of events; ``deflected`` and ``unmatched`` are counted here.
     shedding : LoadShedding
         Asked what is left out.
-    steps : RecordedSteps
-        Of the boom's steps, whether they are recorded or repeated.
     before : BlockUpdate, optional
         Of the same scene under another load, whose arrays are taken over.
 
@@ -129,23 +107,19 @@ class BlockUpdate:
         limits: Limits,
         state: TwinState,
         channels: Mapping[Stream, tuple[str, ...]],
-        step: float,
-        modes: DeviationModes | LengthPredictor,
         judge: HealthMonitor | None,
         counts: Counter[str],
         shedding: LoadShedding,
-        steps: RecordedSteps,
         before: BlockUpdate | None = None,
     ) -> None:
-        self._shedding, self._steps = shedding, steps
-        self._boom, self.limits, self._state, self._channels, self._step = boom, limits, state, channels, step
-        self._modes, self._judge, self._told_counts = modes, judge, counts
+        self._shedding, self._boom, self.limits, self._state, self._channels = shedding, boom, limits, state, channels
+        self._judge, self._told_counts = judge, counts
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
-        self._widths, compiled = limits.channels, boom.compiled
+        self._widths = limits.channels
         self._measured = [(code, int(width)) for code, width in enumerate(self._widths) if code]
         self._copy_predictions, self._copy_residuals = SameTypes(copy_predictions), SameTypes(copy_residuals)
         self._count_residuals, self._of_stream = SameTypes(count_residuals), np.zeros(len(STREAMS), np.int64)
-        sizes = self._joints, len(compiled.row), len(compiled.bending), limits.channels
+        sizes = self._joints, boom.width, boom.stations, limits.channels
         self._found: UpdateOutput = new_output(2 * CAPACITY, *sizes) if before is None else before._found
         self._found.counts[:] = 0
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
@@ -223,20 +197,10 @@ class BlockUpdate:
         self._kept = state, found = self._kept or (hold(self._state), hold(self._found))
         limits, (one, width) = hold(self._limits), (np.zeros(1, np.int64), int(self._widths.max()))
         block = one, one, np.zeros((1, width))
-        kernels: tuple[Any, Any]
-        more: tuple[Any, ...]
-        if isinstance(self._boom, LengthPredictor):
-            kernels = update_lengths, measure_beside_lengths
-            together = *self._boom.held, limits, state
-            beside = *self._boom.filters_held, limits, state
-            more = *block, 0, False, found
-        else:
-            kernels, beside = (update, measure), (limits, state, self._modes.held)
-            together = *self._boom.held, *beside
-            more = self._steps.held, *block, 0, False, False, found
+        together, beside = (*self._boom.held, limits, state), (*self._boom.filters_held, limits, state)
         if self._code is None:
-            advance = kernels[0].for_types_of(*together, *more)
-            self._code = advance, kernels[1].for_types_of(*beside, 0, 0, np.zeros(width), False, found)
+            advance = update.for_types_of(*together, *block, 0, False, found)
+            self._code = advance, measure.for_types_of(*beside, 0, 0, np.zeros(width), False, found)
             self._copy_predictions(found, 0, self._pins, *PredictionRows.room(0, self._joints))
             self._copy_residuals(found, 0, 0, 0, *MeasuredRows.room(0, 1))
             self._count_residuals(found, 0, 0, self._of_stream)
@@ -252,44 +216,28 @@ class BlockUpdate:
             self._begin = self._told = 0, 0
 
     def _advance_strokes(self, run: Run | None, block: SampleBlock, trusted: bool) -> tuple[int, int]:
-        row, is_resumed, size = 0, False, len(block.stamps)
+        row, size = 0, len(block.stamps)
         assert run is not None
         (advance, _), (arguments, _, found) = self._held or self._hold()
-        if self._steps.are_recorded:
-            self._steps.make_room(size, self._boom.step_width)
         while True:
-            if isinstance(self._modes, DeviationModes):
-                reason, row = advance(*arguments, self._steps.held, *block, row, is_resumed, trusted, found)
-            else:
-                reason, row = advance(*arguments, *block, row, trusted, found)
-            if (is_resumed := reason == REFRESH) and isinstance(self._modes, DeviationModes):
-                interval, boom = run.interval or self._step, self._boom
-                assert isinstance(run.deviations, Deviations)
-                prediction = boom.prediction(run.newest)
-                run.deviations.refresh(prediction, interval, boom.take_filtered(), boom.live, boom.angles)
-                assert run.deviations.noise is not None
-                self._modes.refresh(prediction.strokes, boom.angles, boom.live, run.deviations.noise)
-            elif reason == UNRECORDED:
-                raise RuntimeError(f"the step to the strokes at {block.stamps[row]} ns is not the one that was recorded")
-            elif reason != LOOK:
+            reason, row = advance(*arguments, *block, row, trusted, found)
+            if reason != LOOK:
                 return reason, row
-            else:
-                self._look_around(run, row)
-                row += 1
-                if row == size:
-                    return DONE, row  # the judgement, if one is due, is for who asked to take
-                self._take_judgement(row - 1)
+            self._look_around(run, row)
+            row += 1
+            if row == size:
+                return DONE, row  # the judgement, if one is due, is for who asked to take
+            self._take_judgement(row - 1)
 
     def _look_around(self, run: Run, row: int) -> None:
-        """What a prediction that begins a slot, left the model's validity or is not followed has beside its numbers."""
+        """What a prediction that begins a slot or left the model's validity has beside its numbers."""
         clock, at = self._state.clock, int(self._found.counts[0]) - 1 - self._begin[0]
         if self._news is NO_EXTRAS:
             self._news = _UpdateExtras()
         news = self._news
-        oddities = {"deflected": clock[IS_DEFLECTED], "not followed": self._boom.is_lost}
-        if events := tuple(name for name, happened in oddities.items() if happened):
-            news.events[row] = events
-            self._told_counts.update(events)
+        if clock[IS_DEFLECTED]:
+            news.events[row] = ("deflected",)
+            self._told_counts["deflected"] += 1
         if not clock[BEGINS_SLOT]:
             return
         if not self._shedding.leaves_out_shape():
@@ -314,20 +262,9 @@ class BlockUpdate:
         if run is None or self._judge is None:
             return None
         self._tell_health(run.newest // SLOT * SLOT)
-        health = self._judge.judge(run.newest, self._boom.variances, run.deviations.noise, partial(self._tip_deviation, run))
-        if isinstance(self._modes, LengthPredictor):
-            self._modes.leave_out(self._judge.suspected, self._judge.failing_strokes)
-            return health and replace(health, tip_sigmas=self._modes.tip_sigmas)
-        self._modes.mask(self._judge.suspected)
-        self._modes.expect_noise(*self._judge.noise)
-        return health
-
-    def _tip_deviation(self, run: Run) -> Array:
-        """Of the predicted tip, m, shape (2,): by vibration that the model cannot know of, and as the estimate shows it."""
-        if not isinstance(self._modes, DeviationModes):
-            return self._modes.tip_sigmas
-        assert isinstance(run.deviations, Deviations)
-        return np.asarray(np.sqrt(run.deviations.tip**2 + self._modes.tip_variances))
+        health = self._judge.judge(run.newest, self._boom.variances, None, lambda: self._boom.tip_sigmas)
+        self._boom.leave_out(self._judge.suspected, self._judge.failing_strokes)
+        return health and replace(health, tip_sigmas=self._boom.tip_sigmas)
 
     def _take_judgement(self, row: int) -> None:
         """Judge, if that is due, and give the news with sample `row`."""
@@ -422,12 +359,12 @@ class BlockUpdate:
             own = slice(self._begin[1], known)
             rows.streams, rows.stamps = found.residual_streams[own].tolist(), found.residual_stamps[own].tolist()
             rows.values, rows.sigmas = found.values[own].copy(), found.sigmas[own].copy()
-        passes, told, health = 0, tuple(events), None
+        told, health = tuple(events), None
         if predicted > self._begin[0]:
             at = predicted - 1
             rows.row, rows.estimated = found.rows[at].copy(), found.estimates[at].copy()
-            rows.moments, passes = found.moments[at].copy(), int(found.passes[at])
+            rows.moments = found.moments[at].copy()
             if news is not NO_EXTRAS:
                 rows.outline, told = self._outlines().get(0), (*events, *news.events.get(0, ()))
             health = self.judge() if judged else None
-        return Report.of_rows(stamp, rows, told, passes, health)
+        return Report.of_rows(stamp, rows, told, health)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..estimation.tip_estimate import ACCELERATION, ACCELERATION_COVARIANCE, FORCE, FORCE_VARIANCE, TIP, TIP_COVARIANCE, WIDTH
+from ..deviation.estimate_row import ACCELERATION, ACCELERATION_COVARIANCE, FORCE, FORCE_VARIANCE, TIP, TIP_COVARIANCE, WIDTH
 from ..types import Array, Estimate, Health, Outline, Prediction, Report, Residuals, Sample, Stream, channels_of
 
 Integers = NDArray[np.int64]
@@ -105,7 +105,7 @@ class EstimateBlock(NamedTuple):
     stamps : ndarray of int64, shape (p,)
         Nanoseconds.
     rows : ndarray, shape (p, WIDTH)
-        See `boom_twin.estimation.tip_estimate.WIDTH`.
+        See `boom_twin.deviation.estimate_row.WIDTH`.
     """
 
     stamps: Integers
@@ -152,7 +152,7 @@ class EstimateBlock(NamedTuple):
 
 
 def estimate_of(stamp: int, row: Array) -> Estimate:
-    """The estimate at `stamp` (ns) in a row, see `boom_twin.estimation.tip_estimate.WIDTH`; its arrays are views."""
+    """The estimate at `stamp` (ns) in a row, see `boom_twin.deviation.estimate_row.WIDTH`; its arrays are views."""
     return Estimate(stamp, *(row[place] for place in ESTIMATED.values()))
 
 
@@ -169,7 +169,7 @@ ESTIMATED = {
     "acceleration_covariance": slice(ACCELERATION_COVARIANCE, ACCELERATION_COVARIANCE + 6),
     "load_variance": slice(FORCE_VARIANCE, FORCE_VARIANCE + 2),
 }
-"""Fields of an `Estimate` and where each stands in a row, see `boom_twin.estimation.tip_estimate.WIDTH`."""
+"""Fields of an `Estimate` and where each stands in a row, see `boom_twin.deviation.estimate_row.WIDTH`."""
 
 
 class ResidualBlock(NamedTuple):

@@ -15,14 +15,13 @@ EVENTS = {
     "second source": "samples of another source among those that are followed; left out",
     "implausible": "a stroke where its cylinder cannot be; left out, for up to a second if it jumped there",
     "out of range": "a stroke outside 0 to max_stroke of its cylinder; used where it is plausible",
-    "held": "a stroke missing for long; taken to stay where it was",
+    "held": "a stroke missing for long; predicted by the other sensors and by how its cylinder moved",
     "model": "the model failed; it starts again with the next full sample",
     "reset": "asked for; the model started again from rest",
     "load": "payload or line fill changed; the model started again from rest",
     "limits": "other settings changed while the twin ran",
     "zero": "the zero of a sensor was set anew",
     "deflected": "tip further than half the boom's reach from the undeformed boom's: outside the model's validity",
-    "not followed": "a stroke began to move faster than its filter can follow; deviations are wider until it is followed again",
     "unmatched": "no prediction at the stamp of this sample; no residual",
 }
 

@@ -15,17 +15,14 @@ from threading import Thread
 from typing import TYPE_CHECKING
 
 from ..config.settings import Settings
-from ..deviation.predictor import LengthPredictor
+from ..deviation.predictor import BoomPredictor
 from ..errors import BoomTwinError
-from ..estimation.boom_predictor import BoomPredictor
-from ..estimation.deviation_modes import DeviationModes
-from ..estimation.step_choice import StepChoice, choose_steps
 from ..health.baseline import Baseline
 from ..health.inference.block_problem import BlockProblem
 from ..health.monitor import HealthMonitor
 from ..scene.edit import loaded
 from ..scene.schema import Scene
-from ..types import Array, Mount, StrokeReading
+from ..types import Mount, StrokeReading
 from .block_update import limits_of
 from .state import Limits
 
@@ -44,18 +41,6 @@ class LoadedModel:
     limits: Limits
     boom: BoomPredictor
     judge: HealthMonitor | None
-    modes: DeviationModes | LengthPredictor
-    steps: StepChoice
-
-    def prepare(self, strokes: Array) -> None:
-        """Find beforehand what a start from rest at `strokes` (m), shape (n,), needs."""
-        if isinstance(self.modes, DeviationModes):
-            self.modes.postures.prepare(strokes)
-
-    def prepare_piece(self, strokes: Array) -> None:
-        """Do the next piece of what `prepare` does, a millisecond of work at most."""
-        if isinstance(self.modes, DeviationModes):
-            self.modes.postures.prepare_piece(strokes)
 
 
 def loaded_model(
@@ -69,16 +54,10 @@ def loaded_model(
 ) -> LoadedModel:
     """Return the model of `scene` under the load of `settings`; for the parameters see `boom_twin.Twin`."""
     scene = loaded(scene, *settings.load)
-    boom = _predictor(scene, settings, mounts, reads)
+    boom = BoomPredictor(scene, settings, mounts, reads)
     judge = None if baseline is None else HealthMonitor(scene, settings, tuple(mounts), baseline, on_block, absent)
-    modes = boom if isinstance(boom, LengthPredictor) else DeviationModes(scene, boom.plan, settings, mounts)
-    _ = boom.held, modes.held  # made here, where no sample waits for them
-    steps = choose_steps(scene, boom.plan, settings)
-    return LoadedModel(scene, limits_of(scene, boom.plan, settings, steps, mounts, absent), boom, judge, modes, steps)
-
-
-def _predictor(scene: Scene, settings: Settings, mounts: Sequence[Mount | None], reads: StrokeReading) -> BoomPredictor:
-    return LengthPredictor(scene, settings, mounts, reads)
+    _ = boom.held  # made here, where no sample waits for it
+    return LoadedModel(scene, limits_of(scene, boom.plan, settings, mounts, absent), boom, judge)
 
 
 class ModelPreparation:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..estimation.boom_predictor import BoomPredictor
+from ..deviation.predictor import BoomPredictor
 from ..types import Array, Estimate, Outline, Prediction, Residuals, Stream
 from .blocks import STREAMS, estimate_of
 
@@ -27,7 +27,7 @@ class ReportRows:
     Attributes
     ----------
     row, estimated, moments : ndarray or None
-        Of the prediction, see `boom_twin.kernels.result_row`; of the estimate, see `boom_twin.estimation.tip_estimate.WIDTH`;
+        Of the prediction, see `boom_twin.kernels.result_row`; of the estimate, see `boom_twin.deviation.estimate_row.WIDTH`;
         bending moments, N m. None where nothing was predicted.
     outline : Outline or None
         Of the prediction, if it has one.

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from ..deviation.predictor import LengthPredictor
 from ..types import Array
-from .expected_readings import Deviations
-from .state import EPOCH, IN_SLOT, NEWEST, USUAL_STEP, TwinState
+from .state import EPOCH, IN_SLOT, NEWEST, TwinState
 from .stroke_check import StrokeCheck
 from .update import matched
 
@@ -17,13 +13,13 @@ from .update import matched
 class Run:
     """What the twin knows since the boom was last taken to be at rest, beside `TwinState`."""
 
-    def __init__(self, state: TwinState, deviations: Deviations | LengthPredictor, stamp: int, is_again: bool) -> None:
-        self.deviations, self.is_again, self._state = deviations, is_again, state
-        self.plausible = StrokeCheck(state.clock, not isinstance(deviations, LengthPredictor))
+    def __init__(self, state: TwinState, stamp: int, is_again: bool) -> None:
+        self.is_again, self._state = is_again, state
+        self.plausible = StrokeCheck(state.clock)
         self.is_predicted = False
         state.clock[EPOCH] = state.clock[NEWEST] = stamp
         state.clock[IN_SLOT] = -1
-        state.pace[:] = 0.0, 0.0, -math.inf
+        state.interval[:] = 0.0
         state.past.bounds[:] = 0
 
     @property
@@ -39,7 +35,7 @@ class Run:
     @property
     def interval(self) -> float:
         """Running mean of the time between strokes, s."""
-        return float(self._state.pace[USUAL_STEP])
+        return float(self._state.interval[0])
 
     @property
     def strokes(self) -> Array:
@@ -59,5 +55,4 @@ class Run:
         """All stamps are later by `shift` (ns); what is remembered by stamps is forgotten."""
         self._state.clock[EPOCH] += shift
         self._state.clock[NEWEST] += shift
-        self.deviations.rebase(shift)
         self._state.past.bounds[:] = 0

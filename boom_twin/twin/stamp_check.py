@@ -7,8 +7,7 @@ from enum import Enum
 import numpy as np
 
 from ..config.settings import Settings
-from ..estimation.boom_predictor import BoomPredictor
-from ..estimation.stroke_filter import JERK_DENSITIES
+from ..deviation.predictor import BoomPredictor
 from ..types import SECOND, Array, Sample
 from .state import NONE, TwinState
 from .stroke_check import FAR
@@ -222,9 +221,3 @@ def explain(
     if largest_difference(first, boom.extrapolated(0.0)) <= reach:
         return TimeStep.EITHER if fits else TimeStep.PAUSE
     return TimeStep.NEITHER
-
-
-def jerk_densities(boom: BoomPredictor, strokes: Array, span: float, settings: Settings) -> Array:
-    """Of white jerk (n,), m^2/s^5, during a pause of `span` s: as expected, or more where `strokes` (m) after it show so."""
-    shown = 20.0 * (strokes - boom.extrapolated(span)) ** 2 / span**5
-    return np.asarray(np.fmax(shown, settings.stroke_agility * JERK_DENSITIES[0]))

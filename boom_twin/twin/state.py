@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..estimation.look_ahead import Tuning
-from ..estimation.tip_estimate import WIDTH
+from ..deviation.estimate_row import WIDTH
 from ..kernels.jit import by_reference, inner
 from ..types import Array, Stream
 from .blocks import CODES
@@ -24,8 +23,7 @@ RECENT = 16_384  # differences that the zero of a sensor may be found from
 ZEROS = 16  # sets of zeros that late samples may still need
 SLOT = 100_000_000  # ns; the first prediction in each has an outline, and health is judged with it
 
-EPOCH, NEWEST, SEEN, CHECKED, TRUSTED, OTHERS, IN_SLOT, UNMATCHED, STATUS, BEGINS_SLOT, IS_DEFLECTED = range(11)  # of `clock`
-USUAL_STEP, STEPPED, PAUSED = range(3)  # of `pace`
+EPOCH, NEWEST, CHECKED, TRUSTED, OTHERS, IN_SLOT, UNMATCHED, STATUS, BEGINS_SLOT, IS_DEFLECTED = range(10)  # of `clock`
 FIRST, COUNT = range(2)  # of a ring
 
 
@@ -45,8 +43,8 @@ class Ring(NamedTuple):
 class TwinState(NamedTuple):
     """What the twin remembers from sample to sample, beside the boom; s streams of up to w channels, c measured ones in all.
 
-    clock : (11,) whole numbers by the names above; stamps in ns, CHECKED and TRUSTED since EPOCH.
-    pace : (3,) running mean of the time between strokes, times of the newest step and of the newest pause, s.
+    clock : (10,) whole numbers by the names above; stamps in ns, CHECKED and TRUSTED since EPOCH.
+    interval : (1,) running mean of the time between strokes, s; 0 while unknown.
     newest : (s,) stamp of the newest sample of every stream, ns; NONE before the first.
     usual : (s,) time from one sample to the next, ns; 0 while unknown.
     held : (s,) samples that are held, see `boom_twin.twin.stamp_check`.
@@ -55,12 +53,10 @@ class TwinState(NamedTuple):
     waiting : measured samples that wait for a stroke, by stamp and stream.
     recent : measured less expected, without any zero.
     zeros_since, zeros : (ZEROS,), (ZEROS, s, w) what sensors read too much from a stamp on. zero_sets : (1,) how many.
-    joints2, slopes2, accelerations2, pushes2, forces2 : (n,), (n,), (2,), (n, 2), (n,) of the deviations, see
-    `boom_twin.twin.expected_readings.Deviations`.
     """
 
     clock: Integers
-    pace: Array
+    interval: Array
     newest: Integers
     usual: Array
     held: Integers
@@ -72,29 +68,21 @@ class TwinState(NamedTuple):
     zeros_since: Integers
     zeros: Array
     zero_sets: Integers
-    joints2: Array
-    slopes2: Array
-    accelerations2: Array
-    pushes2: Array
-    forces2: Array
 
 
 @by_reference
 class Limits(NamedTuple):
-    """What `update` judges and steps by.
+    """What `update` judges samples by.
 
-    tuning, patient : of the estimator, usually and after a pause.
     gap, leap : ns. far : m, by which a stroke may be off its estimate at once. rate : m/s, of the fastest stroke.
     shortest, longest : (n,) strokes that its cylinder can have, m.
     valid : m, how far the tip may be from the undeformed boom's.
-    angle_variance : rad^2. gravity : (2,) m/s^2. inclination : rad.
+    gravity : (2,) m/s^2. inclination : rad.
     is_mounted : whether any angle sensor is no encoder. absolute, frames : (n,) whether, and in which frame of the chain.
     absent : (c,) measured channels without a sensor.
     first, channels : (s,) first column of every stream among the measured channels, and how many it has.
     """
 
-    tuning: Tuning
-    patient: Tuning
     gap: int
     leap: float
     far: float
@@ -102,7 +90,6 @@ class Limits(NamedTuple):
     shortest: Array
     longest: Array
     valid: float
-    angle_variance: float
     gravity: Array
     inclination: float
     is_mounted: bool
@@ -128,7 +115,6 @@ class UpdateOutput(NamedTuple):
     moments: Array
     estimates: Array
     measured: Array
-    passes: Integers
     residual_at: Integers
     residual_streams: Integers
     residual_stamps: Integers
@@ -161,13 +147,11 @@ def new_state(joints: int, channels: Integers) -> TwinState:
     """Of a boom with so many joints, and so many channels in every stream."""
     streams, width, measured = len(channels), int(channels.max()), int(channels[1:].sum())
     return TwinState(
-        clock=np.zeros(11, np.int64), pace=np.zeros(3),
+        clock=np.zeros(10, np.int64), interval=np.zeros(1),
         newest=np.full(streams, NONE), usual=np.zeros(streams), held=np.zeros(streams, np.int64),
         strokes=np.zeros(joints), taken=np.zeros(joints),
         past=new_ring(KEPT, measured, measured, joints), waiting=new_ring(WAITING, width), recent=new_ring(RECENT, width),
         zeros_since=np.full(ZEROS, NONE), zeros=np.zeros((ZEROS, streams, width)), zero_sets=np.ones(1, np.int64),
-        joints2=np.zeros(joints), slopes2=np.zeros(joints), accelerations2=np.zeros(2), pushes2=np.zeros((joints, 2)),
-        forces2=np.zeros(joints),
     )  # fmt: skip
 
 
@@ -178,8 +162,8 @@ def new_output(samples: int, joints: int, row: int, moments: int, channels: Inte
         counts=np.zeros(2, np.int64), at=np.zeros(samples, np.int64), stamps=np.zeros(samples, np.int64),
         rows=np.zeros((samples, row)), moments=np.zeros((samples, moments)),
         estimates=np.zeros((samples, WIDTH)), measured=np.zeros((samples, joints)),
-        passes=np.zeros(samples, np.int64), residual_at=np.zeros(residuals, np.int64),
-        residual_streams=np.zeros(residuals, np.int64), residual_stamps=np.zeros(residuals, np.int64),
+        residual_at=np.zeros(residuals, np.int64), residual_streams=np.zeros(residuals, np.int64),
+        residual_stamps=np.zeros(residuals, np.int64),
         values=np.full((residuals, width), np.nan), sigmas=np.full((residuals, width), np.nan),
         raw=np.full((residuals, width), np.nan),
     )  # fmt: skip

@@ -11,7 +11,7 @@ from .state import CHECKED, OTHERS, TRUSTED
 
 MOST = 5  # readings in a row that are not believed though none jumps from the one before; the next one is
 FAR = 8.0  # deviations of the noise
-SILENT = 100_000_000  # ns after which a missing stroke is taken to stay where it was
+SILENT = 100_000_000  # ns after which a missing stroke is told
 LASTING = 1_000_000_000  # ns after which readings that jumped elsewhere, and stay there, are believed
 USUAL_RATE = 0.05  # m/s, which a cylinder may have gone at meanwhile, beside twice what it was going at: then it is back
 NEVER = -1
@@ -25,12 +25,10 @@ class StrokeCheck:
     ----------
     clock : ndarray of int64
         Where it keeps CHECKED, TRUSTED and OTHERS, see `boom_twin.twin.state.TwinState`.
-    holds : bool
-        Whether a stroke that is silent is held at its estimate; else it stays missing.
     """
 
-    def __init__(self, clock: NDArray[np.int64], holds: bool) -> None:
-        self._clock, self._holds = clock, holds
+    def __init__(self, clock: NDArray[np.int64]) -> None:
+        self._clock = clock
         self._before = 0
         self._jumped = np.zeros(0, np.int64)  # stamp (ns) since when a stroke is where it jumped; NEVER
 
@@ -89,7 +87,7 @@ class StrokeCheck:
         jumps, is_onward = np.abs(step) > limit, step * (before - estimate) > 0.0
         returned = jumps & (np.abs(values - estimate) <= limit + self._gone(stamp, rates))
         is_back = self._note_jumps(stamp, far, jumps, is_onward, returned)
-        return self._doubted(stamp, values, estimate, far & ~is_back)
+        return self._doubted(stamp, values, far & ~is_back)
 
     @property
     def must_restart(self) -> bool:
@@ -113,7 +111,7 @@ class StrokeCheck:
         self._jumped = np.where(is_over, NEVER, np.where(far & jumps, stamp, self._jumped))
         return is_back
 
-    def _doubted(self, stamp: int, values: Array, estimate: Array, far: Flags) -> tuple[Array, list[str]]:
+    def _doubted(self, stamp: int, values: Array, far: Flags) -> tuple[Array, list[str]]:
         self._strange = np.where(far, self._strange + 1, np.where(np.isnan(values), self._strange, 0))
         implausible = far & ((self._strange <= MOST) | (self._jumped != NEVER))
         taken = np.where(implausible, np.nan, values)
@@ -122,8 +120,6 @@ class StrokeCheck:
         silent = np.isnan(taken) & (stamp - self._seen > SILENT)
         events = ["implausible"] if implausible.any() else []
         if silent.any():
-            if self._holds:
-                taken = np.where(silent, estimate, taken)
             events.append("held")
         return taken, events
 

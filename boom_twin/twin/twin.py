@@ -9,9 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..config.settings import Settings
-from ..deviation.predictor import LengthPredictor
 from ..errors import BoomTwinError, SolverError, UsageError
-from ..estimation.recorded_steps import RecordedSteps
 from ..health.baseline import Baseline
 from ..health.inference.block_problem import BlockProblem
 from ..health.monitor import warm_up
@@ -22,7 +20,6 @@ from ..types import LIMIT, NANO, Array, Change, Health, Mount, Report, Sample, S
 from .adjustments import Requests, ResidualBuffer, SensorZeros
 from .block_update import CAPACITY, BlockUpdate, limits_of
 from .blocks import CODES, STREAMS, ReportBlock, SampleBlock
-from .expected_readings import Deviations
 from .load_shedding import LoadShedding
 from .loaded_model import LoadedModel, loaded_model
 from .run import Run
@@ -34,7 +31,6 @@ from .stamp_check import (
     explain,
     is_close,
     is_continuous,
-    jerk_densities,
     largest_difference,
 )
 from .state import NEWEST, NONE, STATUS, UNMATCHED, drop_waiting, new_state
@@ -52,7 +48,7 @@ class Twin:
         Noise of the sensors, tuning of the estimator, limits on time.
     mounts : sequence of Mount or None, optional
         Of every joint's angle sensor: None is an encoder of the joint (the default), else an inclinometer, see
-        `boom_twin.estimation.sensor_model.Mounting`.
+        `boom_twin.deviation.sensor_model.Mounting`.
     baseline : Baseline, optional
         What model and sensors are off by while all is well. With it the rig's health is judged, see `Report.health`.
     on_block : callable, optional
@@ -76,10 +72,6 @@ class Twin:
         Is told by a live user how full the queue of samples is; decides what is then left out.
     judge : HealthMonitor or None
         Of the rig's health; None without a baseline.
-    steps : StepChoice
-        How the boom is stepped, and how far that may be off.
-    recorded_steps : RecordedSteps
-        Takes the boom's steps for another twin, or has them from one.
 
     Notes
     -----
@@ -100,7 +92,7 @@ class Twin:
         self._on_block, self.reads, self.absent, scene = on_block, reads, frozenset(absent), as_scene(scene)
         self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
         self.counts: Counter[str] = Counter()
-        self.shedding, self.recorded_steps = LoadShedding(), RecordedSteps()
+        self.shedding = LoadShedding()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self._channels = channels_of(len(scene.joints))
         self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
@@ -193,19 +185,15 @@ class Twin:
         """
         self._former: BlockUpdate | None = None
         sensors = self._on_block, self.reads, self.absent
-        found = loaded_model(self.scene, settings, self.mounts, self.baseline, *sensors)
-        if self._state.clock[NEWEST] != NONE:
-            found.prepare(self._state.strokes.copy())  # where the boom will be, or near
-        return found
+        return loaded_model(self.scene, settings, self.mounts, self.baseline, *sensors)
 
     def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
         """Go on with this model, which is of the present load, after that of `before`."""
-        self._model = model
-        self._boom, self.judge, self._modes, self.steps = model.boom, model.judge, model.modes, model.steps
+        self._boom, self.judge = model.boom, model.judge
         self.plan = self._boom.plan
-        parts = self._boom, model.limits, self._state, self._channels, self.settings.step, self._modes, self.judge
+        parts = self._boom, model.limits, self._state, self._channels, self.judge
         self._former = before  # let go of when the next model is made, which may be in a thread of its own
-        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, self.recorded_steps, before)
+        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, before)
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, self.plan.joints)))  # of strokes
 
     def _take_over(self, stamp: int) -> list[str]:
@@ -219,7 +207,7 @@ class Twin:
         events = ["load"] if before.load != self.settings.load else []
         if before.limits != self.settings.limits:
             events.append("limits")
-            self._compiled.limits = limits_of(self.scene, self.plan, self.settings, self.steps, self.mounts, self.absent)
+            self._compiled.limits = limits_of(self.scene, self.plan, self.settings, self.mounts, self.absent)
             for line in self._lines.values():
                 line.tune(self.settings)
         if asked.zeros != self._zeros.values:
@@ -435,26 +423,14 @@ class Twin:
             speeds = self._speeds_of(held)
             self.reset()
             self._speeds = speeds
-        elif events:
-            self._doubt_pause(run, held[0], why)
+        elif events and why is TimeStep.EITHER:
+            self._boom.add_phase(self._boom.prediction(run.newest))
         reports, asked = [], self._judged
         for sample in held:
             complete, self._judged = self._is_complete(sample), asked or sample is not held[-1]
             reports.append(self._follow(sample, self._zeroed(sample), complete, events))
             events = []
         return replace(reports[-1], earlier=tuple(reports[:-1]))
-
-    def _doubt_pause(self, run: Run, first: Sample, why: TimeStep) -> None:
-        """State what the model cannot know after a pause that ended with the sample `first`."""
-        span = (first.stamp - run.newest) * NANO
-        if isinstance(self._boom, LengthPredictor):
-            if why is TimeStep.EITHER:
-                self._boom.add_phase(self._boom.prediction(run.newest))
-            return
-        assert isinstance(run.deviations, Deviations)
-        run.deviations.add_pause(first.stamp, span, jerk_densities(self._boom, self._zeroed(first), span, self.settings))
-        if why is TimeStep.EITHER:
-            run.deviations.add_phase(first.stamp, self._boom.prediction(run.newest))
 
     def _speeds_of(self, held: list[Sample]) -> Array:
         """Of strokes (m/s) around a start from rest: before it as estimated, after it as measured, whichever is larger."""
@@ -474,8 +450,7 @@ class Twin:
         """Stamps are later by `shift` (ns) from now on, and the model goes on."""
         before = run.newest
         run.rebase(shift)
-        if self._modes is not run.deviations:
-            self._modes.rebase(shift)
+        self._boom.rebase(shift)
         for line in self._lines.values():
             line.newest = None
         self._zeros.forget_past()
@@ -516,21 +491,12 @@ class Twin:
 
     def _start(self, sample: Sample, events: list[str]) -> Report:
         try:
-            if isinstance(self._boom, LengthPredictor):
-                self._boom.start(sample.values, self._speeds)
-            else:
-                self._boom.start(sample.values)
+            self._boom.start(sample.values, self._speeds)
         except BoomTwinError as error:
             self._failed = sample.stamp if isinstance(error, SolverError) else self._failed
             return self._refuse(sample, "model", *events, status=str(error))
         speeds, self._speeds = self._speeds, None
-        deviations: Deviations | LengthPredictor
-        if isinstance(self._modes, LengthPredictor):
-            deviations = self._modes
-        else:
-            deviations = Deviations(self.plan, self.settings, self._modes.postures, self._state, sample.stamp, speeds)
-            self._modes.begin()
-        self._run = Run(self._state, deviations, sample.stamp, speeds is not None)
+        self._run = Run(self._state, sample.stamp, speeds is not None)
         return self._step(self._run, sample, events)
 
     def _step(self, run: Run, sample: Sample, events: list[str]) -> Report:
@@ -589,8 +555,6 @@ class Twin:
     def _hold(self, sample: Sample, event: str) -> Report:
         """Taken as a witness of time alone, at first."""
         self.counts[event] += 1
-        if sample.stream is Stream.STROKES:  # the model may start there: its modes are found while nothing is predicted
-            self._model.prepare_piece(self._zeroed(sample))
         return Report(sample.stamp, True, events=(event,))
 
     def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:

@@ -11,17 +11,13 @@ import math
 
 import numpy as np
 
-from ..estimation.deviation_readings import take_angles, take_forces, take_imu
-from ..estimation.deviation_step import advance_estimate
-from ..estimation.look_ahead import follow
-from ..estimation.recorded_steps import MODE, OTHER, RECORDING, REPEATING, record_step, repeat_step
-from ..estimation.sensor_model import TURN
-from ..estimation.tip_estimate import write_estimate
+from ..deviation.models import take_sensor
+from ..deviation.sensor_model import TURN
+from ..deviation.step import step_lengths, write_expected_readings, write_tip_estimate
 from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import OK
 from ..types import LIMIT, NANO
-from .expected_readings import ANGLES, FORCES, IMU, INTERVAL, SPAN, write_expected
 from .sample_check import SHORTEST
 from .stamp_check import SMOOTHING, STEP
 from .state import (
@@ -36,52 +32,37 @@ from .state import (
     NEWEST,
     NONE,
     OTHERS,
-    PAUSED,
-    SEEN,
     SLOT,
     STATUS,
-    STEPPED,
     STROKES,
     TRUSTED,
     UNMATCHED,
-    USUAL_STEP,
     WAITING,
     new_row,
     zeros_at,
 )  # fmt: skip
 
-PAUSE = 0.1  # s without strokes, after which
+SPAN = 2_000_000_000  # ns for which expected readings are kept
 ALONE = np.int64(0)  # row of a sample that comes alone; typed, because numba compiles once more for every literal
-AFTER_PAUSE = 0.15  # s of strokes come before the remembered boom is stepped over it: they tell how the pause ended
 
-DONE, ODD, REFRESH, LOOK, FAILED, UNRECORDED = range(6)
-"""Why `update` returned: all samples taken; the sample is not ordinary; deviations are to be made anew for the sample, which
-was stepped to; the sample is complete and begins a slot, left the model's validity or is not followed; the model failed (see
-`STATUS`); the step that was to be repeated is another's."""
+DONE, ODD, LOOK, FAILED = range(4)
+"""Why `update` returned: all samples taken; the sample is not ordinary; the sample is complete and begins a slot, or left the
+model's validity; the model failed (see `STATUS`)."""
 
 
 @kernel
-def update(
-    t, anchor, live, work, tangents, track, bending, out, limits, state, tip, steps, streams, stamps, values, first, resumed,
-    trusted, found,
-):  # fmt: skip
+def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stamps, values, first, trusted, found):
     """Take the samples of a block from row `first` on, as long as they are ordinary.
 
     Parameters
     ----------
-    t, anchor, live, work, tangents, track, bending, out : fields of CompiledBoom
-        See `boom_twin.estimation.boom_predictor`; as they are, because tuples of tuples take long to compile.
+    t, boom, live, work, p, f, bending, out : fields of CompiledBoom
+        See `boom_twin.deviation.predictor`; as they are, because tuples of tuples take long to compile.
     limits : Limits
     state : TwinState
         Of a run that has begun.
-    tip : DeviationFilter
-        See `boom_twin.estimation.tip_estimate`.
-    steps : StepRows
-        Whether steps are recorded, and nothing else is done, or repeated, see `boom_twin.estimation.recorded_steps`.
     streams, stamps, values : ndarray
         See `boom_twin.twin.blocks.SampleBlock`.
-    resumed : bool
-        Whether the boom was stepped to row `first` before, see `REFRESH`.
     trusted : bool
         Whether row `first`, the only one, was looked at before; of strokes, ``state.strokes`` and ``state.taken`` hold them.
     found : Found
@@ -94,53 +75,39 @@ def update(
     """
     row = first
     while row < stamps.shape[0]:
-        stamp = stamps[row]
+        stamp, before = stamps[row], found.counts[1]
         if streams[row] != STROKES:
-            before = found.counts[1]
             if not compare(limits, state, streams[row], stamp, values[row], row, trusted, found):
                 return ODD, row
-            correct_estimate(limits, tip, before, found)
+            take_residuals(limits, state, p, f, before, found)
             row += 1
             continue
-        if not resumed:
-            if not trusted:
-                if not is_ordinary(track.bank.nodes[0], limits, state, stamp, values[row]):
-                    return ODD, row
-                note_stamp(state, STROKES, stamp)
-            time, tuning = begin_step(limits, state, stamp)
-            if steps.state[MODE] == REPEATING:
-                status = repeat_step(steps, live, work, track, time, state.taken, state.clock[BEGINS_SLOT], out)
-                if status == OTHER:
-                    return UNRECORDED, row
-            else:
-                status = follow(t, anchor, live, work, tangents, track, tuning, time, state.taken, out)
-            is_recorded = steps.state[MODE] == RECORDING
-            if is_recorded:
-                record_step(steps, live, work, track, time, state.taken, state.clock[BEGINS_SLOT], status, out)
-            state.clock[STATUS] = status
-            if status != OK:
-                return FAILED, row
-            end_step(state, stamp)
-            if is_recorded:
-                keep_strokes(state, stamp)
-                row += 1
-                continue
-            if stamp >= state.clock[SEEN] + INTERVAL or track.bank.began[0]:
-                return REFRESH, row
-        resumed = False
-        remember(live, bending, out, t.clearances.shape[0], track.passes[0], limits, state, tip, stamp, row, found)
-        before = found.counts[1]
+        if not trusted:
+            if not is_ordinary(f.strokes, limits, state, stamp, values[row]):
+                return ODD, row
+            note_stamp(state, STROKES, stamp)
+        state.clock[BEGINS_SLOT] = stamp // SLOT != state.clock[IN_SLOT]
+        span = (stamp - state.clock[NEWEST]) * NANO
+        status = step_lengths(t, boom, live, work, p, f, span, stamp, state.taken, limits.gravity, out)
+        state.clock[STATUS] = status
+        if status != OK:
+            return FAILED, row
+        end_step(state, stamp)
+        give_prediction(t.clearances.shape[0], live, bending, out, limits, state, stamp, row, found)
+        results = results_in(out, state.strokes.shape[0], t.clearances.shape[0])
+        past, at = state.past, keep_strokes(state, stamp)
+        write_expected_readings(p, f, live, results, limits.inclination, past.values[at], past.sigmas[at])
         flush_waiting(limits, state, row, found)
-        correct_estimate(limits, tip, before, found)
-        estimate(out, t.clearances.shape[0], tip, found)
+        take_residuals(limits, state, p, f, before, found)
+        write_tip_estimate(p, f, results, found.estimates[found.counts[0] - 1])
         row += 1
-        if state.clock[BEGINS_SLOT] or state.clock[IS_DEFLECTED] or track.bank.began[0]:
+        if state.clock[BEGINS_SLOT] or state.clock[IS_DEFLECTED]:
             return LOOK, row - 1
     return DONE, row
 
 
 @kernel
-def measure(limits, state, tip, stream, stamp, values, trusted, found):
+def measure(p, f, limits, state, stream, stamp, values, trusted, found):
     """Take one measured sample, as `update`, which needs the boom too; False, and nothing done, if it is not ordinary.
 
     One that is `trusted` is refused only if nothing was expected at its stamp.
@@ -148,8 +115,16 @@ def measure(limits, state, tip, stream, stamp, values, trusted, found):
     before = found.counts[1]
     if not compare(limits, state, stream, stamp, values, ALONE, trusted, found):
         return False
-    correct_estimate(limits, tip, before, found)
+    take_residuals(limits, state, p, f, before, found)
     return True
+
+
+@inner
+def take_residuals(limits, state, p, f, first, found):
+    """Let the estimate know of the residuals from row `first` on."""
+    for k in range(first, found.counts[1]):
+        stream = found.residual_streams[k]
+        take_sensor(p, f, stream, limits.first[stream], found.values[k], found.residual_stamps[k], state.clock[NEWEST])
 
 
 # -- strokes --------------------------------------------------------------------------------------------------------------
@@ -194,46 +169,22 @@ def note_stamp(state, stream, stamp):
 
 
 @inner
-def begin_step(limits, state, stamp):
-    """Time (s since the start) of the strokes in `state`, and the tuning by which the boom is stepped to them."""
-    state.clock[BEGINS_SLOT] = stamp // SLOT != state.clock[IN_SLOT]
-    time = (stamp - state.clock[EPOCH]) * NANO
-    if time - state.pace[STEPPED] > PAUSE:
-        state.pace[PAUSED] = time
-    state.pace[STEPPED] = time
-    if time - state.pace[PAUSED] < AFTER_PAUSE:
-        return time, limits.patient
-    return time, limits.tuning
-
-
-@inner
 def end_step(state, stamp):
     """Note that the boom was stepped."""
     span = (stamp - state.clock[NEWEST]) * NANO
-    if state.pace[USUAL_STEP] != 0.0:
-        state.pace[USUAL_STEP] += SMOOTHING * (span - state.pace[USUAL_STEP])
+    if state.interval[0] != 0.0:
+        state.interval[0] += SMOOTHING * (span - state.interval[0])
     else:
-        state.pace[USUAL_STEP] = span
+        state.interval[0] = span
     state.clock[IN_SLOT], state.clock[NEWEST] = stamp // SLOT, stamp
 
 
 @inner
-def remember(live, bending, out, pins, passes, limits, state, tip, stamp, row, found):
-    """Give the prediction, keep what residuals need, and let the estimate follow."""
-    n, k = state.strokes.shape[0], found.counts[0]
-    results, estimates = results_in(out, n, pins), estimates_in(out, n, pins)
-    give_prediction(live, bending, out, pins, passes, limits, state, stamp, row, found)
-    past, at = state.past, keep_strokes(state, stamp)
-    write_expected(limits, state, live, results, estimates, past.values[at], past.sigmas[at])
-    advance_estimate(tip, live, results, estimates, found.moments[k], limits.gravity, stamp)
-
-
-@inner
-def give_prediction(live, bending, out, pins, passes, limits, state, stamp, row, found):
+def give_prediction(pins, live, bending, out, limits, state, stamp, row, found):
     """Give the row of the newest prediction with its bending moments, and note whether the boom is deflected too far."""
     n, k = state.strokes.shape[0], found.counts[0]
     results, estimates = results_in(out, n, pins), estimates_in(out, n, pins)
-    found.at[k], found.stamps[k], found.passes[k] = row, stamp, passes
+    found.at[k], found.stamps[k] = row, stamp
     for i in range(out.shape[0]):
         found.rows[k, i] = out[i]
     for i in range(n):
@@ -260,13 +211,6 @@ def keep_strokes(state, stamp):
     for i in range(state.strokes.shape[0]):
         past.strokes[at, i] = state.strokes[i]
     return at
-
-
-@inner
-def estimate(out, pins, tip, found):
-    """Give the estimate beside the newest prediction."""
-    n = found.measured.shape[1]
-    write_estimate(tip, results_in(out, n, pins), found.estimates[found.counts[0] - 1])
 
 
 # -- measured angles and accelerations --------------------------------------------------------------------------------------
@@ -372,19 +316,6 @@ def write_residual(limits, state, stream, stamp, values, row, found):
     found.residual_at[k], found.residual_streams[k], found.residual_stamps[k] = row, stream, stamp
     found.counts[1] = k + 1
     return True
-
-
-@inner
-def correct_estimate(limits, tip, first, found):
-    """Let the estimate know of the residuals from row `first` on."""
-    for k in range(first, found.counts[1]):
-        stream, stamp, residuals = found.residual_streams[k], found.residual_stamps[k], found.values[k]
-        if stream == ANGLES:
-            take_angles(tip, residuals, limits.first[ANGLES], stamp)
-        elif stream == IMU:
-            take_imu(tip, residuals, limits.first[IMU], stamp)
-        elif stream == FORCES:
-            take_forces(tip, residuals, limits.first[FORCES], stamp)
 
 
 @kernel

@@ -23,8 +23,8 @@ import numpy as np
 
 from boom_twin import Twin
 from boom_twin.config.settings import Settings
-from boom_twin.estimation.load_spectrum import tip_load as pulses_of
-from boom_twin.estimation.tip_estimate import ACCELERATION, ACCELERATION_COVARIANCE, FORCE, TIP, TIP_COVARIANCE
+from boom_twin.deviation.load_spectrum import tip_load as pulses_of
+from boom_twin.deviation.estimate_row import ACCELERATION, ACCELERATION_COVARIANCE, FORCE, TIP, TIP_COVARIANCE
 from boom_twin.scene import load_scene
 from boom_twin.scene.edit import parameter, with_parameters
 from boom_twin.scene.kinematics import strokes_of_posture

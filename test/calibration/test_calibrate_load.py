@@ -27,7 +27,7 @@ from boom_twin.calibration.load_filter import (
 from boom_twin.calibration.load_modes import modes_along, posture_path
 from boom_twin.calibration.sessions import SessionCourse, smoothed
 from boom_twin.compiler.compile import compile_scene
-from boom_twin.estimation.sensor_model import specific_force
+from boom_twin.deviation.sensor_model import specific_force
 from boom_twin.scene.edit import parameter, with_parameters
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 from boom_twin.scene.pump_pulses import ease

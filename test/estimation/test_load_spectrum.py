@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.estimation.load_spectrum import (
+from boom_twin.deviation.load_spectrum import (
     LEAST,
     LOBE,
     LOWEST,

@@ -22,7 +22,7 @@ from boom_twin.estimation.boom_predictor import BoomPredictor
 from boom_twin.estimation.deviation_filter import DeviationFilter
 from boom_twin.estimation.deviation_modes import DeviationModes
 from boom_twin.estimation.posture_modes import GRID
-from boom_twin.estimation.tip_estimate import INEXACT
+from boom_twin.deviation.estimate_row import INEXACT
 from boom_twin.health.baseline import Baseline
 from boom_twin.kernels.result_row import Estimates, Results, estimates_in, results_in
 from boom_twin.kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y

@@ -15,7 +15,7 @@ from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.modal import StrokeSpectrum, joint_increments, stroke_noise
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.config.settings import Settings
-from boom_twin.estimation.sensor_model import Mounting, Reading
+from boom_twin.deviation.sensor_model import Mounting, Reading
 from boom_twin.estimation.stroke_filter import corners
 from boom_twin.health.inference.fault_catalogue import parameters
 from boom_twin.health.inference.innovation_filter import (

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from boom_twin import load_scene
-from boom_twin.estimation.tip_estimate import WIDTH
+from boom_twin.deviation.estimate_row import WIDTH
 from boom_twin.scene.schema import Scene
 from boom_twin.twin.blocks import estimate_of
 from boom_twin.types import Alarm, Array, Change, Health, Prediction, Ranked, Report, Residuals, Stream, channels_of

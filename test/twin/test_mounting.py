@@ -8,7 +8,7 @@ from drive_twin import ARCH_DRIVES, drive_twin
 
 from boom_twin import Sample, Settings, Stream, load_scene
 from boom_twin.bag.reader import read, scan
-from boom_twin.estimation.sensor_model import TURN
+from boom_twin.deviation.sensor_model import TURN
 from boom_twin.scene.kinematics import strokes_of_posture
 
 MS = 1_000_000

@@ -36,8 +36,8 @@ import numpy as np
 
 from ...analysis.modal import Mode, StrokeNoise, along
 from ...compiler.plan import Plan
+from ...deviation.sensor_model import Reading, specific_force
 from ...estimation.deviation_filter import oscillate
-from ...estimation.sensor_model import Reading, specific_force
 from ...kernels.jit import SameTypes, hold
 from ...kernels.tables import FRAME_ANGLE, State, Work
 from ...types import Array

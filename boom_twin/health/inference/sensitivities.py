@@ -12,8 +12,8 @@ from ...analysis.equilibrium import settle
 from ...analysis.modal import frequencies_near, natural_frequencies
 from ...compiler.compile import compile_scene
 from ...compiler.plan import Plan
+from ...deviation.sensor_model import Mounting, Reading
 from ...errors import BoomTwinError, SolverError
-from ...estimation.sensor_model import Mounting, Reading
 from ...kernels.integrators import REST, X, prepare
 from ...kernels.jit import SameTypes, hold
 from ...kernels.tables import OK, State, Work
@@ -64,7 +64,7 @@ class Posture(NamedTuple):
     strokes, forces : ndarray, shape (n,)
         m; of the cylinders, N.
     readings : ndarray, shape (n + 4,)
-        See `boom_twin.estimation.sensor_model.Reading`.
+        See `boom_twin.deviation.sensor_model.Reading`.
     by_stroke : ndarray, shape (n + 4, n)
         Their derivative, 1/m.
     """

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...estimation.load_spectrum import tip_load
+from ...deviation.load_spectrum import tip_load
 from ..protocol import RESPONSE, SPECTROGRAM, SPECTRUM, pack
 from .feed import Feed
 from .present_posture import MOVED, ModeList, ResponseCompiler, ResponseList, TipResponses
