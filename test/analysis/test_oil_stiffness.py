@@ -9,12 +9,12 @@ import pytest
 from oracle import booms
 
 from boom_twin.analysis.equilibrium import rest_at, statics
-from boom_twin.analysis.modal import StrokeNoise, damping_ratio, natural_modes
+from boom_twin.analysis.modal import damping_ratio, natural_modes
 from boom_twin.analysis.simulate import simulate
 from boom_twin.calibration.unknowns import unknowns_of, usual_names
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.config.settings import load_settings
-from boom_twin.estimation.deviation_modes import DeviationModes
+from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.health.inference.fault_catalogue import parameters
 from boom_twin.health.inference.sensitivities import Signatures
 from boom_twin.reduction.variants import KINDS, without
@@ -103,46 +103,12 @@ def test_a_held_boom_swings_as_with_the_number_and_a_moved_one_does_not():
     assert apart[0] < 1e-6 and apart[1] > 1e-3
 
 
-def test_the_estimate_follows_the_stroke():
-    """Compliance in the filter of deviations: half the stroke before any sample, then that of the posture."""
+def test_the_filter_follows_the_stroke():
+    """Compliance in the filter of the twin is that of the posture."""
     scene = with_oil()
     strokes = strokes_of_posture(scene, "high")
-    plan, angles = compile_scene(scene), joint_angles_of_strokes(scene, strokes)
-    modes = DeviationModes(scene, plan, load_settings(), (None,) * 4)
-    none = np.zeros((0, 4))
-    no_noise = StrokeNoise(none, np.zeros(0), none, np.zeros(0), (), np.zeros(0), none, np.zeros((0, 2)))
-    modes.refresh(strokes, angles, plan.state(), no_noise)
+    boom = BoomPredictor(scene, load_settings())
+    boom.start(statics(scene, strokes).lengths)
     expected = [formula(j["cylinder"]["oil"], j["cylinder"]["max_stroke"], s)
                 for j, s in zip(spec_with_oil()["joints"], strokes, strict=True)]  # fmt: skip
-    assert 1.0 / modes.filter.softness == pytest.approx(expected, rel=1e-12)
-
-
-def test_signatures_of_health_are_those_of_the_number():
-    scene = with_oil()
-    strokes = strokes_of_posture(scene, "arch")
-    tables = []
-    for one in (scene, with_numbers(strokes)):
-        known = parameters(one)
-        found = Signatures(one, known, (None,) * 4).at(strokes)
-        columns = [k for k, each in enumerate(known) if each.kind == "softer"]
-        assert found is not None and [known[k].cause for k in columns][:4] == [f"cylinder_{i}.k" for i in range(1, 5)]
-        tables.append(found.channels[:, columns])
-    assert tables[0] == pytest.approx(tables[1], rel=1e-5, abs=1e-9)
-
-
-def test_a_parameter_k_is_the_bulk_modulus():
-    scene = with_oil([1])
-    assert "cylinder_2.k" in parameter_names(scene) and "cylinder_2.k" in usual_names(scene, [Stream.ANGLES])
-    now = parameter(scene, "cylinder_2.k")
-    assert unknowns_of(scene, ["cylinder_2.k"])[0].present == now
-    soft = with_parameters(scene, {"cylinder_2.k": 0.8 * now})
-    old, new = scene.joints[1].cylinder, soft.joints[1].cylinder
-    assert new.k is None and new.oil.bulk_modulus == pytest.approx(0.8 * old.oil.bulk_modulus, rel=1e-12)
-    for stroke in (0.0, 0.1, 0.4):
-        assert stiffness(new, stroke) == pytest.approx(0.8 * stiffness(old, stroke), rel=1e-12)
-
-
-def test_left_out_it_is_incompressible():
-    kind = next(kind for kind in KINDS if kind.name == "cylinder compliance")
-    cylinder = without(with_oil([1]), kind, [1]).of(with_oil([1])).joints[1].cylinder
-    assert (cylinder.k, cylinder.oil, cylinder.d) == (None, None, None)
+    assert 1.0 / boom.posture.compliance == pytest.approx(expected, rel=1e-9)

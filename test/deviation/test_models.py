@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from boom_twin import Sample, Stream, Twin, load_scene, statics
 from boom_twin.config.settings import Settings
 from boom_twin.deviation.models import DRIVE_TIME, FAST, PREDICTION, SLOW, correct, length_row, make_transition, mix
-from boom_twin.deviation.predictor import LengthPredictor
+from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.scene.kinematics import strokes_of_posture
 
 SCENE = load_scene()
@@ -19,14 +19,14 @@ N, STEP = len(DRIVES), 5_000_000
 
 
 @pytest.fixture(scope="module")
-def boom() -> LengthPredictor:
+def boom() -> BoomPredictor:
     """At rest in posture arch."""
-    found = LengthPredictor(SCENE, Settings(), ())
+    found = BoomPredictor(SCENE, Settings())
     found.start(REST.lengths)
     return found
 
 
-def test_transition_is_that_of_the_continuous_system_with_inputs_held(boom: LengthPredictor) -> None:
+def test_transition_is_that_of_the_continuous_system_with_inputs_held(boom: BoomPredictor) -> None:
     p, f, m, h = boom.posture, boom.filters, int(boom.posture.modes[0]), 0.005
     size = 2 * m + 4 + 3 * N
     load, drive = 2 * m, 2 * m + 4
@@ -64,7 +64,7 @@ def test_reading_is_taken_as_the_textbook_has_it() -> None:
     assert found == pytest.approx(joseph)
 
 
-def test_mixture_has_mean_and_covariance_of_its_models(boom: LengthPredictor) -> None:
+def test_mixture_has_mean_and_covariance_of_its_models(boom: BoomPredictor) -> None:
     f, size, rng = boom.filters, 7, np.random.default_rng(2)
     x, chances = rng.normal(size=(3, size)), np.array([0.5, 0.2, 0.3])
     f.x[:3, :size], f.chances[:3] = x, chances
@@ -80,7 +80,7 @@ def test_mixture_has_mean_and_covariance_of_its_models(boom: LengthPredictor) ->
     boom.start(REST.lengths)
 
 
-def test_length_row_is_the_compression_of_the_oil(boom: LengthPredictor) -> None:
+def test_length_row_is_the_compression_of_the_oil(boom: BoomPredictor) -> None:
     # length = drive + c F: the length that statics has at another drive
     p, step, drive = boom.posture, 1e-5, 2 * int(boom.posture.modes[0]) + 4
     for i in range(N):

@@ -10,7 +10,7 @@ from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.modal import natural_modes
 from boom_twin.config.settings import Settings
 from boom_twin.deviation.posture import linearise
-from boom_twin.deviation.predictor import LengthPredictor
+from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 SCENE = load_scene()
@@ -19,20 +19,20 @@ N = len(DRIVES)
 
 
 @pytest.fixture(scope="module")
-def boom() -> LengthPredictor:
+def boom() -> BoomPredictor:
     """Linearised in posture arch."""
-    found = LengthPredictor(SCENE, Settings(), ())
+    found = BoomPredictor(SCENE, Settings())
     found.start(statics(SCENE, DRIVES).lengths)
     return found
 
 
-def test_lengths_at_rest_give_back_the_drives(boom: LengthPredictor) -> None:
+def test_lengths_at_rest_give_back_the_drives(boom: BoomPredictor) -> None:
     assert boom.posture.drives == pytest.approx(DRIVES, abs=1e-9)
     assert boom.posture.pulled == pytest.approx(statics(SCENE, DRIVES).cylinder_forces, rel=1e-9)
 
 
 @pytest.mark.parametrize("i", range(N))
-def test_columns_of_drives_are_those_of_statics(boom: LengthPredictor, i: int) -> None:
+def test_columns_of_drives_are_those_of_statics(boom: BoomPredictor, i: int) -> None:
     step = 1e-5 * np.eye(N)[i]
     one, other = statics(SCENE, DRIVES + step), statics(SCENE, DRIVES - step)
     p, column = boom.posture, 2 + i
@@ -42,7 +42,7 @@ def test_columns_of_drives_are_those_of_statics(boom: LengthPredictor, i: int) -
 
 
 @pytest.mark.parametrize("a", (0, 1))
-def test_column_of_force_and_modes_add_up_to_the_response_at_0_hz(boom: LengthPredictor, a: int) -> None:
+def test_column_of_force_and_modes_add_up_to_the_response_at_0_hz(boom: BoomPredictor, a: int) -> None:
     # the response has five shapes a part where the twin has three: 2e-4 of the flexibility
     found = frequency_response(SCENE, [1e-4], DRIVES, tip_force=np.eye(2)[a])
     p, m = boom.posture, int(boom.posture.modes[0])
@@ -52,7 +52,7 @@ def test_column_of_force_and_modes_add_up_to_the_response_at_0_hz(boom: LengthPr
     assert total[:N] == pytest.approx(found.joints[0].real, rel=1e-3, abs=1e-9)
 
 
-def test_modes_followed_over_a_move_are_those_found_anew(boom: LengthPredictor) -> None:
+def test_modes_followed_over_a_move_are_those_found_anew(boom: BoomPredictor) -> None:
     p, m = boom.posture, int(boom.posture.modes[0])
     end = DRIVES + np.array([0.02, -0.01, 0.015, 0.02])
     for share in np.linspace(0.125, 1.0, 8):  # steps of 0.01 rad at most, as a twin takes them

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from boom_twin.compiler.compile import compile_scene
-from boom_twin.estimation.look_ahead import Track
+from boom_twin.deviation.models import Filters
+from boom_twin.deviation.posture import Posture
 from boom_twin.kernels.jit import HeldFields, _kind, by_reference, hold, kernel, referenced
 from boom_twin.kernels.tables import Condensed, State, Tables, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
@@ -143,7 +144,7 @@ def test_a_field_of_another_kind_is_another_kernel():
     assert total(fields()._replace(table=np.ones((1, 2), dtype=np.int64))) == 11.0 + 1.5
 
 
-@pytest.mark.parametrize("kind", [Tables, State, Work, Condensed, Track, TwinState, Ring, Limits, UpdateOutput])
+@pytest.mark.parametrize("kind", [Tables, State, Work, Condensed, Posture, Filters, TwinState, Ring, Limits, UpdateOutput])
 def test_what_kernels_pass_on_often_goes_by_reference(kind):
     import numba
 

@@ -71,17 +71,16 @@ def test_a_transition_that_is_not_there_is_refused_and_the_node_lives_on(idle: A
 
 
 def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote: Any) -> None:
-    request = DescribeParameters.Request(names=["rho", "look_step"])
-    rho, look_step = remote.call(DescribeParameters, "describe_parameters", request).descriptors
-    assert (rho.floating_point_range[0].from_value, rho.floating_point_range[0].to_value) == (0.0, 1.0)
+    request = DescribeParameters.Request(names=["stroke_rate", "imu_sigma"])
+    stroke_rate, imu_sigma = remote.call(DescribeParameters, "describe_parameters", request).descriptors
+    assert (stroke_rate.floating_point_range[0].from_value, stroke_rate.floating_point_range[0].to_value) == (1e-6, 1e9)
     words = "fixed while the node is configured"
-    assert rho.description == Settings.model_fields["rho"].description
-    assert (look_step.floating_point_range[0].from_value, look_step.additional_constraints) == (1e-5, words)
+    assert stroke_rate.description == Settings.model_fields["stroke_rate"].description
+    assert imu_sigma.additional_constraints == words
     for name, value in [
-        ("rho", 1.5),
-        ("rho", 1.0),
-        ("look_step", 0.0),
-        ("look_step", -1.0),
+        ("stroke_rate", 1e10),
+        ("imu_sigma", 0.0),
+        ("imu_sigma", -1.0),
         ("gap", float("nan")),
         ("gap", "long"),
     ]:
@@ -92,16 +91,16 @@ def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote
     ]:
         refused = remote.set(name, value)
         assert not refused.successful and refused.reason == reason
-    assert remote.set("look_step", 0.03).successful
+    assert remote.set("imu_sigma", 0.03).successful
     assert remote.change(Transition.TRANSITION_CONFIGURE), idle.said()
-    for name, value in [("look_step", 0.05), ("scene", "other.yaml")]:
+    for name, value in [("imu_sigma", 0.05), ("scene", "other.yaml")]:
         refused = remote.set(name, value)
         assert not refused.successful and f"{name}: fixed while the node is configured" in refused.reason
     assert not any(remote.set("gap", absurd).successful for absurd in (1e308, 5e-324))
     assert remote.set("gap", 0.2).successful
     assert not remote.set("payload", -2.0).successful
     assert remote.change(Transition.TRANSITION_CLEANUP)
-    assert remote.set("look_step", 0.05).successful
+    assert remote.set("imu_sigma", 0.05).successful
 
 
 def test_only_what_is_listened_to_is_encoded_and_what_late_listeners_get(domain: None, monkeypatch: Any) -> None:
@@ -145,9 +144,8 @@ def test_a_bad_scene_ends_the_node_with_its_fault(spawn_node: Callable[..., Any]
     ("arguments", "words"),
     [
         (["--badly"], "--badly"),
-        (["-p", "rho:=1.5"], "rho"),
-        (["-p", "look_step:=0.0"], "look_step"),
-        (["-p", "lag:=0.045"], "lag: the stroke filter adapts by itself: leave it out, or set stroke_agility"),
+        (["-p", "imu_sigma:=-1.0"], "imu_sigma"),
+        (["-p", "look_step:=0.03"], "look_step: without effect since 0.2.0, whose filter adapts by itself: leave it out"),
         (["-p", "gap:=1"], "1.0, not 1"),
         (["--params-file", "/nowhere.yaml"], "/nowhere.yaml"),
         (["-p", "strok_rate:=0.4"], "strok_rate: unknown. The nearest is `stroke_rate`"),

@@ -93,7 +93,7 @@ def test_limits_hold_at_once_and_do_not_disturb(strokes: Any) -> None:
     assert twin.update(stroke(9, strokes)).earlier[0].events == ("gap",) and quiet.update(stroke(9, strokes)).events == ()
 
 
-@pytest.mark.parametrize("live", [{"gap": 0.0}, {"payload": -2.0}, {"line_fill": np.nan}, {"stroke_agility": 2.0}, {"x": 1.0}])
+@pytest.mark.parametrize("live", [{"gap": 0.0}, {"payload": -2.0}, {"line_fill": np.nan}, {"imu_sigma": 2.0}, {"x": 1.0}])
 def test_what_cannot_be_asked_is_refused_with_its_name(live: dict[str, float], strokes: Any) -> None:
     twin = drive_twin(load_scene())
     with pytest.raises(UsageError, match=next(iter(live))):

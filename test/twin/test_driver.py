@@ -13,7 +13,7 @@ from drive_twin import drive_twin
 
 import boom_twin
 from boom_twin import Report, Sample, Settings, Stream, load_scene, statics
-from boom_twin.estimation.deviation_modes import DeviationModes
+from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.health.baseline import load_baseline
 from boom_twin.health.sensor_check import MISSTATED
 from boom_twin.messages.report_encoder import ReportEncoder
@@ -166,8 +166,7 @@ def test_what_health_finds_changes_the_estimate_alone(monkeypatch: pytest.Monkey
     kept, estimates = [], []
     for is_heard in (True, False):
         if not is_heard:
-            monkeypatch.setattr(DeviationModes, "mask", lambda *_: None)
-            monkeypatch.setattr(DeviationModes, "expect_noise", lambda *_: None)
+            monkeypatch.setattr(BoomPredictor, "leave_out", lambda *_: None)
         reports = [step.report for step in drive(drive_twin(load_scene(), baseline=load_baseline()), spoilt_samples(5.0, 3.0))]
         judged = [each.health for each in reports if each.health is not None]
         assert {alarm.cause for alarm in judged[-1].alarms} == {"joint_3.sensor"}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from threading import current_thread
 from typing import Any
 
@@ -11,9 +10,7 @@ import pytest
 from drive_twin import drive_twin
 
 from boom_twin import Report, Sample, Stream, Twin, load_scene
-from boom_twin.analysis.modal import ModeSeries
 from boom_twin.errors import UsageError
-from boom_twin.estimation.posture_modes import PostureMode, PostureModes
 from boom_twin.health.baseline import load_baseline
 from boom_twin.health.monitor import HealthMonitor
 from boom_twin.kernels.jit import _kind
@@ -149,64 +146,10 @@ def test_a_restart_and_another_load_leave_health_and_limits_to_others(monkeypatc
     assert twin.update(rows[31], judged=False).change is not None and not found
 
 
-def test_a_restart_and_another_load_find_their_natural_modes_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not at the sample: those of the posture are kept, and made beside the samples with the model of another load."""
-    found: list[str] = []
-    original = ModeSeries.lowest
-
-    def noted(self: ModeSeries, count: int, highest: float) -> Any:
-        before = len(self._modes)
-        modes = original(self, count, highest)
-        if len(self._modes) > before:
-            found.append(current_thread().name)
-        return modes
-
-    monkeypatch.setattr(ModeSeries, "lowest", noted)
-    twin, rows = drive_twin(load_scene()), samples(160)
-    preparation = ModelPreparation(twin)
-    driven(twin, preparation, {50: {"payload": 40.0}}, rows[:120])
-    assert twin.settings.payload == 40.0 and found == ["MainThread", "model"]
-    twin.requests.rest()
-    assert twin.update(rows[120]).change is not None
-    assert found == ["MainThread", "model"]
-
-
-def test_a_restart_elsewhere_finds_natural_modes_that_were_made_while_samples_were_held(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """One at a sample, so that none of them waits for all; and outputs do not depend on it."""
-
-    made: list[PostureMode] = []
-    original = PostureMode.__init__
-
-    def noted(self: PostureMode, *arguments: Any) -> None:
-        made.append(self)
-        original(self, *arguments)
-
-    def reports(twin: Twin) -> list[tuple[int, Report]]:
-        found = []
-        for sample in rows:
-            made.clear()
-            report = twin.update(sample)
-            found.append((len(made), report))
-        return found
-
-    monkeypatch.setattr(PostureMode, "__init__", noted)
-    scene, rows = load_scene(), samples(60)
-    elsewhere = np.array([0.1, -0.08, 0.1, 0.05])
-    rows += [replace(each, stamp=each.stamp + 60_000_000_000, values=each.values + elsewhere) for each in rows]
-    found = reports(drive_twin(scene))
-    (restart,) = [k for k, (_, report) in enumerate(found) if any("restart" in each.events for each in report.all)]
-    held = [count for count, _ in found[60:restart]]
-    assert found[restart][0] == 0 and sum(held) >= 2 and max(held) == 1
-    monkeypatch.setattr(PostureModes, "prepare_piece", lambda *_: None)
-    assert all(equal(one, other) for (_, one), (_, other) in zip(found, reports(drive_twin(scene)), strict=True))
-
-
 def test_code_that_is_compiled_for_a_boom_takes_it_under_any_load() -> None:
     """Its tables have the same types, so that another load does not look them up while a sample waits."""
     twin, kinds = drive_twin(load_scene()), set()
     for live in ({}, {"payload": 40.0}, {"line_fill": 20.0}, {"payload": 40.0, "line_fill": 20.0}):
         model = twin.model(twin.settings.tuned(live))
-        kinds.add((_kind(model.boom.compiled), _kind(model.modes.filter)))
+        kinds.add(_kind(model.boom.compiled))
     assert len(kinds) == 1

@@ -1,6 +1,6 @@
-"""Motions that try the stroke filter: rests, a sweep, abrupt stops; measured strokes of them and what the boom really does.
+"""Motions that try the filter on lengths: rests, a sweep, abrupt stops; lengths measured in them, and what the boom does.
 
-The truth is this package's own model in fine steps along the true strokes, so that what is left is the filter's error.
+The truth is this package's own model in fine steps along the true drives, so that what is left is the filter's error.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ POSTURE = "arch"
 
 
 class Measured(NamedTuple):
-    """Samples of k instants: stamps (ns), strokes and joint angles as measured, the tip's true acceleration (k, 2)."""
+    """Samples of k instants: stamps (ns), lengths and joint angles as measured, the tip's true acceleration (k, 2)."""
 
     stamps: np.ndarray
     strokes: np.ndarray
@@ -68,22 +68,22 @@ MOTIONS = {
 
 @cache
 def true_motion(name):
-    """Times (s), strokes (m), and the boom's motion in steps of 0.5 ms."""
+    """Return the boom's motion in steps of 0.5 ms."""
     scene, times = load_scene(), 5e-4 * np.arange(round(SECONDS / 5e-4) + 1)
     strokes = strokes_of_posture(scene, POSTURE) + MOTIONS[name](times)
-    return times, strokes, simulate(scene, times, strokes, dt=5e-4, estimate_errors=False)
+    return times, simulate(scene, times, strokes, dt=5e-4, estimate_errors=False)
 
 
 def measured(name, rate=200.0, seed=3):
     """What sensors with the virtual rig's noise read of a motion, `rate` times a second."""
-    times, strokes, boom = true_motion(name)
+    times, boom = true_motion(name)
     clock, noise, angles = np.random.default_rng(seed).spawn(3)
     sensors = Sensors(rate=rate, jitter=min(2e-4, 0.2 / rate))
     stamps = sampling_stamps(sensors, SECONDS, 100 * SECOND, clock)
     at = stamps / SECOND - 100.0
     true, joints, acceleration = (
         np.column_stack([np.interp(at, times, column) for column in values.T])
-        for values in (strokes, boom.joints, boom.tip_acceleration[:, :2])
+        for values in (boom.lengths, boom.joints, boom.tip_acceleration[:, :2])
     )
     return Measured(
         stamps,

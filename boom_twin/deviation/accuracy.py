@@ -1,0 +1,92 @@
+"""Accuracy of the tip that a set of sensors gives at rest: the covariance of the estimate, once it has settled.
+
+The filter of `boom_twin.deviation.models` runs over sensors that read what is predicted, while the size of the unknown load is
+held. A covariance does not depend on what is measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..analysis.equilibrium import statics
+from ..config.settings import Settings
+from ..kernels.jit import kernel
+from ..kernels.result_row import results_in
+from ..scene.schema import Scene
+from ..types import SECOND, Array, Mount, Stream, channels_of
+from .estimate_row import ACCELERATION_COVARIANCE, FORCE_VARIANCE, TIP_COVARIANCE, VARIANCES, WIDTH
+from .models import take_sensor
+from .predictor import BoomPredictor
+from .step import step_lengths, write_tip_estimate
+
+SETTLED = 20.0  # s
+
+
+class TipAccuracy(NamedTuple):
+    """Standard deviations of the estimate: tip's x, y (m) and angle (rad), acceleration (m/s^2), load (N); (3,), (2,), (2,)."""
+
+    tip: Array
+    acceleration: Array
+    load: Array
+
+
+def accuracy_at(
+    scene: Scene,
+    drives: Array,
+    sensors: Sequence[Stream],
+    settings: Settings | None = None,
+    mounts: Sequence[Mount | None] = (),
+    rate: float = 200.0,
+) -> TipAccuracy:
+    """Return the accuracy of the estimate at rest, `SETTLED` s after nothing was known.
+
+    Parameters
+    ----------
+    scene : Scene
+        With its load.
+    drives : ndarray, shape (n,)
+        Strokes of the drives, m.
+    sensors : sequence of Stream
+        Beside lengths of the cylinders; one that is named twice is there twice.
+    rate : float
+        Of all of them, Hz.
+
+    Raises
+    ------
+    UsageError, SolverError
+        Strokes out of reach; no equilibrium there.
+    """
+    boom, lengths = BoomPredictor(scene, settings or Settings(), mounts), statics(scene, drives).lengths
+    boom.start(lengths)
+    widths = [len(names) for stream, names in channels_of(boom.plan.joints).items() if stream is not Stream.STROKES]
+    counts = np.array([sum(each is stream for each in sensors) for stream in Stream])
+    first, zeros, out = np.cumsum([0, 0, *widths]), np.zeros(max(widths)), np.zeros(WIDTH)
+    tables, anchor, live, work, posture, filters, _, row = boom.compiled
+    filters.load2[:] = filters.noise.usual_load**2
+    span, steps, gravity = round(SECOND / rate), round(SETTLED * rate), np.array(boom.plan.tables.gravity)
+    settle_covariance(
+        tables, anchor, live, work, posture, filters, row, lengths, gravity, counts, first, zeros, span, steps, out
+    )
+    tip, acceleration = (out[first + np.array(VARIANCES)] for first in (TIP_COVARIANCE, ACCELERATION_COVARIANCE))
+    return TipAccuracy(np.sqrt(tip), np.sqrt(acceleration[:2]), np.sqrt(out[FORCE_VARIANCE:]))
+
+
+@kernel
+def settle_covariance(t, boom, live, work, p, f, row, lengths, gravity, counts, first, zeros, span, steps, out):
+    """Run the filter at rest for `steps` of `span` ns and write the estimate at the last one.
+
+    `counts` and `first` (streams,): how many sensors each stream has, and its first channel. Their residuals are `zeros`.
+    """
+    usual2 = f.load2[0]
+    results = results_in(row, lengths.shape[0], t.clearances.shape[0])
+    for k in range(steps):
+        stamp = k * span
+        step_lengths(t, boom, live, work, p, f, 1e-9 * span if k > 0 else 0.0, stamp, lengths, gravity, row)
+        for stream in range(1, counts.shape[0]):
+            for _ in range(counts[stream]):
+                take_sensor(p, f, stream, first[stream], zeros, stamp, stamp)
+        write_tip_estimate(p, f, results, out)
+        f.load2[:] = usual2  # readings without noise would let it fall
