@@ -58,6 +58,7 @@ LEARN_NOISE = 0.02  # of a reading, by which the noise of its channel is learnt
 CONTRADICTION = 8.0  # standard deviations of the predicted tip, by which the estimate may be off it
 MOST_EXCESS = 1e6  # times the variance that a channel is stated to have
 LEARN_LENGTH = 0.02  # likewise of a length's noise, by third differences
+UNEVEN = 0.5  # share of the time between two lengths by which the one before may differ, for differences of them
 DEAF_WAY, DEAF_RATE = 0.05, 0.02  # m, m/s: how far a drive is, and how fast, whose transducer fails
 DOF = 4.0  # degrees of freedom of Student's t, by which innovations of the estimate are weighed
 PATIENCE = 1_000_000_000  # ns without readings after which the estimate is the prediction again
@@ -86,8 +87,8 @@ class Filters(NamedTuple):
     jerk : (n,) m^2/s^5. is_open : (n,) 1 where a valve is believed open. still : (n,) s since its drive began to stand still.
     status : (3,) whether it has begun, whether the estimate has readings of its own, stamp of the newest of these.
     masked, deaf : (c,), (n,) measured channels, and strokes, that the estimate is not to use. noise : variances.
-    excess : (c,) times the variance that channels are stated to have. length2, before : (n,), (n, 3) variances of lengths (m^2)
-    as learnt, and the three lengths before.
+    excess : (c,) times the variance that channels are stated to have. length2 : (n,) variances of lengths as learnt, m^2.
+    before, interval : (n, 3), (1,) the three lengths before (m), and the time between the newest two, s.
     places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
     felt : (2,) specific force predicted at the tip, m/s^2. shaking : (1,) mean square of its acceleration, m^2/s^4.
     angle : (1,) of the tip, rad. strokes : (n, 3) predicted lengths (m), their rates and accelerations.
@@ -110,6 +111,7 @@ class Filters(NamedTuple):
     excess: Array
     length2: Array
     before: Array
+    interval: Array
     noise: SensorNoise
     places: NDArray[np.int64]
     weights: Array
@@ -140,7 +142,7 @@ def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> F
         spread=np.zeros((2, states, states)), load2=np.zeros(2), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
         still=np.zeros(n), status=np.zeros(3, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan),
-        noise=noise,
+        interval=np.zeros(1), noise=noise,
         places=np.zeros((states, 6 + n), np.int64), weights=np.zeros((states, 6 + n)), counts=np.zeros(states, np.int64),
         variances=np.zeros(states), felt=np.zeros(2), pulls=np.zeros(n), evidence=np.zeros(1), half=np.zeros((states, states)),
         turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)), mixed_p=np.zeros((3, states, states)),
@@ -423,11 +425,8 @@ def take_lengths(p, f, k, size, y):
 
 
 @inner
-def start_models(p, f, speeds, swing):
-    """Begin at rest at the drives of the posture.
-
-    `speeds` (n,) in m/s and `swing` (m) are how fast drives, and how far the tip, may move already.
-    """
+def start_models(p, f, speed, swing):
+    """Begin at rest at the drives of the posture; drives may be as fast as `speed` (m/s), the tip may swing by `swing` (m)."""
     n, m, size = p.drives.shape[0], p.modes[0], all_states(p)
     load, drive = force_place(p), drive_place(p)
     noise, x, covariance = f.noise, f.x[VALVES], f.p[VALVES]
@@ -446,21 +445,19 @@ def start_models(p, f, speeds, swing):
         if j == 0 and motion2 > 0.0:
             off2 += swing * swing / motion2
         for i in range(n):
-            off2 += (p.forces[2 + n + j, i] * speeds[i]) ** 2 / (omega2 * omega2 * omega2)
+            off2 += (p.forces[2 + n + j, i] * speed) ** 2 / (omega2 * omega2 * omega2)
         covariance[j, j], covariance[m + j, m + j] = off2, omega2 * off2
     for i in range(n):
         x[drive + i] = p.drives[i]
         covariance[drive + i, drive + i] = f.noise.length2
-        covariance[drive + n + i, drive + n + i] = CLOSED_RATE * CLOSED_RATE + speeds[i] * speeds[i]
-        f.jerk[i], f.is_open[i], f.still[i] = JERK, 0, 0.0
-        f.length2[i] = noise.length2
+        covariance[drive + n + i, drive + n + i] = CLOSED_RATE * CLOSED_RATE + speed * speed
+        f.jerk[i], f.is_open[i], f.still[i] = JERK, 1 if speed > 0.0 else 0, 0.0
+        f.length2[i], f.pulls[i] = noise.length2, p.pulled[i]
         f.before[i, 0] = f.before[i, 1] = f.before[i, 2] = math.nan
-        if speeds[i] > 0.0:
-            f.is_open[i] = 1
     copy_model(f, VALVES, OPEN, size)
     copy_model(f, VALVES, BURST, size)
     f.chances[VALVES], f.chances[OPEN], f.chances[BURST] = 0.8, 0.1, 0.1
-    f.excess[:] = 1.0
+    f.excess[:], f.shaking[0] = 1.0, 0.0
     mix(f, PREDICTION, zero_place(p))
     follow_prediction(p, f)
     f.status[STARTED], f.status[FED] = 1, 0
@@ -551,7 +548,7 @@ def mix(f, mixture, size):
 def step_models(p, f, h, y):
     """Take all models `h` (s) on to lengths `y` (n, m; NaN = missing)."""
     size, every = zero_place(p), all_states(p)
-    learn_length_noise(f, y)
+    learn_length_noise(f, h, y)
     usual2 = f.load2[0]
     burst2 = max(f.noise.burst_load * f.noise.burst_load, usual2)
     if h > 0.0:
@@ -655,9 +652,15 @@ def learn_jerk(p, f, h):
 
 
 @inner
-def learn_length_noise(f, y):
-    """Learn the noise of lengths from third differences, 20 times its variance; no cylinder moves so unevenly."""
+def learn_length_noise(f, h, y):
+    """Learn the noise of lengths from third differences, 20 times its variance; no cylinder moves so unevenly.
+
+    Lengths that came `h` (s) after those before, and not in even steps with them, begin a new series of differences.
+    """
+    is_even, f.interval[0] = abs(h - f.interval[0]) < UNEVEN * h, h
     for i in range(y.shape[0]):
+        if not is_even:
+            f.before[i, 0] = f.before[i, 1] = f.before[i, 2] = math.nan
         third = y[i] - 3.0 * f.before[i, 0] + 3.0 * f.before[i, 1] - f.before[i, 2]
         if math.isfinite(third):
             found = f.length2[i] + LEARN_LENGTH * (third * third / 20.0 - f.length2[i])

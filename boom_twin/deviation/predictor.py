@@ -34,7 +34,7 @@ MODES = 6  # at most
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
 WIDTH = 1e-6  # relative accuracy of natural frequencies
 USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD = 2.5e-3, 1e-4, 2e-3, 2e-2  # shares of the boom's weight, see `SensorNoise`
-SWING = 0.3  # of the tip's deflection: how far a boom at work swings
+SWING, SPEED = 0.3, 0.05  # how far a boom at work swings, as a share of the tip's deflection; m/s of its cylinders
 
 
 class Drawn(NamedTuple):
@@ -145,13 +145,13 @@ class BoomPredictor:
         """Variances of the strokes as predicted, m^2, shape (n,)."""
         return self._row[self.places.variances]
 
-    def start(self, strokes: Array, speeds: Array | None = None) -> None:
+    def start(self, strokes: Array, may_move: bool = False) -> None:
         """Forget all; at rest in equilibrium where transducers read `strokes` (m), shape (n,).
 
         Parameters
         ----------
-        speeds : ndarray, shape (n,), or None
-            How fast the cylinders may move already, m/s; None if the boom rests.
+        may_move : bool
+            Whether the boom may be at work already: the covariance then allows for it.
 
         Raises
         ------
@@ -176,7 +176,7 @@ class BoomPredictor:
         if status != OK:
             raise SolverError(SENTENCES[int(status)])
         sag = float(np.hypot(*(boom.frames[-1, :2] - self._undeflected.at(rigid)[-1])))
-        start_models(p, f, np.zeros_like(drives) if speeds is None else speeds, 0.0 if speeds is None else SWING * sag)
+        start_models(p, f, SPEED if may_move else 0.0, SWING * sag if may_move else 0.0)
 
     @property
     def angles(self) -> Array:

@@ -110,7 +110,6 @@ class Twin:
         self._run: Run | None = None
         self._is_new = True
         self._failed: int | None = None
-        self._speeds: Array | None = None
         self._lines = self._new_lines()
         self._zeros = SensorZeros(self._state, self._channels)
         self._recent = ResidualBuffer(self._state.recent, self._channels)
@@ -124,7 +123,6 @@ class Twin:
     def reset(self) -> None:
         """Forget all samples; the next full stroke sample starts from static equilibrium. Load, limits and zeros stay."""
         self._begin_anew()
-        self._speeds = None
         self._lines = self._new_lines()
         self._state.waiting.bounds[:] = 0
 
@@ -222,9 +220,7 @@ class Twin:
 
     def _begin_anew_at(self, stamp: int) -> None:
         """Start from rest with the strokes of `stamp` (ns), though the boom may be at work; what was measured since waits."""
-        speeds = np.fmin(np.abs(self._boom.speeds), self.settings.stroke_rate)
         self._begin_anew()
-        self._speeds = speeds
         drop_waiting(self._state, NONE, stamp - 1)
 
     def _begin_anew(self) -> None:
@@ -420,9 +416,7 @@ class Twin:
             self._rebase(run, span - usual)
         elif why is TimeStep.NEITHER:
             events = ["restart" if span > 0 else "jump back"]
-            speeds = self._speeds_of(held)
             self.reset()
-            self._speeds = speeds
         elif events and why is TimeStep.EITHER:
             self._boom.add_phase(self._boom.prediction(run.newest))
         reports, asked = [], self._judged
@@ -431,12 +425,6 @@ class Twin:
             reports.append(self._follow(sample, self._zeroed(sample), complete, events))
             events = []
         return replace(reports[-1], earlier=tuple(reports[:-1]))
-
-    def _speeds_of(self, held: list[Sample]) -> Array:
-        """Of strokes (m/s) around a start from rest: before it as estimated, after it as measured, whichever is larger."""
-        before, (first, last) = np.abs(self._boom.speeds), (held[0], held[-1])
-        after = np.abs(last.values - first.values) / ((last.stamp - first.stamp) * NANO)
-        return np.asarray(np.fmin(np.fmax(before, after), self.settings.stroke_rate))
 
     def _released(self, line: StampCheck) -> list[Sample]:
         """Samples that were held; what those before the newest were told to be counts no more."""
@@ -491,12 +479,11 @@ class Twin:
 
     def _start(self, sample: Sample, events: list[str]) -> Report:
         try:
-            self._boom.start(sample.values, self._speeds)
+            self._boom.start(sample.values, not self._is_new)
         except BoomTwinError as error:
             self._failed = sample.stamp if isinstance(error, SolverError) else self._failed
             return self._refuse(sample, "model", *events, status=str(error))
-        speeds, self._speeds = self._speeds, None
-        self._run = Run(self._state, sample.stamp, speeds is not None)
+        self._run = Run(self._state, sample.stamp, not self._is_new)
         return self._step(self._run, sample, events)
 
     def _step(self, run: Run, sample: Sample, events: list[str]) -> Report:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from drive_twin import ARCH_DRIVES, drive_twin
+from drive_twin import drive_twin
 
-from boom_twin import Sample, Settings, Stream, load_scene
+from boom_twin import Sample, Settings, Stream, Twin, load_scene
 from boom_twin.bag.reader import read, scan
 from boom_twin.deviation.sensor_model import TURN
 from boom_twin.scene.kinematics import strokes_of_posture
 
 MS = 1_000_000
+ARCH = Path(__file__).parents[2] / "bags" / "arch_session"
 
 
 @pytest.fixture(scope="module")
@@ -73,12 +76,12 @@ def test_deviations_add_up_towards_the_tip(scene):
 
 def test_an_inclinometer_at_the_tip_of_the_bundled_session(scene):
     """The rig's own angle of the last head, from an independent code, with the noise of the session's encoders."""
-    truth = np.genfromtxt(ARCH_DRIVES / "truth.csv.gz", delimiter=",", names=True)
+    truth = np.genfromtxt(ARCH / "truth.csv.gz", delimiter=",", names=True)
     noise = np.random.default_rng(5).normal(0.0, Settings().angle_sigma, len(truth))
-    twin, found = drive_twin(scene, Settings(), [None, None, None, "head"]), []
+    twin, found = Twin(scene, Settings(), [None, None, None, "head"]), []
     rows = 4000
     for row, (_, _, msg) in zip(
-        range(rows), read(scan(ARCH_DRIVES), {"cylinder_strokes": "sensor_msgs/msg/JointState"}), strict=False
+        range(rows), read(scan(ARCH), {"cylinder_strokes": "sensor_msgs/msg/JointState"}), strict=False
     ):
         stamp = msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec
         twin.update(Sample(Stream.STROKES, stamp, msg.position))
