@@ -11,17 +11,10 @@ from oracle import booms
 from boom_twin.analysis.equilibrium import rest_at, statics
 from boom_twin.analysis.modal import damping_ratio, natural_modes
 from boom_twin.analysis.simulate import simulate
-from boom_twin.calibration.unknowns import unknowns_of, usual_names
-from boom_twin.compiler.compile import compile_scene
 from boom_twin.config.settings import load_settings
 from boom_twin.deviation.predictor import BoomPredictor
-from boom_twin.health.inference.fault_catalogue import parameters
-from boom_twin.health.inference.sensitivities import Signatures
-from boom_twin.reduction.variants import KINDS, without
-from boom_twin.scene.edit import parameter, parameter_names, with_parameters
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 from boom_twin.scene.oil_spring import stiffness
-from boom_twin.types import Stream
 
 OIL = {"bore": 0.1, "rod": 0.07, "bulk_modulus": 1.5e9, "cap_line": 1e-3, "rod_line": 8e-4}
 

@@ -37,7 +37,7 @@ def test_it_is_what_a_twin_comes_to() -> None:
     for k in range(4000):
         report = twin.update(Sample(Stream.STROKES, 5_000_000 * k, rest.lengths + 2e-5 * rng.normal(size=4)))
         assert report.estimate is not None
-        twin._boom.filters.load2[:] = twin._boom.filters.noise.usual_load ** 2
+        twin._boom.filters.load2[:] = twin._boom.filters.noise.usual_load**2
         twin.update(Sample(Stream.ANGLES, 5_000_000 * k, rest.joints + 1.745e-4 * rng.normal(size=4)))
         estimates.append(report.estimate.tip_covariance[[0, 3, 5]])
     assert np.sqrt(np.mean(estimates[2000:], axis=0)) == pytest.approx(stated.tip, rel=0.15)  # learnt noise adds to it

@@ -19,8 +19,8 @@ from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_session
 from boom_twin.bag.session_sheet import SessionSheet
 from boom_twin.config.settings import Settings
-from boom_twin.errors import BagError, UsageError
 from boom_twin.deviation.load_spectrum import tip_load
+from boom_twin.errors import BagError, UsageError
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.monitor.data.analyst import Analyst
