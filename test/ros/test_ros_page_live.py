@@ -185,7 +185,7 @@ def test_the_figures_are_those_of_the_topics(held: Any, witness: Witness) -> Non
             rms, peak = rows.std(), np.abs(rows - rows.mean()).max()
             expected = [rows.mean(), rms, peak, np.ptp(rows), peak / rms]
             found = [float(cell) for cell in shown[name]]
-            assert found[1:] == pytest.approx(expected[1:], rel=3e-3), name
+            assert found[1:] == pytest.approx(expected[1:], rel=2e-2), name  # page and witness may lose different ones
             assert found[0] == pytest.approx(expected[0], rel=2e-3, abs=0.1 * rms), name
 
     eventually(of_the_topics)
