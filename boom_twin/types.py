@@ -427,21 +427,14 @@ class Health:
         End of the newest block of residuals that was judged.
     alarms : tuple of Alarm
         All that last, and those that have ended since the last `Health`.
-    names : tuple of str
-        Of the channels.
-    levels : ndarray, shape (channels,)
-        How near each channel is to an alarm, which is at 1.
     tip_sigmas : ndarray, shape (2,)
-        Standard deviation of the predicted tip's x and y, m: strokes' noise, and what model and sensors may be off by.
+        Standard deviation of the predicted tip's x and y, m.
     noise : dict
         How many times the stated noise most sensors of a stream have, at least 1; ``noise_over_`` and the name of its setting.
-        While a load shakes the tip, from which loss of stiffness (share) on each could be told: ``told_from_``, its cause.
     """
 
     stamp: int
     alarms: tuple[Alarm, ...]
-    names: tuple[str, ...]
-    levels: Array
     tip_sigmas: Array
     noise: Mapping[str, float] = field(default_factory=dict)
 

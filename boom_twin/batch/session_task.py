@@ -122,7 +122,7 @@ def row_of(task: SessionTask) -> Row:
     assert session is not None
     scene, settings = scene_of(session, task.scene), settings_of(session, params).settings
     window = TimeWindow(task.start, task.duration)
-    evaluator = Evaluator(scene.scene, settings, baseline)
+    evaluator = Evaluator(scene.scene, settings)
     with result_folder(Path(task.out), REPLAY, [session]) as building:
         result = replay_into(
             building, session, scene, settings, mapping=mapping, baseline=baseline, window=window, take=evaluator.add

@@ -1,8 +1,8 @@
-"""Learn a health baseline from recorded healthy sessions, and read and write its file."""
+"""Write the file of a baseline."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from io import StringIO
 from pathlib import Path
 
@@ -12,58 +12,8 @@ from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import UsageError
 from ..health.baseline import Baseline
-from ..health.inference.block_problem import BlockProblem
-from ..health.inference.fault_catalogue import parameters
-from ..health.learning import learn
-from ..health.suspicion import load_levels
-from ..scene.edit import loaded
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
-from ..twin.driver import drive
-from ..twin.twin import Twin
-from ..types import Mount, Sample, StrokeReading
-from .run import common_mapping, refuse_lengths
-from .sessions import read_sessions
-
-
-def learn_baseline(
-    scene: Scene,
-    settings: Settings,
-    sessions: Iterable[Iterable[Sample]],
-    names: Sequence[str],
-    mounts: Sequence[Mount | None] = (),
-    progress: Callable[[float, str], None] = lambda share, what: None,
-) -> Baseline:
-    """What model and sensors are off by in `sessions`, called `names`, in which all was well.
-
-    A pump or wind may have shaken them. `progress` is told the share done and what comes next.
-
-    Raises
-    ------
-    UsageError
-        Too few usable samples to learn from.
-    """
-    problems: list[list[BlockProblem]] = []
-    for name, session in zip(names, sessions, strict=True):
-        progress(0.3 * len(problems) / len(names), name)
-        problems.append(_problems(scene, settings, session, mounts))
-    scene = loaded(scene, *settings.load)
-
-    def tell(share: float) -> None:
-        progress(0.3 + 0.7 * share, "learning")
-
-    return learn(problems, parameters(scene), len(scene.joints), names, tell, load_levels(scene).tolist())
-
-
-def _problems(
-    scene: Scene, settings: Settings, session: Iterable[Sample], mounts: Sequence[Mount | None]
-) -> list[BlockProblem]:
-    """The linear problems that a twin makes of one session."""
-    found: list[BlockProblem] = []
-    for _ in drive(Twin(scene, settings, mounts, Baseline(), found.append, StrokeReading.DRIVE), session):
-        pass
-    return found
-
 
 WIDTH = 120
 
@@ -91,27 +41,12 @@ def baseline_of(
     window : TimeWindow, optional
         The part of each session that is used.
 
-    Returns
-    -------
-    Baseline
-        Mean and covariance of the parameters, and the errors that stay; see `boom_twin.health.baseline`.
-
     Raises
     ------
     UsageError
-        Sessions with different mappings, or too short.
-    BagError
-        A session that cannot be used.
+        Always: what was learnt for the inference of causes is of no use without it.
     """
-    paths, joints = [Path(bag) for bag in bags], len(scene.joints)
-    progress(0.0, "reading")
-    mapped = common_mapping(paths, Path(mapping) if mapping else None, joints)
-    refuse_lengths(paths, mapped)
-    topics = mapped.topics.of_joints(joint.range_deg for joint in scene.joints)
-    sessions = read_sessions(paths, topics, joints, window)
-    mounts = topics.mounts(joints)
-    names = [f"{session.name} {session.digest}" for session in sessions]
-    return learn_baseline(scene, settings or Settings(), (session.samples() for session in sessions), names, mounts, progress)
+    raise UsageError("a baseline is not learnt: no cause is inferred that it would serve. Leave --baseline out.")
 
 
 def write_baseline(baseline: Baseline, path: Path, credit: str, force: bool) -> None:

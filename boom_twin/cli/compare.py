@@ -63,7 +63,7 @@ def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) ->
         print(f"replaying {session} ..", file=sys.stderr)
         scene, settings = open_session_scene(session, args.scene), open_session_settings(session, args.params)
         inner = building.inner(name)
-        evaluator = Evaluator(scene.scene, settings, args.baseline)
+        evaluator = Evaluator(scene.scene, settings)
         result = replay_into(inner, session, scene, settings, baseline=args.baseline, window=window, take=evaluator.add)
         evaluator.finish(result, inner.folder)
         return inner.folder

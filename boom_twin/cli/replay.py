@@ -88,7 +88,7 @@ def run(args: Namespace) -> int:
         progress = partial(progress_of, unit="messages", name="replay")
         asked = args.mapping, not args.no_changes, not args.no_health, args.baseline
         options = settings, progress, *asked, window, args.namespace
-        evaluator = Evaluator(scene.scene, settings, args.baseline, heights, args.fatigue)
+        evaluator = Evaluator(scene.scene, settings, heights, args.fatigue)
         joints, name = len(scene.scene.joints), f"samples.{args.table}"
         table = SampleTable(table_file(building.folder / name, joints), joints) if args.table else None
 
@@ -139,7 +139,6 @@ def _write(args: Namespace, result: Replay, found: Evaluation, scene: SessionSce
 
 def as_text(summary: dict[str, Any]) -> list[str]:
     """A short table."""
-    from ..health.alarm_text import limits_as_text
     from ..health.sensor_monitor import noise_as_text
     from ..offline.replay import alarm_as_text
 
@@ -167,7 +166,6 @@ def as_text(summary: dict[str, Any]) -> list[str]:
     for name, count in summary.get("lost_contacts", {}).items():
         lines.append(f"{name:18s} lost contact between two samples {count} times")
     lines += [f"noise              {told}" for told in noise_as_text(summary)]
-    lines += [f"judgement          {told}" for told in limits_as_text(summary)]
     if summary["output_sha256"] is None:
         lines.append("result bag         not written (--no-bag)")
     alarms = summary["alarms"]

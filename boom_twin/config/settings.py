@@ -20,7 +20,7 @@ Table = TypeVar("Table", bound=BaseModel)
 _GONE = ("jerk_density", "lag", "stroke_agility", "step", "look_step", "step_tip_error", "step_acceleration_error", "rho")
 RETIRED = dict.fromkeys(
     (*_GONE, "section_deviation"), "without effect since 0.2.0, whose filter adapts by itself: leave it out"
-)
+) | dict.fromkeys(("false_alarms", "tip_load_limit"), "without effect since 0.2.0, which infers no causes: leave it out")
 """Parameters of earlier versions, and what takes their place."""
 
 
@@ -173,8 +173,9 @@ class Settings(BaseModel):
     jump_back: Limit = Field(default=1.0, description="a stamp earlier by less may be of a late sample, s")
     leap: Limit = Field(default=3600.0, description="a longer step of the first stamps of angles is confirmed, s")
     exaggeration: Positive = Field(default=10.0, description="factor of the displacements drawn large in ~/shape")
-    false_alarms: Positive = Field(default=0.03, description="false alarms of all residuals together that are allowed, a day")
-    tip_load_limit: Positive = Field(default=500.0, description="force at the tip beside the known load that is an alarm, N")
+    tip_deviation: Positive = Field(default=0.02, description="an angle off its prediction by more at the tip is an alarm, m")
+    imu_deviation: Positive = Field(default=0.7, description="an IMU's axis off its prediction by more is an alarm, m/s^2")
+    force_deviation: Positive = Field(default=5e3, description="a cylinder force off its prediction by more is an alarm, N")
     force_scale: Positive = Field(default=1.0e5, description="cylinder force that has the full colour in ~/shape, N")
 
     @classmethod

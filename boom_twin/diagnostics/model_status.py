@@ -12,6 +12,7 @@ import numpy as np
 from ..config.settings import Thresholds
 from ..deviation.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms, repeated, values_of
+from ..health.deviations import KIND as DEVIATION
 from ..health.sensor_monitor import noise_as_text
 from ..types import SECOND, Alarm, Array, Estimate, Health, Report
 from .levels import Bounds, ComponentJudge, Evaluation, Level, Status
@@ -295,8 +296,9 @@ class HealthWatch:
 
     @property
     def explained(self) -> str:
-        """Where to look for what residuals deviate by: the channels whose alarms were inferred from them; empty without one."""
-        channels = dict.fromkeys(alarm.channel for alarm in self._alarms.lasting if alarm.ranked)
+        """Return a reference to the alarms that large residuals raised; empty without one."""
+        found = (alarm for alarm in self._alarms.lasting if alarm.ranked or alarm.kind == DEVIATION)
+        channels = dict.fromkeys(alarm.channel for alarm in found)
         return f"judged by health: alarm of {', '.join(channels)}" if channels else ""
 
     def status(self, at: Evaluation) -> Status:

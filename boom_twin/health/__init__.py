@@ -1,1 +1,1 @@
-"""What residuals mean: detection, inference, alarms."""
+"""Alarms: of sensors by themselves, and of channels that deviate from the prediction."""

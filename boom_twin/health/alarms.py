@@ -41,7 +41,7 @@ class Alarms:
         self._keep(self.lasting)
 
     def fold_ended(self) -> list[Alarm]:
-        """Keep of those that ended and are of the same channel, kind and cause the newest; gives the others."""
+        """Keep of those that ended and are of the same channel, kind and cause the newest; return the others."""
         newest = {repeated(alarm): alarm for alarm in self.all if alarm.until is not None}
         gone = [alarm for alarm in self.all if alarm.until is not None and newest[repeated(alarm)] is not alarm]
         if gone:
@@ -54,17 +54,17 @@ class Alarms:
 
     @property
     def lasting(self) -> list[Alarm]:
-        """Those that have not ended."""
+        """Alarms that have not ended."""
         return [self.all[place] for place in self._lasting.values()]
 
 
 def repeated(alarm: Alarm) -> tuple[str, str, str | None]:
-    """What is the same of an alarm that comes again: channel, kind and cause."""
+    """Return what is the same of an alarm that comes again: channel, kind and cause."""
     return alarm.channel, alarm.kind, alarm.cause
 
 
 def values_of(alarm: Alarm) -> dict[str, str]:
-    """An alarm as named values: times are stamps in s, units end the names, ``nan`` is not known."""
+    """Return an alarm as named values: times are stamps in s, units end the names, ``nan`` is not known."""
     found = {
         "kind": alarm.kind,
         "cause": alarm.cause or "",
@@ -80,7 +80,7 @@ def values_of(alarm: Alarm) -> dict[str, str]:
 
 
 def alarm_of(channel: str, told: str, values: Mapping[str, str]) -> Alarm:
-    """An alarm from what `values_of` made of it: stamps to the millisecond, causes without what would be the matter.
+    """Return an alarm from what `values_of` made of it: stamps to the millisecond, causes without what would be the matter.
 
     Raises
     ------
@@ -96,5 +96,5 @@ def alarm_of(channel: str, told: str, values: Mapping[str, str]) -> Alarm:
 
 
 def _stamp(seconds: str) -> int:
-    """In ns."""
+    """Return a stamp, ns."""
     return round(float(seconds) / NANO)

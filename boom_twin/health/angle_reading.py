@@ -15,11 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BoomTwinError
-from ..kernels.jit import SameTypes
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Alarm, Array, Mount, Ranked
-from .sensor_survey import follow_heard
 from .stream_readings import ENOUGH, WINDOW, StreamReadings
 
 FAR = radians(1.0)  # by which readings have to be off, and two expected angles apart, for their exchange to be told
@@ -55,7 +53,6 @@ class AngleReading:
         self._scene, self._are_encoders = scene, not any(mounts)
         self._found: list[_Exchange] = []
         self._none = np.zeros(len(scene.joints), dtype=bool)
-        self._follow_heard = SameTypes(follow_heard)
         self.begin()
 
     def begin(self) -> None:
@@ -66,7 +63,7 @@ class AngleReading:
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
-        """Those that last."""
+        """Alarms that last."""
         return tuple(found.alarm for found in self._found)
 
     @property
@@ -81,16 +78,16 @@ class AngleReading:
 
     @property
     def has_wrong_strokes(self) -> bool:
-        """Whether strokes are swapped, and so nothing is predicted rightly."""
+        """True if strokes are swapped, so that nothing is predicted rightly."""
         return any(found.is_of_strokes for found in self._found)
 
     def explains(self, alarm: Alarm) -> bool:
-        """Whether an alarm of a single sensor says less of what is told here."""
+        """Return True if an alarm of a single sensor is a part of what is told here."""
         joints = {joint for found in self._found if not found.is_of_strokes for joint in found.joints}
         return alarm.kind in {"range", "jump", "noise", "spikes"} and alarm.channel in {f"joint_{i + 1}" for i in joints}
 
     def take(self, readings: StreamReadings, strokes: Array, span: float, start: int, end: int) -> list[Alarm]:
-        """Take a block; gives alarms that began or ended.
+        """Take a block; return alarms that began or ended.
 
         Parameters
         ----------
@@ -103,11 +100,10 @@ class AngleReading:
         start, end : int
             Of the block, ns.
         """
-        counts, off = readings.counts, readings.off
-        is_heard, largest = self._follow_heard(self._strokes, strokes, counts, min(1.0, span / WINDOW), off)
-        if not is_heard or not (self._is_off or self._found or largest > FAR):
+        heard, is_off = readings.counts > 0.0, np.abs(readings.off) > FAR
+        self._strokes[heard] += min(1.0, span / WINDOW) * (strokes - self._strokes)[heard]
+        if not heard.any() or not (self._is_off or self._found or is_off.any()):
             return []
-        heard, is_off = counts > 0.0, np.abs(off) > FAR
         self._since = np.where(is_off, np.where(self._since < 0, start, self._since), np.where(heard, -1, self._since))
         self._is_off = bool((self._since >= 0).any())
         weight = np.maximum(readings.slow.weight, 1e-9)
@@ -122,7 +118,7 @@ class AngleReading:
 
     @staticmethod
     def _is_over(found: _Exchange, read: Array, expected: Array) -> bool:
-        """Whether joints read their own angles; where an exchange would make no difference, that is not known."""
+        """Return True if joints read their own angles; False where an exchange would make no difference."""
         if found.is_in_degrees:
             return all(abs(read[i] - expected[i]) < max(FAR, RIGHT * abs(degrees(expected[i]))) for i in found.joints)
         first, last = found.joints[0], found.joints[-1]
@@ -131,7 +127,7 @@ class AngleReading:
         return bool(apart > FAR and all(abs(read[i] - expected[i]) < RIGHT * least for i in found.joints))
 
     def _begun(self, is_known: NDArray[np.bool_], read: Array, expected: Array, strokes: Array) -> list[Alarm]:
-        """Alarms that begin, of angles that were read and expected, rad, and strokes, m, lately; shape (n,) each."""
+        """Return alarms that begin, by slow means of angles read and expected (rad) and of strokes (m), shape (n,) each."""
         taken = self.masked
         off = is_known & (np.abs(read - expected) > FAR) & ~taken & (self._since >= 0)
         if not off.any():
@@ -206,6 +202,6 @@ class AngleReading:
 
 
 def _are_in_degrees(read: Array, expected: Array) -> bool:
-    """Whether all readings are what the model expects, rad, in degrees, and one of them can be nothing else."""
+    """Return True if all readings are the expected angles (rad) in degrees, and one of them can be nothing else."""
     is_near = np.abs(np.radians(read) - expected) < FAR + CLOSE * np.abs(expected)
     return bool(is_near.all() and np.abs(read).max() > TURN)

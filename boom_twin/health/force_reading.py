@@ -22,7 +22,7 @@ RIGHT = 0.5  # of the force: a reading that is less off has the right unit and s
 
 
 def _reasons() -> dict[str, float]:
-    """What may be wrong, and by which factor it is read then; units as of who states N, and N as of who states another."""
+    """Return reasons for a wrong reading with its factor: units of who states N, and N of who states another unit."""
     units = {unit: size for unit, size in SENSORS[Stream.FORCES].units.items() if size != 1.0}
     found = {f"in {unit}": 1.0 / size for unit, size in units.items()}
     found |= {f"in N and stated as {unit}": size for unit, size in units.items()}
@@ -52,7 +52,7 @@ class ForceReading:
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
-        """Those that last."""
+        """Alarms that last."""
         return tuple(self._alarms.values())
 
     @property
@@ -62,7 +62,7 @@ class ForceReading:
         return found | bool(self._alarms) & (found | ~self._is_large).all()
 
     def take(self, readings: StreamReadings, start: int, end: int) -> list[Alarm]:
-        """Take a block from `start` to `end` (ns) of forces in N; gives alarms that began or ended."""
+        """Take a block from `start` to `end` (ns) of forces in N; return alarms that began or ended."""
         if not any(readings.counts.tolist()):
             return []
         heard, slow = readings.counts > 0.0, readings.slow
@@ -83,7 +83,7 @@ class ForceReading:
         return news
 
     def _is_lasting(self, i: int, reason: str, start: int, end: int) -> bool:
-        """Whether this reason has explained what channel `i` reads for long, up to the block from `start` to `end` (ns)."""
+        """Return True if this reason has explained channel `i` for `LASTING` at the block from `start` to `end` (ns)."""
         if self._reasons.get(i, ("", 0))[0] != reason:
             self._reasons[i] = reason, start
         return bool(reason) and end - self._reasons[i][1] >= LASTING
@@ -103,7 +103,7 @@ def _three_digits(force: float) -> str:
 
 
 def _reason(factor: float) -> str:
-    """What explains that the model's force is read times `factor`, in words; empty where nothing does, or needs to."""
+    """Return the reason for reading `factor` times the model's force; empty where none explains it or is needed."""
     if abs(factor - 1.0) < RIGHT:
         return ""
     return next((reason for reason, by in REASONS.items() if abs(factor / by - 1.0) < CLOSE), "")

@@ -29,7 +29,7 @@ REASONS = {
     "turned by 90 deg anticlockwise": lambda x, z: (-z, x),
     "turned by 90 deg clockwise": lambda x, z: (z, -x),
 }
-"""What may be wrong, and what readings (x, z) in m/s^2 then mean."""
+"""Reasons for a wrong mean, and what readings (x, z) in m/s^2 then mean."""
 TAKEN_OUT = "with gravity taken out"
 
 
@@ -47,7 +47,7 @@ class ImuMount:
         self._reasons: tuple[str, ...] = ()
 
     def take(self, readings: StreamReadings, start: int, end: int) -> list[Alarm]:
-        """Take a block from `start` to `end` (ns) of readings in m/s^2; gives an alarm that began or ended."""
+        """Take a block from `start` to `end` (ns) of readings in m/s^2; return an alarm that began or ended."""
         if not all(readings.counts.tolist()):
             return []
         slow = readings.slow
@@ -74,23 +74,23 @@ class ImuMount:
         return self.alarm
 
     def _is_reason_open(self, slow: SlowMeans) -> bool:
-        """Whether what was told explains the readings still: an axis the other way round shows only where gravity is in it."""
+        """Return True if a reason still explains the readings: a reversed axis shows only where gravity is in it."""
         read, expected = _means(slow)
         return any(_miss(reason, read, expected) < FAR for reason in self._reasons)
 
 
 def _means(slow: SlowMeans) -> tuple[list[float], list[float]]:
-    """What was read and what was expected, m/s^2 in x and z."""
+    """Return the slow means of what was read and expected, m/s^2 in x and z."""
     return (slow.read / slow.weight).tolist(), (slow.expected / slow.weight).tolist()
 
 
 def _miss(reason: str, read: list[float], expected: list[float]) -> float:
-    """How far the mean is off what is expected if it is read as `reason` says, m/s^2."""
+    """Return how far the mean is off the expected one if it is read as `reason` says, m/s^2."""
     return math.hypot(*read) if reason == TAKEN_OUT else math.dist(REASONS[reason](*read), expected)
 
 
 def _likely(read: list[float], expected: list[float]) -> tuple[str, ...]:
-    """What explains the mean, in words; nothing where nothing does."""
+    """Return the reasons that explain the mean."""
     if math.hypot(*read) < CLEAR:
         return (TAKEN_OUT,)
     missed = {reason: _miss(reason, read, expected) for reason in REASONS}

@@ -14,11 +14,11 @@ from ..scene.schema import Scene
 from ..types import GIVE, Array, Mount, Stream, channels_of
 from .sensor_findings import NOISY as IS_NOISY
 from .sensor_findings import OUTSIDE, SILENT, SPIKE, SPIKES, STUCK, find
-from .sensor_survey import FIRST, LASTING, NOISE, ROOM, CheckWork, survey
+from .sensor_survey import FIRST, LASTING, ROOM, CheckWork, survey
 
 
 def readings_of_frozen(sigma: float, resolution: float, false_alarm: float) -> float:
-    """Equal readings in a row that white noise gives with a probability below `false_alarm`.
+    """Return the number of equal readings in a row that white noise gives with a probability below `false_alarm`.
 
     Noise of standard deviation s, read out in steps of q, repeats a reading with a probability of at most
 
@@ -62,7 +62,7 @@ MISSING = 0.1  # share of the readings
 
 
 def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, tuple[Array, Array]]:
-    """Lowest and highest values that the sensors of every stream can measure.
+    """Return the lowest and highest values that the sensors of every stream can measure.
 
     Parameters
     ----------
@@ -157,12 +157,6 @@ class SensorCheck:
         """Times the noise that is stated, as it is with most channels, lately."""
         return math.sqrt(self._known.lately[LASTING]) / self._sigma
 
-    @property
-    def noise_now(self) -> float:
-        """The same over `NOISY_WINDOW` where it is worth a warning; else 1."""
-        times = math.sqrt(self._known.lately[NOISE]) / self._sigma
-        return times if times > MISSTATED else 1.0
-
     def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
         """Take the readings of a block.
 
@@ -191,7 +185,7 @@ class SensorCheck:
             self._held = hold(self._known)
 
     def _findings(self, largest: float, rows: int, now: float) -> SensorFindings:
-        """What is found in so many readings, whose largest step is `largest`."""
+        """Return the findings in so many readings, whose largest step is `largest`."""
         known = self._known
         interval = (known.times[2 + rows] - known.times[2]) / rows
         is_motion = self._fastest > 0.0 and JERK * interval**3 > NOISY * self._sigma  # what bends readings so much
@@ -209,6 +203,6 @@ class SensorCheck:
 
 
 def repeats(sigma: float, resolution: float) -> int:
-    """Times that a reading repeats with a probability below `FALSE_ALARM` while the sensor lives, within `REPEATS`."""
+    """Return how often a live sensor repeats a reading with a probability below `FALSE_ALARM`, within `REPEATS`."""
     least, most = REPEATS
     return int(min(max(readings_of_frozen(sigma, resolution, FALSE_ALARM) - 1.0, least), most))

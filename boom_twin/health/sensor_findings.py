@@ -1,11 +1,11 @@
-"""What is found in a block of readings of single sensors, compiled: stuck, noisy, spikes, silence, out of range, jumps."""
+"""Findings in a block of readings of single sensors, compiled: stuck, noisy, spikes, silence, out of range, jumps."""
 
 from __future__ import annotations
 
 import math
 
 from ..kernels.jit import inner, kernel
-from .sensor_survey import GAP, LACK, LEAP, PATIENCE, ROWS, STATED, loud, noise2_at, sorted_in
+from .sensor_survey import GAP, LACK, LEAP, PATIENCE, ROWS, STATED, loud, noise2_at
 
 STUCK, NOISY, SPIKES, SILENT, OUTSIDE = range(5)  # rows of the flags that `find` writes
 SPIKE = 8.0  # deviations of the noise by which a reading leaves both of its neighbours
@@ -17,7 +17,7 @@ ENOUGH, MEDIAN2 = 6, 0.4549  # third differences whose median tells noise; that 
 
 @kernel
 def find(sensors, largest, now, is_known, fastest, column, flags, jumped):
-    """Write what is found in the block that `boom_twin.health.sensor_survey.survey` took; gives whether there is anything.
+    """Write the findings in the block that `boom_twin.health.sensor_survey.survey` took; return True if there is any.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def find(sensors, largest, now, is_known, fastest, column, flags, jumped):
 
 @inner
 def is_any_live(sensors):
-    """Whether a channel of several is alive with noise."""
+    """Return True if a channel of several is alive with noise."""
     power, least = sensors.power, QUIET * math.sqrt(sensors.limits[STATED])
     live = False
     for i in range(power.shape[0] if power.shape[0] > 1 else 0):
@@ -67,7 +67,7 @@ def is_any_live(sensors):
 
 @inner
 def noise_of(sensors, count, i, column):
-    """Noise of channel i: as measured over time, or by the median of the third differences of the readings, and as stated.
+    """Return the noise of channel i: as measured over time, by the median of third differences, or as stated.
 
     That median does not wait for the noise to be measured, as a mean over time does, and one spike leaves it as it is. A sensor
     that has twice the stated noise gives no spikes by that.
@@ -83,8 +83,21 @@ def noise_of(sensors, count, i, column):
 
 
 @inner
+def sorted_in(column, size, value):
+    """Sort a value into the first `size` of a column, which are in order, if it is finite; return how many they are then."""
+    if not math.isfinite(value):
+        return size
+    at = size
+    while at > 0 and column[at - 1] > value:
+        column[at] = column[at - 1]
+        at -= 1
+    column[at] = value
+    return size + 1
+
+
+@inner
 def step(sensors, t, i):
-    """Change of what is left to reading t of channel i from the one before; NaN across a gap."""
+    """Return the change of the residual to reading t of channel i from the one before; NaN across a gap."""
     if sensors.times[t] - sensors.times[t - 1] > sensors.limits[GAP]:
         return math.nan
     return sensors.left[t, i] - sensors.left[t - 1, i]
@@ -92,7 +105,7 @@ def step(sensors, t, i):
 
 @inner
 def has_spikes(sensors, count, i, least):
-    """Whether a reading of channel i leaves both neighbours the same way by more than `least`, while these agree."""
+    """Return True if a reading of channel i leaves both neighbours the same way by more than `least`, while these agree."""
     for t in range(1, count - 1):
         out, back = step(sensors, t, i), -step(sensors, t + 1, i)
         if out * back > 0.0 and abs(out) > least and abs(back) > least and abs(out - back) < 0.5 * min(abs(out), abs(back)):
@@ -102,7 +115,7 @@ def has_spikes(sensors, count, i, least):
 
 @inner
 def jump(sensors, count, i, least, fastest):
-    """How far readings of channel i changed at once by more than `least` and more than `fastest` allows, for good."""
+    """Return how far readings of channel i changed at once by more than `least` and more than `fastest` allows, for good."""
     raw, left, times, total = sensors.raw, sensors.left, sensors.times, 0.0
     for t in range(2, count - 1):
         change = step(sensors, t, i)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ import numpy as np
 from ..types import Alarm, Array, SensorKind
 from .sensor_check import MISSTATED, NOISE_OVER, Flags, SensorFindings
 
-NOTHING: Mapping[str, float] = MappingProxyType({})
 SETTLED = 2_000_000_000  # ns without the fault after which it has ended
 CAME_BACK = 0.3  # of a jump, by which a sensor that came back may still be off
 MEASURED = 4.0  # times the stated noise, above which there may be more: a reading counts for so much at most
@@ -28,7 +26,7 @@ TOLD = {
 
 
 def noise_as_text(figures: Mapping[str, Any]) -> list[str]:
-    """A warning for every stream whose sensors are noisier than stated, by figures as in `Health.noise`."""
+    """Return a warning for every stream whose sensors are noisier than stated, by figures as in `Health.noise`."""
     found = {name.removeprefix(NOISE_OVER): times for name, times in figures.items() if name.startswith(NOISE_OVER)}
     return [
         f"most sensors are {times:.1f} times {'or more ' if times > MEASURED else ''}as noisy as {name} states; judgement "
@@ -44,7 +42,7 @@ class _Fault:
     seen: int
     offset: float = 0.0
     before: float = math.nan
-    """Of a jump: how far the reading was off before it."""
+    """Residual before a jump."""
 
 
 class SensorMonitor:
@@ -82,7 +80,7 @@ class SensorMonitor:
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
-        """Those that last."""
+        """Alarms that last."""
         return tuple(fault.alarm for fault in self._faults.values()) if self._faults else ()
 
     def _mask(self) -> None:
@@ -96,32 +94,27 @@ class SensorMonitor:
         findings: SensorFindings,
         start: int,
         end: int,
-        blamed: Mapping[str, float] = NOTHING,
         newest: Array | None = None,
     ) -> list[Alarm]:
-        """Take what was found in a block from `start` to `end` (ns); gives alarms that began or ended.
+        """Take what was found in a block from `start` to `end` (ns); return alarms that began or ended.
 
-        `blamed`: causes that residuals' alarms are explained by, and by how much a sensor would then be off. One among them
-        that jumps to what the model expects, or back by that much where none does, has come back, and residuals tell so.
         `newest`: by how much the block's last readings are off (strokes: the readings), shape (channels,), if it has any.
         """
         news = self._back_after_start(end, newest)
         if not findings.is_calm or self._faults:
-            news += self._found(findings, start, end, blamed, newest)
+            news += self._found(findings, start, end, newest)
         if news:
             self._mask()
         return news
 
-    def _found(
-        self, findings: SensorFindings, start: int, end: int, blamed: Mapping[str, float], newest: Array | None
-    ) -> list[Alarm]:
-        """Begin, keep and end faults by what was found; gives alarms that began or ended. See `take`."""
+    def _found(self, findings: SensorFindings, start: int, end: int, newest: Array | None) -> list[Alarm]:
+        """Begin, keep and end faults by what was found; return alarms that began or ended. See `take`."""
         news: list[Alarm] = []
         for kind, flags in findings.by_kind().items():
             if kind not in self._sensors.alarms or not flags.any():
                 continue
             for channel in np.flatnonzero(flags & self._there).tolist():
-                if kind == "jump" and (self._is_wild(channel) or self._comes_back(channel, findings, blamed)):
+                if kind == "jump" and self._is_wild(channel):
                     continue
                 jump = (float(findings.jumped[channel]), float(findings.level[channel])) if kind == "jump" else None
                 told = self._offset(float(findings.level[channel])) if kind == "range" else ""
@@ -148,16 +141,8 @@ class SensorMonitor:
         return news
 
     def _is_wild(self, channel: int) -> bool:
-        """Whether jumps mean nothing more: the sensor has another fault, out of which it jumps when it recovers."""
+        """Return True if jumps mean nothing: the sensor has another fault, out of which it jumps when it recovers."""
         return (channel, "jump") not in self._faults and any(known == channel for known, _ in self._faults)
-
-    def _comes_back(self, channel: int, findings: SensorFindings, blamed: Mapping[str, float]) -> bool:
-        """Whether a jump of a sensor that is blamed, and has not jumped before, leaves it at what is expected."""
-        cause, jump = f"{self._names[channel]}.sensor", float(findings.jumped[channel])
-        if cause not in blamed or (channel, "jump") in self._faults:
-            return False
-        off = float(findings.level[channel]) if self._is_predicted else blamed[cause] + jump
-        return abs(off) < CAME_BACK * abs(jump)
 
     def _offset(self, off: float) -> str:
         """Return by how much a reading is off the model, in words; empty where no model says what it should read."""

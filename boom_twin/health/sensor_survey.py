@@ -1,4 +1,4 @@
-"""What single sensors show in a block of readings, compiled: noise, repetition, what is missing or out of range, means."""
+"""Survey of single sensors in a block of readings, compiled: noise, repetition, missing and out-of-range readings, means."""
 
 from __future__ import annotations
 
@@ -14,37 +14,31 @@ from ..types import NANO, Array
 Integers = NDArray[np.int64]
 
 ROOM = 32  # readings of a block for which callers make room at first
-COUNTS, OFF, NEAR, NEAR_COUNTS, RATES, EVENED = range(6)  # rows of `ReadingsWork.numbers`
-MEASURED, SPREAD, TURNING = range(3)  # rows of what `summarise_predictions` writes
-SLOW_READ, SLOW_EXPECTED, SLOW_SQUARES, WEIGHT = range(4)  # of `ReadingsWork.slow`
-VARIANCE, BENT, WHITE, FAR, LOUDEST, NOISE_SHARE = range(6)  # of `ReadingsWork.limits`
+COUNTS, OFF, RATES = range(3)  # rows of `ReadingsWork.numbers`
+SLOW_READ, SLOW_EXPECTED, SLOW_SQUARES, SLOW_VARIANCE, SLOW_RATE, WEIGHT = range(6)  # of `ReadingsWork.slow`
+VARIANCE, BENT, WHITE = range(3)  # of `ReadingsWork.limits`
 GAP, CUT, STATED, WINDOW, LONG_WINDOW, LEAP, LOUD, LOUDEST_USUAL, LACK, PATIENCE = range(10)  # of `CheckWork.limits`
 FIRST, ROWS, NOISE, LASTING = range(4)  # of `CheckWork.lately`
 
 
 @by_reference
 class ReadingsWork(NamedTuple):
-    """What `summarise` goes on with, of one stream.
+    """State of `summarise`, of one stream.
 
-    limits : (6,) variance that noise is stated to have; times of it by which readings bend that move, and share of that power
-    which third differences have for noise; what lies that far from the median is an outlier; the largest variance that counts,
-    and the weight of a block in what is measured.
-    numbers : (6, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
-    slow : (4, channels) weighted sums of what was read and expected, of the squares of the difference, and their weight.
-    noise2 : (channels,) variance of the noise as measured.
-    column : scratch, as long as the largest block.
+    limits : (3,) stated variance of the noise; times of it by which readings of a moving boom bend; share of that power which
+    third differences of noise have.
+    numbers : (3, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
+    slow : (6, channels) see `boom_twin.health.stream_readings.SlowMeans`.
     """
 
     limits: Array
     numbers: Array
     slow: Array
-    noise2: Array
-    column: Array
 
 
 @by_reference
 class CheckWork(NamedTuple):
-    """What `survey` goes on with, of one stream.
+    """State of `survey`, of one stream.
 
     limits : (10,) readings that lie farther apart (s) are no neighbours; what a single outlier counts at most, and what noise
     is stated to have, as variances; times (s) over which the noise of a channel and the usual one are taken. What no channel
@@ -77,14 +71,14 @@ class CheckWork(NamedTuple):
 
 @inner
 def bend2(values, t, i):
-    """Square of the second difference at row t of channel i; its mean is the variance of white noise."""
+    """Return the square of the second difference at row t of channel i; its mean is the variance of white noise."""
     bend = values[t, i] - 2.0 * values[t - 1, i] + values[t - 2, i]
     return bend * bend / 6.0
 
 
 @inner
 def rough2(values, t, i):
-    """Square of the third difference likewise: of a swing at w rad/s, 0.3 (w dt)^2 times what second differences have of it."""
+    """Return the square of the third difference likewise: for a swing at w rad/s 0.3 (w dt)^2 times the second one."""
     step = values[t - 1, i] - values[t - 2, i]
     third = (values[t, i] - values[t - 1, i] - step) - (step - (values[t - 2, i] - values[t - 3, i]))
     return third * third / 20.0
@@ -92,7 +86,7 @@ def rough2(values, t, i):
 
 @inner
 def noise2_at(times, values, t, i):
-    """Variance of white noise by row t of channel i and the three before it, where the values may move as a parabola.
+    """Return the variance of white noise by row t of channel i and the three before it, while values move as a parabola.
 
     The less of what third differences say and of what Newton's divided ones do: stamps that are uneven are either those of when
     readings were taken, or of readings that were taken evenly and came so.
@@ -143,7 +137,7 @@ def survey(sensors, stamps, raw, expected, now):
 
 @inner
 def loud(sensors):
-    """Variance of the noise above which a channel is noisy."""
+    """Return the variance of the noise above which a channel is noisy."""
     return sensors.limits[LOUD] * min(sensors.lately[NOISE], sensors.limits[LOUDEST_USUAL])
 
 
@@ -159,7 +153,7 @@ def keep_newest(sensors):
 
 @inner
 def usual_power(power, stated):
-    """Variance of the noise, as it is with most channels; at least what is stated, of a single channel just that.
+    """Return the variance of the noise, as it is with most channels; at least what is stated, of a single channel just that.
 
     A sensor is faulty that is noisier than its like, not than a data sheet.
     """
@@ -183,7 +177,7 @@ def usual_power(power, stated):
 def go_on(sensors, stamps, raw, expected, share):
     """Take the readings, which have a weight of `share`.
 
-    Gives the largest change of `left` from one to the next, but for those across a gap; the largest of `power`, `run`,
+    Return the largest change of `left` from one to the next, but for those across a gap; the largest of `power`, `run`,
     `missing` and `outside`; and whether no reading is missing.
     """
     times, all_raw, left, count = sensors.times, sensors.raw, sensors.left, 3 + stamps.shape[0]
@@ -237,95 +231,52 @@ def go_on(sensors, stamps, raw, expected, share):
 
 
 @kernel
-def summarise(work, stamps, raw, left, masked, share):
-    """Work out what a block of readings says, and go on with what it says of noise and slow means; gives whether it is bent.
+def summarise(work, stamps, raw, left, sigmas, masked, share):
+    """Work out the numbers of a block of readings, and update the slow means; return True if readings bend.
 
-    Bent are readings of a channel that is not masked if they bend more than noise does, and smoothly: there is a motion that
-    is quick against their rate.
+    Readings bend if those of a channel that is not masked bend more than noise does, and smoothly: there is a motion that is
+    quick against their rate.
 
     Parameters
     ----------
     work : ReadingsWork
-        Its `numbers` are written.
-    stamps, raw, left : ndarray, shape (k,), (k, channels), (k, channels)
-        ns, as measured, less what the model has; NaN where it is missing; k > 0.
+    stamps, raw, left, sigmas : ndarray, shape (k,), (k, channels), (k, channels), (k, channels)
+        See `boom_twin.health.blocks.MeasuredRows`; NaN where a reading is missing; k > 0.
     masked : ndarray of bool, shape (channels,)
-        Channels that are not to be trusted.
+        Channels that are not to be trusted; their slow means begin anew.
     share : float
         Weight of the block in the slow means.
     """
     numbers, slow, last = work.numbers, work.slow, stamps.shape[0] - 1
     span = (stamps[last] - stamps[0]) * NANO
     for i in range(raw.shape[1]):
-        known, read, off, squares = 0, 0.0, 0.0, 0.0
+        known, read, off, squares, variance = 0, 0.0, 0.0, 0.0, 0.0
         for t in range(last + 1):
             if math.isfinite(left[t, i]):
                 known += 1
                 read += raw[t, i]
                 off += left[t, i]
                 squares += left[t, i] * left[t, i]
-        numbers[COUNTS, i], numbers[OFF, i] = known, off / max(known, 1)
+                variance += sigmas[t, i] * sigmas[t, i]
+        numbers[COUNTS, i], numbers[OFF, i], numbers[RATES, i] = known, off / max(known, 1), math.nan
         if span > 0.0:
             numbers[RATES, i] = ((raw[last, i] - left[last, i]) - (raw[0, i] - left[0, i])) / span
-        else:
-            numbers[RATES, i] = math.nan
-        if known > 0:
+        if masked[i]:
+            slow[:, i] = 0.0
+        elif known > 0:
             slow[SLOW_READ, i] += share * (read / known - slow[SLOW_READ, i])
-            slow[SLOW_EXPECTED, i] += share * (read / known - numbers[OFF, i] - slow[SLOW_EXPECTED, i])
+            slow[SLOW_EXPECTED, i] += share * ((read - off) / known - slow[SLOW_EXPECTED, i])
             slow[SLOW_SQUARES, i] += share * (squares / known - slow[SLOW_SQUARES, i])
+            slow[SLOW_VARIANCE, i] += share * (variance / known - slow[SLOW_VARIANCE, i])
             slow[WEIGHT, i] += share * (1.0 - slow[WEIGHT, i])
-        mean_of_near(work, left, i)
-    follow_noise(work, left)
-    stated = work.limits[VARIANCE]
-    for i in range(raw.shape[1]):
-        numbers[EVENED, i] = numbers[NEAR_COUNTS, i] * stated / max(work.noise2[i], stated)
+        if math.isfinite(numbers[RATES, i]) and not masked[i]:
+            slow[SLOW_RATE, i] += share * (numbers[RATES, i] - slow[SLOW_RATE, i])
     return is_bent(work, raw, masked)
 
 
 @inner
-def sorted_in(column, size, value):
-    """Sort a value into the first `size` of a column, which are in order, if it is finite; gives how many they are then."""
-    if not math.isfinite(value):
-        return size
-    at = size
-    while at > 0 and column[at - 1] > value:
-        column[at] = column[at - 1]
-        at -= 1
-    column[at] = value
-    return size + 1
-
-
-@inner
-def mean_of_near(work, left, i):
-    """Mean of those `left` of channel i that are not far from the median, and how many these are; NaN and 0 of none."""
-    column, size = work.column, 0
-    for t in range(left.shape[0]):
-        size = sorted_in(column, size, left[t, i])
-    total, near = 0.0, 0
-    for t in range(left.shape[0]):
-        if size > 0 and abs(left[t, i] - column[size // 2]) <= work.limits[FAR]:
-            total += left[t, i]
-            near += 1
-    work.numbers[NEAR, i], work.numbers[NEAR_COUNTS, i] = total / near if near > 0 else math.nan, near
-
-
-@inner
-def follow_noise(work, left):
-    """Go on with the variances of single readings by second differences, if there are some and all are known."""
-    count, noise2 = left.shape[0] - 2, work.noise2
-    is_known = count > 0
-    for i in range(noise2.shape[0]):
-        is_known = is_known and work.numbers[COUNTS, i] == left.shape[0]
-    for i in range(noise2.shape[0] if is_known else 0):
-        total = 0.0
-        for t in range(2, left.shape[0]):
-            total += bend2(left, t, i)
-        noise2[i] += work.limits[NOISE_SHARE] * (min(total / count, work.limits[LOUDEST]) - noise2[i])
-
-
-@inner
 def is_bent(work, raw, masked):
-    """Whether readings of a channel that is not masked bend more than noise does; it gives the same by third differences."""
+    """Return True if readings of a channel that is not masked bend more than noise does, by second and third differences."""
     count, found = raw.shape[0], False
     for i in range(raw.shape[1]):
         power, rougher = 0.0, 0.0
@@ -337,70 +288,3 @@ def is_bent(work, raw, masked):
         if is_quick and rougher < work.limits[WHITE] * power and not masked[i]:
             found = True
     return found
-
-
-@kernel
-def follow_heard(slow, values, counts, share, off):
-    """Go on with slow means by `values` (k,) of those sensors that have `counts` (k,) readings.
-
-    Gives whether one has any, and the largest magnitude of `off` (k,).
-    """
-    is_heard, largest = False, 0.0
-    for i in range(slow.shape[0]):
-        if counts[i] > 0.0:
-            slow[i] += share * (values[i] - slow[i])
-            is_heard = True
-        largest = max(largest, abs(off[i]))
-    return is_heard, largest
-
-
-@kernel
-def collect_means(numbers, masked, first, left, counts, rates):
-    """Write the means of a stream's readings without outliers, of how many each is worth, and rates, from channel `first` on.
-
-    Parameters
-    ----------
-    numbers : ndarray, shape (6, channels)
-        See `boom_twin.health.stream_readings.StreamReadings`.
-    masked : ndarray of bool, shape (channels,)
-        Channels that are not to be trusted: NaN is written.
-    left, counts, rates : ndarray
-        Of all streams; a rate of 0 where there is none.
-    """
-    for i in range(masked.shape[0]):
-        left[first + i] = math.nan if masked[i] else numbers[NEAR, i]
-        counts[first + i] = numbers[EVENED, i]
-        rates[first + i] = numbers[RATES, i] if math.isfinite(numbers[RATES, i]) else 0.0
-
-
-@kernel
-def summarise_predictions(stamps, measured, variances, joints, accelerations, found):
-    """Write means of a block of predictions: measured strokes, variances of the estimates, rates of the joints.
-
-    Parameters
-    ----------
-    stamps, measured, variances, joints, accelerations : ndarray, shape (k,), (k, n), (k, n), (k, n), (k, 2)
-        ns, m, m^2, rad, m/s^2; k > 0.
-    found : ndarray, shape (3, n)
-        m, m^2, rad/s; rates of 0 from the first to the last where no time lies between them.
-
-    Returns
-    -------
-    largest, shaking : float
-        Of the variances; NaN if one is. Mean square of the accelerations.
-    """
-    count, largest = stamps.shape[0], 0.0
-    span = (stamps[count - 1] - stamps[0]) * NANO
-    for i in range(measured.shape[1]):
-        strokes, spread = 0.0, 0.0
-        for t in range(count):
-            strokes += measured[t, i]
-            spread += variances[t, i]
-            if not variances[t, i] <= largest:
-                largest = variances[t, i]
-        found[MEASURED, i], found[SPREAD, i] = strokes / count, spread / count
-        found[TURNING, i] = (joints[count - 1, i] - joints[0, i]) / span if span > 0.0 else 0.0
-    shaking = 0.0
-    for t in range(count):
-        shaking += accelerations[t, 0] * accelerations[t, 0] + accelerations[t, 1] * accelerations[t, 1]
-    return largest, shaking / count

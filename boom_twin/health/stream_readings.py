@@ -1,4 +1,4 @@
-"""What a block of readings of one stream says, worked out once for all that judge it: means, rates, noise, motion."""
+"""Numbers of a block of readings of one stream, worked out once for all that judge it: means, rates, slow means, motion."""
 
 from __future__ import annotations
 
@@ -10,96 +10,72 @@ from numpy.typing import NDArray
 
 from ..kernels.jit import SameTypes, hold
 from ..types import Array
-from .inference.block_problem import MeasuredRows, PredictionRows
+from .blocks import MeasuredRows
 from .sensor_survey import (
     COUNTS,
-    MEASURED,
-    NEAR,
     OFF,
     RATES,
-    ROOM,
     SLOW_EXPECTED,
+    SLOW_RATE,
     SLOW_READ,
     SLOW_SQUARES,
-    SPREAD,
-    TURNING,
+    SLOW_VARIANCE,
     WEIGHT,
     ReadingsWork,
     summarise,
-    summarise_predictions,
 )
 
-_summarise_predictions = SameTypes(summarise_predictions)
-
-SHAKEN = 3.0
-"""Variances of a reading in its second differences, by which other sensors bear witness that the boom is shaken and that what
-looks like noise in strokes may be motion."""
-WHITE = 0.75
-"""Share of that variance that third differences must have for noise."""
-OUTLIER = 6.0  # deviations of the noise from the median, from which on a reading counts in no mean
-LOUDEST, NOISE_SHARE = 100.0, 0.05
-"""Times the stated variance that noise is taken for at most; and weight of a block in the variance that is measured."""
+SHAKEN = 3.0  # variances of a reading in its second differences, from which on the boom is shaken
+WHITE = 0.75  # share of that variance that third differences have at least if it is noise
 WINDOW = 2.0  # s, time constant of the slow means
-ENOUGH = 0.6  # of their weight: after 1.8 s
+ENOUGH = 0.6  # weight of slow means that are judged: after 1.8 s
 
 
 @dataclass(frozen=True, slots=True)
 class SlowMeans:
-    """Means over the last `WINDOW`; they go on with every block.
+    """Means over the last `WINDOW`, kept up to date in place; shape (channels,) each.
 
     Attributes
     ----------
-    read, expected, squares : ndarray, shape (channels,)
-        Weighted sums that begin at 0: divided by `weight` they are means of what was read, of what the model had, and of the
-        square of the difference; in the unit of the readings.
-    weight : ndarray, shape (channels,)
+    read, expected, squares, variance, rate : ndarray
+        Weighted sums that begin at 0. Divided by `weight` they are means: of what was read, of what the model had, of the
+        squared difference, of its expected variance, and of the expected reading's rate (1/s).
+    weight : ndarray
         From 0 to 1.
     """
 
     read: Array
     expected: Array
     squares: Array
+    variance: Array
+    rate: Array
     weight: Array
 
 
 class StreamReadings(NamedTuple):
-    """What a block of k readings says.
+    """A block of k readings.
 
     Attributes
     ----------
     rows : MeasuredRows
-    numbers : ndarray, shape (6, channels)
-        What follows, by `boom_twin.health.sensor_survey.COUNTS`.
+    counts : ndarray, shape (channels,)
+        Readings that the model has something to compare with.
+    off : ndarray, shape (channels,)
+        Mean residual in the unit of the sensor; 0 of none.
+    rates : ndarray, shape (channels,)
+        Rate of the expected reading from the first to the last, per s; NaN of fewer than two.
     slow : SlowMeans
     is_bent : bool
-        Whether trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by second and
+        True if trusted sensors tell of a motion that is quick against their rate. Noise gives the same variance by second and
         by third differences, motion much less by third ones.
     """
 
     rows: MeasuredRows
-    numbers: Array
+    counts: Array
+    off: Array
+    rates: Array
     slow: SlowMeans
     is_bent: bool
-
-    @property
-    def counts(self) -> Array:
-        """Of the readings that the model has something to compare with, shape (channels,)."""
-        return np.asarray(self.numbers[COUNTS])
-
-    @property
-    def off(self) -> Array:
-        """Mean by which these are off, in their unit; 0 of none; shape (channels,)."""
-        return np.asarray(self.numbers[OFF])
-
-    @property
-    def near(self) -> Array:
-        """The same without outliers, NaN of none."""
-        return np.asarray(self.numbers[NEAR])
-
-    @property
-    def rates(self) -> Array:
-        """Of what the model expects from the first reading to the last, per s; NaN of fewer than two; shape (channels,)."""
-        return np.asarray(self.numbers[RATES])
 
 
 class StreamSurvey:
@@ -108,26 +84,21 @@ class StreamSurvey:
     Parameters
     ----------
     variance : float
-        Of the noise of a reading, as stated.
+        Variance of the noise of a reading, as stated.
     channels : int
 
     Attributes
     ----------
-    noise2 : ndarray, shape (channels,)
-        The same as measured, by second differences.
     slow : SlowMeans
     """
 
     def __init__(self, variance: float, channels: int) -> None:
-        limits = np.array([variance, SHAKEN, WHITE, OUTLIER * variance**0.5, LOUDEST * variance, NOISE_SHARE])
-        self.noise2 = np.full(channels, variance)
-        self._numbers, slow = np.zeros((6, channels)), np.zeros((4, channels))
-        self._work = ReadingsWork(limits, self._numbers, slow, self.noise2, np.zeros(ROOM))
-        self._held = hold(self._work)
-        self.slow = SlowMeans(slow[SLOW_READ], slow[SLOW_EXPECTED], slow[SLOW_SQUARES], slow[WEIGHT])
-        nothing = np.zeros((6, channels))
-        nothing[NEAR], nothing[RATES] = np.nan, np.nan
-        self._nothing = StreamReadings(MeasuredRows.room(0, channels), nothing, self.slow, False)
+        self._numbers, slow = np.zeros((3, channels)), np.zeros((6, channels))
+        self._held = hold(ReadingsWork(np.array([variance, SHAKEN, WHITE]), self._numbers, slow))
+        rows = SLOW_READ, SLOW_EXPECTED, SLOW_SQUARES, SLOW_VARIANCE, SLOW_RATE, WEIGHT
+        self.slow = SlowMeans(*(slow[row] for row in rows))
+        none, unknown = np.zeros(channels), np.full(channels, np.nan)
+        self._nothing = StreamReadings(MeasuredRows.room(0, channels), none, none, unknown, self.slow, False)
         self._summarise = SameTypes(summarise)
 
     def take(self, rows: MeasuredRows | None, masked: NDArray[np.bool_], span: float) -> StreamReadings:
@@ -138,45 +109,13 @@ class StreamSurvey:
         rows : MeasuredRows or None
             NaN of what is missing, or what the model does not have.
         masked : ndarray of bool, shape (channels,)
-            Sensors that are not to be trusted.
+            Sensors that are not to be trusted; their slow means begin anew.
         span : float
             Length (s) of the block that the slow means take; 0 if they are to leave it out.
         """
-        if rows is None or not (count := len(rows.stamps)):
+        if rows is None or not len(rows.stamps):
             return self._nothing
-        if count > len(self._work.column):
-            self._work = self._work._replace(column=np.zeros(2 * count))
-            self._held = hold(self._work)
-        stamps, raw, left = map(np.ascontiguousarray, rows)
-        is_bent = self._summarise(self._held, stamps, raw, left, masked, min(1.0, span / WINDOW))
-        return StreamReadings(rows, self._numbers.copy(), self.slow, bool(is_bent))
-
-
-class PredictionMeans(NamedTuple):
-    """What a block of predictions of n joints says.
-
-    Attributes
-    ----------
-    strokes, variances : ndarray, shape (n,)
-        Means of the strokes as measured, m, and of the variances of their estimates, m^2.
-    rates : ndarray, shape (n,)
-        Of the joints from the first prediction to the last, rad/s.
-    largest : float
-        Of the variances, m^2.
-    shaking : float
-        Mean square of the tip's acceleration, (m/s^2)^2.
-    """
-
-    strokes: Array
-    variances: Array
-    rates: Array
-    largest: float
-    shaking: float
-
-    @classmethod
-    def of(cls, rows: PredictionRows) -> PredictionMeans:
-        """Of one prediction or more."""
-        found = np.empty((3, rows.measured.shape[1]))
-        given = rows.stamps, rows.measured, rows.variances, rows.joints, rows.accelerations
-        largest, shaking = _summarise_predictions(*map(np.ascontiguousarray, given), found)
-        return cls(found[MEASURED], found[SPREAD], found[TURNING], largest, shaking)
+        columns = map(np.ascontiguousarray, rows)
+        is_bent = self._summarise(self._held, *columns, masked, min(1.0, span / WINDOW))
+        numbers = self._numbers.copy()
+        return StreamReadings(rows, numbers[COUNTS], numbers[OFF], numbers[RATES], self.slow, bool(is_bent))

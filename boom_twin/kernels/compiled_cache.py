@@ -29,9 +29,7 @@ KERNEL_SOURCES = (
     "twin/state.py", "twin/stamp_check.py", "twin/sample_check.py", "twin/blocks.py",
     "twin/health_rows.py",
     "calibration/load_filter.py",
-    "health/inference/kalman_update.py", "health/inference/block_kernels.py", "health/inference/evidence_kernels.py",
-    "health/inference/normal_distribution.py", "health/deviation_sums.py", "health/sensor_survey.py",
-    "health/lag_equations.py", "health/sensor_findings.py", "messages/prediction_numbers.py", "types.py",
+    "health/sensor_survey.py", "health/sensor_findings.py", "messages/prediction_numbers.py", "types.py",
 )  # fmt: skip
 """Folders and modules of the package that kernels, or the constants in them, come from."""
 SUFFIX = ".kernel"

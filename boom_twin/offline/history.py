@@ -64,10 +64,9 @@ class HistoryBuilder:
     def __init__(self, scene: Scene) -> None:
         self._scene, self._plan = scene, compile_scene(scene)
         self._predicted = ExtremeRows(MOST_ROWS, (1, 2, 3, 7, 8, 9, 10, 11, 12))
-        self._imu, self._levels = ExtremeRows(MOST_ROWS, (1, 2)), ExtremeRows(MOST_ROWS, (1,))
+        self._imu = ExtremeRows(MOST_ROWS, (1, 2))
         self._residuals = {stream: ExtremeRows(MOST_ROWS, (1, 3)) for stream in Stream}
         self._totals = SessionTotalsBuilder()
-        self._level_names: tuple[str, ...] = ()
         self._shapes = _Shapes()
         self._peak, self._peak_at = -1.0, 0.0  # largest acceleration of the tip, and when, s
 
@@ -87,9 +86,6 @@ class HistoryBuilder:
                 self._put(table, (stamps, rows.values, rows.sigmas, _running_means(stamps, rows.values)))
         if own.imu is not None:
             self._put(self._imu, (own.imu.stamps_s, own.imu.measured, own.imu.predicted))
-        if stretch.health:
-            self._level_names = own.level_names
-            self._put(self._levels, (own.level_stamps_s, own.levels))
         self._shapes.add(own.shapes)
         return own
 
@@ -112,7 +108,7 @@ class HistoryBuilder:
 
     def history(self, recording: Recording) -> History:
         """The history of all stretches so far; at least one."""
-        for table in (self._predicted, self._imu, self._levels, *self._residuals.values()):
+        for table in (self._predicted, self._imu, *self._residuals.values()):
             if table.is_thin:
                 table.thin(self._enlarged(table))  # the newest ones as those before
         predicted = self._predicted.columns
@@ -122,7 +118,6 @@ class HistoryBuilder:
         tables = [(names[stream], table.columns) for stream, table in self._residuals.items() if table.columns]
         groups = [_ChannelGroup(own, columns[0], columns[1:]) for own, columns in tables]
         residuals = _channels(groups, 3)
-        level_stamps, levels = self._levels.columns or (np.zeros(0), np.zeros((0, 0)))
         plan, stamps = self._plan, found["stamps_s"]
         return History(
             **found,
@@ -138,9 +133,6 @@ class HistoryBuilder:
             orbits=_orbits(plan, stamps, pins, recording) if plan.pins else None,
             slow_moments=slow,
             totals=self._totals.totals,
-            level_stamps_s=level_stamps,
-            level_names=self._level_names,
-            levels=levels,
             estimate=None if load is None else EstimateTrace(*estimated),
             load_text="" if load is None else load.text,
         )
@@ -195,9 +187,6 @@ def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan) -> History:
         imu=_imu(stretch.of(Stream.IMU), stamps, felt, stretch.first),
         shapes=[(float(stamps[row]), outline.shape.copy()) for row, outline in predictions.outlines.items()],
         moments=predictions.moments,
-        level_stamps_s=np.array([(health.stamp - stretch.first) * NANO for health in stretch.health]),
-        level_names=stretch.health[0].names if stretch.health else (),
-        levels=np.array([health.levels for health in stretch.health]),
     )
 
 

@@ -5,21 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ..types import Array
 from .history import AlarmSpan, History
 from .residuals import running_mean
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, extent, legend_above, limits, picture, shade_gaps
+from .style import BLUE, GREEN, INK, ORANGE, extent, legend_above, limits, picture, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-
-COLOURS = (BLUE, GREEN, PURPLE, SKY, INK, GREY)
-IN_ROW, ROW = 8, 20.0  # channels in a row of the legend, and what it takes, points
-SMALLEST = 0.05
-"""Level below which nothing is drawn."""
 
 
 def timeline_picture(
@@ -27,12 +19,9 @@ def timeline_picture(
     session: str,
     end: float,
     alarms: list[AlarmSpan],
-    stamps: Array,
-    names: tuple[str, ...],
-    levels: Array,
     note: str,
 ) -> None:
-    """Write the picture of the alarms of a session, and of the levels of its channels.
+    """Write the picture of the alarms of a session.
 
     Parameters
     ----------
@@ -43,22 +32,13 @@ def timeline_picture(
         Last time of the session, s.
     alarms : list of AlarmSpan
         Gaps among them.
-    stamps : ndarray, shape (m,)
-        s.
-    names : tuple of str
-        Of the channels.
-    levels : ndarray, shape (m, channels)
-        1 is an alarm.
     note : str
     """
-    height = 4.5 + 0.45 * max(len(alarms), 1)
-    with picture(path, f"{session}: alarms, and how near they were", note, (16.0, height)) as figure:
-        ratios = [0.45 * max(len(alarms), 1) + 0.3, 3.0]
-        upper, lower = figure.subplots(2, 1, sharex=True, gridspec_kw={"height_ratios": ratios})
-        _bars(upper, alarms, end)
-        _levels(lower, stamps, names, levels)
-        lower.set_xlim(0.0, max(end, 1e-3))
-        lower.set_xlabel("time since first sample, s")
+    with picture(path, f"{session}: alarms", note, (16.0, 1.8 + 0.45 * max(len(alarms), 1))) as figure:
+        axes = figure.add_subplot()
+        _bars(axes, alarms, end)
+        axes.set_xlim(0.0, max(end, 1e-3))
+        axes.set_xlabel("time since first sample, s")
 
 
 def _bars(axes: Axes, alarms: list[AlarmSpan], end: float) -> None:
@@ -76,18 +56,6 @@ def _bars(axes: Axes, alarms: list[AlarmSpan], end: float) -> None:
             alarm.label, (alarm.start, row), xytext=(-6 if late else 6, 0), textcoords="offset points", va="center",
             ha="right" if late else "left", color=INK,
         )  # fmt: skip
-
-
-def _levels(axes: Axes, stamps: Array, names: tuple[str, ...], levels: Array) -> None:
-    words = "How far every channel deviates: above 1 causes are weighed; what a load at the tip explains is no alarm"
-    axes.set_title(words, pad=6.0 + ROW * -(-len(names) // IN_ROW))  # above the legend
-    for i, name in enumerate(names):
-        values = np.maximum(levels[:, i], SMALLEST) if len(levels) else np.zeros(0)
-        axes.semilogy(stamps, values, color=COLOURS[i % len(COLOURS)], label=name)
-    axes.axhline(1.0, color=ORANGE, linewidth=1.6)
-    axes.set_ylim(SMALLEST, max(2.0, float(levels.max(initial=1.0)) * 1.5))
-    if names:
-        legend_above(axes, IN_ROW, handlelength=1.2)
 
 
 def frequency_picture(

@@ -183,12 +183,6 @@ class History:
     slow_moments : ndarray, shape (m, k), or None
         Static part of `moments`.
     totals : SessionTotals or None
-    level_stamps_s : ndarray, shape (h,)
-        When the rig's health was judged, s.
-    level_names : tuple of str
-        Of its channels.
-    levels : ndarray, shape (h, channels)
-        How near each was to an alarm, which is at 1.
     estimate : EstimateTrace or None
         None where nothing but strokes was measured.
     load_text : str
@@ -215,8 +209,5 @@ class History:
     residual_means: Array | None = None
     slow_moments: Array | None = None
     totals: SessionTotals | None = None
-    level_stamps_s: Array = field(default_factory=lambda: np.zeros(0))
-    level_names: tuple[str, ...] = ()
-    levels: Array = field(default_factory=lambda: np.zeros((0, 0)))
     estimate: EstimateTrace | None = None
     load_text: str = ""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..bag.session_model import baseline_of
 from ..config.settings import Settings
 from ..offline.history import HistoryBuilder
 from ..offline.recording import Stretch
@@ -52,8 +51,6 @@ class Evaluator:
     scene : Scene
     settings : Settings
         Of the replay.
-    baseline : Path, optional
-        As for the replay.
     heights : ndarray, shape (n,), optional
         Of the sections, m, for the stresses; by default those of the scene, or of thin-walled boxes.
     category : float, optional
@@ -64,11 +61,10 @@ class Evaluator:
         self,
         scene: Scene,
         settings: Settings,
-        baseline: Path | None,
         heights: Array | None = None,
         category: float | None = None,
     ) -> None:
-        self._scene, self._settings, self._baseline = scene, settings, baseline
+        self._scene, self._settings = scene, settings
         self._history = HistoryBuilder(scene)
         self._quantities, self._holds, self._heights = QuantityBuilder(scene), HoldFinder(scene), heights
         self._fatigue = None if category is None else FatigueCounter(scene, category, heights)
@@ -83,8 +79,8 @@ class Evaluator:
 
     def finish(self, result: Replay, folder: Path) -> Evaluation:
         """What came out of the replay, whose figures are written into `folder`; to be called once."""
-        still, usual = self._holds.finish(), baseline_of(result.session.path, self._baseline).baseline
-        found = self._quantities.quantities(result.recording.totals.tip_sigma, still, self._settings, usual)
+        still = self._holds.finish()
+        found = self._quantities.quantities(result.recording.totals.tip_sigma, still, self._settings)
         file = write(folder, self._scene, found)
         fatigue, category = ([], None) if self._fatigue is None else (self._fatigue.found(), self._fatigue.category)
         loads = self._quantities.loads(self._heights)

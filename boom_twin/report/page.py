@@ -12,7 +12,6 @@ import numpy as np
 from .. import __version__
 from ..analysis.bending_stress import BOX
 from ..analysis.free_vibration import Vibration
-from ..health.alarm_text import limits_as_text
 from ..health.sensor_monitor import noise_as_text
 from ..offline.recording import Recording
 from ..offline.replay import Replay
@@ -107,7 +106,6 @@ def _head(subject: Subject) -> list[str]:
         *((name, summary[key]) for key, name in _AGAINST_TRUTH if key in summary),
         *([("load at the tip that the model does not know", summary["tip_load"])] if "tip_load" in summary else []),
         *(("noise", told) for told in noise_as_text(summary)),
-        *(("judgement", told) for told in limits_as_text(summary)),
     ]
     scene = f"{subject.scene_name}: {len(subject.scene.sections)} sections. {subject.scene.description}".strip()
     return [
@@ -142,7 +140,7 @@ def _verdict(result: Replay) -> str:
     count = len(result.recording.alarms())
     if count:
         return paragraph(f"{count} alarm{'s' if count > 1 else ''} of the rig's health.", "alarm")
-    return paragraph("No alarm: all residuals are as the model, the sensors' noise and the baseline explain.", "well")
+    return paragraph("No alarm: no sensor gives itself away, and no residual is beyond its limit.", "well")
 
 
 def _joints(summary: dict[str, Any]) -> list[tuple[object, ...]]:
@@ -161,12 +159,11 @@ def _alarms(subject: Subject, folder: Path) -> list[str]:
     gaps = [AlarmSpan("cylinder_strokes", start, stop, "gap") for start, stop in history.gaps]
     spans = sorted([*gaps, *history.alarms], key=lambda alarm: alarm.start)
     path, end = folder / "timeline.png", float(history.stamps_s[-1])
-    judged = history.level_stamps_s, history.level_names, history.levels
-    timeline_picture(path, subject.name, end, spans, *judged, subject.origin)
+    timeline_picture(path, subject.name, end, spans, subject.origin)
     alarms = recording.alarms()
     found = [_alarm(alarm, recording.first) for alarm in alarms] or [paragraph("None.")]
     note = [paragraph(SHARES, "note")] if any(alarm.ranked for alarm in alarms) else []
-    return [heading("Alarms"), *found, *note, image(path, "alarms and levels over time")]
+    return [heading("Alarms"), *found, *note, image(path, "alarms over time")]
 
 
 def _alarm(alarm: Alarm, first: int) -> str:

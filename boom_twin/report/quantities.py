@@ -17,13 +17,12 @@ from ..analysis.bending_moments import Station, stations
 from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
-from ..health.baseline import Baseline, judged_channels
 from ..plots import History
 from ..plots.health import slow_part
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..system.received_files import open_received
-from ..types import Array, sensor_kind
+from ..types import Array, Stream, sensor_kind, stream_of
 from .vibration import HoldInterval
 
 FILE_NAME = "quantities.json"
@@ -31,6 +30,9 @@ BATCHES = 10
 """Parts of a session whose means show how sure the mean of all is (method of batch means)."""
 LEG = 1e-3
 """m; a stroke has turned when it came back by this."""
+MODEL_ERROR: dict[Stream | None, float] = {Stream.ANGLES: 5e-5, Stream.IMU: 0.02}
+"""Deviation of the model's error of a reading in one posture, by stream; rad, m/s^2."""
+FREQUENCY_ERROR = 0.01  # share by which natural frequencies of the model may be wrong in one posture
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +77,11 @@ class QuantityBuilder:
         """As `SectionLoads.loads`."""
         return self._loads.loads(heights)
 
-    def quantities(
-        self, tip_sigma: float | None, still: list[HoldInterval], settings: Settings, baseline: Baseline
-    ) -> list[Quantity]:
+    def quantities(self, tip_sigma: float | None, still: list[HoldInterval], settings: Settings) -> list[Quantity]:
         """All figures of the session; `tip_sigma` is the largest deviation of the predicted tip, m, if it is known."""
         return [
-            *self._residuals(baseline),
-            *_frequencies(still, baseline.detuning),
+            *self._residuals(),
+            *_frequencies(still),
             Quantity("tip_displacement_max", self._displacement, tip_sigma, "m"),
             Quantity("tip_acceleration_max", self._acceleration, None, "m/s^2"),
             *(
@@ -91,20 +91,18 @@ class QuantityBuilder:
             *self._stroke_travels(settings),
         ]
 
-    def _residuals(self, baseline: Baseline) -> Iterator[Quantity]:
-        """Mean and root mean square of every channel; the model's error in a posture counts as uncertainty of the mean.
+    def _residuals(self) -> Iterator[Quantity]:
+        """Yield mean and root mean square of every channel; the model's error in a posture counts as uncertainty of the mean.
 
-        Where the baseline does not have that error, it is not known how sure the figures are.
+        The deviations are None where that error is not known.
         """
-        joints = len(self._scene.joints)
-        errors = dict(zip(judged_channels(joints), baseline.errors(joints).tolist(), strict=True))
         for name, (values, squares) in self._channels.items():
             unit = sensor_kind(name).unit
             if values.count < BATCHES:
                 continue
             (mean, mean_sigma), (square, square_sigma) = values.mean, squares.mean
             rms, mean_error, rms_error = sqrt(square), None, None
-            if (error := errors.get(name)) is not None:
+            if (error := MODEL_ERROR.get(stream_of(name))) is not None:
                 mean_error = hypot(mean_sigma, error)
                 rms_error = hypot(square_sigma, 2.0 * mean * error) / (2.0 * rms) if rms else 0.0
             yield Quantity(f"residual_mean_{name}", mean, mean_error, unit)
@@ -143,16 +141,13 @@ class BatchMeans:
         return total / self.count, float(means.std(ddof=1) / sqrt(len(means))) if len(means) > 1 else 0.0
 
 
-def _frequencies(still: list[HoldInterval], detuning: float) -> Iterator[Quantity]:
-    """Of every mode that was seen: measured over model frequency, and damping.
-
-    The ratio is that of the rig to the model in any posture, but for the `detuning` that the model may have in each.
-    """
+def _frequencies(still: list[HoldInterval]) -> Iterator[Quantity]:
+    """Yield measured over model frequency, and damping, of every mode that was seen."""
     for mode in sorted({mode for hold in still for mode in hold.measured}):
         seen = [(hold.model[mode], hold.measured[mode]) for hold in still if mode in hold.measured]
         ratios = np.array([(each.frequency / model, each.frequency_sigma / model) for model, each in seen])
         dampings = np.array([(each.damping, each.damping_sigma) for _, each in seen])
-        yield _weighted(f"frequency_ratio_mode_{mode + 1}", ratios, detuning)
+        yield _weighted(f"frequency_ratio_mode_{mode + 1}", ratios, FREQUENCY_ERROR)
         yield _weighted(f"damping_mode_{mode + 1}", dampings, 0.0)
 
 

@@ -16,7 +16,7 @@ from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor, Drawn
 from ..deviation.sensor_model import Mounting
-from ..health.inference.block_problem import MeasuredRows, PredictionRows
+from ..health.blocks import MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
 from ..kernels.jit import SameTypes, hold
 from ..kernels.result_row import PIN
@@ -262,9 +262,9 @@ class BlockUpdate:
         if run is None or self._judge is None:
             return None
         self._tell_health(run.newest // SLOT * SLOT)
-        health = self._judge.judge(run.newest, self._boom.variances, None, lambda: self._boom.tip_sigmas)
+        health = self._judge.judge(run.newest, lambda: self._boom.tip_sigmas)
         self._boom.leave_out(self._judge.suspected, self._judge.failing_strokes)
-        return health and replace(health, tip_sigmas=self._boom.tip_sigmas)
+        return health
 
     def _take_judgement(self, row: int) -> None:
         """Judge, if that is due, and give the news with sample `row`."""

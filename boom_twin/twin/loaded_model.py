@@ -8,7 +8,7 @@ replay makes the same model at the same sample.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from threading import Thread
@@ -18,7 +18,6 @@ from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor
 from ..errors import BoomTwinError
 from ..health.baseline import Baseline
-from ..health.inference.block_problem import BlockProblem
 from ..health.monitor import HealthMonitor
 from ..scene.edit import loaded
 from ..scene.schema import Scene
@@ -48,14 +47,13 @@ def loaded_model(
     settings: Settings,
     mounts: Sequence[Mount | None],
     baseline: Baseline | None,
-    on_block: Callable[[BlockProblem], object] | None,
     reads: StrokeReading,
     absent: Collection[str],
 ) -> LoadedModel:
     """Return the model of `scene` under the load of `settings`; for the parameters see `boom_twin.Twin`."""
     scene = loaded(scene, *settings.load)
     boom = BoomPredictor(scene, settings, mounts, reads)
-    judge = None if baseline is None else HealthMonitor(scene, settings, tuple(mounts), baseline, on_block, absent)
+    judge = None if baseline is None else HealthMonitor(scene, settings, tuple(mounts), absent)
     _ = boom.held  # made here, where no sample waits for it
     return LoadedModel(scene, limits_of(scene, boom.plan, settings, mounts, absent), boom, judge)
 

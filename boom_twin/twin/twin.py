@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,6 @@ import numpy as np
 from ..config.settings import Settings
 from ..errors import BoomTwinError, SolverError, UsageError
 from ..health.baseline import Baseline
-from ..health.inference.block_problem import BlockProblem
 from ..health.monitor import warm_up
 from ..kernels.tables import SENTENCES
 from ..scene.kinematics import stroke_curve
@@ -50,9 +49,7 @@ class Twin:
         Of every joint's angle sensor: None is an encoder of the joint (the default), else an inclinometer, see
         `boom_twin.deviation.sensor_model.Mounting`.
     baseline : Baseline, optional
-        What model and sensors are off by while all is well. With it the rig's health is judged, see `Report.health`.
-    on_block : callable, optional
-        Is told every linear problem that health is judged by; a baseline is learnt from them.
+        With it the rig's health is judged, see `Report.health`.
     reads : StrokeReading
         What the stroke transducers read: the lengths of the cylinders, oil compressed, or, of sessions that were made before
         version 0.2.0, their drives.
@@ -85,11 +82,10 @@ class Twin:
         settings: Settings | None = None,
         mounts: Sequence[Mount | None] = (),
         baseline: Baseline | None = None,
-        on_block: Callable[[BlockProblem], object] | None = None,
         reads: StrokeReading = StrokeReading.LENGTH,
         absent: Collection[str] = (),
     ) -> None:
-        self._on_block, self.reads, self.absent, scene = on_block, reads, frozenset(absent), as_scene(scene)
+        self.reads, self.absent, scene = reads, frozenset(absent), as_scene(scene)
         self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
         self.counts: Counter[str] = Counter()
         self.shedding = LoadShedding()
@@ -182,8 +178,7 @@ class Twin:
             The load cannot be.
         """
         self._former: BlockUpdate | None = None
-        sensors = self._on_block, self.reads, self.absent
-        return loaded_model(self.scene, settings, self.mounts, self.baseline, *sensors)
+        return loaded_model(self.scene, settings, self.mounts, self.baseline, self.reads, self.absent)
 
     def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
         """Go on with this model, which is of the present load, after that of `before`."""

@@ -21,7 +21,7 @@ STUCK = Alarm("joint_3", "stuck", BEGIN, BEGIN + 1_500_000_000, "joint_3.sensor"
 
 
 def sent(*alarms: Alarm):
-    data = encode_health(Health(BEGIN + 2_000_000_000, alarms, (), np.zeros(0), np.zeros(2)))
+    data = encode_health(Health(BEGIN + 2_000_000_000, alarms, np.zeros(2)))
     return jazzy().deserialize_cdr(data, TYPES[Output.HEALTH])
 
 

@@ -17,7 +17,7 @@ OPEN = Alarm("joint_1", "residual", 16 * SECOND, None, None, "cannot be told apa
 
 
 def health(second: int, *alarms: Alarm) -> Health:
-    return Health(second * SECOND, alarms, ("joint_1", "joint_3"), np.zeros(2), np.zeros(2))
+    return Health(second * SECOND, alarms, np.zeros(2))
 
 
 def status(watch: HealthWatch) -> Status:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from drive_twin import ARCH_DRIVES, drive_twin
 
 from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.bag.reader import read, scan
@@ -19,11 +18,12 @@ from boom_twin.health.baseline import Baseline
 from boom_twin.types import Alarm, Health, Report
 
 NANO = 1e-9
+ARCH, PUMP = (Path(__file__).parents[2] / "bags" / name for name in ("arch_session", "pump_session"))
 TYPES = {Stream.STROKES: "JointState", Stream.ANGLES: "JointState", Stream.IMU: "Imu"}
 
 
 @lru_cache
-def session(seconds: float = 12.0, folder: Path = ARCH_DRIVES) -> tuple[Sample, ...]:
+def session(seconds: float = 12.0, folder: Path = ARCH) -> tuple[Sample, ...]:
     """Its samples."""
     streams, found = {stream.value: stream for stream in TYPES}, []
     wanted = {stream.value: f"sensor_msgs/msg/{kind}" for stream, kind in TYPES.items()}
@@ -45,7 +45,7 @@ def written(folder: Path, seconds: float) -> int:
     stamps = np.array([sample.stamp for sample in found[Stream.STROKES][:count]])
     values = [np.array([sample.values for sample in found[stream][:count]]) for stream in TYPES]
     write_session(folder, stamps, *values, {"origin": "synthetic, the beginning of the bundled session"})
-    shutil.copy(ARCH_DRIVES / "session.yaml", folder)
+    shutil.copy(ARCH / "session.yaml", folder)
     return count
 
 
@@ -80,7 +80,7 @@ class Outcome(NamedTuple):
 def run(samples: Iterable[Sample], settings: Settings | None = None, baseline: Baseline | None = None, twin=None) -> Outcome:
     """A twin of the default boom takes them all."""
     samples = list(samples)
-    twin = twin or drive_twin(load_scene(), settings, baseline=baseline or Baseline())
+    twin = twin or Twin(load_scene(), settings, baseline=baseline or Baseline())
     reports = [twin.update(sample) for sample in samples]
     return Outcome(twin, reports, [r.health for r in reports if r.health is not None], samples[0].stamp)
 

@@ -12,7 +12,7 @@ from health.stream_blocks import block_of
 
 from boom_twin import Stream, load_scene, statics
 from boom_twin.health.angle_reading import AngleReading
-from boom_twin.health.inference.block_problem import BLOCK
+from boom_twin.health.blocks import BLOCK
 from boom_twin.types import NANO, Alarm
 
 SCENE = load_scene()

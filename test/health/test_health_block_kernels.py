@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.health.inference.block_problem import BLOCK, MeasuredRows, PredictionRows
+from boom_twin.health.blocks import BLOCK, MeasuredRows
 from boom_twin.health.sensor_check import NOISY_WINDOW, SensorCheck
-from boom_twin.health.sensor_survey import NEAR_COUNTS
-from boom_twin.health.stream_readings import PredictionMeans, StreamReadings, StreamSurvey
+from boom_twin.health.stream_readings import StreamReadings, StreamSurvey
 from boom_twin.types import NANO, Array
 
 from .numpy_findings import bends2, findings_of, rough2
@@ -20,55 +19,35 @@ def readings(seed: int, rows: int = 20, channels: int = 4) -> Array:
     return np.random.default_rng(seed).normal(3.0, SIGMA, (rows, channels))
 
 
-def taken(raw: Array, left: Array, masked: Array | None = None) -> tuple[StreamSurvey, StreamReadings]:
-    """What a survey says of one block."""
+def taken(raw: Array, left: Array, masked: Array | None = None) -> StreamReadings:
+    """Return what a survey says of one block."""
     survey = StreamSurvey(SIGMA**2, raw.shape[1])
     none = np.zeros(raw.shape[1], dtype=bool)
     stamps = 7 * BLOCK + 5_000_000 * np.arange(len(raw))
-    return survey, survey.take(MeasuredRows(stamps, raw, left), none if masked is None else masked, BLOCK * NANO)
-
-
-@pytest.mark.parametrize("rows", [1, 2, 3, 19, 20, 50])
-def test_means_leave_out_what_is_far_from_the_median(rows: int) -> None:
-    left = readings(rows, rows)
-    left[rows // 2, 1] += 100.0 * SIGMA
-    near = np.abs(left - np.sort(left, axis=0)[rows // 2]) <= 6.0 * SIGMA
-    _, found = taken(left, left)
-    assert found.numbers[NEAR_COUNTS].tolist() == near.sum(axis=0).tolist()
-    assert np.array_equal(found.near, np.where(near, left, 0.0).sum(axis=0) / found.numbers[NEAR_COUNTS])
-    assert found.off == pytest.approx(left.mean(axis=0)) and found.counts.tolist() == [rows] * 4
+    return survey.take(
+        MeasuredRows(stamps, raw, left, np.full(raw.shape, 3.0)), none if masked is None else masked, BLOCK * NANO
+    )
 
 
 def test_means_of_readings_some_of_which_are_missing() -> None:
     left = readings(1)
     left[3, 0], left[:, 2] = np.nan, np.nan
-    survey, found = taken(left + 1.0, left)
-    assert found.numbers[NEAR_COUNTS].tolist() == [19.0, 20.0, 0.0, 20.0] == found.counts.tolist()
-    assert np.isnan(found.near).tolist() == [False, False, True, False]
-    assert found.near[0] == pytest.approx(np.nanmean(left[:, 0])) and found.off[2] == 0.0
+    found = taken(left + 1.0, left)
+    assert found.counts.tolist() == [19.0, 20.0, 0.0, 20.0]
+    assert found.off[0] == pytest.approx(np.nanmean(left[:, 0])) and found.off[2] == 0.0
     assert found.slow.weight == pytest.approx([0.05, 0.05, 0.0, 0.05])
     assert found.slow.expected[[0, 1, 3]] == pytest.approx([0.05] * 3) and found.slow.expected[2] == 0.0
     assert found.slow.squares[1] == pytest.approx(0.05 * (left[:, 1] ** 2).mean())
-    assert np.array_equal(survey.noise2, np.full(4, SIGMA**2))
+    assert found.slow.variance[:2] == pytest.approx([0.05 * 9.0] * 2)
 
 
 def test_rates_are_those_of_what_is_expected() -> None:
     """From the first reading to the last; unknown of one alone, or where the model has nothing."""
     expected = 3.0 * 0.005 * np.arange(20.0)[:, None] * np.array([1.0, -2.0])
     left = np.random.default_rng(3).normal(size=(20, 2))
-    _, found = taken(expected + left, left)
-    assert found.rates == pytest.approx([3.0, -6.0])
-    assert np.isnan(taken(expected[:1], left[:1])[1].rates).all() and np.isnan(taken(expected, left * np.nan)[1].rates).all()
-
-
-@pytest.mark.parametrize("order", ["C", "F"])
-def test_noise_is_followed_by_second_differences(order: str) -> None:
-    left = np.array(readings(2), order=order) * np.array([1.0, 2.0, 0.1, 30.0])
-    survey, _ = taken(left, left)
-    found = np.minimum(bends2(left).mean(axis=0), 100.0 * SIGMA**2)
-    assert survey.noise2 == pytest.approx(SIGMA**2 + 0.05 * (found - SIGMA**2), rel=1e-14)
-    for unknown in (left[:2], np.where(left == left[4, 2], np.nan, left)):
-        assert np.array_equal(taken(unknown, unknown)[0].noise2, np.full(4, SIGMA**2))
+    found = taken(expected + left, left)
+    assert found.rates == pytest.approx([3.0, -6.0]) and found.slow.rate == pytest.approx([0.15, -0.3])
+    assert np.isnan(taken(expected[:1], left[:1]).rates).all() and np.isnan(taken(expected, left * np.nan).rates).all()
 
 
 def test_motion_bends_readings_smoothly_and_noise_does_not() -> None:
@@ -81,11 +60,11 @@ def test_motion_bends_readings_smoothly_and_noise_does_not() -> None:
         trusted = raw[:, ~masked]
         power, rougher = bends2(trusted).sum(axis=0), rough2(trusted).sum(axis=0)
         wanted = bool(((power > 3.0 * SIGMA**2 * 18) & (rougher < 0.75 * power)).any())
-        assert taken(raw, raw, masked)[1].is_bent is wanted
+        assert taken(raw, raw, masked).is_bent is wanted
         told.append(wanted)
     assert 20 < sum(told) < 180
-    assert not taken(readings(1), readings(1))[1].is_bent
-    assert not taken(np.zeros((0, 4)), np.zeros((0, 4)))[1].is_bent
+    assert not taken(readings(1), readings(1)).is_bent
+    assert not taken(np.zeros((0, 4)), np.zeros((0, 4))).is_bent
 
 
 @pytest.mark.parametrize("fastest", [0.0, 2000.0])
@@ -124,16 +103,3 @@ def test_what_is_found_in_a_block_is_what_numpy_finds(fastest: float) -> None:
         calm += found.is_calm
         told |= {kind for kind, flags in wanted.items() if any(flags)} | ({"jump"} if any(jumped) else set())
     assert 50 < calm < 580 and told == {"stuck", "noise", "spikes", "jump", "dropout", "range"}
-
-
-def test_predictions_of_a_block_are_averaged() -> None:
-    rng, stamps = np.random.default_rng(8), 5_000_000 * np.arange(20)
-    measured, strokes, variances, joints = rng.normal(size=(4, 20, 3))
-    rows = PredictionRows(stamps, measured, strokes, variances**2, joints, np.zeros((20, 2)))
-    found = PredictionMeans.of(rows)
-    assert found.strokes == pytest.approx(measured.mean(axis=0))
-    assert found.variances == pytest.approx((variances**2).mean(axis=0))
-    assert found.rates == pytest.approx((joints[-1] - joints[0]) / 0.095) and found.largest == (variances**2).max()
-    one = PredictionMeans.of(PredictionRows(*(column[:1] for column in rows)))
-    assert not one.rates.any() and one.strokes.tolist() == measured[0].tolist()
-    assert np.isnan(PredictionMeans.of(rows._replace(variances=np.full((20, 3), np.nan))).largest)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from boom_twin.health.blocks import BLOCK
 from boom_twin.health.force_reading import ForceReading
-from boom_twin.health.inference.block_problem import BLOCK
 from boom_twin.types import Alarm
 
 from .stream_blocks import block_of

@@ -1,37 +1,75 @@
-"""Health on cylinder lengths: what an angle sensor is off by is told in its units, and ends where it does."""
+"""Deviations from the prediction on lengths: told in the unit of the channel without a cause, and ended with the deviation."""
 
 from __future__ import annotations
 
-import numpy as np
+from functools import lru_cache
 
-from boom_twin import Sample, Stream, Twin, load_scene, statics
+import numpy as np
+import pytest
+
+from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
 from boom_twin.health.baseline import Baseline
 from boom_twin.types import Alarm
 
 STEP, ONSET, END = 5_000_000, 600, 1800  # ns; samples
+OFF = {  # of a channel that reads too much for 6 s
+    "joint_2": (Stream.ANGLES, 1, 4e-3, "joint_2 reads +4"),
+    "tip_imu_x": (Stream.IMU, 0, 1.2, "tip_imu_x reads +1.2"),
+    "cylinder_force_2": (Stream.FORCES, 1, 9e3, "cylinder_force_2 reads +9"),
+}
 
 
-def alarms(shift: float) -> list[Alarm]:
-    """Every alarm that began or ended while a boom rests; the transducer of cylinder 2 is off by `shift` (m) for 6 s."""
-    scene, rng, found = load_scene(), np.random.default_rng(5), []
-    rest = statics(scene, posture="arch")
-    twin = Twin(scene, baseline=Baseline())
-    for k in range(3400):
-        lengths = rest.lengths + rng.normal(0.0, 2e-5, 4) + [0.0, shift if ONSET <= k < END else 0.0, 0.0, 0.0]
-        joints = rest.joints + rng.normal(0.0, 1.745e-4, 4)
-        for stream, values in ((Stream.STROKES, lengths), (Stream.ANGLES, joints)):
-            health = twin.update(Sample(stream, 10**18 + k * STEP, values)).health
+@lru_cache
+def rest() -> tuple[np.ndarray, dict[Stream, np.ndarray]]:
+    """Return cylinder lengths, and what other sensors read, of a boom at rest."""
+    found = statics(load_scene(), posture="arch")
+    first = Twin(load_scene()).update(Sample(Stream.STROKES, 0, np.array(found.lengths))).prediction
+    pitch = first.tip_angle
+    gravity = 9.81 * np.array([np.sin(pitch), np.cos(pitch)])
+    others = {Stream.ANGLES: np.array(found.joints), Stream.IMU: gravity, Stream.FORCES: np.array(found.cylinder_forces)}
+    return np.array(found.lengths), others
+
+
+def alarms(stream: Stream, channel: int, shift: float, settings: Settings | None = None, ramp: int = 0) -> list[Alarm]:
+    """Return every alarm that began or ended while a boom rests and a channel reads `shift` too much, after a `ramp`."""
+    rng, found, sigmas = np.random.default_rng(5), [], {Stream.ANGLES: 1.745e-4, Stream.IMU: 0.05, Stream.FORCES: 100.0}
+    lengths, others = rest()
+    twin = Twin(load_scene(), settings, baseline=Baseline())
+    for k in range(3600):
+        share = 1.0 if ramp == 0 else min(1.0, (k - ONSET) / ramp, (END - k) / ramp)
+        readings = {Stream.STROKES: lengths + rng.normal(0.0, 2e-5, 4)}
+        readings |= {each: others[each] + rng.normal(0.0, sigmas[each], len(others[each])) for each in others}
+        readings[stream][channel] += shift * share if ONSET <= k < END else 0.0
+        for each, values in readings.items():
+            health = twin.update(Sample(each, 10**18 + k * STEP, values)).health
             found += [] if health is None else health.alarms
     return found
 
 
 def test_a_healthy_boom_raises_none() -> None:
-    assert alarms(0.0) == []
+    assert alarms(Stream.STROKES, 0, 0.0) == []
 
 
-def test_a_stroke_transducer_that_is_off_is_told_and_ends() -> None:
-    found = [alarm for alarm in alarms(1e-3) if alarm.kind == "deviation"]
-    assert {alarm.channel for alarm in found} == {"joint_2"} and found[-1].until is not None
+@pytest.mark.parametrize("name", OFF)
+def test_a_channel_that_is_off_is_told_in_its_unit_and_ends(name: str) -> None:
+    """A sensor that drifts within a second, which is no jump."""
+    stream, channel, shift, told = OFF[name]
+    found = alarms(stream, channel, shift, ramp=200)
+    assert {(alarm.channel, alarm.kind, alarm.cause) for alarm in found} == {(name, "deviation", None)}
     since, until = ((stamp - 10**18) * 1e-9 for stamp in (found[0].since, found[-1].until))
-    assert 3.0 <= since < 6.0 and 9.0 <= until < 14.0
-    assert found[0].cause is None and "joint_2 reads" in found[0].told
+    assert 3.0 <= since < 8.0 and 9.0 <= until < 14.0
+    assert f"{name} reads +" in found[0].told and told[:5] == found[0].told[:5] and found[0].ranked == ()
+
+
+def test_a_stroke_transducer_that_is_off_shows_in_its_joint() -> None:
+    found = [alarm for alarm in alarms(Stream.STROKES, 1, 1e-3) if alarm.kind == "deviation"]
+    assert {alarm.channel for alarm in found} == {"joint_2"} and found[-1].until is not None
+
+
+@pytest.mark.parametrize(
+    "name, limit", [("joint_2", "tip_deviation"), ("tip_imu_x", "imu_deviation"), ("cylinder_force_2", "force_deviation")]
+)
+def test_limits_are_settings(name: str, limit: str) -> None:
+    stream, channel, shift, _ = OFF[name]
+    larger = {"tip_deviation": 0.1, "imu_deviation": 1.5, "force_deviation": 1e4}[limit]
+    assert alarms(stream, channel, shift, Settings(**{limit: larger}), ramp=200) == []

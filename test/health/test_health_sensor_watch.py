@@ -129,25 +129,6 @@ def test_a_jump_ends_where_the_reading_is_right_again():
     assert watched.take(findings(0, "jump", 0.8, level=0.299)) == [], "elsewhere, but not right"
 
 
-def test_a_sensor_that_is_blamed_and_jumps_to_what_is_expected_has_come_back():
-    """Its drift is over: no jump is told and it is not left out. Of another sensor, or beside what is expected, one is."""
-    for blamed, level, told in (("joint_1.sensor", 1e-4, 0), ("joint_2.sensor", 1e-4, 1), ("joint_1.sensor", 0.005, 1)):
-        watch = SensorMonitor(NAMES, SENSORS[Stream.ANGLES])
-        assert len(watch.take(findings(0, "jump", -0.01, level), 0, BLOCK, {blamed: math.nan})) == told
-        assert watch.masked.tolist() == [bool(told), False]
-
-
-def test_a_stroke_that_is_blamed_and_jumps_back_by_what_it_is_off_has_come_back():
-    """No model says what it should read: a stroke that has drifted by 2.5 mm jumps back by as much, or by something else."""
-    names, kind = ("cylinder_1", "cylinder_2"), SENSORS[Stream.STROKES]
-    first, second = "cylinder_1.sensor", "cylinder_2.sensor"
-    others = (first, -2.5e-3, 1), (first, 5e-3, 1), (first, math.nan, 1), (second, 2.5e-3, 1)
-    for cause, off, told in ((first, 2.5e-3, 0), *others):
-        watch = SensorMonitor(names, kind, is_predicted=False)
-        assert len(watch.take(findings(0, "jump", -2.48e-3, 0.4), 0, BLOCK, {cause: off})) == told
-        assert watch.masked.tolist() == [bool(told), False]
-
-
 def test_two_faults_of_one_sensor():
     watched = Watched()
     watched.take(findings(0, "range"))

@@ -87,7 +87,7 @@ def _health(random: np.random.Generator, stamp: int) -> Health:
     ranked = (Ranked("cylinder_1.k", 0.9, (("softer", 0.4, 0.02, ""),)),)
     alarm = Alarm("joint_1", "softer", stamp - 10**9, None, "cylinder_1.k", "softer " * int(random.integers(1, 9)), ranked)
     alarms = (alarm,) * int(random.integers(0, 3))
-    return Health(stamp - int(random.integers(0, 10**8)), alarms, ("joint_1",), random.random(1), random.random(2))
+    return Health(stamp - int(random.integers(0, 10**8)), alarms, random.random(2))
 
 
 def _numbers(random: np.random.Generator, shape: int | tuple[int, ...]) -> Array:

@@ -65,7 +65,7 @@ ALARM = Alarm(
 
 def judged(*alarms: Alarm) -> Report:
     """With news of the rig's health, which are of another stamp."""
-    health = Health(STAMP - 100_000_000, alarms, ("joint_1", "joint_2"), np.array([0.2, 1.5]), np.array([0.001, 0.004]))
+    health = Health(STAMP - 100_000_000, alarms, np.array([0.001, 0.004]))
     return replace(report(), health=health)
 
 

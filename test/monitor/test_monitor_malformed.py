@@ -99,7 +99,7 @@ def statuses(*names: str, role: Output = Output.DIAGNOSTICS, text: str = "well",
 
 
 def health(**changes: str) -> Any:
-    encoded = encode_health(Health(EPOCH, (ALARM,), (), np.zeros(0), np.zeros(2)))
+    encoded = encode_health(Health(EPOCH, (ALARM,), np.zeros(2)))
     message = jazzy().deserialize_cdr(encoded, TYPES[Output.HEALTH])
     for pair in message.status[0].values:
         pair.value = changes.get(pair.key, pair.value)

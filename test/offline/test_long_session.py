@@ -23,7 +23,7 @@ from boom_twin.twin.blocks import CODES, ReportBlock, SampleBlock
 def replayed(session: Path, out: Path) -> tuple[dict, Evaluation, list[Stretch]]:
     """Summary, evaluation and stretches of a replay into `out`."""
     scene, stretches = load_scene(), []
-    evaluator = Evaluator(scene, Settings(), None)
+    evaluator = Evaluator(scene, Settings())
 
     def take(stretch: Stretch) -> None:
         stretches.append(stretch)
@@ -67,7 +67,7 @@ def test_the_figures_are_those_of_the_whole(both: tuple) -> None:
 
 def test_the_history_is_that_of_the_whole(both: tuple) -> None:
     (_, whole, _), (_, parts, _), _ = both
-    for name in ("stamps_s", "tip_position", "moments", "residual_values", "levels"):
+    for name in ("stamps_s", "tip_position", "moments", "residual_values"):
         assert np.array_equal(getattr(parts.history, name), getattr(whole.history, name), equal_nan=True), name
     assert len(parts.history.shapes) == len(whole.history.shapes)
     for name, found in parts.history.totals.residuals.items():
@@ -89,7 +89,7 @@ def peak_of(parts: list[ReportBlock], times: int, monkeypatch: pytest.MonkeyPatc
     """Peak of memory, bytes, and what comes out of a session that repeats `parts`."""
     monkeypatch.setattr(recording, "STRETCH", 2000)
     monkeypatch.setattr(history, "MOST_ROWS", 8192)
-    evaluator = Evaluator(load_scene(), Settings(), None)
+    evaluator = Evaluator(load_scene(), Settings())
     held = Recording(4, evaluator.add)
     tracemalloc.start()
     for k in range(times):

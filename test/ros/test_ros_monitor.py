@@ -56,7 +56,7 @@ def tell(end: int | None, message: Any) -> None:
     """One alarm, that has ended or lasts."""
     from rclpy.serialization import deserialize_message
 
-    health = Health(ALARM.since, (replace(ALARM, until=end),), (), np.zeros(0), np.zeros(2))
+    health = Health(ALARM.since, (replace(ALARM, until=end),), np.zeros(2))
     message.status = deserialize_message(encode_health(health), type(message)).status
 
 

@@ -107,7 +107,7 @@ def test_there_is_one_loop() -> None:
     drives = re.compile(r"\bdrive(_blocks|_one)?\(.*twin", re.I)
     users = {name for name, text in texts.items() if drives.search(text) and "twin.driver import" in text}
     assert users == {
-        "calibration/baseline.py", "calibration/validation.py", "monitor/data/bag_feed.py", "offline/replay.py",
+        "calibration/validation.py", "monitor/data/bag_feed.py", "offline/replay.py",
         "ros/node/node.py",
     }  # fmt: skip
     assert {name for name, text in texts.items() if re.search(r"twin\.update\(\w", text)} == {"twin/driver.py"}
@@ -175,7 +175,7 @@ def test_what_health_finds_changes_the_estimate_alone(monkeypatch: pytest.Monkey
             *(each.prediction.tip_acceleration for each in reports if each.prediction is not None),
             *(each.prediction.cylinder_forces for each in reports if each.prediction is not None),
             *(part for each in reports for row in each.residuals for part in (row.values, row.sigmas)),
-            *(each.levels for each in judged),
+            *(each.tip_sigmas for each in judged),
         ]
         kept.append((b"".join(map(np.ndarray.tobytes, numbers)), [each.alarms for each in judged]))
         estimates.append(np.array([each.estimate.tip for each in reports if each.estimate is not None]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.health.inference.block_problem import MeasuredRows
+from boom_twin.health.blocks import MeasuredRows
 from boom_twin.kernels.jit import SameTypes, hold
 from boom_twin.twin.blocks import STREAMS
 from boom_twin.twin.health_rows import copy_residuals, count_residuals
@@ -19,7 +19,7 @@ def test_residuals_are_counted_and_copied_by_stream(first: int, last: int) -> No
     found, rng = new_output(64, 4, 40, 5, WIDTHS), np.random.default_rng(first)
     found.residual_streams[:] = rng.integers(1, len(STREAMS), len(found.residual_streams))
     found.residual_stamps[:] = rng.integers(0, 10**18, len(found.residual_stamps))
-    found.raw[:], found.values[:] = rng.normal(size=(2, *found.raw.shape))
+    found.raw[:], found.values[:], found.sigmas[:] = rng.normal(size=(3, *found.raw.shape))
     held, counts, own = hold(found), np.full(len(STREAMS), 9), slice(first, last)
     SameTypes(count_residuals)(held, first, last, counts)
     assert counts.tolist() == np.bincount(found.residual_streams[own], minlength=len(STREAMS)).tolist()
@@ -29,3 +29,4 @@ def test_residuals_are_counted_and_copied_by_stream(first: int, last: int) -> No
         assert np.array_equal(rows.stamps, found.residual_stamps[own][chosen])
         assert np.array_equal(rows.raw, found.raw[own][chosen, :width])
         assert np.array_equal(rows.left, found.values[own][chosen, :width])
+        assert np.array_equal(rows.sigmas, found.sigmas[own][chosen, :width])

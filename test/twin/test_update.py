@@ -60,7 +60,7 @@ def told(reports: list[Report]) -> list[tuple[object, ...]]:
                 p.cylinder_forces, p.shape, p.undeflected, p.pins, p.clearances, p.moments)),
         )  # fmt: skip
         residuals = [(r.stream, r.stamp, r.names, r.values.tobytes(), r.sigmas.tobytes()) for r in report.residuals]
-        level = None if health is None else (health.stamp, health.alarms, health.levels.tobytes(), health.tip_sigmas.tobytes())
+        level = None if health is None else (health.stamp, health.alarms, health.tip_sigmas.tobytes())
         found.append((report.stamp, report.accepted, report.events, report.status, numbers, residuals, level, report.change))
         found += told(list(report.earlier))
     return found

@@ -1,0 +1,145 @@
+"""Blocks of 0.1 s of predictions and measured samples, collected in the order of time from samples in any order."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types import Array, Stream
+
+BLOCK = 100_000_000  # ns
+GRACE = 100_000_000  # ns that a block waits for late samples
+
+
+class PredictionRows(NamedTuple):
+    """Predictions with the strokes that they followed.
+
+    Attributes
+    ----------
+    stamps : ndarray of int64, shape (k,)
+        ns.
+    measured : ndarray, shape (k, n)
+        Strokes, m.
+    variances : ndarray, shape (k, n)
+        Variances of the estimated strokes, m^2.
+    """
+
+    stamps: NDArray[np.int64]
+    measured: Array
+    variances: Array
+
+    @classmethod
+    def room(cls, rows: int, joints: int) -> PredictionRows:
+        """Return arrays for so many rows, not filled."""
+        return cls(np.empty(rows, np.int64), *np.empty((2, rows, joints)))
+
+
+class MeasuredRows(NamedTuple):
+    """Measured samples of one stream.
+
+    Attributes
+    ----------
+    stamps : ndarray of int64, shape (k,)
+        ns.
+    raw, left, sigmas : ndarray, shape (k, channels)
+        Readings, residuals and expected standard deviations of these, in the unit of the sensor.
+    """
+
+    stamps: NDArray[np.int64]
+    raw: Array
+    left: Array
+    sigmas: Array
+
+    @classmethod
+    def room(cls, rows: int, channels: int) -> MeasuredRows:
+        """Return arrays for so many rows, not filled."""
+        return cls(np.empty(rows, np.int64), *np.empty((3, rows, channels)))
+
+
+Rows = TypeVar("Rows", PredictionRows, MeasuredRows)
+
+
+class Block:
+    """Predictions and samples within one block.
+
+    Attributes
+    ----------
+    start, end : int
+        Stamps (ns) at which it begins and ends.
+    """
+
+    def __init__(self, number: int) -> None:
+        self.number, self.start, self.end = number, number * BLOCK, (number + 1) * BLOCK
+        self.followed: list[PredictionRows] = []
+        self.compared: dict[Stream, list[MeasuredRows]] = {}
+
+    def predictions(self) -> PredictionRows:
+        """Return all predictions; there is at least one."""
+        return joined(self.followed)
+
+    def readings(self, stream: Stream) -> MeasuredRows | None:
+        """Return all samples of a stream; None without any."""
+        rows = self.compared.get(stream)
+        return None if rows is None else joined(rows)
+
+
+def joined(parts: list[Rows]) -> Rows:
+    """Return the rows of all parts, one after the other."""
+    if len(parts) == 1:
+        return parts[0]
+    return type(parts[0])(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def by_block(rows: Rows) -> Iterator[tuple[int, Rows]]:
+    """Yield the number of every block that has rows, and these."""
+    numbers = rows.stamps // BLOCK
+    if (first := int(numbers.min())) == numbers.max():
+        yield first, rows
+        return
+    for number in np.unique(numbers).tolist():
+        own = numbers == number
+        yield number, type(rows)(*(column[own] for column in rows))
+
+
+class BlockBuilder:
+    """Open blocks, in the order of time."""
+
+    def __init__(self) -> None:
+        self._open: deque[Block] = deque()
+        self._closed = -1
+
+    def predicted(self, followed: PredictionRows) -> None:
+        """Take predictions, at least one."""
+        for number, rows in by_block(followed):
+            if (block := self._at(number)) is not None:
+                block.followed.append(rows)
+
+    def measured(self, stream: Stream, compared: MeasuredRows) -> None:
+        """Take samples of a stream with their residuals, at least one."""
+        for number, rows in by_block(compared):
+            if (block := self._at(number)) is not None:
+                block.compared.setdefault(stream, []).append(rows)
+
+    def close(self, stamp: int) -> list[Block]:
+        """Return blocks for which no sample is awaited once a stroke has come with `stamp` (ns); they may be empty."""
+        done = []
+        while self._open and self._open[0].end + GRACE <= stamp:
+            done.append(self._open.popleft())
+            self._closed = done[-1].number
+        return done
+
+    def _at(self, number: int) -> Block | None:
+        """Return the block of a number, and open those in between; None if it is closed already."""
+        if number <= self._closed:
+            return None
+        if not self._open:
+            self._open.append(Block(number))
+        while self._open[-1].number < number:
+            self._open.append(Block(self._open[-1].number + 1))
+        while self._open[0].number > number:
+            self._open.appendleft(Block(self._open[0].number - 1))
+        return self._open[number - self._open[0].number]

@@ -1,0 +1,92 @@
+"""Monitor lasting deviations of a stream from the prediction, each told in its own unit; no cause is inferred from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..config.settings import Settings
+from ..scene.schema import Scene
+from ..types import SENSORS, Alarm, Array, Stream, channels_of
+from .blocks import Block
+from .stream_readings import ENOUGH, StreamReadings
+
+KIND = "deviation"  # of all its alarms
+SIGMAS = {Stream.ANGLES: 3.0, Stream.IMU: 3.0, Stream.FORCES: 10.0}
+"""Stated deviations by which a mean residual has to be off beside its limit; of forces they lack the error of a model."""
+LAG = 0.4  # s; a residual that stamps explain which are late by less is no deviation, see `delay_monitor`
+LASTING = 3_000_000_000  # ns for which a deviation has to last: in haste a mean is off for two seconds
+GONE = 0.5  # share of the limit below which a deviation is over
+SETTLED = 5_000_000_000  # ns for which it has to be below
+REMEDY = {
+    Stream.ANGLES: "its sensor, a stroke transducer, or the scene is off. Compare both at rest",
+    Stream.IMU: "its zero or mount, a stroke transducer, or the scene is off. Compare it with gravity at rest",
+    Stream.FORCES: "its sensor, the load, or the scene is off. Check payload and line fill, then the sensor's zero",
+}
+
+
+@dataclass
+class _Deviation:
+    alarm: Alarm
+    seen: int  # ns, newest end of a block in which it was there
+
+
+class DeviationMonitor:
+    """Judges the slow means of the residuals of one stream.
+
+    Parameters
+    ----------
+    stream : Stream
+    scene : Scene
+    settings : Settings
+        With the limits.
+    """
+
+    def __init__(self, stream: Stream, scene: Scene, settings: Settings) -> None:
+        self._stream, self._names = stream, channels_of(len(scene.joints))[stream]
+        lengths = np.array([section.length for section in scene.sections])
+        self._reach = np.cumsum(lengths[::-1])[::-1] if stream is Stream.ANGLES else None  # m; outboard of each joint
+        limit = {Stream.IMU: settings.imu_deviation, Stream.FORCES: settings.force_deviation}.get(stream, 0.0)
+        self._limits = np.full(len(self._names), limit) if self._reach is None else settings.tip_deviation / self._reach
+        self._since, self._last = np.full(len(self._names), -1), dict[int, _Deviation]()
+
+    @property
+    def alarms(self) -> Sequence[Alarm]:
+        """Alarms that last."""
+        return [each.alarm for each in self._last.values()]
+
+    def take(self, readings: StreamReadings, masked: NDArray[np.bool_], block: Block) -> list[Alarm]:
+        """Take a block, without the channels that are `masked`; return the alarms that began or ended."""
+        slow, news = readings.slow, list[Alarm]()
+        weight = np.maximum(slow.weight, 1e-9)
+        off = (slow.read - slow.expected) / weight
+        if not self._last and not (np.abs(off) > self._limits).any():
+            self._since[:] = -1
+            return []
+        is_known = (readings.counts > 0.0) & (slow.weight > ENOUGH) & ~masked
+        least = np.maximum(self._limits, SIGMAS[self._stream] * np.sqrt(slow.variance / weight))
+        late = -LAG * slow.rate / weight  # residual of readings so late
+        is_far, is_near = is_known & (np.abs(off) > least), is_known & (np.abs(off) < GONE * self._limits)
+        is_explained = (off < np.maximum(late, 0.0) + least) & (off > np.minimum(late, 0.0) - least)
+        self._since = np.where(is_far, np.where(self._since < 0, block.start, self._since), -1)
+        for i in np.flatnonzero(is_far & ~is_explained & (block.end - self._since >= LASTING)).tolist():
+            if i not in self._last:
+                alarm = Alarm(self._names[i], KIND, int(self._since[i]), None, None, self._told(i, off[i]))
+                self._last[i] = _Deviation(alarm, block.end)
+                news.append(alarm)
+        for i, each in list(self._last.items()):
+            if not is_near[i]:
+                each.seen = block.end
+            if masked[i] or block.end - each.seen > SETTLED:
+                news.append(replace(self._last.pop(i).alarm, until=each.seen))
+        return news
+
+    def _told(self, i: int, off: Array) -> str:
+        """Return what channel `i` reads too much, and what may be the matter."""
+        factor, unit = SENSORS[self._stream].shown_unit
+        tip = "" if self._reach is None else f", up to {1e3 * abs(off) * self._reach[i]:.0f} mm at the tip"
+        size = f"{float(f'{factor * off:.3g}'):+g} {unit}"
+        return f"{self._names[i]} reads {size} against the cylinder lengths{tip}: {REMEDY[self._stream]}"

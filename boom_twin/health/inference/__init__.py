@@ -1,1 +1,0 @@
-"""Inference of faults from residuals: sensitivities, whitening filter, hypothesis test."""
