@@ -8,7 +8,7 @@ from oracle import booms, segments
 from scipy.linalg import eigh, null_space
 
 from boom_twin.analysis.equilibrium import settle, statics
-from boom_twin.analysis.modal import damping_ratio, frequencies_near, natural_frequencies, natural_modes
+from boom_twin.analysis.modal import damping_ratio, natural_modes
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.errors import SolverError, UsageError
 from boom_twin.kernels.jit import Kernel
@@ -144,14 +144,6 @@ def test_a_mode_takes_few_calls_of_kernels(monkeypatch):
     calls.clear()
     modes = natural_modes(*boom, 4, 1e-3)
     assert len(modes) == 4 and len(calls) <= 4 + 8 * len(modes)
-
-
-@pytest.mark.parametrize("share", [0.2, 0.9995, 1.0, 1.0005, 1.7])
-def test_a_frequency_is_found_wherever_it_is_looked_for_first(share):
-    boom = settled(load_scene(), "arch")
-    exact = natural_frequencies(*boom, 4, 1e-9)
-    found = frequencies_near(*boom, [0, 2, 3], share * exact[[0, 2, 3]], 1e-6)
-    assert found == pytest.approx(exact[[0, 2, 3]], rel=1e-6)
 
 
 def test_negative_eigenvalues_of_matrices_without_a_diagonal():

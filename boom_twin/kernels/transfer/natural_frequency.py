@@ -20,7 +20,6 @@ RENEW = np.bool_(True)
 TRIES = 20  # frequencies, each a little beside the last, where one meets a pivot that is zero
 BALANCED = 6  # times that rows of a matrix are brought to one order of magnitude
 LARGE = 0.64  # of the largest entry beside the diagonal, from which on one of the diagonal is a pivot by itself
-FIRST_STEP = 1e-3  # of a frequency that is known about, by which it is looked for beside it at first
 
 
 @kernel
@@ -63,10 +62,8 @@ def condense(t, state, work, motion, drive, still):
 
 
 @kernel
-def bisect_frequency(t, state, work, position, drive, still, base, number, low, near, width, scratch):
-    """The frequency (rad/s), above `low`, at which `count_below`, less `base`, rises from at most `number` to more.
-
-    Where it is known about, `near` is not 0, and what it is looked for between first.
+def bisect_frequency(t, state, work, position, drive, still, base, number, low, width, scratch):
+    """Return the frequency (rad/s), above `low`, at which `count_below`, less `base`, rises from at most `number` to more.
 
     Returns
     -------
@@ -74,22 +71,13 @@ def bisect_frequency(t, state, work, position, drive, still, base, number, low, 
         As `count_below`; of the middle of the last bracket, which is `width` of its upper end wide.
     """
     place(t, state, work)
-    high, step, is_above = max(2.0 * low, 1.0), 0.0, False
-    if near > low:
-        high, step = near, FIRST_STEP * near
+    high = max(2.0 * low, 1.0)
     status, count, at = count_below(t, state, work, position, drive, still, high, scratch)
     found = count - base > number
     while count != NOT_COUNTED and not found:
-        low, high = high, high + step if step > 0.0 else 2.0 * high
-        step, is_above = 2.0 * step, True
+        low, high = high, 2.0 * high
         status, count, at = count_below(t, state, work, position, drive, still, high, scratch)
         found = count - base > number
-    while count != NOT_COUNTED and step > 0.0 and not is_above and high - step > low:
-        status, count, at = count_below(t, state, work, position, drive, still, high - step, scratch)
-        if count - base > number:
-            high, step = high - step, 2.0 * step
-        else:
-            low, step = high - step, 0.0
     if count == NOT_COUNTED:
         return status, count, at
     while high - low > width * high:
