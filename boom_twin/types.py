@@ -141,6 +141,7 @@ SENSORS: dict[Stream, SensorKind] = {
         noise="stroke_sigma",
         resolution="stroke_resolution",
         lack="nothing can be replayed",
+        shown="mm",
     ),
     Stream.ANGLES: SensorKind(
         title="joint angles",
@@ -295,28 +296,38 @@ class Estimate:
     ----------
     stamp : int
         Nanoseconds.
-    tip, acceleration : ndarray, shape (3,)
-        x, y (m) and angle (rad) of the last head at the tip; their second derivatives.
+    tip, velocity, acceleration : ndarray, shape (3,)
+        x, y (m) and angle (rad) of the last head at the tip; their first and second derivatives.
     load : ndarray, shape (2,)
         Force at the tip that the model does not know, N.
-    tip_covariance, acceleration_covariance : ndarray, shape (6,)
-        Upper triangles by rows of the covariance of `tip` and of `acceleration`.
+    modes, mode_rates : ndarray, shape (6,)
+        Coordinates (m) of the natural modes at a modal mass of 1 kg, lowest first, and their rates (m/s). They are about the
+        static equilibrium of the deflected boom; a positive one lifted the tip where the model began. NaN beyond its last mode.
+    tip_covariance, velocity_covariance, acceleration_covariance : ndarray, shape (6,)
+        Upper triangles by rows of the covariance of `tip`, `velocity` and `acceleration`.
     load_variance : ndarray, shape (2,)
         N^2.
     """
 
     stamp: int
     tip: Array
+    velocity: Array
     acceleration: Array
     load: Array
+    modes: Array
+    mode_rates: Array
     tip_covariance: Array
+    velocity_covariance: Array
     acceleration_covariance: Array
     load_variance: Array
 
 
 @dataclass(frozen=True, slots=True)
 class Residuals:
-    """Measured minus predicted at the stamp of one sample of angles, accelerations or forces.
+    """Measured minus predicted at the stamp of one sample.
+
+    The prediction is that of the strokes up to this stamp. Residuals of strokes are innovations: the prediction, its mean over
+    the filter's models by their probabilities, is that of the strokes before them.
 
     Attributes
     ----------
@@ -324,7 +335,7 @@ class Residuals:
     stamp : int
         Nanoseconds.
     names : tuple of str
-        One per channel: ``joint_1``, .., ``tip_imu_x``, ``tip_imu_z``, or ``cylinder_force_1``, ..
+        One per channel: ``cylinder_1``, .., ``joint_1``, .., ``tip_imu_x``, ``tip_imu_z``, or ``cylinder_force_1``, ..
     values, sigmas : ndarray, shape (len(names),)
         The residual in the unit of the sensor, and the standard deviation expected of it. NaN where not measured.
     """

@@ -92,6 +92,7 @@ class Filters(NamedTuple):
     places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
     felt : (2,) specific force predicted at the tip, m/s^2. shaking : (1,) mean square of its acceleration, m^2/s^4.
     angle : (1,) of the tip, rad. strokes : (n, 3) predicted lengths (m), their rates and accelerations.
+    innovations : (n, 2) newest lengths less what the prediction's mixture expected before them (m), and their variances.
     pulls : (n,) predicted forces, N. evidence : (1,) logarithm of the likelihood of all that was read, up to a constant.
     The others are scratch.
     """
@@ -132,6 +133,7 @@ class Filters(NamedTuple):
     shaking: Array
     angle: Array
     strokes: Array
+    innovations: Array
 
 
 def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> Filters:
@@ -146,8 +148,9 @@ def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> F
         places=np.zeros((states, 6 + n), np.int64), weights=np.zeros((states, 6 + n)), counts=np.zeros(states, np.int64),
         variances=np.zeros(states), felt=np.zeros(2), pulls=np.zeros(n), evidence=np.zeros(1), half=np.zeros((states, states)),
         turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)), mixed_p=np.zeros((3, states, states)),
-        row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((8, states)), likely=np.zeros(5),
+        row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((9, states)), likely=np.zeros(5),
         switch=np.zeros((3, 3)), shaking=np.zeros(1), angle=np.zeros(1), strokes=np.zeros((n, 3)),
+        innovations=np.zeros((n, 2)),
     )  # fmt: skip
 
 
@@ -408,14 +411,34 @@ def hold_still(p, f, k, size):
 
 
 @inner
+def length_of(p, i, row, x, size):
+    """Return what the stroke transducer of cylinder `i` reads by a state, m; `row` is that of `length_row`."""
+    return p.drives[i] + p.oil_read[i] * p.pulled[i] + about_rest(p, row, x, size)
+
+
+@inner
+def note_innovations(p, f, y):
+    """Write lengths `y` less the mean of the prediction's mixture before them, and the variances of that."""
+    n = y.shape[0]
+    size = drive_place(p) + n  # a length does not depend on the states behind
+    for i in range(n):
+        mean = square = 0.0
+        length_row(p, i, f.row)
+        for k in range(BURST + 1):
+            innovation = y[i] - length_of(p, i, f.row, f.x[k], size)
+            mean += f.chances[k] * innovation
+            square += f.chances[k] * (innovation * innovation + variance_of(f.row, f.p[k], f.gain, size))
+        f.innovations[i, 0], f.innovations[i, 1] = mean, square - mean * mean + f.length2[i]
+
+
+@inner
 def take_lengths(p, f, k, size, y):
     """Take lengths `y` (n, m; NaN = missing) into model `k`; returns the logarithm of their likelihood."""
     total = 0.0
     for i in range(y.shape[0]):
         if math.isfinite(y[i]) and not (k >= ALL_VALVES and f.deaf[i]):
             length_row(p, i, f.row)
-            rest = p.drives[i] + p.oil_read[i] * p.pulled[i]
-            innovation = y[i] - rest - about_rest(p, f.row, f.x[k], size)
+            innovation = y[i] - length_of(p, i, f.row, f.x[k], size)
             expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, f.length2[i], size)
             total -= 0.5 * (innovation * innovation / expected + math.log(expected))
     return total
@@ -568,6 +591,7 @@ def step_models(p, f, h, y):
         hold_still(p, f, BURST, size)
         if f.status[FED] == 1:
             hold_still(p, f, ALL_VALVES, every)
+    note_innovations(p, f, y)
     for k in range(3):
         f.likely[k] = take_lengths(p, f, k, size, y)
     weigh_models(f, PREDICTION)

@@ -26,11 +26,11 @@ from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
 from ..types import SENSORS, Array, Mount, Outline, Prediction, Stream, StrokeReading, channels_of
+from .estimate_row import MODES
 from .models import FED, FED_STAMP, PREDICTION, Filters, SensorNoise, new_filters, start_models
 from .posture import Posture, linearise, new_posture
 from .sensor_model import Mounting
 
-MODES = 6  # at most
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
 WIDTH = 1e-6  # relative accuracy of natural frequencies
 USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD = 2.5e-3, 1e-4, 2e-3, 2e-2  # shares of the boom's weight, see `SensorNoise`
@@ -170,7 +170,8 @@ class BoomPredictor:
         modes = natural_modes(self.plan, boom, self._work, MODES, WIDTH, 2.0 * math.pi * HIGHEST)
         p.modes[0] = len(modes)
         for j, mode in enumerate(modes):
-            p.motions[j], p.columns[2 + self.plan.joints + j] = mode.motion, mode.increments
+            side = math.copysign(1.0, mode.motion[self.plan.tables.tip + 1])  # a positive coordinate lifts the tip
+            p.motions[j], p.columns[2 + self.plan.joints + j] = side * mode.motion, side * mode.increments
             p.omega[j] = 2.0 * math.pi * mode.frequency
         status = linearise(self.plan.tables, boom, self._work, p, drives, False)
         if status != OK:

@@ -10,7 +10,18 @@ from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, NOT_FINITE, OK
 from ..kernels.transfer.forward_kinematics import place
-from .estimate_row import ACCELERATION, ACCELERATION_COVARIANCE, FORCE, FORCE_VARIANCE, TIP_COVARIANCE
+from .estimate_row import (
+    ACCELERATION,
+    ACCELERATION_COVARIANCE,
+    COORDINATES,
+    FORCE,
+    FORCE_VARIANCE,
+    MODES,
+    RATES,
+    TIP_COVARIANCE,
+    VELOCITY,
+    VELOCITY_COVARIANCE,
+)
 from .estimate_row import TIP as TIP_AT
 from .models import (
     ESTIMATE,
@@ -18,13 +29,12 @@ from .models import (
     FED_STAMP,
     PATIENCE,
     PREDICTION,
-    about_rest,
     acceleration_row,
-    all_states,
     angle_row,
     column_row,
     drive_place,
     force_place,
+    length_of,
     length_row,
     rate_row,
     read,
@@ -131,7 +141,7 @@ def write_prediction(t, live, p, f, h, gravity, out):
         found.joints[i] = live.frames[root, FRAME_ANGLE] - live.frames[root - 1, FRAME_ANGLE]
         f.pulls[i] = found.cylinder_forces[i] = live.z[t.cylinders[i].z]
         length_row(p, i, f.row)
-        estimates.strokes[i] = p.drives[i] + p.oil_read[i] * p.pulled[i] + about_rest(p, f.row, f.mean[PREDICTION], size)
+        estimates.strokes[i] = length_of(p, i, f.row, f.mean[PREDICTION], size)
         estimates.variances[i] = variance_of(f.row, f.spread[PREDICTION], f.gain, size)
         f.strokes[i, 0], f.strokes[i, 1] = estimates.strokes[i], stroke_rate(p, f, i)
         found.lengths[i] = estimates.strokes[i] + (p.compliance[i] - p.oil_read[i]) * f.pulls[i]
@@ -236,14 +246,20 @@ def write_expected_readings(p, f, live, results, inclination, values, sigmas):
 @inner
 def write_tip_estimate(p, f, results, out):
     """Write the estimate beside the newest prediction; see `boom_twin.deviation.estimate_row.WIDTH`."""
-    n, size, every, load = p.drives.shape[0], zero_place(p), all_states(p), force_place(p)
+    n, m, size, load = p.drives.shape[0], p.modes[0], zero_place(p), force_place(p)
     for a in range(3):
         column_row(p, p.readings, n + a, 1.0, f.rows[a])
-        acceleration_row(p, a, f.rows[3 + a])
+        rate_row(p, a, f.rows[3 + a])
+        acceleration_row(p, a, f.rows[6 + a])
         out[TIP_AT + a] = results.tip[0, a] + difference(f, f.rows[a], size)
-        out[ACCELERATION + a] = results.tip[2, a] + difference(f, f.rows[3 + a], size)
-    write_covariance(f, 0, every, out[TIP_COVARIANCE:ACCELERATION_COVARIANCE])
-    write_covariance(f, 3, every, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
+        out[VELOCITY + a] = results.tip[1, a] + difference(f, f.rows[3 + a], size)
+        out[ACCELERATION + a] = results.tip[2, a] + difference(f, f.rows[6 + a], size)
+    write_covariance(f, 0, size, out[TIP_COVARIANCE:VELOCITY_COVARIANCE])
+    write_covariance(f, 3, size, out[VELOCITY_COVARIANCE:ACCELERATION_COVARIANCE])
+    write_covariance(f, 6, size, out[ACCELERATION_COVARIANCE:FORCE_VARIANCE])
+    for j in range(MODES):
+        out[COORDINATES + j] = f.mean[ESTIMATE, j] if j < m else math.nan
+        out[RATES + j] = f.mean[ESTIMATE, m + j] if j < m else math.nan
     covariance = f.spread[ESTIMATE]
     for a in range(2):
         fast, slow = load + a, load + 2 + a

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..deviation.estimate_row import MODES
 from ..twin.blocks import Integers
 from ..types import Array
 from .cdr_encoder import NumberFields
 from .message_fields import fill_xz
-from .prediction_numbers import number_names
+from .prediction_numbers import COVARIANCE, ESTIMATED_NUMBERS, number_names
 from .topic_table import Output
 
 
@@ -58,6 +59,17 @@ def _put_pose(msg: Any, fields: NumberFields) -> None:
     _put_covariance(msg.pose, fields)
 
 
+def _put_twist(msg: Any, fields: NumberFields) -> None:
+    fill_xz(msg.twist.twist.linear, fields.row(2))
+    msg.twist.twist.angular.y = fields.double()
+    _put_covariance(msg.twist, fields)
+
+
+def _put_modes(msg: Any, fields: NumberFields) -> None:
+    msg.name = [f"mode_{j}" for j in range(1, MODES + 1)]
+    msg.position, msg.velocity = (np.array(fields.row(MODES)) for _ in range(2))
+
+
 def _put_acceleration_estimate(msg: Any, fields: NumberFields) -> None:
     fill_xz(msg.accel.accel.linear, fields.row(2))
     msg.accel.accel.angular.y = fields.double()
@@ -74,19 +86,24 @@ def _put_covariance(holder: Any, fields: NumberFields) -> None:
     holder.covariance = table.ravel()
 
 
+TURNED = "covariance_xa", "covariance_ya"  # have the other sign in a message, where the turn counts about -y
+
+
 def _covariance(kind: str) -> tuple[str, ...]:
-    """Numbers of `_put_covariance`: the turn counts about -y."""
-    xx, xy, xa, yy, ya, aa = (f"{kind}variance_xx", f"{kind}covariance_xy", f"-{kind}covariance_xa",
-                              f"{kind}variance_yy", f"-{kind}covariance_ya", f"{kind}variance_aa")  # fmt: skip
+    """Return the numbers of `_put_covariance`."""
+    xx, xy, xa, yy, ya, aa = (f"{'-' if entry in TURNED else ''}{kind}{entry}" for entry in COVARIANCE)
     return xx, xy, xa, yy, ya, aa, xy, xa, ya
 
 
 _POSE = "estimate_x", "estimate_y", "-sine_of_half", "cosine_of_half", *_covariance("")
+_TWIST = "estimate_velocity_x", "estimate_velocity_y", "-estimate_angular_velocity"
 _ACCELERATION = "estimate_acceleration_x", "estimate_acceleration_y", "-estimate_angular_acceleration"
 ESTIMATED = (
     NumericOutput(Output.ESTIMATE_POSE, _put_pose, _POSE),
+    NumericOutput(Output.ESTIMATE_TWIST, _put_twist, (*_TWIST, *_covariance("velocity_"))),
     NumericOutput(Output.ESTIMATE_ACCELERATION, _put_acceleration_estimate, (*_ACCELERATION, *_covariance("acceleration_"))),
     NumericOutput(Output.ESTIMATE_LOAD, lambda msg, fields: fill_xz(msg.wrench.force, fields.row(2)), ("load_x", "load_y")),
+    NumericOutput(Output.ESTIMATE_MODES, _put_modes, tuple(name for name in ESTIMATED_NUMBERS if name.startswith("mode_"))),
 )
 """In the order in which a bag has them, behind ``joint_states``."""
 

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..deviation.estimate_row import FORCE_VARIANCE
+from ..deviation.estimate_row import FORCE_VARIANCE, MODES
 from ..kernels.jit import by_reference, inner, kernel
 from ..kernels.result_row import estimates_in, results_in
-from ..twin.blocks import EstimateBlock, PredictionBlock
+from ..twin.blocks import ESTIMATED, EstimateBlock, PredictionBlock
 from ..types import SECOND, Array, Estimate, Prediction
 
 TIP_NUMBERS = (
@@ -27,13 +27,15 @@ TIP_NUMBERS = (
 TIP_JOINTS = ("tip_dx", "tip_dz", "tip_pitch")
 """Of the joints that lead from the tip of rigid sections to that of the deflected boom: along and across the last section, m;
 its turn, rad."""
+COVARIANCE = "variance_xx", "covariance_xy", "covariance_xa", "variance_yy", "covariance_ya", "variance_aa"
+"""Upper triangle of a covariance by rows, of x, y and angle."""
 ESTIMATED_NUMBERS = (
     "estimate_x", "estimate_y", "estimate_angle",
+    "estimate_velocity_x", "estimate_velocity_y", "estimate_angular_velocity",
     "estimate_acceleration_x", "estimate_acceleration_y", "estimate_angular_acceleration",
     "load_x", "load_y",
-    "variance_xx", "covariance_xy", "covariance_xa", "variance_yy", "covariance_ya", "variance_aa",
-    "acceleration_variance_xx", "acceleration_covariance_xy", "acceleration_covariance_xa",
-    "acceleration_variance_yy", "acceleration_covariance_ya", "acceleration_variance_aa",
+    *(f"{kind}_{j}" for kind in ("mode", "mode_rate") for j in range(1, MODES + 1)),
+    *(f"{kind}{entry}" for kind in ("", "velocity_", "acceleration_") for entry in COVARIANCE),
 )  # fmt: skip
 """As in a row of an estimate, see `boom_twin.deviation.estimate_row.WIDTH`, up to its variances of the load."""
 TURN = ("sine_of_half", "cosine_of_half")
@@ -117,7 +119,7 @@ def number_columns(
         more = p.tip_acceleration.T, p.tip_angular_acceleration, p.tip_displacement.T
         _stack(numbers, (*own, *more, p.joints.T, p.strokes.T, p.cylinder_forces.T))
     if e is not None:
-        parts = e.tip.T, e.acceleration.T, e.load.T, e.tip_covariance.T, e.acceleration_covariance.T
+        parts = [getattr(e, name).T for name, place in ESTIMATED.items() if place.stop <= FORCE_VARIANCE]
         _stack(numbers[JOINTS + 3 * joints + len(TIP_JOINTS) :], parts)
     _derive_columns(chain, numbers)
     return numbers

@@ -103,8 +103,10 @@ class Output(StrEnum):
     HEALTH = "health"
     TIP_UNCERTAINTY = "tip_uncertainty"
     ESTIMATE_POSE = "estimate_pose"
+    ESTIMATE_TWIST = "estimate_twist"
     ESTIMATE_ACCELERATION = "estimate_acceleration"
     ESTIMATE_LOAD = "estimate_load"
+    ESTIMATE_MODES = "estimate_modes"
     DIAGNOSTICS = "diagnostics"
 
 
@@ -120,8 +122,10 @@ TYPES: dict[Stream | Output, str] = {
     Output.HEALTH: "diagnostic_msgs/msg/DiagnosticArray",
     Output.TIP_UNCERTAINTY: "geometry_msgs/msg/Vector3Stamped",
     Output.ESTIMATE_POSE: "geometry_msgs/msg/PoseWithCovarianceStamped",
+    Output.ESTIMATE_TWIST: "geometry_msgs/msg/TwistWithCovarianceStamped",
     Output.ESTIMATE_ACCELERATION: "geometry_msgs/msg/AccelWithCovarianceStamped",
     Output.ESTIMATE_LOAD: "geometry_msgs/msg/WrenchStamped",
+    Output.ESTIMATE_MODES: "sensor_msgs/msg/JointState",
     Output.DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
 }
 """The one message type that the program reads or fills for each role."""

@@ -13,7 +13,7 @@ from typing import IO, Any, Protocol
 
 import numpy as np
 
-from ..deviation.estimate_row import VARIANCES
+from ..deviation.estimate_row import MODES, VARIANCES
 from ..errors import UsageError
 from ..twin.blocks import CODES, Integers, SampleBlock
 from ..types import NANO, SENSORS, Array, Stream, channels_of
@@ -22,10 +22,12 @@ from .recording import Stretch
 DELAY = 2.0
 """s for which a row waits for residuals that become known late."""
 ESTIMATED = (
-    "tip_x_m", "tip_y_m", "tip_angle_rad", "tip_ax_m_s2", "tip_ay_m_s2", "tip_angular_acceleration_rad_s2",
-    "load_x_N", "load_y_N",
+    "tip_x_m", "tip_y_m", "tip_angle_rad", "tip_vx_m_s", "tip_vy_m_s", "tip_angular_velocity_rad_s",
+    "tip_ax_m_s2", "tip_ay_m_s2", "tip_angular_acceleration_rad_s2", "load_x_N", "load_y_N",
 )  # fmt: skip
 """Names of what is estimated, each with ``estimate_`` before it, and with ``estimate_sigma_`` for its standard deviation."""
+MODAL = [f"estimate_mode_{j}_{end}" for end in ("m", "m_s") for j in range(1, MODES + 1)]
+"""Names of the modal coordinates and their rates, at a modal mass of 1 kg."""
 NEVER = np.iinfo(np.int64).min
 
 
@@ -42,14 +44,12 @@ def predicted_columns(joints: int) -> list[str]:
 
 
 def columns_of(joints: int) -> list[str]:
-    """Names of all columns: predicted, measured, residuals, estimated, deviations of the estimate."""
-    residuals = {
-        stream: names for stream, names in _channel_columns(joints, "residual").items() if stream is not Stream.STROKES
-    }
+    """Names of all columns: predicted, measured, residuals, modes, estimated, deviations of the estimate."""
     return [
         *predicted_columns(joints),
         *chain.from_iterable(_channel_columns(joints, "measured").values()),
-        *chain.from_iterable(residuals.values()),
+        *chain.from_iterable(_channel_columns(joints, "residual").values()),
+        *MODAL,
         *(f"estimate_{name}" for name in ESTIMATED),
         *(f"estimate_sigma_{name}" for name in ESTIMATED),
     ]
@@ -169,7 +169,7 @@ class SampleTable:
     def __init__(self, file: TableFile, joints: int) -> None:
         columns, self._file = columns_of(joints), file
         self._measured, self._residuals = (
-            {CODES[stream]: columns.index(names[0]) for stream, names in found.items() if names[0] in columns}
+            {CODES[stream]: columns.index(names[0]) for stream, names in found.items()}
             for found in (_channel_columns(joints, "measured"), _channel_columns(joints, "residual"))
         )
         self._widths = {CODES[stream]: len(names) for stream, names in channels_of(joints).items()}
@@ -204,8 +204,10 @@ class SampleTable:
         rows = np.full((len(p.stamps), self._rows.shape[1]), np.nan)
         seconds = (p.stamps - stretch.first) * NANO
         predicted = np.column_stack([seconds, p.strokes, p.joints, p.tip_position, p.tip_acceleration, p.cylinder_forces])
-        variances = e.tip_covariance[:, VARIANCES], e.acceleration_covariance[:, VARIANCES], e.load_variance
-        estimated = np.column_stack([e.tip, e.acceleration, e.load, *map(np.sqrt, variances)])
+        covariances = e.tip_covariance, e.velocity_covariance, e.acceleration_covariance
+        variances = *(each[:, VARIANCES] for each in covariances), e.load_variance
+        told = e.modes, e.mode_rates, e.tip, e.velocity, e.acceleration, e.load
+        estimated = np.column_stack([*told, *map(np.sqrt, variances)])
         rows[:, : predicted.shape[1]], rows[:, -estimated.shape[1] :] = predicted, estimated
         return rows
 

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..deviation.estimate_row import ACCELERATION, ACCELERATION_COVARIANCE, FORCE, FORCE_VARIANCE, TIP, TIP_COVARIANCE, WIDTH
+from ..deviation import estimate_row
+from ..deviation.estimate_row import MODES, WIDTH
 from ..types import Array, Estimate, Health, Outline, Prediction, Report, Residuals, Sample, Stream, channels_of
 
 Integers = NDArray[np.int64]
@@ -122,8 +123,13 @@ class EstimateBlock(NamedTuple):
         return self.rows[:, ESTIMATED["tip"]]
 
     @property
+    def velocity(self) -> Array:
+        """First derivatives of `tip`, shape (p, 3): m/s, rad/s."""
+        return self.rows[:, ESTIMATED["velocity"]]
+
+    @property
     def acceleration(self) -> Array:
-        """Of these, shape (p, 3): m/s^2, rad/s^2."""
+        """Second derivatives of `tip`, shape (p, 3): m/s^2, rad/s^2."""
         return self.rows[:, ESTIMATED["acceleration"]]
 
     @property
@@ -132,9 +138,24 @@ class EstimateBlock(NamedTuple):
         return self.rows[:, ESTIMATED["load"]]
 
     @property
+    def modes(self) -> Array:
+        """Modal coordinates, shape (p, MODES), see `Estimate`."""
+        return self.rows[:, ESTIMATED["modes"]]
+
+    @property
+    def mode_rates(self) -> Array:
+        """First derivatives of `modes`."""
+        return self.rows[:, ESTIMATED["mode_rates"]]
+
+    @property
     def tip_covariance(self) -> Array:
         """Of `tip`, upper triangle by rows, shape (p, 6)."""
         return self.rows[:, ESTIMATED["tip_covariance"]]
+
+    @property
+    def velocity_covariance(self) -> Array:
+        """Of `velocity`, likewise."""
+        return self.rows[:, ESTIMATED["velocity_covariance"]]
 
     @property
     def acceleration_covariance(self) -> Array:
@@ -162,14 +183,21 @@ def row_of(estimate: Estimate) -> Array:
 
 
 ESTIMATED = {
-    "tip": slice(TIP, TIP + 3),
-    "acceleration": slice(ACCELERATION, ACCELERATION + 3),
-    "load": slice(FORCE, FORCE + 2),
-    "tip_covariance": slice(TIP_COVARIANCE, TIP_COVARIANCE + 6),
-    "acceleration_covariance": slice(ACCELERATION_COVARIANCE, ACCELERATION_COVARIANCE + 6),
-    "load_variance": slice(FORCE_VARIANCE, FORCE_VARIANCE + 2),
+    name: slice(first, first + size)
+    for name, first, size in (
+        ("tip", estimate_row.TIP, 3),
+        ("velocity", estimate_row.VELOCITY, 3),
+        ("acceleration", estimate_row.ACCELERATION, 3),
+        ("load", estimate_row.FORCE, 2),
+        ("modes", estimate_row.COORDINATES, MODES),
+        ("mode_rates", estimate_row.RATES, MODES),
+        ("tip_covariance", estimate_row.TIP_COVARIANCE, 6),
+        ("velocity_covariance", estimate_row.VELOCITY_COVARIANCE, 6),
+        ("acceleration_covariance", estimate_row.ACCELERATION_COVARIANCE, 6),
+        ("load_variance", estimate_row.FORCE_VARIANCE, 2),
+    )
 }
-"""Fields of an `Estimate` and where each stands in a row, see `boom_twin.deviation.estimate_row.WIDTH`."""
+"""Fields of an `Estimate` in their order, and where each stands in a row, see `boom_twin.deviation.estimate_row`."""
 
 
 class ResidualBlock(NamedTuple):

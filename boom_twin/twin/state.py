@@ -104,7 +104,7 @@ class Limits(NamedTuple):
 class UpdateOutput(NamedTuple):
     """Room for what a call gives, see `boom_twin.twin.blocks`; `counts` has the rows of predictions, and of residuals.
 
-    rows : results and estimates, see `boom_twin.kernels.result_row`. estimates : see `boom_twin.estimation.tip_estimate`.
+    rows : results and estimates, see `boom_twin.kernels.result_row`. estimates : see `boom_twin.deviation.estimate_row`.
     measured : strokes less their zeros, m. raw : as measured.
     """
 

@@ -94,6 +94,8 @@ def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stam
             return FAILED, row
         end_step(state, stamp)
         give_prediction(t.clearances.shape[0], live, bending, out, limits, state, stamp, row, found)
+        if span > 0.0:
+            give_innovations(f, state, stamp, row, found)
         results = results_in(out, state.strokes.shape[0], t.clearances.shape[0])
         past, at = state.past, keep_strokes(state, stamp)
         write_expected_readings(p, f, live, results, limits.inclination, past.values[at], past.sigmas[at])
@@ -200,6 +202,26 @@ def give_prediction(pins, live, bending, out, limits, state, stamp, row, found):
 
 
 @inner
+def give_innovations(f, state, stamp, row, found):
+    """Give the residuals of strokes against what was predicted of them before they were taken."""
+    k = new_residual(found, row, STROKES, stamp)
+    for i in range(state.taken.shape[0]):
+        found.values[k, i], found.sigmas[k, i] = f.innovations[i, 0], math.sqrt(f.innovations[i, 1])
+        found.raw[k, i] = state.taken[i]
+
+
+@inner
+def new_residual(found, row, stream, stamp):
+    """Return the place of one more residual, empty, of the sample at `stamp` (ns) that became known by sample `row`."""
+    k = found.counts[1]
+    found.residual_at[k], found.residual_streams[k], found.residual_stamps[k] = row, stream, stamp
+    for i in range(found.values.shape[1]):
+        found.values[k, i] = found.sigmas[k, i] = found.raw[k, i] = math.nan
+    found.counts[1] = k + 1
+    return k
+
+
+@inner
 def keep_strokes(state, stamp):
     """Keep the newest strokes with those of the last `SPAN`; gives their row, where the expected readings go."""
     past = state.past
@@ -297,7 +319,7 @@ def write_residual(limits, state, stream, stamp, values, row, found):
         return False
     zeros = zeros_at(state, stamp)
     before = (after + KEPT - 1) % KEPT
-    past, at, k = state.past, limits.first[stream], found.counts[1]
+    past, at, k = state.past, limits.first[stream], new_residual(found, row, stream, stamp)
     recent = new_row(state.recent)
     state.recent.stamps[recent], state.recent.streams[recent] = stamp, stream
     for i in range(limits.channels[stream]):
@@ -311,10 +333,6 @@ def write_residual(limits, state, stream, stamp, values, row, found):
         state.recent.values[recent, i] = value
         found.values[k, i], found.sigmas[k, i] = value - state.zeros[zeros, stream, i], past.sigmas[after, at + i]
         found.raw[k, i] = values[i]
-    for i in range(limits.channels[stream], found.values.shape[1]):
-        found.values[k, i] = found.sigmas[k, i] = found.raw[k, i] = math.nan
-    found.residual_at[k], found.residual_streams[k], found.residual_stamps[k] = row, stream, stamp
-    found.counts[1] = k + 1
     return True
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drive_twin import drive_twin
@@ -11,9 +13,11 @@ from boom_twin.analysis.bending_moments import increments_by_tip_force, moments_
 from boom_twin.analysis.bending_stress import BOX, BendingStressModel, section_moduli
 from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.motions import motion_of
+from boom_twin.deviation.estimate_row import WIDTH
 from boom_twin.errors import UsageError
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.types import Estimate, StrokeReading
+from boom_twin.twin.blocks import estimate_of
+from boom_twin.types import StrokeReading
 from boom_twin.validation.rig.exudyn.solve import at_rest, move
 from boom_twin.validation.rig.exudyn.system import Boom
 
@@ -111,9 +115,8 @@ def test_a_force_at_the_tip_bends_as_a_payload_does():
 def test_what_sensors_know_beyond_the_prediction_is_added_with_its_deviation():
     strokes, model = strokes_of_posture(SCENE, "horizontal"), BendingStressModel(SCENE)
     prediction = drive_twin(SCENE).update(Sample(Stream.STROKES, 10**9, strokes)).prediction
-    zeros = np.zeros(3)
     load, variance = np.array([0.0, -100.0]), np.array([0.0, 400.0])
-    estimate = Estimate(10**9, zeros, zeros, load, np.zeros(6), np.zeros(6), variance)
+    estimate = replace(estimate_of(10**9, np.zeros(WIDTH)), load=load, load_variance=variance)
     found, bare = model.at(prediction, estimate), model.at(prediction, None)
     assert np.isnan(bare.moment_sigmas).all()
     arm = 13.46 - 0.6  # the first station of section 1, inboard of the first pin C
@@ -123,10 +126,7 @@ def test_what_sensors_know_beyond_the_prediction_is_added_with_its_deviation():
 
 
 def test_a_posture_that_is_read_as_lengths_is_that_of_its_drives():
-    rest, estimate = (
-        statics(SCENE, "horizontal"),
-        Estimate(10**9, *map(np.zeros, (3, 3)), np.ones(2), *map(np.zeros, (6, 6, 2))),
-    )
+    rest, estimate = statics(SCENE, "horizontal"), replace(estimate_of(10**9, np.zeros(WIDTH)), load=np.ones(2))
     by_load = []
     for reads, strokes in ((StrokeReading.DRIVE, rest.strokes), (StrokeReading.LENGTH, rest.lengths)):
         model = BendingStressModel(SCENE, reads=reads)

@@ -105,3 +105,37 @@ def test_a_boom_at_rest_is_predicted_where_statics_has_it_however_soft_the_oil_i
     assert np.hypot(*(report.prediction.tip_position - softer.tip)) < 1e-3  # taken for drives it is off by 0.3 m
     assert report.estimate.tip == pytest.approx([*report.prediction.tip_position, report.prediction.tip_angle])
     assert (np.sqrt(report.estimate.tip_covariance[[0, 3]]) < 1e-3).all()
+
+
+def test_a_mode_that_swings_is_told_with_the_tips_velocity_and_lengths_have_innovations(boom: BoomPredictor) -> None:
+    """From lengths with noise, of free vibration in the lowest mode after a blow; at the end transducer 2 jumps by 1 mm."""
+    p, m, twin, rng = boom.posture, int(boom.posture.modes[0]), Twin(SCENE), np.random.default_rng(4)
+    row, omega, half = np.zeros(boom.filters.x.shape[1]), p.omega[0], 0.5 * p.decay[0]
+    shown = np.zeros((N, 2))  # of coordinate and rate
+    for i in range(N):
+        length_row.py_func(p, i, row)
+        shown[i] = row[0], row[m]
+    motion = p.readings[2 + N, N : N + 3]
+    assert motion[1] > 0.0, "a positive coordinate lifts the tip"
+    ratios, modes, velocities, sigmas = [], [], [], []
+    for k in range(1000):
+        size, phase = 0.3 * np.exp(-half * k * 0.005) * (k > 100), omega * (k - 100) * 0.005
+        mode = size * np.sin(phase), size * (omega * np.cos(phase) - half * np.sin(phase))
+        jump = 1e-3 * np.eye(N)[1] if k == 999 else 0.0
+        values = REST.lengths + shown @ mode + rng.normal(0.0, 2e-5, N) + jump
+        report = twin.update(Sample(Stream.STROKES, 10**18 + k * STEP, values))
+        assert [each.stream for each in report.residuals] == [Stream.STROKES] * (k > 0)
+        ratios += [each.normalised for each in report.residuals]
+        if 700 <= k < 999:
+            modes.append([report.estimate.modes[0], mode[0], report.estimate.mode_rates[0], mode[1]])
+            velocities.append([report.estimate.velocity, motion * mode[1]])
+            sigmas.append(np.sqrt(report.estimate.velocity_covariance[[0, 3, 5]]))
+    for found, true in np.array(modes).T.reshape(2, 2, -1):
+        assert np.sqrt(np.mean((found - true) ** 2)) < 0.15 * np.abs(true).max()
+    assert np.isnan([*report.estimate.modes[m:], *report.estimate.mode_rates[m:]]).all()
+    found, true = np.moveaxis(velocities, 1, 0)
+    assert (np.sqrt(np.mean((found - true) ** 2, axis=0)) < 0.15 * np.abs(true).max(axis=0)).all()
+    assert 0.3 < np.sqrt(np.mean(((found - true) / sigmas) ** 2)) < 1.5
+    assert np.sqrt(np.mean(np.square(ratios[-300:-1]), axis=0)) == pytest.approx(np.ones(N), abs=0.25)
+    assert report.residuals[0].names[1] == "cylinder_2" and report.residuals[0].values[1] == pytest.approx(1e-3, abs=1e-4)
+    assert abs(ratios[-1][1]) > 20.0 and np.abs(ratios[-1][[0, 2, 3]]).max() < 5.0

@@ -10,6 +10,7 @@ import pytest
 from drive_twin import drive_twin
 
 from boom_twin.config.settings import Settings, Thresholds
+from boom_twin.deviation.estimate_row import WIDTH
 from boom_twin.diagnostics import twin_status as module
 from boom_twin.diagnostics.levels import Evaluation, Level, Status
 from boom_twin.diagnostics.sensor_status import sensors_of
@@ -18,7 +19,8 @@ from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.types import Estimate, Report, Residuals, Sample, Stream
+from boom_twin.twin.blocks import estimate_of
+from boom_twin.types import Report, Residuals, Sample, Stream
 
 NAMES = {stream: stream.value for stream in Stream}
 REQUIRED = {stream: stream in (Stream.STROKES, Stream.ANGLES) for stream in Stream}
@@ -246,7 +248,7 @@ def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() ->
         (np.array([0.0, -100.0]), "-98.1 ± 0.73 MPa in section 1"),
     ):
         variance = np.full(2, 400.0)
-        estimate = Estimate(10**18, np.zeros(3), np.zeros(3), load, np.zeros(6), np.zeros(6), variance)
+        estimate = replace(estimate_of(10**18, np.zeros(WIDTH)), load=load, load_variance=variance)
         status = watch.status(prediction, estimate, at)
         assert status.level == Level.OK and status.message.startswith(told), status.message
     assert status.values["section_1_at_0.60_m_sigma_MPa"] == pytest.approx(0.73, rel=0.02)
@@ -260,7 +262,7 @@ def test_the_load_at_the_tip_is_told_once_anything_was_measured() -> None:
     for row in range(8000):
         stamp = 10**18 + row * 5_000_000
         load = np.array([0.0, 120.0 * (row * 0.005 * 0.5 % 1.0 < 0.5) + 1.0])
-        estimate = Estimate(stamp, np.zeros(3), np.zeros(3), load, np.zeros(6), np.zeros(6), np.zeros(2))
+        estimate = replace(estimate_of(stamp, np.zeros(WIDTH)), load=load)
         rig.watch.took(Sample(Stream.STROKES, stamp, np.zeros(4)), Report(stamp, True, estimate=estimate), 0.0)
     status = rig.second()["tip load"]
     assert status.level == Level.OK and status.message.startswith("pulses of 12")

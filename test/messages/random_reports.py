@@ -45,7 +45,7 @@ def random_reports(seed: int, count: int, told: Told) -> list[Report]:
 
 
 def _report(random: np.random.Generator, stamp: int, told: Told) -> Report:
-    streams = [Stream.ANGLES, *([Stream.IMU] if told.imu else [])]
+    streams = [Stream.STROKES, Stream.ANGLES, *([Stream.IMU] if told.imu else [])]
     chosen = random.integers(0, len(streams), random.choice([0, 1, 2, 5], p=[0.4, 0.4, 0.1, 0.1]))
     prediction = _prediction(random, stamp, told) if random.random() < 0.4 else None
     return Report(

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from boom_twin.config.settings import Settings
+from boom_twin.deviation.estimate_row import COORDINATES, RATES, WIDTH
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output
 from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.scene import load_scene
+from boom_twin.twin.blocks import estimate_of
 from boom_twin.types import Alarm, Health, Prediction, Ranked, Report, Residuals, Stream
 
 STAMP = 1_700_000_000_123_456_789
@@ -126,6 +128,24 @@ def test_passive_joints_come_with_a_shape_only() -> None:
     own, bare = encoder(), replace(report(), prediction=replace(prediction(), shape=None))
     counts = [len(decoded(own.fill(each))[Output.JOINT_STATES].name) for each in (report(), bare, report())]
     assert counts == [16, 9, 16]
+
+
+def test_an_estimate_tells_velocity_and_modes_along_the_axes_of_the_base() -> None:
+    row = 0.1 * np.arange(WIDTH)
+    row[[COORDINATES + 5, RATES + 5]] = np.nan
+    estimate = estimate_of(STAMP, row)
+    told = decoded(encoder().fill(replace(report(), estimate=estimate)))
+    twist, modes = told[Output.ESTIMATE_TWIST].twist, told[Output.ESTIMATE_MODES]
+    (x, y, a), (xx, xy, xa, yy, ya, aa) = estimate.velocity, estimate.velocity_covariance
+    linear, angular = twist.twist.linear, twist.twist.angular
+    assert (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z) == (x, 0.0, y, 0.0, -a, 0.0)
+    covariance = twist.covariance.reshape(6, 6)
+    assert covariance[np.ix_([0, 2, 4], [0, 2, 4])].tolist() == [[xx, xy, -xa], [xy, yy, -ya], [-xa, -ya, aa]]
+    assert np.count_nonzero(covariance) == 9
+    assert list(modes.name) == [f"mode_{j}" for j in range(1, 7)] and len(modes.effort) == 0
+    np.testing.assert_array_equal([modes.position, modes.velocity], [estimate.modes, estimate.mode_rates])
+    assert np.isnan(modes.position).tolist() == [False] * 5 + [True]
+    assert {stamp_of(told[key]) for key in (Output.ESTIMATE_TWIST, Output.ESTIMATE_MODES)} == {STAMP}
 
 
 def test_residuals_are_named(filled: dict[Output, Any]) -> None:

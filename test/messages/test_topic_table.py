@@ -25,8 +25,10 @@ def test_defaults_are_those_of_the_interface() -> None:
         Output.HEALTH: "/boom_twin/health",
         Output.TIP_UNCERTAINTY: "/boom_twin/tip/uncertainty",
         Output.ESTIMATE_POSE: "/boom_twin/estimate/tip/pose",
+        Output.ESTIMATE_TWIST: "/boom_twin/estimate/tip/twist",
         Output.ESTIMATE_ACCELERATION: "/boom_twin/estimate/tip/acceleration",
         Output.ESTIMATE_LOAD: "/boom_twin/estimate/tip/load",
+        Output.ESTIMATE_MODES: "/boom_twin/estimate/modes",
         Output.DIAGNOSTICS: "/diagnostics",
     }
     assert topics.inputs[Stream.IMU].absolute == "/tip_imu"

@@ -88,6 +88,14 @@ def test_rows_are_what_was_predicted_measured_and_estimated(tmp_path: Path, monk
     assert told["estimate_tip_x_m"] == pytest.approx(estimates.tip[:, 0], rel=1e-8)
     assert told["estimate_load_y_N"] == pytest.approx(estimates.load[:, 1], rel=1e-8)
     assert told["estimate_sigma_tip_angle_rad"] == pytest.approx(np.sqrt(estimates.tip_covariance[:, 5]), rel=1e-8)
+    assert told["estimate_tip_vy_m_s"] == pytest.approx(estimates.velocity[:, 1], rel=1e-8)
+    assert told["estimate_sigma_tip_vx_m_s"] == pytest.approx(np.sqrt(estimates.velocity_covariance[:, 0]), rel=1e-8)
+    for i in range(6):
+        assert told[f"estimate_mode_{i + 1}_m"] == pytest.approx(estimates.modes[:, i], rel=1e-8, nan_ok=True)
+        assert told[f"estimate_mode_{i + 1}_m_s"] == pytest.approx(estimates.mode_rates[:, i], rel=1e-8, nan_ok=True)
+    innovations = found.of(Stream.STROKES)
+    assert np.isnan(told["residual_cylinder_2_m"][0]) and len(innovations.stamps) == len(predictions.stamps) - 1
+    assert told["residual_cylinder_2_m"][1:] == pytest.approx(innovations.values[:, 1], rel=1e-8)
     given = samples()
     strokes = {each.stamp: each.values for each in given if each.stream is Stream.STROKES}
     assert told["measured_cylinder_2_m"] == pytest.approx(

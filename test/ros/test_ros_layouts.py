@@ -23,7 +23,7 @@ ROOT = Path(boom_twin.__file__).parent
 LAUNCH = sorted((ROOT / "launch").glob("*.py"))
 CONFIG = ROOT / "msg_config"
 TOPICS = {topic.absolute: topic for each in (load_topics().inputs, load_topics().outputs) for topic in each.values()}
-CHANNELS = [f"{kind}_{i}" for kind in ("joint", "cylinder") for i in range(1, 5)] + ["tip_imu_x", "tip_imu_z"]
+CHANNELS = [f"{kind}_{i}" for kind in ("joint", "cylinder", "mode") for i in range(1, 5)] + ["tip_imu_x", "tip_imu_z"]
 
 # What these modules of ROS 2 Jazzy have, of what is used here.
 API = {
@@ -138,7 +138,7 @@ def test_foxglove_shows_topics_and_fields_that_exist() -> None:
     assert sorted(placed) == sorted(panels)
     assert panels["3D!boom"]["topics"].keys() - TOPICS.keys() == {"/robot_description"}
     paths = [row["value"] for panel in panels.values() for row in panel.get("paths", [])]
-    assert len(paths) == 24
+    assert len(paths) == 29
     for path in paths:
         topic, *parts = path.split(".")
         field(TOPICS[topic].type, parts)
@@ -150,7 +150,7 @@ def test_plotjuggler_shows_topics_and_fields_that_exist() -> None:
     """It names the arrays of a JointState by channel."""
     root = ElementTree.parse(CONFIG / "plotjuggler.xml").getroot()
     curves = [curve.attrib["name"] for curve in root.iter("curve")]
-    assert (len(curves), len(set(curves))) == (48, 44)  # those of the prediction stand beside the estimate again
+    assert (len(curves), len(set(curves))) == (58, 54)  # those of the prediction stand beside the estimate again
     for curve in curves:
         (topic,) = (name for name in TOPICS if curve.startswith(f"{name}/"))
         *parts, last = curve.removeprefix(f"{topic}/").split("/")

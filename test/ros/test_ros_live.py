@@ -26,7 +26,7 @@ from boom_twin.twin.twin import Twin
 from boom_twin.types import Stream
 
 PARAMETERS = Path(__file__).parents[2] / "msg_config" / "twin.yaml"
-ESTIMATES = [Output.ESTIMATE_POSE, Output.ESTIMATE_ACCELERATION, Output.ESTIMATE_LOAD]
+ESTIMATES = [output for output in Output if output.startswith("estimate_")]
 SINGLE = [Output.TIP_DISPLACEMENT, Output.TIP_POSITION, Output.TIP_ACCELERATION, Output.JOINT_STATES, *ESTIMATES]
 ASKED: dict[int, Callable[[Any], Any]] = {
     300: lambda remote: remote.set("payload", 35.0),  # the model is made beside the samples, which takes its time
@@ -132,7 +132,7 @@ def test_predictions_are_those_of_the_twin_bit_for_bit(outputs: Any, expected: A
 
 def test_residuals_are_those_of_the_twin_bit_for_bit(outputs: Any, expected: Any, motion: dict[str, Any]) -> None:
     live, here = set(outputs[Output.RESIDUALS]), set(expected[Output.RESIDUALS])
-    assert len(live) == len(outputs[Output.RESIDUALS]) > 0.98 * 2 * len(motion["stamps_ns"])
+    assert len(live) == len(outputs[Output.RESIDUALS]) > 0.98 * 3 * len(motion["stamps_ns"])
     assert live <= here
 
 

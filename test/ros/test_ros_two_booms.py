@@ -39,7 +39,7 @@ from boom_twin.types import Stream
 BOOMS = {"front": "0.0", "rear": "1.0"}
 """Their namespaces, and from when on the session is played to each, s."""
 COMPARED = [key for key in Output if key not in (Output.DIAGNOSTICS, Output.RESIDUALS)]
-ORDERED = (Output.ESTIMATE_POSE, Output.ESTIMATE_ACCELERATION, Output.ESTIMATE_LOAD)
+ORDERED = tuple(output for output in Output if output.startswith("estimate_"))
 """What depends on the order in which samples of several streams are taken. Where DDS sends a lost packet again, to the recorder
 or to the node, the two have not seen the same order; that their bits are equal where they have is for `test_ros_live`. Here the
 recording is brought into the order of its stamps: angles 2 s behind the strokes are a dropout of their sensors."""

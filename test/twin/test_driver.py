@@ -55,7 +55,7 @@ def test_drive_is_update_by_update() -> None:
         if report.prediction is not None and step.report.prediction is not None:
             assert report.prediction.tip_acceleration.tobytes() == step.report.prediction.tip_acceleration.tobytes()
         assert (report.prediction is None) == (step.report.prediction is None)
-    assert residuals == 30
+    assert residuals == 58  # of angles, and of strokes but for the first
 
 
 def bits(reports: list[Report]) -> list[bytes]:

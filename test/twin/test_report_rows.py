@@ -107,7 +107,7 @@ def test_rows_are_encoded_as_what_is_made_of_them(is_worn: bool, given: list[Rep
         told |= {(key, len(data)) for key, data in messages}
     assert {key for key, _ in told} >= {Output.SHAPE, Output.RESIDUALS, Output.ESTIMATE_POSE, Output.TIP_POSITION}
     assert len([key for key, _ in told if key is Output.JOINT_STATES]) == 2
-    assert len([key for key, _ in told if key is Output.RESIDUALS]) == 3
+    assert len([key for key, _ in told if key is Output.RESIDUALS]) == 4
 
 
 def test_only_what_is_wanted_is_encoded_of_rows(given: list[Report]) -> None:

@@ -163,7 +163,7 @@ def test_time_set_back_starts_everything_again(scene, new, still):
     again = again[20:]
     assert again[0].events == ("jump back",) and again[0].change.from_rest
     assert starts_alike(again, expected)
-    assert sum(len(report.residuals) for report in again) == 0
+    assert {each.stream for report in again for each in report.residuals} == {Stream.STROKES}
 
 
 @pytest.mark.parametrize("stamp", [4_102_444_800 * 10**9, 2**31 * 10**9 - 1, 1, START - 5000 * 10**9])
@@ -284,7 +284,7 @@ def test_residuals_do_not_depend_on_the_order_of_arrival(scene, new, still, orde
 
     def residuals(samples):
         twin = new(scene)
-        return {r.stamp: r.values for sample in samples for r in twin.update(sample).residuals}
+        return {(r.stream, r.stamp): r.values for sample in samples for r in twin.update(sample).residuals}
 
     expected = residuals(sorted(first + second, key=lambda s: s.stamp))
     arrival = {
@@ -293,7 +293,7 @@ def test_residuals_do_not_depend_on_the_order_of_arrival(scene, new, still, orde
         "shuffled": sorted(first + second, key=lambda s: s.stamp // (20 * MS) * 2 + (s.stream is Stream.STROKES)),
     }[order]
     got = residuals(arrival)
-    assert len(expected) == len(second)
+    assert len(expected) == len(first) - 1 + len(second)
     assert got.keys() == expected.keys() and all(np.array_equal(got[k], expected[k]) for k in expected)
 
 

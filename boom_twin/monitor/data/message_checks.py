@@ -49,7 +49,7 @@ def count(what: str, found: int, most: int) -> None:
 def stream_of_residuals(names: Sequence[str]) -> Stream:
     """The stream whose channels they are: ``joint_1`` and the like, each once; of an IMU both axes in their order."""
     stream = stream_of(names[0]) if names else None
-    odd = next((name for name in names if stream in (None, Stream.STROKES) or stream_of(name) is not stream), None)
+    odd = next((name for name in names if stream is None or stream_of(name) is not stream), None)
     if odd is not None or stream is None or len(set(names)) != len(names):
         raise MalformedError(f"names of sensors, each once, are expected; not {odd if odd is not None else list(names)!r}")
     if SENSORS[stream].ends and tuple(names) != SENSORS[stream].channels(0):
