@@ -18,8 +18,8 @@ from ..kernels.result_row import results_in
 from ..scene.schema import Scene
 from ..types import SECOND, Array, Mount, Stream, channels_of
 from .estimate_row import ACCELERATION_COVARIANCE, FORCE_VARIANCE, TIP_COVARIANCE, VARIANCES, WIDTH
-from .models import take_sensor
 from .predictor import BoomPredictor
+from .sensors import take_sensor
 from .step import step_lengths, write_tip_estimate
 
 SETTLED = 20.0  # s

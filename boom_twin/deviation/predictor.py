@@ -27,9 +27,10 @@ from ..scene.schema import Scene
 from ..scene.summary import weight_of
 from ..types import SENSORS, Array, Mount, Outline, Prediction, Stream, StrokeReading, channels_of
 from .estimate_row import MODES
-from .models import FED, FED_STAMP, PREDICTION, Filters, SensorNoise, new_filters, start_models
+from .models import start_models
 from .posture import Posture, linearise, new_posture
 from .sensor_model import Mounting
+from .states import FED, FED_STAMP, PREDICTION, Filters, SensorNoise, new_filters
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
 WIDTH = 1e-6  # relative accuracy of natural frequencies

@@ -23,30 +23,24 @@ from .estimate_row import (
     VELOCITY_COVARIANCE,
 )
 from .estimate_row import TIP as TIP_AT
-from .models import (
-    ESTIMATE,
-    FED,
-    FED_STAMP,
-    PATIENCE,
-    PREDICTION,
+from .models import step_models
+from .posture import WIDEST, linearise
+from .rows import (
     acceleration_row,
     angle_row,
     column_row,
-    drive_place,
-    force_place,
     length_of,
     length_row,
     rate_row,
     read,
     specific_force_row,
     spread_of,
-    step_models,
     variance_of,
-    zero_place,
 )
-from .posture import WIDEST, linearise
 from .sensor_model import specific_force
+from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, drive_place, force_place, zero_place
 
+PATIENCE = 1_000_000_000  # ns without readings after which the estimate is the prediction again
 SHAKEN_TIME = 0.5  # s, over which the mean square of the tip's acceleration is taken
 ANGLE_STEP = 0.01  # rad that a joint turns by before the boom is linearised anew
 

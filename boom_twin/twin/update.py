@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from ..deviation.models import take_sensor
 from ..deviation.sensor_model import TURN
+from ..deviation.sensors import take_sensor
 from ..deviation.step import step_lengths, write_expected_readings, write_tip_estimate
 from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in

@@ -8,8 +8,11 @@ from scipy.linalg import expm
 
 from boom_twin import Sample, Stream, Twin, load_scene, statics
 from boom_twin.config.settings import Settings
-from boom_twin.deviation.models import DRIVE_TIME, FAST, PREDICTION, SLOW, correct, length_row, make_transition, mix
+from boom_twin.deviation.kalman import DRIVE_TIME, FAST, SLOW, correct, make_transition
+from boom_twin.deviation.mixture import mix
 from boom_twin.deviation.predictor import BoomPredictor
+from boom_twin.deviation.rows import length_row
+from boom_twin.deviation.states import PREDICTION
 from boom_twin.scene.kinematics import strokes_of_posture
 
 SCENE = load_scene()

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from boom_twin.compiler.compile import compile_scene
-from boom_twin.deviation.models import Filters
 from boom_twin.deviation.posture import Posture
+from boom_twin.deviation.states import Filters
 from boom_twin.kernels.jit import HeldFields, _kind, by_reference, hold, kernel, referenced
 from boom_twin.kernels.tables import Condensed, State, Tables, Work
 from boom_twin.kernels.transfer.forward_kinematics import place

@@ -1,0 +1,123 @@
+"""Kalman filter: transition of the states over a step, and correction by one reading."""
+
+from __future__ import annotations
+
+import math
+
+from ..kernels.jit import inner
+from .rows import spread_of
+from .states import all_states, drive_place, force_place, zero_place
+
+FAST, SLOW = 0.25, 60.0  # s, correlation times of the two parts of the load
+DRIVE_TIME = 0.12  # s, correlation time of a drive's acceleration
+LEAK = 1e-14  # m^2/s, random walk of a drive
+IMU_ZERO, IMU_DRIFT = 0.3, 3e-3  # m/s^2; m/s^2 in a root second
+ANGLE_ZERO, ANGLE_DRIFT = 2e-4, 1e-5  # rad; rad in a root second: sensors' zeros, and the error of the model's statics
+FORCE_ZERO, FORCE_DRIFT = 1.0, 0.03  # share of the force; in a root second
+
+
+@inner
+def put_weight(f, row, place, weight):
+    """Add an entry to a row of the transition matrix."""
+    f.places[row, f.counts[row]], f.weights[row, f.counts[row]] = place, weight
+    f.counts[row] += 1
+
+
+@inner
+def make_transition(p, f, h):
+    """Write the transition over `h` (s), inputs of the modes held, and the variances that the drives gain; loads follow."""
+    n, m, load, drive = p.drives.shape[0], p.modes[0], force_place(p), drive_place(p)
+    for k in range(all_states(p)):
+        f.counts[k], f.variances[k] = 0, 0.0
+    for j in range(m):
+        omega2, half = p.omega[j] * p.omega[j], 0.5 * p.decay[j]
+        swing = math.sqrt(max(omega2 - half * half, 1e-12))
+        left, c, s = math.exp(-half * h), math.cos(swing * h), math.sin(swing * h)
+        qq, qv = left * (c + half / swing * s), left * s / swing
+        vq, vv = -left * omega2 / swing * s, left * (c - half / swing * s)
+        put_weight(f, j, j, qq)
+        put_weight(f, j, m + j, qv)
+        put_weight(f, m + j, j, vq)
+        put_weight(f, m + j, m + j, vv)
+        still, moving = (1.0 - qq) / omega2, -vq / omega2
+        for a in range(2):
+            motion = p.readings[2 + n + j, n + a]
+            for b in range(2):
+                put_weight(f, j, load + 2 * b + a, still * motion)
+                put_weight(f, m + j, load + 2 * b + a, moving * motion)
+        for i in range(n):
+            push = -p.forces[2 + n + j, i] / omega2
+            put_weight(f, j, drive + 2 * n + i, still * push)
+            put_weight(f, m + j, drive + 2 * n + i, moving * push)
+    for a in range(2):
+        put_weight(f, load + a, load + a, math.exp(-h / FAST))
+        put_weight(f, load + 2 + a, load + 2 + a, math.exp(-h / SLOW))
+    kept = math.exp(-h / DRIVE_TIME)
+    for i in range(n):
+        put_weight(f, drive + i, drive + i, 1.0)
+        put_weight(f, drive + i, drive + n + i, h)
+        put_weight(f, drive + i, drive + 2 * n + i, 0.5 * h * h)
+        put_weight(f, drive + n + i, drive + n + i, 1.0)
+        put_weight(f, drive + n + i, drive + 2 * n + i, h)
+        put_weight(f, drive + 2 * n + i, drive + 2 * n + i, kept)
+        f.variances[drive + i], f.variances[drive + 2 * n + i] = LEAK * h, f.jerk[i] * h
+    zero = zero_place(p)
+    for k in range(zero, all_states(p)):
+        put_weight(f, k, k, 1.0)
+    for a in range(2):
+        f.variances[zero + a] = IMU_DRIFT * IMU_DRIFT * h
+    for i in range(n):
+        f.variances[zero + 4 + i] = ANGLE_DRIFT * ANGLE_DRIFT * h
+        f.variances[zero + 4 + n + i] = (FORCE_DRIFT * f.pulls[i]) ** 2 * h
+
+
+@inner
+def transit(p, f, k, size, h, load2):
+    """Take model `k` with its first `size` states over the transition; its fast load has the variance `load2` (N^2)."""
+    x, covariance, load = f.x[k], f.p[k], force_place(p)
+    for i in range(size):
+        total = 0.0
+        for c in range(f.counts[i]):
+            total += f.weights[i, c] * x[f.places[i, c]]
+        f.row[i] = total
+    for i in range(size):
+        x[i] = f.row[i]
+    multiply(f, covariance, f.half, size)
+    for i in range(size):
+        for j in range(size):
+            f.turned[i, j] = f.half[j, i]
+    multiply(f, f.turned, covariance, size)
+    for i in range(size):
+        covariance[i, i] += f.variances[i]
+    slow2 = f.noise.least_load * f.noise.least_load + load2
+    for a in range(2):
+        covariance[load + a, load + a] += load2 * (1.0 - math.exp(-2.0 * h / FAST))
+        covariance[load + 2 + a, load + 2 + a] += slow2 * (1.0 - math.exp(-2.0 * h / SLOW))
+
+
+@inner
+def multiply(f, right, found, size):
+    """Write the product of the transition matrix and `right` (s, s)."""
+    for i in range(size):
+        for j in range(size):
+            found[i, j] = 0.0
+        for c in range(f.counts[i]):
+            weight, line = f.weights[i, c], right[f.places[i, c]]
+            for j in range(size):
+                found[i, j] += weight * line[j]
+
+
+@inner
+def correct(x, covariance, row, gain, innovation, variance, size):
+    """Take a reading into a state and its covariance; returns the variance of the innovation."""
+    spread_of(row, covariance, gain, size)
+    expected = variance
+    for k in range(size):
+        expected += row[k] * gain[k]
+    share = innovation / expected
+    for i in range(size):
+        x[i] += gain[i] * share
+        part = gain[i] / expected
+        for k in range(size):
+            covariance[i, k] -= part * gain[k]
+    return expected

@@ -1,0 +1,88 @@
+"""Learn which valves are open, and the sizes of jerk, load and noise of lengths."""
+
+from __future__ import annotations
+
+import math
+
+from ..kernels.jit import inner
+from .kalman import DRIVE_TIME
+from .mixture import copy_model
+from .states import ALL_OPEN, ALL_VALVES, BURST, ESTIMATE, FED, OPEN, PREDICTION, VALVES, all_states, drive_place, force_place
+
+LEARN_LOAD = 3.0  # s, in which the size of the fast load is learnt
+SURPRISE = 9.0  # times its variance: most that one sample counts for in that
+LEAST_JERK, MOST_JERK = 1e-3, 10.0  # m^2/s^5
+JERK_RISE, JERK_FALL = 0.05, 0.5  # s, in which that density is learnt
+OPENED, SHUT = 4.0, 3.0  # standard deviations of a drive's rate: beyond the one it moves, below the other it may stand still
+SHUT_TIME = 0.15  # s below the second before its valve is believed closed
+LEARN_LENGTH = 0.02  # share of a third difference that counts for the noise of a length
+UNEVEN = 0.5  # share of the time between two lengths by which the one before may differ, for differences of them
+
+
+@inner
+def watch_valves(p, f, h, size):
+    """Believe valves open or closed by the rates of their drives in the model in which all are open."""
+    n, drive, opened = p.drives.shape[0], drive_place(p), False
+    for i in range(n):
+        at = drive + n + i
+        deviation = abs(f.x[OPEN, at]) / math.sqrt(max(f.p[OPEN, at, at], 1e-300))
+        f.still[i] = f.still[i] + h if deviation < SHUT else 0.0
+        if deviation > OPENED and f.chances[OPEN] > 0.5:
+            if f.is_open[i] == 0:
+                opened = True
+                f.is_open[i] = 1
+        elif f.still[i] > SHUT_TIME:
+            f.is_open[i] = 0
+    if opened:
+        copy_model(f, OPEN, VALVES, size)
+        copy_model(f, OPEN, BURST, size)
+        if f.status[FED] == 1:
+            copy_model(f, ALL_OPEN, ALL_VALVES, all_states(p))
+
+
+@inner
+def learn_jerk(p, f, h):
+    """Learn how the accelerations of the drives change: a variance of 2/T (E a^2) is stationary under that density."""
+    n = p.drives.shape[0]
+    for i in range(n):
+        at = drive_place(p) + 2 * n + i
+        shown = 2.0 / DRIVE_TIME * (f.x[OPEN, at] * f.x[OPEN, at] + f.p[OPEN, at, at])
+        time = JERK_RISE if shown > f.jerk[i] else JERK_FALL
+        f.jerk[i] = min(max(f.jerk[i] + min(h / time, 1.0) * (shown - f.jerk[i]), LEAST_JERK), MOST_JERK)
+
+
+@inner
+def learn_length_noise(f, h, y):
+    """Learn the noise of lengths from third differences, 20 times its variance; no cylinder moves so unevenly.
+
+    Lengths that came `h` (s) after those before, and not in even steps with them, begin a new series of differences.
+    """
+    is_even, f.interval[0] = abs(h - f.interval[0]) < UNEVEN * h, h
+    for i in range(y.shape[0]):
+        if not is_even:
+            f.before[i, 0] = f.before[i, 1] = f.before[i, 2] = math.nan
+        third = y[i] - 3.0 * f.before[i, 0] + 3.0 * f.before[i, 1] - f.before[i, 2]
+        if math.isfinite(third):
+            found = f.length2[i] + LEARN_LENGTH * (third * third / 20.0 - f.length2[i])
+            f.length2[i] = max(found, f.noise.length2)
+        f.before[i, 2], f.before[i, 1], f.before[i, 0] = f.before[i, 1], f.before[i, 0], y[i]
+
+
+@inner
+def learn_load(p, f, h):
+    """Learn the variance of the fast load, of the prediction and of the estimate."""
+    for k in range(2):
+        if k == ESTIMATE and f.status[FED] == 0:
+            f.load2[ESTIMATE] = f.load2[PREDICTION]
+            return
+        shown = 0.0
+        for at in range(force_place(p), force_place(p) + 2):
+            shown += 0.5 * (f.mean[k, at] * f.mean[k, at] + f.spread[k, at, at])
+        f.load2[k] = learnt(f, f.load2[k], shown, h)
+
+
+@inner
+def learnt(f, before, shown, h):
+    """Return a variance (N^2) brought towards what is shown."""
+    found = before + min(h / LEARN_LOAD, 1.0) * (min(shown, SURPRISE * before) - before)
+    return max(found, f.noise.least_load * f.noise.least_load)

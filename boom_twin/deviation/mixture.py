@@ -1,0 +1,109 @@
+"""Interacting models (H. Blom and Y. Bar-Shalom, IEEE Trans. Automat. Control 33 (1988), 780-783): mixing and weighing."""
+
+from __future__ import annotations
+
+import math
+
+from ..kernels.jit import inner
+from .rows import clear
+from .states import ALL_VALVES, BURST, ESTIMATE, FED, OPEN, PREDICTION, VALVES
+
+OPENS, CLOSES = 0.3, 1.0  # 1/s, rates at which valves open, and are closed again
+COMES, STAYS = 0.2, 1.0  # 1/s, rates at which a load comes, and is usual again
+
+
+@inner
+def copy_model(f, source, target, size):
+    """Copy state and covariance of a model."""
+    for i in range(size):
+        f.x[target, i] = f.x[source, i]
+        for k in range(size):
+            f.p[target, i, k] = f.p[source, i, k]
+
+
+@inner
+def models_of(mixture):
+    """Return the first model of a mixture, and how many it has."""
+    return (VALVES, 3) if mixture == PREDICTION else (ALL_VALVES, 2)
+
+
+@inner
+def interact(f, mixture, size, h):
+    """Mix the models of a mixture before a step of `h` (s), by the rates at which valves and load change."""
+    first, count = models_of(mixture)
+    opens, closes = 1.0 - math.exp(-OPENS * h), 1.0 - math.exp(-CLOSES * h)
+    comes, stays = 1.0 - math.exp(-COMES * h), 1.0 - math.exp(-STAYS * h)
+    if count == 2:
+        comes = 0.0
+    switch = f.switch
+    switch[VALVES, VALVES], switch[VALVES, OPEN], switch[VALVES, BURST] = 1.0 - opens - comes, opens, comes
+    switch[OPEN, VALVES], switch[OPEN, OPEN], switch[OPEN, BURST] = closes, 1.0 - closes, 0.0
+    switch[BURST, VALVES], switch[BURST, OPEN], switch[BURST, BURST] = stays, opens, 1.0 - stays - opens
+    for target in range(count):
+        new = 0.0
+        for source in range(count):
+            new += f.chances[first + source] * switch[source, target]
+        f.likely[target] = new
+        mean, spread = f.mixed_x[target], f.mixed_p[target]
+        clear(mean, size)
+        for i in range(size):
+            clear(spread[i], size)
+        for source in range(count):
+            add_mean(f, first + source, f.chances[first + source] * switch[source, target] / new, mean, size)
+        for source in range(count):
+            share = f.chances[first + source] * switch[source, target] / new
+            add_spread(f, first + source, share, mean, spread, size)
+    for target in range(count):
+        f.chances[first + target] = f.likely[target]
+        for i in range(size):
+            f.x[first + target, i] = f.mixed_x[target, i]
+            for k in range(size):
+                f.p[first + target, i, k] = f.mixed_p[target, i, k]
+
+
+@inner
+def add_mean(f, model, share, mean, size):
+    """Add a share of a model's state to a mean."""
+    for i in range(size):
+        mean[i] += share * f.x[model, i]
+
+
+@inner
+def add_spread(f, model, share, mean, spread, size):
+    """Add a share of a model's covariance, and of how far its state is from the mean, to a covariance."""
+    if share < 1e-12:
+        return
+    for i in range(size):
+        apart = share * (f.x[model, i] - mean[i])
+        for k in range(size):
+            spread[i, k] += share * f.p[model, i, k] + apart * (f.x[model, k] - mean[k])
+
+
+@inner
+def mix(f, mixture, size):
+    """Write mean and covariance of a mixture."""
+    first, count = models_of(mixture)
+    mean, spread = f.mean[mixture], f.spread[mixture]
+    clear(mean, size)
+    for i in range(size):
+        clear(spread[i], size)
+    for k in range(count):
+        add_mean(f, first + k, f.chances[first + k], mean, size)
+    for k in range(count):
+        add_spread(f, first + k, f.chances[first + k], mean, spread, size)
+
+
+@inner
+def weigh_models(f, mixture):
+    """Bring the chances of a mixture's models up to date by their likelihoods."""
+    first, count = models_of(mixture)
+    most, total = f.likely[first], 0.0
+    for k in range(1, count):
+        most = max(most, f.likely[first + k])
+    for k in range(count):
+        f.chances[first + k] = max(f.chances[first + k] * math.exp(f.likely[first + k] - most), 1e-9)
+        total += f.chances[first + k]
+    for k in range(count):
+        f.chances[first + k] /= total
+    if mixture == ESTIMATE or f.status[FED] == 0:
+        f.evidence[0] += most + math.log(total)

@@ -1,0 +1,131 @@
+"""Rows of the measurement matrix: what sensors, lengths and the tip read of the states of `boom_twin.deviation.states`."""
+
+from __future__ import annotations
+
+from ..kernels.jit import inner
+from .states import all_states, drive_place, force_place, zero_place
+
+
+@inner
+def clear(row, size):
+    """Set the first `size` entries to zero."""
+    for k in range(size):
+        row[k] = 0.0
+
+
+@inner
+def read(row, x, size):
+    """Return the reading of a row."""
+    total = 0.0
+    for k in range(size):
+        total += row[k] * x[k]
+    return total
+
+
+@inner
+def about_rest(p, row, x, size):
+    """Return the reading of a row less that at rest."""
+    total, drive = read(row, x, size), drive_place(p)
+    for i in range(p.drives.shape[0]):
+        total -= row[drive + i] * p.drives[i]
+    return total
+
+
+@inner
+def variance_of(row, covariance, gain, size):
+    """Return the variance of the reading of a row; `gain` is scratch."""
+    spread_of(row, covariance, gain, size)
+    return max(read(row, gain, size), 0.0)
+
+
+@inner
+def spread_of(row, covariance, gain, size):
+    """Write the covariance of all states with the reading of a row."""
+    clear(gain, size)
+    for k in range(size):
+        if row[k] != 0.0:
+            weight, line = row[k], covariance[k]
+            for i in range(size):
+                gain[i] += weight * line[i]
+
+
+@inner
+def column_row(p, columns, at, scale, row):
+    """Write the row of a quantity that changes by `scale` times a column of `columns` (c, ..) a state, see `Posture`."""
+    n, m = p.drives.shape[0], p.modes[0]
+    clear(row, all_states(p))
+    load, drive = force_place(p), drive_place(p)
+    for j in range(m):
+        row[j] = scale * columns[2 + n + j, at]
+    for a in range(2):
+        row[load + a] = row[load + 2 + a] = scale * columns[a, at]
+    for i in range(n):
+        row[drive + i] = scale * columns[2 + i, at]
+
+
+@inner
+def length_row(p, i, row):
+    """Write the row of what the stroke transducer of cylinder `i` reads."""
+    n, m = p.drives.shape[0], p.modes[0]
+    column_row(p, p.forces, i, p.oil_read[i], row)
+    row[drive_place(p) + i] += 1.0
+    for j in range(m):
+        row[m + j] = -p.lag[i] * p.oil_read[i] * p.forces[2 + n + j, i]
+
+
+@inner
+def length_of(p, i, row, x, size):
+    """Return what the stroke transducer of cylinder `i` reads by a state, m; `row` is that of `length_row`."""
+    return p.drives[i] + p.oil_read[i] * p.pulled[i] + about_rest(p, row, x, size)
+
+
+@inner
+def rate_row(p, a, row):
+    """Write the row of the velocity of the tip (x, y, angle: `a`)."""
+    n, m = p.drives.shape[0], p.modes[0]
+    clear(row, all_states(p))
+    drive = drive_place(p)
+    for j in range(m):
+        row[m + j] = p.readings[2 + n + j, n + a]
+    for i in range(n):
+        row[drive + n + i] = p.readings[2 + i, n + a]
+
+
+@inner
+def acceleration_row(p, a, row):
+    """Write the row of the acceleration of the tip (x, y, angle: `a`), less what its curved way needs at its speed."""
+    n, m = p.drives.shape[0], p.modes[0]
+    clear(row, all_states(p))
+    load, drive = force_place(p), drive_place(p)
+    for i in range(n):
+        row[drive + 2 * n + i] = p.readings[2 + i, n + a]
+    for j in range(m):
+        at, omega2 = 2 + n + j, p.omega[j] * p.omega[j]
+        motion = p.readings[at, n + a]
+        row[j], row[m + j] = -omega2 * motion, -p.decay[j] * motion
+        for b in range(2):
+            share = motion * p.readings[at, n + b]
+            row[load + b] += share
+            row[load + 2 + b] += share
+        for i in range(n):
+            row[drive + 2 * n + i] -= motion * p.forces[at, i] / omega2
+
+
+@inner
+def angle_row(p, i, row):
+    """Write the row of angle sensor `i`."""
+    column_row(p, p.readings, i, 1.0, row)
+
+
+@inner
+def specific_force_row(p, f, axis, c, s, row):
+    """Write the row of the IMU's x or z (`axis` 0 or 1) at a tip whose angle has cosine `c` and sine `s`."""
+    n = p.drives.shape[0]
+    acceleration_row(p, 0, f.rows[0])
+    acceleration_row(p, 1, f.rows[1])
+    column_row(p, p.readings, n + 2, f.felt[1] if axis == 0 else -f.felt[0], row)
+    along, across = (c, s) if axis == 0 else (-s, c)
+    zero = zero_place(p)
+    for k in range(zero):
+        row[k] += along * f.rows[0, k] + across * f.rows[1, k]
+    row[zero + 2], row[zero + 3] = f.felt[1] if axis == 0 else -f.felt[0], f.felt[axis]

@@ -1,0 +1,106 @@
+"""Corrections of the estimate by angles, IMU and cylinder forces."""
+
+from __future__ import annotations
+
+import math
+
+from ..kernels.jit import inner, kernel
+from .kalman import correct
+from .learning import SURPRISE
+from .mixture import mix, weigh_models
+from .rows import angle_row, column_row, specific_force_row, variance_of
+from .states import (
+    ALL_OPEN,
+    ALL_VALVES,
+    ANGLES,
+    ESTIMATE,
+    FED,
+    FED_STAMP,
+    FORCES,
+    IMU,
+    PREDICTION,
+    all_states,
+    drive_place,
+    zero_place,
+)
+
+INEXACT = 0.03  # share of the tip's acceleration that modes left out and those there are wrong by
+LEARN_NOISE = 0.02  # of a reading, by which the noise of its channel is learnt
+DOF = 4.0  # degrees of freedom of Student's t, by which innovations of the estimate are weighed
+OLDEST = 0.1  # s, most that a reading may be late
+
+
+@kernel
+def take_sensor(p, f, stream, first, residuals, stamp, newest):
+    """Take residuals of one sample against the prediction into the estimate.
+
+    Parameters
+    ----------
+    stream : int
+        By `boom_twin.twin.blocks.CODES`: angles (rad), IMU (m/s^2) or forces (N); the estimate leaves out all others.
+    first : int
+        First of its channels among the measured ones.
+    residuals : ndarray, shape (k,)
+        NaN where missing.
+    stamp, newest : int
+        Of the sample, and of the newest lengths, ns.
+    """
+    n, zero, age = p.drives.shape[0], zero_place(p), (newest - stamp) * 1e-9
+    if stream != ANGLES and stream != IMU and stream != FORCES:
+        return
+    channels = 2 if stream == IMU else n
+    usable = False
+    for i in range(channels):
+        usable |= math.isfinite(residuals[i]) and not f.masked[first + i]
+    if not usable or age > OLDEST:
+        return
+    f.status[FED], f.status[FED_STAMP] = 1, newest
+    c, s = math.cos(f.angle[0]), math.sin(f.angle[0])
+    f.likely[ALL_VALVES] = f.likely[ALL_OPEN] = 0.0
+    for i in range(channels):
+        if f.masked[first + i]:
+            continue
+        if stream == ANGLES:
+            angle_row(p, i, f.row)
+            take_reading(p, f, first + i, residuals[i], zero + 4 + i, f.noise.angle2, age)
+        elif stream == IMU:
+            specific_force_row(p, f, i, c, s, f.row)
+            inexact2 = INEXACT * INEXACT * f.shaking[0]
+            take_reading(p, f, first + i, residuals[i], zero + i, f.noise.acceleration2 + inexact2, age)
+        else:
+            column_row(p, p.forces, i, 1.0, f.row)
+            take_reading(p, f, first + i, residuals[i], zero + 4 + n + i, f.noise.force2, age)
+    weigh_models(f, ESTIMATE)
+    mix(f, ESTIMATE, all_states(p))
+
+
+@inner
+def take_reading(p, f, channel, residual, zero, variance, age):
+    """Take a residual of a channel, of the quantity in `f.row` with its zero at place `zero`, `age` s ago.
+
+    Its noise is learnt: innovations that are larger than expected raise it until they are as expected.
+    """
+    if not math.isfinite(residual):
+        return
+    size, every, m = zero_place(p), all_states(p), p.modes[0]
+    n, drive = p.drives.shape[0], drive_place(p)
+    if age > 0.0:
+        for j in range(m):
+            q, v = f.row[j], f.row[m + j]
+            f.row[j], f.row[m + j] = q + age * p.omega[j] * p.omega[j] * v, v - age * (q - p.decay[j] * v)
+        for i in range(n):
+            f.row[drive + n + i] -= age * f.row[drive + i]
+    f.row[zero] = 1.0
+    variance *= max(f.excess[channel], 1.0)
+    shown = 0.0
+    for k in range(ALL_VALVES, ALL_OPEN + 1):
+        innovation = residual
+        for i in range(every):
+            known = f.mean[PREDICTION, i] if i < size else 0.0
+            innovation -= f.row[i] * (f.x[k, i] - known)
+        expected = variance + variance_of(f.row, f.p[k], f.gain, every)
+        shown += f.chances[k] * innovation * innovation / expected
+        weight = min((DOF + 1.0) / (DOF + innovation * innovation / expected), 1.0)
+        expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, variance / weight, every)
+        f.likely[k] -= 0.5 * (innovation * innovation / expected + math.log(expected))
+    f.excess[channel] = max(f.excess[channel] * (1.0 + LEARN_NOISE * (min(shown, SURPRISE) - 1.0)), 1.0)

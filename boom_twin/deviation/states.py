@@ -1,0 +1,129 @@
+"""States of the filters of one boom: their places, and all that the filters remember."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.jit import by_reference, inner
+from ..types import Array, Stream
+
+VALVES, OPEN, BURST, ALL_VALVES, ALL_OPEN = range(5)  # models: three of the prediction, two of the estimate
+ANGLES, IMU, FORCES = map(list(Stream).index, (Stream.ANGLES, Stream.IMU, Stream.FORCES))  # codes of these streams
+PREDICTION, ESTIMATE = range(2)  # mixtures of these
+STARTED, FED, FED_STAMP = range(3)  # of `status`
+
+
+class SensorNoise(NamedTuple):
+    """Variances of sensors, and sizes of loads (N): usual, least, at the start of a session, just come."""
+
+    length2: float
+    angle2: float
+    acceleration2: float
+    force2: float
+    usual_load: float
+    least_load: float
+    first_load: float
+    burst_load: float
+
+
+@by_reference
+class Filters(NamedTuple):
+    """Filters of one boom; n cylinders, m modes at most, s states, p of them of the prediction (zeros behind).
+
+    x, p : (5, s), (5, s, s) states and covariances of the models. chances : (5,) of them, in each mixture one in all.
+    mean, spread : (2, s), (2, s, s) of the mixtures. load2 : (2,) variance of the fast load, N^2, of prediction and estimate.
+    jerk : (n,) m^2/s^5. is_open : (n,) 1 where a valve is believed open. still : (n,) s since its drive began to stand still.
+    status : (3,) whether it has begun, whether the estimate has readings of its own, stamp of the newest of these.
+    masked, deaf : (c,), (n,) measured channels, and strokes, that the estimate is not to use. noise : variances.
+    excess : (c,) times the variance that channels are stated to have. length2 : (n,) variances of lengths as learnt, m^2.
+    before, interval : (n, 3), (1,) the three lengths before (m), and the time between the newest two, s.
+    places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
+    felt : (2,) specific force predicted at the tip, m/s^2. shaking : (1,) mean square of its acceleration, m^2/s^4.
+    angle : (1,) of the tip, rad. strokes : (n, 3) predicted lengths (m), their rates and accelerations.
+    innovations : (n, 2) newest lengths less what the prediction's mixture expected before them (m), and their variances.
+    pulls : (n,) predicted forces, N. evidence : (1,) logarithm of the likelihood of all that was read, up to a constant.
+    The others are scratch.
+    """
+
+    x: Array
+    p: Array
+    chances: Array
+    mean: Array
+    spread: Array
+    load2: Array
+    jerk: Array
+    is_open: NDArray[np.int64]
+    still: Array
+    status: NDArray[np.int64]
+    masked: NDArray[np.bool_]
+    deaf: NDArray[np.bool_]
+    excess: Array
+    length2: Array
+    before: Array
+    interval: Array
+    noise: SensorNoise
+    places: NDArray[np.int64]
+    weights: Array
+    counts: NDArray[np.int64]
+    variances: Array
+    felt: Array
+    pulls: Array
+    evidence: Array
+    half: Array
+    turned: Array
+    mixed_x: Array
+    mixed_p: Array
+    row: Array
+    gain: Array
+    rows: Array
+    likely: Array
+    switch: Array
+    shaking: Array
+    angle: Array
+    strokes: Array
+    innovations: Array
+
+
+def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> Filters:
+    """Return filters of a boom with so many joints, modes at most, and measured channels."""
+    n, states = joints, 2 * modes + 4 + 3 * joints + 4 + 2 * joints
+    return Filters(
+        x=np.zeros((5, states)), p=np.zeros((5, states, states)), chances=np.zeros(5), mean=np.zeros((2, states)),
+        spread=np.zeros((2, states, states)), load2=np.zeros(2), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
+        still=np.zeros(n), status=np.zeros(3, np.int64), masked=np.zeros(channels, np.bool_),
+        deaf=np.zeros(n, np.bool_), excess=np.ones(channels), length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan),
+        interval=np.zeros(1), noise=noise,
+        places=np.zeros((states, 6 + n), np.int64), weights=np.zeros((states, 6 + n)), counts=np.zeros(states, np.int64),
+        variances=np.zeros(states), felt=np.zeros(2), pulls=np.zeros(n), evidence=np.zeros(1), half=np.zeros((states, states)),
+        turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)), mixed_p=np.zeros((3, states, states)),
+        row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((9, states)), likely=np.zeros(5),
+        switch=np.zeros((3, 3)), shaking=np.zeros(1), angle=np.zeros(1), strokes=np.zeros((n, 3)),
+        innovations=np.zeros((n, 2)),
+    )  # fmt: skip
+
+
+@inner
+def force_place(p):
+    """Return the first place of the fast load (2), behind the modes' coordinates and rates; the slow one (2) follows."""
+    return 2 * p.modes[0]
+
+
+@inner
+def drive_place(p):
+    """Return the first place of the drives (n); their rates (n) and accelerations (n) follow."""
+    return 2 * p.modes[0] + 4
+
+
+@inner
+def zero_place(p):
+    """Return how many states the prediction has; zeros (2), mount, scale of the IMU, zeros of angles and forces follow."""
+    return 2 * p.modes[0] + 4 + 3 * p.drives.shape[0]
+
+
+@inner
+def all_states(p):
+    """Return the number of states of the estimate."""
+    return zero_place(p) + 4 + 2 * p.drives.shape[0]
