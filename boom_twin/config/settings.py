@@ -174,7 +174,6 @@ class Settings(BaseModel):
     leap: Limit = Field(default=3600.0, description="a longer step of the first stamps of angles is confirmed, s")
     exaggeration: Positive = Field(default=10.0, description="factor of the displacements drawn large in ~/shape")
     tip_deviation: Positive = Field(default=0.02, description="an angle off its prediction by more at the tip is an alarm, m")
-    imu_deviation: Positive = Field(default=0.7, description="an IMU's axis off its prediction by more is an alarm, m/s^2")
     force_deviation: Positive = Field(default=5e3, description="a cylinder force off its prediction by more is an alarm, N")
     force_scale: Positive = Field(default=1.0e5, description="cylinder force that has the full colour in ~/shape, N")
 

@@ -15,7 +15,7 @@ from .blocks import Block
 from .stream_readings import ENOUGH, StreamReadings
 
 KIND = "deviation"  # of all its alarms
-SIGMAS = {Stream.ANGLES: 3.0, Stream.IMU: 3.0, Stream.FORCES: 10.0}
+SIGMAS = {Stream.ANGLES: 3.0, Stream.FORCES: 10.0}
 """Stated deviations by which a mean residual has to be off beside its limit; of forces they lack the error of a model."""
 LAG = 0.4  # s; a residual that stamps explain which are late by less is no deviation, see `delay_monitor`
 LASTING = 3_000_000_000  # ns for which a deviation has to last: in haste a mean is off for two seconds
@@ -23,7 +23,6 @@ GONE = 0.5  # share of the limit below which a deviation is over
 SETTLED = 5_000_000_000  # ns for which it has to be below
 REMEDY = {
     Stream.ANGLES: "its sensor, a stroke transducer, or the scene is off. Compare both at rest",
-    Stream.IMU: "its zero or mount, a stroke transducer, or the scene is off. Compare it with gravity at rest",
     Stream.FORCES: "its sensor, the load, or the scene is off. Check payload and line fill, then the sensor's zero",
 }
 
@@ -49,8 +48,8 @@ class DeviationMonitor:
         self._stream, self._names = stream, channels_of(len(scene.joints))[stream]
         lengths = np.array([section.length for section in scene.sections])
         self._reach = np.cumsum(lengths[::-1])[::-1] if stream is Stream.ANGLES else None  # m; outboard of each joint
-        limit = {Stream.IMU: settings.imu_deviation, Stream.FORCES: settings.force_deviation}.get(stream, 0.0)
-        self._limits = np.full(len(self._names), limit) if self._reach is None else settings.tip_deviation / self._reach
+        force = np.full(len(self._names), settings.force_deviation)
+        self._limits = force if self._reach is None else settings.tip_deviation / self._reach
         self._since, self._last = np.full(len(self._names), -1), dict[int, _Deviation]()
 
     @property

@@ -14,7 +14,6 @@ from boom_twin.types import Alarm
 STEP, ONSET, END = 5_000_000, 600, 1800  # ns; samples
 OFF = {  # of a channel that reads too much for 6 s
     "joint_2": (Stream.ANGLES, 1, 4e-3, "joint_2 reads +4"),
-    "tip_imu_x": (Stream.IMU, 0, 1.2, "tip_imu_x reads +1.2"),
     "cylinder_force_2": (Stream.FORCES, 1, 9e3, "cylinder_force_2 reads +9"),
 }
 
@@ -66,10 +65,8 @@ def test_a_stroke_transducer_that_is_off_shows_in_its_joint() -> None:
     assert {alarm.channel for alarm in found} == {"joint_2"} and found[-1].until is not None
 
 
-@pytest.mark.parametrize(
-    "name, limit", [("joint_2", "tip_deviation"), ("tip_imu_x", "imu_deviation"), ("cylinder_force_2", "force_deviation")]
-)
+@pytest.mark.parametrize("name, limit", [("joint_2", "tip_deviation"), ("cylinder_force_2", "force_deviation")])
 def test_limits_are_settings(name: str, limit: str) -> None:
     stream, channel, shift, _ = OFF[name]
-    larger = {"tip_deviation": 0.1, "imu_deviation": 1.5, "force_deviation": 1e4}[limit]
+    larger = {"tip_deviation": 0.1, "force_deviation": 1e4}[limit]
     assert alarms(stream, channel, shift, Settings(**{limit: larger}), ramp=200) == []
