@@ -20,7 +20,7 @@ Table = TypeVar("Table", bound=BaseModel)
 _GONE = ("jerk_density", "lag", "stroke_agility", "step", "look_step", "step_tip_error", "step_acceleration_error", "rho")
 RETIRED = dict.fromkeys(
     (*_GONE, "section_deviation"), "without effect since 0.2.0, whose filter adapts by itself: leave it out"
-) | dict.fromkeys(("false_alarms", "tip_load_limit"), "without effect since 0.2.0, which infers no causes: leave it out")
+) | {"false_alarms": "without effect since 0.2.0: leave it out"}
 """Parameters of earlier versions, and what takes their place."""
 
 
@@ -175,6 +175,7 @@ class Settings(BaseModel):
     exaggeration: Positive = Field(default=10.0, description="factor of the displacements drawn large in ~/shape")
     tip_deviation: Positive = Field(default=0.02, description="an angle off its prediction by more at the tip is an alarm, m")
     force_deviation: Positive = Field(default=5e3, description="a cylinder force off its prediction by more is an alarm, N")
+    tip_load_limit: Positive = Field(default=500.0, description="force at the tip beside the known load that is an alarm, N")
     force_scale: Positive = Field(default=1.0e5, description="cylinder force that has the full colour in ~/shape, N")
 
     @classmethod

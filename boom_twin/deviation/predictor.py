@@ -30,7 +30,7 @@ from .estimate_row import MODES
 from .models import start_models
 from .posture import Posture, linearise, new_posture
 from .sensor_model import Mounting
-from .states import FED, FED_STAMP, PREDICTION, Filters, SensorNoise, new_filters
+from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, new_filters
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
 WIDTH = 1e-6  # relative accuracy of natural frequencies
@@ -241,6 +241,14 @@ class BoomPredictor:
     def evidence(self) -> float:
         """Logarithm of the likelihood of all that was read since the twin was made, up to a constant of the session."""
         return float(self.filters.evidence[0])
+
+    @property
+    def tip_load(self) -> tuple[Array, Array]:
+        """Estimated force at the tip that the model does not know (N), and its variances, shape (2,) each."""
+        fast = 2 * int(self.posture.modes[0]) + np.arange(2)
+        mean, spread = self.filters.mean[ESTIMATE], self.filters.spread[ESTIMATE]
+        variances = spread[fast, fast] + 2.0 * spread[fast, fast + 2] + spread[fast + 2, fast + 2]
+        return mean[fast] + mean[fast + 2], variances
 
     @property
     def tip_sigmas(self) -> Array:

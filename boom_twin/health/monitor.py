@@ -19,6 +19,7 @@ from .imu_mount import KNOWN, ImuMount
 from .sensor_check import NOISE_OVER, SensorCheck, sensor_ranges
 from .sensor_monitor import SensorMonitor
 from .stream_readings import StreamReadings, StreamSurvey
+from .tip_load import TipLoadMonitor
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news
 UNCERTAIN = 2.0  # variances of a stroke reading; while a stroke is known worse, sensors are not compared with the prediction
@@ -52,7 +53,7 @@ class HealthMonitor:
         self._delay = DelayMonitor()
         self._deviations = {stream: DeviationMonitor(stream, scene, settings) for stream in SIGMAS}
         self._mount, self._forces = ImuMount(), ForceReading(self._channels[Stream.FORCES])
-        self._angles = AngleReading(scene, mounts)
+        self._angles, self._load = AngleReading(scene, mounts), TipLoadMonitor(settings.tip_load_limit)
         self._told = 0
         self.begin()
 
@@ -75,6 +76,7 @@ class HealthMonitor:
         self._delay.begin()
         self._forces.begin()
         self._angles.begin()
+        self._load.begin()
 
     def predicted(self, followed: PredictionRows) -> None:
         """Take predictions, at least one."""
@@ -108,16 +110,19 @@ class HealthMonitor:
             return masked | self._forces.masked
         return masked | (stream is Stream.IMU and self._mount.alarm is not None)
 
-    def judge(self, stamp: int, tip_sigmas: Callable[[], Array]) -> Health | None:
+    def judge(self, stamp: int, load: tuple[Array, Array], tip_sigmas: Callable[[], Array]) -> Health | None:
         """Judge the blocks that are complete now that strokes came with `stamp` (ns); None if there is nothing to tell.
 
         Parameters
         ----------
+        load : two ndarray, shape (2,)
+            Estimated force at the tip that the model does not know, N, and its variances.
         tip_sigmas : callable
             Asked, if there is something to tell, for the standard deviations of the predicted tip, m, shape (2,).
         """
         done = self._blocks.close(stamp)
         news = [alarm for block in done if block.followed for alarm in self._judge(block)]
+        news += self._load.take(stamp, *load)
         if not done or not (news or done[-1].end - self._told >= PERIOD or self._told > done[-1].end):
             return None
         self._told = done[-1].end
@@ -130,7 +135,7 @@ class HealthMonitor:
         for sensors in self._sensors.values():
             yield from (alarm for alarm in sensors.alarms if not self._angles.explains(alarm))
         yield from (*self._angles.alarms, *self._forces.alarms)
-        yield from (alarm for alarm in (self._mount.alarm, self._delay.alarm) if alarm is not None)
+        yield from (alarm for alarm in (self._mount.alarm, self._delay.alarm, self._load.alarm) if alarm is not None)
         for deviations in self._deviations.values():
             yield from deviations.alarms
 

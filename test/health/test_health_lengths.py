@@ -9,6 +9,7 @@ import pytest
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
 from boom_twin.health.baseline import Baseline
+from boom_twin.health.tip_load import TipLoadMonitor
 from boom_twin.types import Alarm
 
 STEP, ONSET, END = 5_000_000, 600, 1800  # ns; samples
@@ -70,3 +71,14 @@ def test_limits_are_settings(name: str, limit: str) -> None:
     stream, channel, shift, _ = OFF[name]
     larger = {"tip_deviation": 0.1, "force_deviation": 1e4}[limit]
     assert alarms(stream, channel, shift, Settings(**{limit: larger}), ramp=200) == []
+
+
+def test_a_load_at_the_tip_above_its_limit_is_told_and_ends() -> None:
+    """Estimates ten times a second: blows of 900 N half a second apart for 4 s, and pulses below the limit before and after."""
+    monitor, news = TipLoadMonitor(500.0), list[Alarm]()
+    for k in range(200):
+        size = (900.0 if 50 <= k < 90 else 400.0) * (k % 5 == 0)
+        news += monitor.take(k * 100_000_000, np.array([0.0, -size]), np.array([1e4, 2500.0]))
+    began, ended = news
+    assert (began.channel, began.cause, began.since, began.until) == ("tip", "tip.load", 5_000_000_000, None)
+    assert "900 +- 50 N" in began.told and ended.until == 8_500_000_000 and monitor.alarm is None
