@@ -24,8 +24,6 @@ from ..types import Array
 
 PLACES = (0.0, 0.5, 1.0)
 """Of the stations of a part, over its length."""
-SIMPSON = (1 / 6, 4 / 6, 1 / 6)
-"""Shares of a part's length in an integral over it, by station."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,20 +60,6 @@ def stations(scene: Scene) -> tuple[Station, ...]:
         if one.section == other.section and f"{one.place:.2f}" == f"{other.place:.2f}":
             found[number], found[number + 1] = replace(one, side="inboard"), replace(other, side="outboard")
     return tuple(found)
-
-
-def flexibility_by_station(scene: Scene) -> Array:
-    """Weights (stations,), 1/(N m): the sum of weight, moment and another moment is the work of the one on the other's bending.
-
-    Simpson's rule over every part, exact while their product is of the third degree, divided by EI.
-    """
-    found = []
-    for index in range(len(scene.sections)):
-        inertia = scene.sections[index].I
-        for start, stop in flexible_parts(scene, index):
-            assert inertia is not None
-            found += [share * (stop - start) / (scene.material.E * inertia) for share in SIMPSON]
-    return np.array(found)
 
 
 def moments_by_unknowns(plan: Plan) -> Array:

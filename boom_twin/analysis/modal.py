@@ -132,13 +132,6 @@ def natural_modes(
     return tuple(modes)
 
 
-def natural_frequencies(plan: Plan, state: State, work: Work, count: int, width: float) -> Array:
-    """The lowest `count` natural frequencies (Hz) alone, or all if there are fewer; see `natural_modes`."""
-    found = np.array(list(_AtRest(plan, state, work).lowest(count, width, HIGHEST)))
-    place(plan.tables, state, work)
-    return found / (2.0 * math.pi)
-
-
 def _mode(plan: Plan, state: State, work: Work, boom: _AtRest, omega: float, lower: list[Mode]) -> Mode:
     """Inverse iteration from a random inertial load, a little beside `omega`, free of the `lower` modes."""
     rng = np.random.default_rng(1)

@@ -13,7 +13,7 @@ from ..kernels.elements.beam import LOCAL_ROWS, TURN_ROWS
 from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.integrators import DEPTH, new_weights
 from ..kernels.result_row import Results, results_of, row_width
-from ..kernels.tables import CORRECTIONS, RECORDS, SLOTS, Condensed, State, Tables, Tangents, Work
+from ..kernels.tables import CORRECTIONS, RECORDS, SLOTS, Condensed, State, Tables, Work
 from ..kernels.transfer.time_step import observe
 from ..types import Array
 
@@ -136,12 +136,6 @@ class Plan:
             corrections=np.zeros((CORRECTIONS, len(self.names))), kept_z=np.zeros(len(self.names)), kept=np.zeros(4),
             cut=np.zeros(SLOTS),
         )  # fmt: skip
-
-    def tangents(self, count: int) -> Tangents:
-        """Room for what `count` steps that take turns keep."""
-        works = [self.work() for _ in range(count)]
-        own = {name: np.stack([getattr(work, name) for work in works]) for name in Tangents._fields if name != "condensed"}
-        return Tangents(condensed=stacked([work.condensed for work in works]), **own)
 
 
 def stacked(parts: Sequence[Any]) -> Any:

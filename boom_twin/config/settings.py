@@ -220,11 +220,6 @@ class Settings(BaseModel):
         """Noise and rounding of a stroke, m^2."""
         return self.stroke_sigma**2 + self.stroke_resolution**2 / 12.0
 
-    @property
-    def angle_variance(self) -> float:
-        """Noise and rounding of a joint angle, rad^2."""
-        return self.angle_sigma**2 + self.angle_resolution**2 / 12.0
-
 
 def load_settings(path: Path | None = None, namespace: str = "") -> Settings:
     """Return the settings of a ROS parameter file, see `read_parameters`; the package's own if no path is given.

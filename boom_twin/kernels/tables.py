@@ -204,20 +204,6 @@ class Work(NamedTuple):
     cut: Array  # (SLOTS,)
 
 
-@by_reference
-class Tangents(NamedTuple):
-    """What k steps that take turns keep, each its own: fields of `Work`, their arrays with a leading axis over the steps.
-
-    See `kernels.transfer.kept_tangent.work_of`.
-    """
-
-    condensed: Condensed
-    drho: Array
-    corrections: Array
-    kept_z: Array
-    kept: Array
-
-
 OF_FORCES = (
     "offset", "s", "p", "g", "h", "own_g", "own_h", "right", "hold", "apart", "local", "drive", "drive_rate", "dz", "cut",
 )  # fmt: skip

@@ -36,19 +36,16 @@ def put_vector(msg: Any, fields: NumberFields) -> None:
     fill_xz(msg.vector, fields.row(2))
 
 
-def _put_point(msg: Any, fields: NumberFields) -> None:
-    fill_xz(msg.point, fields.row(2))
+def _put_motion(motion: Any, fields: NumberFields) -> None:
+    fill_xz(motion.linear, fields.row(2))
+    motion.angular.y = fields.double()
 
 
-def _put_acceleration(msg: Any, fields: NumberFields) -> None:
-    fill_xz(msg.accel.linear, fields.row(2))
-    msg.accel.angular.y = fields.double()
-
-
+_ACCELERATION = "acceleration_x", "acceleration_y", "-angular_acceleration"
 PREDICTED = (
     NumericOutput(Output.TIP_DISPLACEMENT, put_vector, ("displacement_x", "displacement_y")),
-    NumericOutput(Output.TIP_POSITION, _put_point, ("tip_x", "tip_y")),
-    NumericOutput(Output.TIP_ACCELERATION, _put_acceleration, ("acceleration_x", "acceleration_y", "-angular_acceleration")),
+    NumericOutput(Output.TIP_POSITION, lambda msg, fields: fill_xz(msg.point, fields.row(2)), ("tip_x", "tip_y")),
+    NumericOutput(Output.TIP_ACCELERATION, lambda msg, fields: _put_motion(msg.accel, fields), _ACCELERATION),
 )
 """In the order in which a bag has them: m; m; m/s^2 and rad/s^2. ``joint_states`` follows."""
 
@@ -59,21 +56,14 @@ def _put_pose(msg: Any, fields: NumberFields) -> None:
     _put_covariance(msg.pose, fields)
 
 
-def _put_twist(msg: Any, fields: NumberFields) -> None:
-    fill_xz(msg.twist.twist.linear, fields.row(2))
-    msg.twist.twist.angular.y = fields.double()
-    _put_covariance(msg.twist, fields)
+def _put_estimate(holder: Any, motion: Any, fields: NumberFields) -> None:
+    _put_motion(motion, fields)
+    _put_covariance(holder, fields)
 
 
 def _put_modes(msg: Any, fields: NumberFields) -> None:
     msg.name = [f"mode_{j}" for j in range(1, MODES + 1)]
     msg.position, msg.velocity = (np.array(fields.row(MODES)) for _ in range(2))
-
-
-def _put_acceleration_estimate(msg: Any, fields: NumberFields) -> None:
-    fill_xz(msg.accel.accel.linear, fields.row(2))
-    msg.accel.accel.angular.y = fields.double()
-    _put_covariance(msg.accel, fields)
 
 
 def _put_covariance(holder: Any, fields: NumberFields) -> None:
@@ -95,15 +85,25 @@ def _covariance(kind: str) -> tuple[str, ...]:
     return xx, xy, xa, yy, ya, aa, xy, xa, ya
 
 
+def _motion(kind: str) -> tuple[str, ...]:
+    """Return the numbers of `_put_estimate`."""
+    return f"estimate_{kind}_x", f"estimate_{kind}_y", f"-estimate_angular_{kind}", *_covariance(f"{kind}_")
+
+
 _POSE = "estimate_x", "estimate_y", "-sine_of_half", "cosine_of_half", *_covariance("")
-_TWIST = "estimate_velocity_x", "estimate_velocity_y", "-estimate_angular_velocity"
-_ACCELERATION = "estimate_acceleration_x", "estimate_acceleration_y", "-estimate_angular_acceleration"
+_MODES = tuple(name for name in ESTIMATED_NUMBERS if name.startswith("mode_"))
 ESTIMATED = (
     NumericOutput(Output.ESTIMATE_POSE, _put_pose, _POSE),
-    NumericOutput(Output.ESTIMATE_TWIST, _put_twist, (*_TWIST, *_covariance("velocity_"))),
-    NumericOutput(Output.ESTIMATE_ACCELERATION, _put_acceleration_estimate, (*_ACCELERATION, *_covariance("acceleration_"))),
+    NumericOutput(
+        Output.ESTIMATE_TWIST, lambda msg, fields: _put_estimate(msg.twist, msg.twist.twist, fields), _motion("velocity")
+    ),
+    NumericOutput(
+        Output.ESTIMATE_ACCELERATION,
+        lambda msg, fields: _put_estimate(msg.accel, msg.accel.accel, fields),
+        _motion("acceleration"),
+    ),
     NumericOutput(Output.ESTIMATE_LOAD, lambda msg, fields: fill_xz(msg.wrench.force, fields.row(2)), ("load_x", "load_y")),
-    NumericOutput(Output.ESTIMATE_MODES, _put_modes, tuple(name for name in ESTIMATED_NUMBERS if name.startswith("mode_"))),
+    NumericOutput(Output.ESTIMATE_MODES, _put_modes, _MODES),
 )
 """In the order in which a bag has them, behind ``joint_states``."""
 

@@ -182,19 +182,14 @@ class ReportEncoder:
     def _fill_numbers(self, report: Report, is_wanted: Callable[[Output], bool]) -> Messages:
         """Of prediction, estimate and residuals."""
         p, e, messages = report.prediction, report.estimate, Messages()
-        numbers = None if p is None and e is None else number_columns(self._chain, p, e, 1)
-        if p is not None and numbers is not None:
-            for key, template, chosen in self._predicted:
+        told = [(each.stamp, outputs) for each, outputs in ((p, self._predicted), (e, self._estimated)) if each is not None]
+        numbers = number_columns(self._chain, p, e, 1) if told else np.zeros((0, 1))
+        for stamp, outputs in told:
+            for key, template, chosen in outputs:
                 if key is Output.JOINT_STATES and is_wanted(key):
-                    messages.append((key, self._fill_joint_states(p.stamp, numbers, _has_shape(p))))
+                    messages.append((key, self._fill_joint_states(stamp, numbers, _has_shape(p))))
                 elif is_wanted(key):
-                    messages.append((key, template.fill(p.stamp, chosen.of(numbers)[:, 0])))
-        if e is not None and numbers is not None:
-            messages += [
-                (key, template.fill(e.stamp, chosen.of(numbers)[:, 0]))
-                for key, template, chosen in self._estimated
-                if is_wanted(key)
-            ]
+                    messages.append((key, template.fill(stamp, chosen.of(numbers)[:, 0])))
         if report.residuals and is_wanted(Output.RESIDUALS):
             messages += [(Output.RESIDUALS, self._fill_residuals(residuals)) for residuals in report.residuals]
         return messages

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..deviation import estimate_row
-from ..deviation.estimate_row import MODES, WIDTH
+from ..deviation import estimate_row as row_at
 from ..types import Array, Estimate, Health, Outline, Prediction, Report, Residuals, Sample, Stream, channels_of
 
 Integers = NDArray[np.int64]
@@ -98,78 +97,48 @@ class PredictionBlock(NamedTuple):
         )
 
 
-class EstimateBlock(NamedTuple):
-    """Estimates, one beside every prediction.
+class _Columns:
+    """Columns of the rows of an `EstimateBlock`, read as its attribute."""
+
+    def __init__(self, first: int, count: int) -> None:
+        self.place = slice(first, first + count)
+
+    def __get__(self, block: EstimateBlock, owner: type) -> Array:
+        return block.rows[:, self.place]
+
+
+class EstimateBlock:
+    """Estimates, one beside every prediction; every attribute but `stamps` and `rows` as in `Estimate`, shape (p, ..).
 
     Attributes
     ----------
     stamps : ndarray of int64, shape (p,)
         Nanoseconds.
     rows : ndarray, shape (p, WIDTH)
-        See `boom_twin.deviation.estimate_row.WIDTH`.
+        See `boom_twin.deviation.estimate_row`.
     """
 
-    stamps: Integers
-    rows: Array
+    tip, velocity, acceleration = (_Columns(first, 3) for first in (row_at.TIP, row_at.VELOCITY, row_at.ACCELERATION))
+    load = _Columns(row_at.FORCE, 2)
+    modes, mode_rates = _Columns(row_at.COORDINATES, row_at.MODES), _Columns(row_at.RATES, row_at.MODES)
+    tip_covariance, velocity_covariance = _Columns(row_at.TIP_COVARIANCE, 6), _Columns(row_at.VELOCITY_COVARIANCE, 6)
+    acceleration_covariance, load_variance = _Columns(row_at.ACCELERATION_COVARIANCE, 6), _Columns(row_at.FORCE_VARIANCE, 2)
+
+    def __init__(self, stamps: Integers, rows: Array) -> None:
+        self.stamps, self.rows = stamps, rows
 
     @property
     def is_fed(self) -> NDArray[np.bool_]:
         """Whether anything was measured before, shape (p,); until then the load is exactly zero, the rest the prediction."""
         return np.asarray(self.load.any(axis=1))
 
-    @property
-    def tip(self) -> Array:
-        """Place of the tip, shape (p, 3): x, y (m) and the angle of the last head (rad)."""
-        return self.rows[:, ESTIMATED["tip"]]
-
-    @property
-    def velocity(self) -> Array:
-        """First derivatives of `tip`, shape (p, 3): m/s, rad/s."""
-        return self.rows[:, ESTIMATED["velocity"]]
-
-    @property
-    def acceleration(self) -> Array:
-        """Second derivatives of `tip`, shape (p, 3): m/s^2, rad/s^2."""
-        return self.rows[:, ESTIMATED["acceleration"]]
-
-    @property
-    def load(self) -> Array:
-        """Force at the tip that the model does not know, shape (p, 2), N."""
-        return self.rows[:, ESTIMATED["load"]]
-
-    @property
-    def modes(self) -> Array:
-        """Modal coordinates, shape (p, MODES), see `Estimate`."""
-        return self.rows[:, ESTIMATED["modes"]]
-
-    @property
-    def mode_rates(self) -> Array:
-        """First derivatives of `modes`."""
-        return self.rows[:, ESTIMATED["mode_rates"]]
-
-    @property
-    def tip_covariance(self) -> Array:
-        """Of `tip`, upper triangle by rows, shape (p, 6)."""
-        return self.rows[:, ESTIMATED["tip_covariance"]]
-
-    @property
-    def velocity_covariance(self) -> Array:
-        """Of `velocity`, likewise."""
-        return self.rows[:, ESTIMATED["velocity_covariance"]]
-
-    @property
-    def acceleration_covariance(self) -> Array:
-        """Of `acceleration`, likewise."""
-        return self.rows[:, ESTIMATED["acceleration_covariance"]]
-
-    @property
-    def load_variance(self) -> Array:
-        """Of `load`, shape (p, 2)."""
-        return self.rows[:, ESTIMATED["load_variance"]]
-
     def one(self, row: int) -> Estimate:
-        """The estimate of a row."""
+        """Return the estimate of a row."""
         return estimate_of(int(self.stamps[row]), self.rows[row])
+
+
+ESTIMATED = {name: columns.place for name, columns in vars(EstimateBlock).items() if isinstance(columns, _Columns)}
+"""Fields of an `Estimate` in their order, and where each stands in a row, see `boom_twin.deviation.estimate_row`."""
 
 
 def estimate_of(stamp: int, row: Array) -> Estimate:
@@ -180,24 +149,6 @@ def estimate_of(stamp: int, row: Array) -> Estimate:
 def row_of(estimate: Estimate) -> Array:
     """Inverse of `estimate_of`."""
     return np.concatenate([getattr(estimate, name) for name in ESTIMATED])
-
-
-ESTIMATED = {
-    name: slice(first, first + size)
-    for name, first, size in (
-        ("tip", estimate_row.TIP, 3),
-        ("velocity", estimate_row.VELOCITY, 3),
-        ("acceleration", estimate_row.ACCELERATION, 3),
-        ("load", estimate_row.FORCE, 2),
-        ("modes", estimate_row.COORDINATES, MODES),
-        ("mode_rates", estimate_row.RATES, MODES),
-        ("tip_covariance", estimate_row.TIP_COVARIANCE, 6),
-        ("velocity_covariance", estimate_row.VELOCITY_COVARIANCE, 6),
-        ("acceleration_covariance", estimate_row.ACCELERATION_COVARIANCE, 6),
-        ("load_variance", estimate_row.FORCE_VARIANCE, 2),
-    )
-}
-"""Fields of an `Estimate` in their order, and where each stands in a row, see `boom_twin.deviation.estimate_row`."""
 
 
 class ResidualBlock(NamedTuple):
@@ -319,7 +270,9 @@ def report_block(reports: list[Report], joints: int) -> ReportBlock:
 
 def table_of(estimates: list[Estimate | None]) -> Array:
     """Rows of estimates, shape (k, WIDTH); NaN where there is none."""
-    return np.array([np.full(WIDTH, np.nan) if each is None else row_of(each) for each in estimates]).reshape(-1, WIDTH)
+    return np.array([np.full(row_at.WIDTH, np.nan) if each is None else row_of(each) for each in estimates]).reshape(
+        -1, row_at.WIDTH
+    )
 
 
 def _outline_of(prediction: Prediction) -> Outline | None:
@@ -336,7 +289,7 @@ def joined(parts: list[ReportBlock]) -> ReportBlock:
     return ReportBlock(
         np.concatenate([part.stamps for part in parts]),
         _joined_predictions([(part.predictions, first) for part, first in zip(parts, samples, strict=True)]),
-        EstimateBlock._make(map(np.concatenate, zip(*(part.estimates for part in parts), strict=True))),
+        EstimateBlock(*(np.concatenate([getattr(part.estimates, each) for part in parts]) for each in ("stamps", "rows"))),
         ResidualBlock._make([np.concatenate(residuals_at), *map(np.concatenate, others)]),
         {first + row: health for part, first in zip(parts, samples, strict=True) for row, health in part.health.items()},
     )

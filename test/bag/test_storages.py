@@ -287,7 +287,7 @@ def test_the_truth_goes_with_the_window(tmp_path: Path) -> None:
     part = replay(session, None, tmp_path / "part", health=False, window=TimeWindow(20.0, 5.0))
     assert part.summary["window_start_s"] == 20.0 and part.summary["samples"] == 1000
     columns = part.columns()
-    assert columns["t_s"][-1] == pytest.approx(4.995, abs=1e-3) and len(columns) == 57
+    assert columns["t_s"][-1] == pytest.approx(4.995, abs=1e-3) and len(columns) == 79
     assert np.isfinite([columns["measured_cylinder_1_m"], columns["estimate_tip_x_m"]]).all()
     assert part.summary["tip_error_rms_m"] < 0.03  # the boom was moving, the model begins at rest; by another time decimetres
 

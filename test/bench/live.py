@@ -29,6 +29,7 @@ from geometry_msgs.msg import (
     AccelWithCovarianceStamped,
     PointStamped,
     PoseWithCovarianceStamped,
+    TwistWithCovarianceStamped,
     Vector3,
     Vector3Stamped,
     WrenchStamped,
@@ -51,8 +52,10 @@ OUT = {
     "tip/acceleration": AccelStamped,
     "joint_states": JointState,
     "estimate/tip/pose": PoseWithCovarianceStamped,
+    "estimate/tip/twist": TwistWithCovarianceStamped,
     "estimate/tip/acceleration": AccelWithCovarianceStamped,
     "estimate/tip/load": WrenchStamped,
+    "estimate/modes": JointState,
     "residuals": JointState,
 }
 SENSOR = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -66,11 +69,10 @@ class Echo(Node):
     def __init__(self) -> None:
         super().__init__("echo")
         self._out = {name: (self.create_publisher(kind, f"~/{name}", 100), kind()) for name, kind in OUT.items()}
-        for message in (self._out["joint_states"][1], self._out["residuals"][1]):
+        for message in (self._out[name][1] for name, kind in OUT.items() if kind is JointState):
             message.name = [f"joint_{i}" for i in range(1, 5)]
             message.position = message.velocity = message.effort = array("d", [0.0] * 4)
-        strokes = [name for name in OUT if name != "residuals"]
-        self.create_subscription(JointState, "cylinder_strokes", lambda msg: self._answer(msg, strokes), SENSOR)
+        self.create_subscription(JointState, "cylinder_strokes", lambda msg: self._answer(msg, list(OUT)), SENSOR)
         self.create_subscription(JointState, "joint_angles", lambda msg: self._answer(msg, ["residuals"]), SENSOR)
         self.create_subscription(Imu, "tip_imu", lambda msg: self._answer(msg, ["residuals"]), SENSOR)
 
@@ -211,11 +213,11 @@ def run(who: str, rate: float, duration: float, words: list[str], arguments: lis
         finally:
             for process in (answering, listener):
                 process.kill()
-    return judge(told, heard, 1 + ("imu" in words)) | {"cpu": 100.0 * used / told["seconds"], "MB": resident}
+    return judge(told, heard, 2 + ("imu" in words)) | {"cpu": 100.0 * used / told["seconds"], "MB": resident}
 
 
 def judge(told: dict[str, Any], heard: dict[str, list[list[int]]], compared: int) -> dict[str, float]:
-    """Loss and latency of one process, with so many streams that are compared with the prediction."""
+    """Loss and latency of one process, with so many streams that have residuals; the node has none of the first strokes."""
     answers = heard["tip/position"]
     delays = np.array([delay for _, delay in answers]) * 1e-6
     sent, stamps = told["sent"], [stamp for stamp, _ in answers]

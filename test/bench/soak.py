@@ -49,7 +49,8 @@ def main() -> int:
     rise, largest = pieces[:-BACKLOGS].mean() * len(pieces), pieces[-BACKLOGS:]
     print(f"{len(rows)} s at {args.rate:g} Hz: {resident[0]:.2f} MB after {SETTLING:g} s, {resident[-1]:.2f} MB at the end")
     print(f"rise {rise:.2f} MB, bound {LARGEST:g} MB; left out of it, largest of {PIECE:g} s: {largest.round(2).tolist()} MB")
-    lost = {name: found.sent - found.heard[name] for name in ("tip/position", "residuals")}
+    due = {"tip/position": found.sent, "residuals": 2 * found.sent - 1}  # of strokes, but for the first, and of angles
+    lost = {name: count - found.heard[name] for name, count in due.items()}
     print(f"{found.sent} samples sent; without prediction {lost['tip/position']}, without residuals {lost['residuals']}")
     print(f"{len(found.log)} lines in the log, fewer than {LINES} wanted; the last:", *found.log[-5:], sep="\n")
     return 0 if rise <= LARGEST and not any(lost.values()) and len(found.log) < LINES else 1

@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from ..integrators import A
 from ..jit import inner, select, some
-from ..tables import CORRECTIONS, Condensed, Work
+from ..tables import CORRECTIONS
 
 LEAD = 4.0  # at first
 MOST_SHARE = 0.15  # of an error that a pass may leave
@@ -58,34 +58,6 @@ def forget_all(work):
 def forget_tangent(work):
     """The next step begins with a new tangent."""
     work.kept[GAIN] = 0.0
-
-
-@inner
-def keep_corrections(work, most):
-    """The next step's guess is corrected by the polynomial through the last `most` corrections at most."""
-    work.kept[CORRECTED] = min(work.kept[CORRECTED], most)
-
-
-@inner
-def condensed_of(tangents, k):
-    """What the `k`-th of several steps has condensed; a caller takes it by reference, whose room has to be the caller's."""
-    c = tangents.condensed
-    return Condensed(
-        gains=c.gains[k], free=c.free[k], factors=c.factors[k], order=c.order[k],
-        blocks=c.blocks[k], ends=c.ends[k], end_gains=c.end_gains[k], end_free=c.end_free[k],
-    )  # fmt: skip
-
-
-@inner
-def work_of(work, tangents, k, condensed):
-    """`work` with what the `k`-th of several steps has kept, beside its `condensed`; by reference as that."""
-    return Work(
-        position=work.position, velocity=work.velocity, acceleration=work.acceleration, hat=work.hat, offset=work.offset,
-        weights=work.weights, finer=work.finer, s=work.s, p=work.p, g=work.g, h=work.h, own_g=work.own_g, own_h=work.own_h,
-        right=work.right, condensed=condensed, hold=work.hold, apart=work.apart, rho=work.rho, drho=tangents.drho[k],
-        turn=work.turn, local=work.local, drive=work.drive, drive_rate=work.drive_rate, dz=work.dz, guess=work.guess,
-        corrections=tangents.corrections[k], kept_z=tangents.kept_z[k], kept=tangents.kept[k], cut=work.cut,
-    )  # fmt: skip
 
 
 @inner
