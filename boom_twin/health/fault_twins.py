@@ -81,11 +81,11 @@ def hypotheses(scene: Scene) -> list[Hypothesis]:
         if name.endswith((".k", ".EI")):
             softer = with_parameters(scene, {name: (1.0 - LOSS) * parameter(scene, name)})
             found.append(Hypothesis(name, "softer", softer))
-    for name in ("tip.payload", "line_fill"):
-        for sign, kind in ((1.0, "more"), (-1.0, "less")):
-            size = sign * LOAD * mass / (scene.reach if name == "line_fill" else 1.0)
-            if sign > 0.0 or parameter(scene, name) > 0.0:
-                found.append(Hypothesis(name, kind, scene, **{name.removeprefix("tip."): size}))
+    for sign, kind in ((1.0, "more"), (-1.0, "less")):
+        if sign > 0.0 or parameter(scene, "tip.payload") > 0.0:
+            found.append(Hypothesis("tip.payload", kind, scene, payload=sign * LOAD * mass))
+        if sign > 0.0 or parameter(scene, "line_fill") > 0.0:
+            found.append(Hypothesis("line_fill", kind, scene, line_fill=sign * LOAD * mass / scene.reach))
     channels = channels_of(len(scene.joints))
     doubts = [(name,) for name in channels[Stream.ANGLES]] + [channels[Stream.IMU]]
     return found + [Hypothesis(f"{each[0]}.sensor", "off", scene, doubted=each) for each in doubts]
