@@ -45,6 +45,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     usual = "what is known of this rig while all is well; by default as the session was recorded, else the package's"
     parser.add_argument("--baseline", metavar="FILE", type=Path, help=usual)
+    told = (
+        "name what is wrong with the boom, if one cause explains the readings, by twins that have it; takes ten times as long"
+    )
+    parser.add_argument("--causes", action="store_true", help=told)
     parser.add_argument("--no-health", action="store_true", help="do not judge the rig's health")
     told = "do not write the result bag; output_sha256 of the summary is null then, all else is the same"
     parser.add_argument("--no-bag", action="store_true", help=told)
@@ -97,7 +101,7 @@ def run(args: Namespace) -> int:
             if table is not None:
                 table.add(stretch)
 
-        result = replay_into(building, args.bag, scene, *options, take=take, with_bag=not args.no_bag)
+        result = replay_into(building, args.bag, scene, *options, take=take, with_bag=not args.no_bag, causes=args.causes)
         found = evaluator.finish(result, building.folder)
         files = [path.name for path in _write(args, result, found, scene, building.folder)]
         if table is not None:

@@ -65,10 +65,10 @@ def make_transition(p, f, h):
     for k in range(zero, all_states(p)):
         put_weight(f, k, k, 1.0)
     for a in range(2):
-        f.variances[zero + a] = IMU_DRIFT * IMU_DRIFT * h
+        f.variances[zero + a] = f.drift[a] * IMU_DRIFT * IMU_DRIFT * h
     for i in range(n):
-        f.variances[zero + 4 + i] = ANGLE_DRIFT * ANGLE_DRIFT * h
-        f.variances[zero + 4 + n + i] = (FORCE_DRIFT * f.pulls[i]) ** 2 * h
+        f.variances[zero + 4 + i] = f.drift[4 + i] * ANGLE_DRIFT * ANGLE_DRIFT * h
+        f.variances[zero + 4 + n + i] = f.drift[4 + n + i] * (FORCE_DRIFT * f.pulls[i]) ** 2 * h
 
 
 @inner

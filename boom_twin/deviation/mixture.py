@@ -6,7 +6,7 @@ import math
 
 from ..kernels.jit import inner
 from .rows import clear
-from .states import ALL_VALVES, BURST, ESTIMATE, FED, OPEN, PREDICTION, VALVES
+from .states import ALL_VALVES, BURST, OPEN, PREDICTION, VALVES
 
 OPENS, CLOSES = 0.3, 1.0  # 1/s, rates at which valves open, and are closed again
 COMES, STAYS = 0.2, 1.0  # 1/s, rates at which a load comes, and is usual again
@@ -95,7 +95,7 @@ def mix(f, mixture, size):
 
 @inner
 def weigh_models(f, mixture):
-    """Bring the chances of a mixture's models up to date by their likelihoods."""
+    """Bring the chances of a mixture's models up to date by their likelihoods; returns the log likelihood of all together."""
     first, count = models_of(mixture)
     most, total = f.likely[first], 0.0
     for k in range(1, count):
@@ -105,5 +105,4 @@ def weigh_models(f, mixture):
         total += f.chances[first + k]
     for k in range(count):
         f.chances[first + k] /= total
-    if mixture == ESTIMATE or f.status[FED] == 0:
-        f.evidence[0] += most + math.log(total)
+    return most + math.log(total)

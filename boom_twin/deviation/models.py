@@ -86,7 +86,7 @@ def start_models(p, f, speed, swing):
     copy_model(f, VALVES, OPEN, size)
     copy_model(f, VALVES, BURST, size)
     f.chances[VALVES], f.chances[OPEN], f.chances[BURST] = 0.8, 0.1, 0.1
-    f.excess[:], f.shaking[0] = 1.0, 0.0
+    f.excess[:], f.ratio[:], f.shaking[0] = 1.0, 1.0, 0.0
     mix(f, PREDICTION, zero_place(p))
     follow_prediction(p, f)
     f.status[STARTED], f.status[FED] = 1, 0
@@ -119,14 +119,15 @@ def step_models(p, f, h, y):
     note_innovations(p, f, y)
     for k in range(3):
         f.likely[k] = take_lengths(p, f, k, size, y)
-    weigh_models(f, PREDICTION)
+    evidence = weigh_models(f, PREDICTION)
     mix(f, PREDICTION, size)
     if f.status[FED] == 1:
         for k in range(2):
             f.likely[ALL_VALVES + k] = take_lengths(p, f, ALL_VALVES + k, every, y)
-        weigh_models(f, ESTIMATE)
+        evidence = weigh_models(f, ESTIMATE)
         mix(f, ESTIMATE, every)
         leave_contradiction(p, f, size)
+    f.evidence[0] += evidence
     if h > 0.0:
         watch_valves(p, f, h, size)
         learn_jerk(p, f, h)

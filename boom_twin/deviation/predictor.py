@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -35,6 +35,7 @@ from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
 WIDTH = 1e-6  # relative accuracy of natural frequencies
 USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD = 2.5e-3, 1e-4, 2e-3, 2e-2  # shares of the boom's weight, see `SensorNoise`
+DOUBTED_DRIFT = 1000.0  # times the usual variance of the drift of a zero, of a sensor in doubt
 SWING, SPEED = 0.3, 0.05  # how far a boom at work swings, as a share of the tip's deflection; m/s of its cylinders
 
 
@@ -220,6 +221,14 @@ class BoomPredictor:
         if (masked & ~f.masked).any() or (strokes != f.deaf).any():
             f.status[FED] = 0
         f.masked[:], f.deaf[:] = masked, strokes
+
+    def doubt(self, channels: Collection[str]) -> None:
+        """Let the zeros of these angle sensors and axes of the IMU drift as they may not when all is well."""
+        names = channels_of(self.plan.joints)
+        places = [*names[Stream.IMU], "", "", *names[Stream.ANGLES]]  # as zeros stand among the states, mount and scale between
+        for place, name in enumerate(places):
+            if name in channels:
+                self.filters.drift[place] = DOUBTED_DRIFT
 
     def rebase(self, shift: int) -> None:
         """All stamps are later by `shift` (ns) from now on."""

@@ -26,6 +26,7 @@ from .states import (
 
 INEXACT = 0.03  # share of the tip's acceleration that modes left out and those there are wrong by
 LEARN_NOISE = 0.02  # of a reading, by which the noise of its channel is learnt
+LEARN_RATIO = 0.005  # of a reading, by which the size of its channel's normalised innovations is learnt
 DOF = 4.0  # degrees of freedom of Student's t, by which innovations of the estimate are weighed
 OLDEST = 0.1  # s, most that a reading may be late
 
@@ -78,7 +79,8 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
 def take_reading(p, f, channel, residual, zero, variance, age):
     """Take a residual of a channel, of the quantity in `f.row` with its zero at place `zero`, `age` s ago.
 
-    Its noise is learnt: innovations that are larger than expected raise it until they are as expected.
+    Its noise is learnt: innovations that are larger than expected raise it until they are as expected. The evidence takes
+    innovations by the size that they have lately had, for a model is not better for expecting less of the same innovations.
     """
     if not math.isfinite(residual):
         return
@@ -92,15 +94,20 @@ def take_reading(p, f, channel, residual, zero, variance, age):
             f.row[drive + n + i] -= age * f.row[drive + i]
     f.row[zero] = 1.0
     variance *= max(f.excess[channel], 1.0)
-    shown = 0.0
+    shown, likelihood, ratio = 0.0, 0.0, f.ratio[channel]
     for k in range(ALL_VALVES, ALL_OPEN + 1):
         innovation = residual
         for i in range(every):
             known = f.mean[PREDICTION, i] if i < size else 0.0
             innovation -= f.row[i] * (f.x[k, i] - known)
         expected = variance + variance_of(f.row, f.p[k], f.gain, every)
-        shown += f.chances[k] * innovation * innovation / expected
-        weight = min((DOF + 1.0) / (DOF + innovation * innovation / expected), 1.0)
+        normalised2 = innovation * innovation / expected
+        shown += f.chances[k] * normalised2
+        tail = 1.0 + normalised2 / (DOF * ratio)
+        likelihood += f.chances[k] / math.sqrt(ratio * expected * tail ** (DOF + 1.0))
+        weight = min((DOF + 1.0) / (DOF + normalised2), 1.0)
         expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, variance / weight, every)
         f.likely[k] -= 0.5 * (innovation * innovation / expected + math.log(expected))
+    f.evidence[0] += math.log(max(likelihood, 1e-300))
+    f.ratio[channel] += LEARN_RATIO * (min(shown, SURPRISE * ratio) - ratio)
     f.excess[channel] = max(f.excess[channel] * (1.0 + LEARN_NOISE * (min(shown, SURPRISE) - 1.0)), 1.0)

@@ -38,8 +38,9 @@ class Filters(NamedTuple):
     jerk : (n,) m^2/s^5. is_open : (n,) 1 where a valve is believed open. still : (n,) s since its drive began to stand still.
     status : (3,) whether it has begun, whether the estimate has readings of its own, stamp of the newest of these.
     masked, deaf : (c,), (n,) measured channels, and strokes, that the estimate is not to use. noise : variances.
-    excess : (c,) times the variance that channels are stated to have. length2 : (n,) variances of lengths as learnt, m^2.
-    before, interval : (n, 3), (1,) the three lengths before (m), and the time between the newest two, s.
+    excess : (c,) times the variance that channels are stated to have. ratio : (c,) mean square of their normalised innovations.
+    drift : (z,) times the usual variance of the random walk of sensors' zeros. length2 : (n,) variances of lengths as learnt,
+    m^2. before, interval : (n, 3), (1,) the three lengths before (m), and the time between the newest two, s.
     places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
     felt : (2,) specific force predicted at the tip, m/s^2. shaking : (1,) mean square of its acceleration, m^2/s^4.
     angle : (1,) of the tip, rad. strokes : (n, 3) predicted lengths (m), their rates and accelerations.
@@ -61,6 +62,8 @@ class Filters(NamedTuple):
     masked: NDArray[np.bool_]
     deaf: NDArray[np.bool_]
     excess: Array
+    ratio: Array
+    drift: Array
     length2: Array
     before: Array
     interval: Array
@@ -94,8 +97,8 @@ def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> F
         x=np.zeros((5, states)), p=np.zeros((5, states, states)), chances=np.zeros(5), mean=np.zeros((2, states)),
         spread=np.zeros((2, states, states)), load2=np.zeros(2), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
         still=np.zeros(n), status=np.zeros(3, np.int64), masked=np.zeros(channels, np.bool_),
-        deaf=np.zeros(n, np.bool_), excess=np.ones(channels), length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan),
-        interval=np.zeros(1), noise=noise,
+        deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(4 + 2 * joints),
+        length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(1), noise=noise,
         places=np.zeros((states, 6 + n), np.int64), weights=np.zeros((states, 6 + n)), counts=np.zeros(states, np.int64),
         variances=np.zeros(states), felt=np.zeros(2), pulls=np.zeros(n), evidence=np.zeros(1), half=np.zeros((states, states)),
         turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)), mixed_p=np.zeros((3, states, states)),

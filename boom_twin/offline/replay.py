@@ -9,7 +9,7 @@ import gc
 import json
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,9 +30,10 @@ from ..deviation.load_spectrum import TipLoad
 from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
 from ..health.baseline import Baseline
+from ..health.fault_twins import FaultTwins, Hypothesis
 from ..messages.sample_decoder import ODDITIES, stamp_of
 from ..messages.topic_table import Topics
-from ..scene.edit import anew
+from ..scene.edit import anew, loaded
 from ..scene.schema import Scene
 from ..scene.source import SceneSource, as_scene
 from ..system.atomic_files import write_atomic
@@ -139,6 +140,7 @@ def replay(
     window: TimeWindow = WHOLE,
     namespace: str = "",
     with_bag: bool = True,
+    causes: bool = False,
 ) -> Replay:
     """Replay `bag` through a twin of `scene`; writes ``summary.json`` and ``bag/`` into `out`.
 
@@ -171,6 +173,9 @@ def replay(
         ROS namespace of the node in the session, where the mapping does not tell that.
     with_bag : bool
         Write the result bag; without it, ``output_sha256`` of the summary is None, and all else is the same.
+    causes : bool
+        Compare with twins of booms that have a fault, and name the one that explains the readings; see
+        `boom_twin.health.fault_twins`. It takes about ten times as long.
 
     Returns
     -------
@@ -187,7 +192,7 @@ def replay(
     """
     with result_folder(Path(out), REPLAY, [Path(bag)]) as building:
         options = progress, mapping, changes, health, baseline, window, namespace
-        return replay_into(building, bag, scene, settings, *options, with_bag=with_bag)
+        return replay_into(building, bag, scene, settings, *options, with_bag=with_bag, causes=causes)
 
 
 def replay_into(
@@ -204,6 +209,7 @@ def replay_into(
     namespace: str = "",
     take: Callable[[Stretch], None] | None = None,
     with_bag: bool = True,
+    causes: bool = False,
 ) -> Replay:
     """As `replay`, into a folder that is being built, for more to be added to it.
 
@@ -237,6 +243,9 @@ def replay_into(
             began = time.perf_counter()
             if not changes:
                 samples = (sample for sample in samples if not isinstance(sample, Change))
+            fault_twins = _fault_twins(twin) if causes else None
+            if fault_twins is not None:
+                samples = _followed(samples, fault_twins)
             for step in drive_blocks(twin, samples):
                 if bar is not None:
                     bar.update(1 if step is None else len(step[0].stamps))
@@ -267,6 +276,8 @@ def replay_into(
                 f"and stamps.{_explained(ahead.oddities)}{refused.told}"
             )
         recording.close()
+        if fault_twins is not None and (named := fault_twins.judge()) is not None:
+            recording.add_alarm(named)
         if recording.totals.samples == 1 < recording.refused:
             raise BagError(
                 f"{session.path}: of {1 + recording.refused} stroke samples only the first could be used ({_told(twin)})."
@@ -385,6 +396,28 @@ def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Base
     twin = Twin(scene, settings, topics.mounts(len(scene.joints)), baseline, reads=reads, absent=topics.absent)
     twin.warm_up()
     return twin
+
+
+def _fault_twins(twin: Twin) -> FaultTwins:
+    """Return twins as `twin` of all that may be wrong with its boom."""
+
+    def make(hypothesis: Hypothesis) -> Twin:
+        settings = twin.settings.tuned(hypothesis.load(*twin.settings.load))
+        made = type(twin)(hypothesis.scene, settings, twin.mounts, reads=twin.reads, absent=twin.absent)
+        made.doubt(hypothesis.doubted)
+        return made
+
+    return FaultTwins(loaded(twin.scene, *twin.settings.load), make)
+
+
+def _followed(samples: Iterable[SampleBlock | Change | None], twins: FaultTwins) -> Iterator[SampleBlock | Change | None]:
+    """Return the samples; fault twins take them, and the changes, first."""
+    for each in samples:
+        if isinstance(each, Change):
+            twins.change(each)
+        elif each is not None:
+            twins.take(each)
+        yield each
 
 
 @contextmanager

@@ -95,6 +95,7 @@ class Twin:
         self._widths = [len(names) for names in self._channels.values()]
         self._edge = SampleCheck(self._channels)
         self.requests = Requests(self.settings)
+        self._doubted: frozenset[str] = frozenset()
         self._judged = True  # health, with the present sample
         self._begin()
 
@@ -129,6 +130,20 @@ class Twin:
             return
         self._begin()
         self.requests.zero({})  # what they are holds with the first strokes
+
+    @property
+    def evidence(self) -> float:
+        """Logarithm of the likelihood of all that was read, up to a constant that the samples alone decide."""
+        return self._boom.evidence
+
+    def doubt(self, channels: Collection[str]) -> None:
+        """Let the zeros of these channels (angles, IMU) drift by any amount."""
+        self._doubted = frozenset(channels)
+        self._boom.doubt(self._doubted)
+
+    def repeat(self, change: Change) -> None:
+        """Do with the next full stroke sample what was done to another twin; see `Requests.repeat`."""
+        self.requests.repeat(change)
 
     def rezero(self, sensor: str) -> dict[str, float]:
         """Ask that the mean residual of the last second becomes the zero of a sensor; gives its new zeros by channel.
@@ -183,6 +198,7 @@ class Twin:
     def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
         """Go on with this model, which is of the present load, after that of `before`."""
         self._boom, self.judge = model.boom, model.judge
+        self._boom.doubt(self._doubted)
         self.plan = self._boom.plan
         parts = self._boom, model.limits, self._state, self._channels, self.judge
         self._former = before  # let go of when the next model is made, which may be in a thread of its own
