@@ -1,7 +1,7 @@
 """Measured sessions as arrays, with strokes smoothed forth and back on a uniform grid.
 
 The filter is Butterworth's of third order run in both directions, so that its gain is 1 / (1 + (omega/omega_c)^6) without any
-lag: that of the quietest smoother of the twin's strokes (`boom_twin.estimation.stroke_filter`), at whose corner it is.
+lag: its corner is that of a smoother of drives whose jerk is white, of the density `JERK`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from ..bag.reader import Session, check_topic, files_sha256, scan
 from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import BagError
-from ..estimation.stroke_filter import corners
 from ..messages.topic_table import Topics
 from ..offline.reader_process import SampleReader
 from ..types import NANO, SENSORS, Array, Change, Sample, Stream, channels_of
@@ -152,6 +151,8 @@ LARGEST_GAP = 0.5  # s between strokes; a session is used from one such gap to t
 REST, SPEED = 1.0, 1e-3  # a course starts where no stroke has gone faster (m/s) than this for so long (s)
 SHORTEST = 15.0  # s
 HIGHEST = 0.4  # of the grid's frequency, bound of the corner
+GRID = 0.005  # s, of the grid on which sessions are compared
+JERK = 4e-4  # m^2/s^5, density of the jerk of a drive in a calm move
 BAND = 5.0 * math.pi / 9.0  # integral of the gain's square over frequencies of both signs, over the corner
 
 
@@ -227,11 +228,11 @@ def course_of(session: MeasuredSession, settings: Settings) -> SessionCourse:
     """
     series = _longest(session.series[Stream.STROKES])
     times: Array = np.asarray((series.stamps - series.stamps[0]) * NANO)
-    step = settings.step
+    step = GRID
     grid: Array = np.asarray(step * np.arange(int(times[-1] / step) + 1))
     refuse_short(session.name, float(grid[-1]), "without a gap in the strokes")
-    quietest = corners(settings.stroke_variance, float(np.median(np.diff(times))), settings.stroke_agility)[0]
-    corner = min(float(quietest) / (2.0 * np.pi), HIGHEST / step)
+    noise = settings.stroke_variance * float(np.median(np.diff(times)))  # density, m^2 s
+    corner = min((JERK / noise) ** (1.0 / 6.0) / (2.0 * np.pi), HIGHEST / step)
     moved = smoothed(_on_grid(times, filled(times, series.values), grid), step, corner)
     first = _rest(np.abs(np.gradient(moved, step, axis=0)).max(axis=1), round(REST / step))
     if first is None:

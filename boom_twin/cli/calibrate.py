@@ -33,10 +33,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("bags", nargs="+", metavar="BAG", help="healthy sessions, begun at rest; the last one is held out")
     add_session_scene(parser)
-    result = parser.add_mutually_exclusive_group(required=True)
-    result.add_argument("--out", type=Path, metavar="SCENE", help="the new scene; zeros: a mapping beside it")
-    learn = "learn what is healthy on this rig, for alarms (replay --baseline, the node's parameter); changes no scene"
-    result.add_argument("--baseline", type=Path, metavar="FILE", help=learn)
+    parser.add_argument("--out", type=Path, metavar="SCENE", required=True, help="the new scene; zeros: a mapping beside it")
     parser.add_argument("--parameters", metavar="A,B,..", help="just these, as cylinder_1.k,joint_2.zero; else those below")
     parser.add_argument("--load", choices=("payload", "line_fill"), help="besides k of cylinders and zeros of sensors: a load")
     parser.add_argument("--damping", choices=("d", "beta"), help="besides: damping of cylinders, or of sections")
@@ -53,35 +50,13 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Calibrate, or learn a baseline; write, tell."""
+    """Calibrate; write, tell."""
     from ..bag.reader import scan
 
-    code = _learn(args) if args.baseline else _calibrate(args)
+    code = _calibrate(args)
     for bag in args.bags:
         warn_incomplete(scan(Path(bag)))
     return code
-
-
-def _learn(args: Namespace) -> int:
-    from ..calibration.baseline import baseline_of, write_baseline
-    from ..system.atomic_files import check_target
-
-    check_target(args.baseline, _sources(args))
-    if args.baseline.exists() and not args.force:
-        raise UsageError(f"{args.baseline} is there already. Give another name, or --force.")
-    scene, settings = _scene(args), open_session_settings(args.bags[0], args.params)
-    with _bar() as progress:
-        learnt = baseline_of(args.bags, scene.scene, settings, args.mapping, progress, window_of(args))
-    write_baseline(learnt, args.baseline, _credit(args), args.force)
-    if args.json:
-        print_json(learnt.model_dump(exclude={"mean", "covariance", "names"}))
-        return 0
-    for name, mean, row, i in zip(learnt.names, learnt.mean, learnt.covariance, range(len(learnt.names)), strict=True):
-        print(f"{name:28s} {mean:+.2e} +- {row[i] ** 0.5:.1e}")
-    shares = f"{learnt.detuning:.1%}, of those measured in holds {learnt.frequency_error:.2%}"
-    print(f"error of an angle in a posture {1e3 * learnt.angle_error:.3f} mrad, of natural frequencies {shares}")
-    print(args.baseline)
-    return 0
 
 
 def _scene(args: Namespace) -> SessionScene:

@@ -1,4 +1,4 @@
-"""Baseline of a healthy rig: bias and spread of parameters, sensors and model error, learnt from its sessions or assumed."""
+"""Baseline of a healthy rig: bias and spread of parameters, sensors and model error. It switches health on."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..config.yaml_text import read_plain
 from ..errors import UsageError
 
 DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "baseline.yaml"))
-REMEDY = "Give a file written by `boom_twin calibrate --baseline`."
+REMEDY = "Give a file with the keys of the package's own, msg_config/baseline.yaml."
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]

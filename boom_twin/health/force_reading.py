@@ -1,7 +1,7 @@
 """Monitor in which unit and with which sign cylinder forces are read: their means must be what holds the boom up.
 
 Forces in kN for N, or positive in compression, differ from the model by a factor that no load at the tip makes. The estimate
-does not use them. Other offsets and scales it knows as states, see `boom_twin.estimation.tip_estimate`.
+does not use them. Other offsets and scales it knows as states, see `boom_twin.deviation.sensors`.
 """
 
 from __future__ import annotations

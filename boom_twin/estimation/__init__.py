@@ -1,1 +1,0 @@
-"""From strokes to a prediction: stroke filter, look-ahead, sensor model."""
