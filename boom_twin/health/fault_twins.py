@@ -38,8 +38,9 @@ class Follower(Protocol):
     def evidence(self) -> float:
         """Logarithm of the likelihood of all that was read."""
 
-    def repeat(self, change: Change) -> None:
-        """Take a change into account from the next stroke sample on."""
+    @property
+    def requests(self) -> Any:
+        """Changes that wait for the next stroke sample."""
 
     def update_block(self, block: Any, /) -> object:
         """Take the samples of a block."""
@@ -128,7 +129,7 @@ class FaultTwins:
         """Repeat a change that was made while the session was recorded, with the load that each twin has more."""
         load = change.settings["payload"], change.settings["line_fill"]
         for each, twin in zip(self.hypotheses, self.twins, strict=True):
-            twin.repeat(replace(change, settings=change.settings | each.load(*load)))
+            twin.requests.repeat(replace(change, settings=change.settings | each.load(*load)))
 
     def judge(self) -> Alarm | None:
         """Return an alarm with the cause that explains what was read, or None if nothing is wrong or no cause is certain.

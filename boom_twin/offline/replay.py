@@ -403,9 +403,8 @@ def _fault_twins(twin: Twin) -> FaultTwins:
 
     def make(hypothesis: Hypothesis) -> Twin:
         settings = twin.settings.tuned(hypothesis.load(*twin.settings.load))
-        made = type(twin)(hypothesis.scene, settings, twin.mounts, reads=twin.reads, absent=twin.absent)
-        made.doubt(hypothesis.doubted)
-        return made
+        boom = hypothesis.scene, settings, twin.mounts
+        return type(twin)(*boom, reads=twin.reads, absent=twin.absent, doubted=hypothesis.doubted)
 
     return FaultTwins(loaded(twin.scene, *twin.settings.load), make)
 

@@ -55,6 +55,8 @@ class Twin:
         version 0.2.0, their drives.
     absent : collection of str
         Channels without a sensor, such as ``joint_3``: no reading of them is missed.
+    doubted : collection of str
+        Channels of angle sensors and of the IMU whose zeros may drift by any amount.
 
     Attributes
     ----------
@@ -84,6 +86,7 @@ class Twin:
         baseline: Baseline | None = None,
         reads: StrokeReading = StrokeReading.LENGTH,
         absent: Collection[str] = (),
+        doubted: Collection[str] = (),
     ) -> None:
         self.reads, self.absent, scene = reads, frozenset(absent), as_scene(scene)
         self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
@@ -95,7 +98,7 @@ class Twin:
         self._widths = [len(names) for names in self._channels.values()]
         self._edge = SampleCheck(self._channels)
         self.requests = Requests(self.settings)
-        self._doubted: frozenset[str] = frozenset()
+        self._doubted = frozenset(doubted)
         self._judged = True  # health, with the present sample
         self._begin()
 
@@ -135,15 +138,6 @@ class Twin:
     def evidence(self) -> float:
         """Logarithm of the likelihood of all that was read, up to a constant that the samples alone decide."""
         return self._boom.evidence
-
-    def doubt(self, channels: Collection[str]) -> None:
-        """Let the zeros of these channels (angles, IMU) drift by any amount."""
-        self._doubted = frozenset(channels)
-        self._boom.doubt(self._doubted)
-
-    def repeat(self, change: Change) -> None:
-        """Do with the next full stroke sample what was done to another twin; see `Requests.repeat`."""
-        self.requests.repeat(change)
 
     def rezero(self, sensor: str) -> dict[str, float]:
         """Ask that the mean residual of the last second becomes the zero of a sensor; gives its new zeros by channel.

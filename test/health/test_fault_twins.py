@@ -68,6 +68,10 @@ class Follower:
         self._seconds += 1
         self.evidence += self._rate if self._seconds > self._onset else 0.0
 
+    @property
+    def requests(self):
+        return self
+
     def repeat(self, change):
         """Keep the change."""
         self.changes.append(change)

@@ -24,7 +24,6 @@ from boom_twin.types import Stream
 
 SECONDS, WRONG_FROM, GAP = 40.0, 15.0, (30.0, 30.6)
 OFFSET = 0.02  # rad, by which joint 3's encoder is wrong from WRONG_FROM on
-DRIFT = 5e-4  # rad/s
 
 
 @pytest.fixture(scope="session")
@@ -36,17 +35,6 @@ def faulty(made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
     to = tmp_path_factory.mktemp("faulty") / "faulty_session"
     return made_once.folder("faulty_session", lambda folder: spoilt(folder, jump), to)
-
-
-@pytest.fixture(scope="session")
-def drifting(made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same, but its encoder drifts from 15 s on."""
-
-    def drift(time: Any, joints: Any) -> None:
-        joints[:, 2] += DRIFT * np.maximum(0.0, time - WRONG_FROM)
-
-    to = tmp_path_factory.mktemp("drifting") / "drifting_session"
-    return made_once.folder("drifting_session", lambda folder: spoilt(folder, drift), to)
 
 
 def spoilt(path: Path, spoil: Callable[[Any, Any], None]) -> Path:

@@ -76,7 +76,7 @@ def test_residuals_tell_of_the_load(replayed):
     for stream in (Stream.ANGLES, Stream.FORCES):
         rows = replayed.recording.of(stream)
         times = (rows.stamps - first) * 1e-9 + truth.times[0]
-        calm, shaken = (np.sqrt(np.nanmean(rows.normalised[part] ** 2)) for part in (times < QUIET, times > QUIET))
+        calm, shaken = (np.sqrt(np.nanmean(rows.values[part] ** 2)) for part in (times < QUIET, times > QUIET))
         assert shaken > 1.8 * calm, stream
     load, force = np.interp(times, truth.times, truth.load[:, 1]), rows.values[:, 0]
     slow = np.array([np.convolve(each, np.ones(200) / 200, "same") for each in (load, force)])

@@ -271,7 +271,7 @@ def test_the_parameters_are_those_of_the_node_that_was_recorded(tmp_path, capsys
     given = tmp_path / "given.yaml"
     given.write_text("/**:\n  ros__parameters:\n    imu_sigma: 0.1\n", encoding="utf-8")
     assert settings_of(tmp_path, given).settings == Settings(imu_sigma=0.1)
-    for wrong in ({"imu_sigma": -1.0}, {"step": 1e-12}, {"gap": "a while"}):
+    for wrong in ({"imu_sigma": -1.0}, {"stroke_rate": -1.0}, {"gap": "a while"}):
         SessionSheet("0", twin=wrong).write(tmp_path)
         with pytest.raises(BagError, match=rf"session\.yaml, twin: {next(iter(wrong))} .*--params"):
             settings_of(tmp_path)
