@@ -24,6 +24,10 @@ CAUSES = (Ranked("joint_3.sensor", 0.9, ()), Ranked("cylinder_3.k", 0.1, ()))
 ALARM = Alarm("joint_3", "residual", BEGIN, None, "joint_3.sensor", "joint_3.sensor jumped", CAUSES)
 
 
+UNHEARD = {Output.CHANGES, Output.ESTIMATE_TWIST, Output.ESTIMATE_MODES}
+"""Outputs that the page does not subscribe to."""
+
+
 class Rig:
     """Publishers of what the node would publish, and a subscriber of events."""
 
@@ -43,7 +47,7 @@ class Rig:
         self.node.create_subscription(Log, TOPICS.events.absolute, self.events.append, 10)
 
     def is_heard(self) -> bool:
-        return all(self._publishers[role].get_subscription_count() for role in set(self._publishers) - {Output.CHANGES})
+        return all(self._publishers[role].get_subscription_count() for role in set(self._publishers) - UNHEARD)
 
     def send(self, role: Any, nanosec: int, fill: Callable[[Any], None]) -> None:
         message = self._kinds[role]()

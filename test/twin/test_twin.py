@@ -131,7 +131,7 @@ def test_waits_for_all_strokes(twin, still):
 
 
 def test_a_gap_is_bridged_and_flagged(scene, still):
-    steady, gappy = Twin(scene), Twin(scene)
+    steady, gappy = drive_twin(scene), drive_twin(scene)
     for ms in range(0, 3000, 5):
         a = steady.update(strokes(ms, moved(still, ms * 1e-3))).prediction
         if not 100 < ms < 400:
