@@ -179,7 +179,6 @@ def test_no_recording_is_written_over(scene: Path, tmp_path: Path, capsys: pytes
         ["recover", str(bag), "--out", str(bag)],
         ["replay", str(scene), "--out", str(bag)],
         ["calibrate", str(bag), "--out", str(bag / "metadata.yaml"), "--force"],
-        ["calibrate", str(bag), "--baseline", str(bag / "session.yaml"), "--force"],
         ["simulate", str(scene), "--posture", "up", "--drive", "x.csv", "--out", str(bag / "session_0.mcap")],
         ["simulate", str(scene), "--posture", "up", "--drive", str(scene), "--out", str(scene)],
     ]
