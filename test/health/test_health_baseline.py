@@ -49,7 +49,7 @@ def test_a_value_that_cannot_be(tmp_path, changes, told):
 def test_a_file_that_is_no_baseline(tmp_path, text):
     path = tmp_path / "baseline.yaml"
     path.write_text(text)
-    with pytest.raises(UsageError, match=r"baseline\.yaml.*calibrate --baseline"):
+    with pytest.raises(UsageError, match=r"baseline\.yaml.*msg_config"):
         load_baseline(path)
 
 
