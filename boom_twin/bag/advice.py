@@ -24,7 +24,7 @@ JOINT_STATES = tuple(stream for stream, kind in SENSORS.items() if not kind.is_i
 
 
 def names_missing(info: BagInfo, topics: Topics, joints: int) -> list[str]:
-    """Names of the channels of a scene with so many joints that are not in (all) messages, one sentence for each."""
+    """Return a sentence for each channel of a scene with `joints` joints whose name is missing from some or all messages."""
     found: list[str] = []
     for stream, tally in _joint_states(info, topics):
         own = [name for name in _names(topics, stream, joints) if name not in topics.absent]
@@ -37,7 +37,7 @@ def names_missing(info: BagInfo, topics: Topics, joints: int) -> list[str]:
 
 
 def names_extra(info: BagInfo, topics: Topics, joints: int) -> list[str]:
-    """Names that no replay with so many joints uses, one sentence for each."""
+    """Return a sentence for each name in the messages that a replay with `joints` joints does not use."""
     used: dict[str, set[str]] = {}
     for stream, tally in _joint_states(info, topics):
         used.setdefault(tally.name, set()).update(_names(topics, stream, joints))
@@ -50,17 +50,17 @@ def names_extra(info: BagInfo, topics: Topics, joints: int) -> list[str]:
 
 
 def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list[str]:
-    """What is missing for a replay, one sentence for each, the worst first; empty when all is there.
+    """Return a sentence for each thing that a replay needs and the session lacks, the worst first.
 
     Parameters
     ----------
     info : BagInfo
     topics : Topics
-        How its topics and sensors are named.
+        Names of its topics and sensors.
     joints : int
-        Of the scene.
+        Number of joints of the scene.
     scene : str
-        Where that was taken from.
+        Source of the scene, for the sentences.
     """
     names = {stream: [name for names in tally.names for name in names] for stream, tally in _joint_states(info, topics)}
     found = list(other_names(topics, names, joints, scene))
@@ -83,7 +83,7 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
 
 
 def remarks(info: BagInfo, topics: Topics) -> list[str]:
-    """What else a reader should know: checksums, origin, clocks."""
+    """Return a sentence for each remark on checksums, origin, clocks and messages that are not read."""
     found: list[str] = []
     if not info.session.checked:
         found.append("No checksums: a flipped bit cannot be noticed. Record with `boom_twin record`.")
@@ -111,7 +111,7 @@ def remarks(info: BagInfo, topics: Topics) -> list[str]:
 
 
 def _passed_over(session: Session, topic: Topic) -> Iterator[str]:
-    """Name the messages of a topic that are of another type or encoding than the one that is read."""
+    """Yield a sentence for each channel of a topic whose messages have another type or encoding than the one that is read."""
     for file in session.files:
         for channel in file.channels.values():
             kind, encoding = file.type_of(channel), channel.message_encoding
@@ -142,7 +142,7 @@ def _joint_states(info: BagInfo, topics: Topics) -> Iterator[tuple[Stream, Tally
 
 
 def _names(topics: Topics, stream: Stream, joints: int) -> list[str]:
-    """Under which names the channels of a stream are published."""
+    """Return the names under which the channels of a stream are published."""
     return [sensor.name for sensor in topics.sensors_of(stream, joints).values()]
 
 
@@ -151,7 +151,7 @@ _USUAL = Qos(reliability="reliable", durability="volatile", depth=100)
 
 @dataclass(frozen=True, slots=True)
 class Publishable:
-    """One topic: name as it is published under, type, quality of service."""
+    """Topic that can be published: its name, type and quality of service."""
 
     name: str
     type: str
@@ -159,7 +159,9 @@ class Publishable:
 
 
 def publishable(session: Session, names: Sequence[str] | None = None) -> list[Publishable]:
-    """The topics of those names; without names the session's inputs: strokes, and what else has messages.
+    """Return the topics with these names; without names, the session's inputs that have messages.
+
+    The strokes are always among the inputs.
 
     Raises
     ------
@@ -176,7 +178,7 @@ def publishable(session: Session, names: Sequence[str] | None = None) -> list[Pu
 
 
 def _inputs(session: Session, topics: Topics) -> dict[str, TopicInfo]:
-    """By the names of the mapping, which may be relative and so be put into a namespace."""
+    """Return the input topics by their names in the mapping. A relative name can be put into a namespace."""
     found: dict[str, TopicInfo] = {}
     for stream, topic in topics.inputs.items():
         info = session.find(topic.name)
@@ -186,7 +188,7 @@ def _inputs(session: Session, topics: Topics) -> dict[str, TopicInfo]:
 
 
 def _type(session: Session, name: str) -> str:
-    """The type of a topic; of one that is not there nothing is known, which `check_topic` tells."""
+    """Return the type of a topic; empty for a missing topic, for which `check_topic` raises the error."""
     info = session.find(name)
     if info is not None and info.type.count("/") != 2:
         raise BagError(f"{session.path}: topic {info.name} has type {info.type!r}: no message of ROS 2. Leave it out.")
@@ -194,7 +196,7 @@ def _type(session: Session, name: str) -> str:
 
 
 def _qos(session: Session, topic: TopicInfo, topics: Topics) -> Qos:
-    """What was offered by the metadata, else by the channels, else as the mapping has it; the strongest of several."""
+    """Return the strongest QoS that the metadata, else the channels, offer; without an offer, that of the mapping."""
     offered = [qos for value in _values(session, topic.name) for qos in profiles(value)]
     if not offered:
         known = (each for each in topics.inputs.values() if each.absolute == topic.name)

@@ -18,16 +18,16 @@ from .writer import BagWriter
 
 
 class Syncer:
-    """Puts on the disk what was written; asked by one thread.
+    """Thread that calls ``fsync`` on files; requests come from one other thread.
 
     Attributes
     ----------
     done : int
         The mark of the newest request that is on the disk.
     time : float
-        When that was asked for, s of `time.monotonic`.
+        Time of that request, s of `time.monotonic`.
     error : OSError or None
-        Why the disk failed.
+        Error of the disk, if it failed.
     """
 
     def __init__(self) -> None:
@@ -40,16 +40,16 @@ class Syncer:
 
     @property
     def waits(self) -> float:
-        """For how long the disk has not answered, s."""
+        """Time since the disk last answered, s; 0 without an open request."""
         return time.monotonic() - self._began if self._answered < self._sent else 0.0
 
     def ask(self, file: int, mark: int) -> None:
-        """Put the file with that descriptor on the disk; passed over while the disk has not answered all requests."""
+        """Request ``fsync`` of the file with this descriptor, unless an earlier request is still open."""
         if self._answered == self._sent:
             self.put(file, mark)
 
     def put(self, file: int, mark: int) -> None:
-        """The same, never passed over; the file may be closed at once."""
+        """Request ``fsync`` of the file with this descriptor in any case. The caller may close the file at once."""
         now = time.monotonic()
         if self._answered == self._sent:
             self._began = now
@@ -92,13 +92,13 @@ _Message = tuple[int, int, bytes, int, int]
 
 @dataclass(frozen=True, slots=True)
 class FileSplit:
-    """When a new file begins: bytes, and seconds of log time; None for never."""
+    """Limits of one file: `size` in bytes and `duration` in seconds of log time; None is no limit."""
 
     size: int | None = None
     duration: float | None = None
 
     def is_due(self, bag: BagWriter, log_time: int) -> bool:
-        """Whether a message of that log time (ns) belongs into the next file."""
+        """Return True if a message with this log time (ns) belongs into the next file."""
         if bag.first is None:
             return False
         if self.size is not None and bag.size >= self.size:
@@ -107,15 +107,17 @@ class FileSplit:
 
 
 class Storage:
-    """Takes messages at any pace; `FLUSH` later they survive this process, and the loss of power as soon as the disk has them.
+    """Queue of messages in front of a bag; a thread writes them, so that a slow disk does not block the caller.
+
+    Messages survive this process after `FLUSH` seconds. They survive a loss of power as soon as the disk has them.
 
     Parameters
     ----------
     bag : BagWriter
-        From now on only used here.
+        Used by this object only from now on.
     split : FileSplit
     tell : callable
-        Told in words that the disk does not answer, and that it does again; and that no further file begins.
+        Receives a sentence when the disk does not answer, when it answers again, and when no further file begins.
     """
 
     def __init__(self, bag: BagWriter, split: FileSplit, tell: Callable[[str], None]) -> None:
@@ -133,7 +135,7 @@ class Storage:
         self._thread.start()
 
     def add(self, topic: Recorded) -> int:
-        """Register a topic; gives the key that `put` takes."""
+        """Register a topic and return its key for `put`."""
         self._queue.put(topic)
         self._topics += 1
         return self._topics - 1
@@ -144,7 +146,7 @@ class Storage:
         self._queue.put((key, log_time, data, publish_time, sequence))
 
     def check(self) -> None:
-        """Say if the disk does not answer.
+        """Report a disk that does not answer, or that answers again.
 
         Raises
         ------
@@ -163,7 +165,7 @@ class Storage:
             raise self._stalled(f"{MOST // 2**20} MiB of messages wait in memory")
 
     def state(self) -> DiskState:
-        """What is on the disk."""
+        """Return the state of the disk: delay, waiting and written bytes, free space and time until it is full."""
         now = time.monotonic()
         pace = self._written / (now - self._began)
         return DiskState(
@@ -175,7 +177,7 @@ class Storage:
         )
 
     def close(self) -> list[int]:
-        """Complete the bag; gives the messages written by key.
+        """Complete the bag and return the number of written messages by key.
 
         Raises
         ------
@@ -213,7 +215,7 @@ class Storage:
         return f"`boom_twin recover {self._bag.directory} --out DIR` saves what was written before."
 
     def _serve(self) -> None:
-        """Write until the end, flushing now and then."""
+        """Write messages until the end and flush every `FLUSH` seconds."""
         due = time.monotonic()
         while True:
             self._alive = time.monotonic()
@@ -232,7 +234,7 @@ class Storage:
                 self._write(item)
 
     def _flush(self) -> None:
-        """Ask onto the disk what was taken; its room is asked for here, because a stalled disk holds up that too."""
+        """Flush the bag, request ``fsync`` and read the free space. A stalled disk blocks all three, so this thread does it."""
         self._syncer.ask(self._bag.flush(), self._taken)
         self._check_disk()
         self._written, self._free = self._bag.written, disk_usage(self._bag.directory).free
@@ -249,7 +251,7 @@ class Storage:
         self._taken += len(data)
 
     def _is_in_last_file(self) -> bool:
-        """Whether there are `MOST_FILES`, which is told once."""
+        """Return True if the open file is the last of `MOST_FILES`; report that once."""
         if self._bag.completed + 1 < MOST_FILES:
             return False
         if not self._is_last:

@@ -18,13 +18,13 @@ _OTHER = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
 
 
 def dump(document: Any) -> str:
-    """YAML text in block style, keys in the order given, no anchors."""
+    """Return a document as YAML text in block style: keys in the given order, no anchors."""
     lines = _lines(document)
     return "\n".join([*lines, ""])
 
 
 def _lines(value: Any) -> list[str]:
-    """Of a value, not indented."""
+    """Return the lines of a value as YAML, without indentation."""
     if isinstance(value, list) and value:
         return [line for item in value for line in _marked(_lines(item))]
     if not isinstance(value, dict) or not value:
@@ -44,7 +44,7 @@ def _lines(value: Any) -> list[str]:
 
 
 def _plain(value: Any) -> str | None:
-    """The text of a value that needs no care; None of any other."""
+    """Return the YAML text of a value that needs no quoting; None for any other value."""
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -61,7 +61,7 @@ def _plain(value: Any) -> str | None:
 
 
 def _marked(lines: list[str]) -> list[str]:
-    """An item of a list."""
+    """Return the lines of a list item: a dash before the first line, the others indented."""
     return [f"- {lines[0]}", *_indented(lines[1:])]
 
 

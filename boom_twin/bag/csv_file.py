@@ -36,7 +36,7 @@ NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}
 
 @dataclass(frozen=True, slots=True)
 class CsvFile(SessionFile):
-    """What one CSV file holds; its log times are its stamps."""
+    """Content of one CSV file. Its log times are its stamps."""
 
     @property
     def storage(self) -> str:
@@ -48,7 +48,7 @@ class CsvFile(SessionFile):
         return "CSV", "none"
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
-        """See `SessionFile`; by log time."""
+        """Yield messages as in `SessionFile`, in the order of log times."""
         encode = jazzy().serialize_cdr
         for sample in _samples(self.path):
             data = encode(sensor_message(sample), SENSORS[sample.stream].message)
@@ -61,7 +61,7 @@ def summarise(path: Path) -> CsvFile:
     Raises
     ------
     BagError
-        It is not there, or a column or value of it cannot be used: says which, in which line.
+        The file is missing, or a column or value cannot be used; the message names it and its line.
     """
     try:
         open_received(path).close()
@@ -86,7 +86,7 @@ def summarise(path: Path) -> CsvFile:
 
 
 def _samples(path: Path) -> Iterator[Sample]:
-    """All samples in the order of their stamps."""
+    """Yield all samples in the order of their stamps."""
     shift = 0
     last: int | None = None
     for number, piece in enumerate(_with_equal_times_joined(read_csv_pieces(path, BagError))):
@@ -107,7 +107,7 @@ def _samples(path: Path) -> Iterator[Sample]:
 
 
 def _columns_of(table: CsvTable) -> dict[Stream, list[str]]:
-    """The names of the columns that every stream may have; refuses a header that lacks one or has another."""
+    """Return the column names of every stream; refuse a header that lacks a required column or has an unknown one."""
     numbers = [max(map(int, filter(None, found.groups()))) for name in table.names if (found := _NUMBERED.fullmatch(name))]
     joints = max(numbers, default=1)
     table.require([TIME, *(STROKE.format(number) for number in range(1, joints + 1))])
@@ -117,7 +117,7 @@ def _columns_of(table: CsvTable) -> dict[Stream, list[str]]:
 
 
 def _columns(joints: int) -> dict[Stream, list[str]]:
-    """The names of the columns of every stream."""
+    """Return the column names of every stream."""
     channels = channels_of(joints)
     return {
         Stream.STROKES: [STROKE.format(number) for number in range(1, joints + 1)],
@@ -142,7 +142,7 @@ def _column(table: CsvTable, name: str) -> list[float]:
 
 
 def _stamps(table: CsvTable, last: int | None) -> list[int]:
-    """Times, ns, each after the one before; `last` is that of the row before the first, if there is one."""
+    """Return the times of all rows, ns. Refuse a time that is not after the one before (`last`: before the first row)."""
     place = table.names.index(TIME)
     found: list[int] = []
     for row, line in zip(table.rows, table.lines, strict=True):
@@ -160,7 +160,7 @@ def _stamps(table: CsvTable, last: int | None) -> list[int]:
 
 
 def _refuse_other_units(table: CsvTable, stamps: list[int]) -> None:
-    """Refuse times that go on as ms, us or ns do, or that no stamp can have."""
+    """Refuse times whose step is that of ms, us or ns, or that are too large for a stamp."""
     step = float(np.median(np.diff(stamps))) / SECOND if len(stamps) > 1 else 0.0
     if stamps[-1] < 2**31 * SECOND and (len(stamps) < FEWEST or step < SLOWEST):
         return
@@ -173,7 +173,7 @@ def _refuse_other_units(table: CsvTable, stamps: list[int]) -> None:
 
 
 def _with_equal_times_joined(pieces: Iterable[CsvTable]) -> Iterator[CsvTable]:
-    """Yield tables in which rows of one time are one row, where no column has two values: a row for each topic is common."""
+    """Yield tables with rows of equal time joined, unless a column has two values. Many files have a row for each topic."""
     rows, lines = list[list[str]](), list[int]()
     for piece in pieces:
         place = piece.names.index(TIME) if TIME in piece.names else -1
@@ -191,5 +191,5 @@ def _with_equal_times_joined(pieces: Iterable[CsvTable]) -> Iterator[CsvTable]:
 
 
 def _are_apart(pairs: list[tuple[str, str]], place: int) -> bool:
-    """Return True if no column but that of the time has a value in both of two rows."""
+    """Return True if no column except the time has a value in both rows."""
     return all(i == place or any(cell.strip().lower() in NOTHING for cell in pair) for i, pair in enumerate(pairs))

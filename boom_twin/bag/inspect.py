@@ -23,30 +23,30 @@ VARIANTS = 100
 
 @dataclass(slots=True)
 class Tally:
-    """What was seen of one topic.
+    """Statistics of one topic.
 
-    Stamps are taken where the messages begin with a header and it is not 0, log times elsewhere.
+    Steps are between stamps if the messages begin with a header, else between log times. A stamp of 0 is left out.
 
     Attributes
     ----------
     name, type : str
     stamped, named : bool
-        Whether its messages begin with a header, and whether they are joint states.
+        True if its messages begin with a header, and if they are joint states.
     count : int
     first, last : int
         Log times, ns.
     gap, gap_after : int
         Largest step between two stamps, ns, and log time of the message before it.
     not_increasing : int
-        Messages with a stamp not after that of the message before.
+        Number of messages whose stamp is not after that of the message before.
     unset : int
-        Messages with a stamp of 0, or too short for one.
+        Number of messages with a stamp of 0 or too short for a stamp.
     skews : list of int
         Log time minus stamp, ns: smallest, largest and sum over `skewed` messages.
     names : Counter
-        Messages by their joint names.
+        Number of messages by their joint names.
     unreadable : int
-        Joint states whose names cannot be read.
+        Number of joint states whose names cannot be read.
     """
 
     name: str
@@ -68,7 +68,7 @@ class Tally:
     _known: tuple[bytes, tuple[str, ...]] | None = None
 
     def add(self, log_time: int, data: bytes) -> None:
-        """Take one message in."""
+        """Add one message to the statistics."""
         before_this, self.last = self.last, log_time
         if self.count == 0:
             self.first = log_time
@@ -105,7 +105,7 @@ class Tally:
         self.skewed += 1
 
     def _read_names(self, data: bytes) -> None:
-        """Joint names; where they are the same bytes as before, they are not read again."""
+        """Count the joint names of a message. Bytes equal to those of the message before are not read again."""
         if self._known is None or not data.startswith(self._known[0], 12):
             try:
                 names, end = names_in(data)
@@ -123,21 +123,21 @@ _NAMED = TYPES[Stream.STROKES]
 
 @dataclass(frozen=True, slots=True)
 class BagInfo:
-    """What a session holds.
+    """Statistics of a session and of its topics.
 
     Attributes
     ----------
     session : Session
     tallies : tuple of Tally
-        By name of the topic.
+        Sorted by the name of the topic.
     library : str
-        The program that wrote the first file, in its own words.
+        Program that wrote the first file, by its own name.
     compression : str
-        Of the chunks: ``zstd``, ``lz4``, ``none``, ..; or that the file has none.
+        Compression of the chunks: ``zstd``, ``lz4``, ``none``, ..; or a note that the file has no chunks.
     size : int
-        Bytes of all files.
+        Size of all files, bytes.
     window : TimeWindow
-        The part of the session that the tallies are of.
+        Part of the session that the tallies count.
     """
 
     session: Session
@@ -149,7 +149,7 @@ class BagInfo:
 
     @property
     def span(self) -> tuple[int, int]:
-        """Log times (ns) of the first and the last message in the window; twice its beginning where there is none."""
+        """Log times (ns) of the first and the last message in the window; twice its beginning if it has no message."""
         if self.window == WHOLE:
             return self.session.start, self.session.end
         seen = [tally for tally in self.tallies if tally.count]
@@ -158,17 +158,19 @@ class BagInfo:
 
     @property
     def synthetic(self) -> bool | None:
-        """Whether the session says that no rig made it; None if it says nothing about its origin."""
+        """Return True if the session is noted as synthetic; None if its origin is not noted."""
         origin = self.session.notes.get("origin")
         return None if origin is None else "synthetic" in origin.lower()
 
     def tally(self, name: str) -> Tally | None:
-        """The topic of that name, with or without its leading slash."""
+        """Return the tally of a topic, whose name may lack its leading slash."""
         return next((each for each in self.tallies if each.name.lstrip("/") == name.lstrip("/")), None)
 
 
 def inspect(path: Path, window: TimeWindow = WHOLE) -> BagInfo:
-    """Read a session once; what is outside the window, which counts from its first message, is not told of.
+    """Read a session once and return the statistics of its messages in the window.
+
+    The window counts from the first message of the session.
 
     Raises
     ------
@@ -187,7 +189,7 @@ def inspect(path: Path, window: TimeWindow = WHOLE) -> BagInfo:
 
 
 def _count(file: SessionFile, tallies: dict[str, Tally], bounds: tuple[int, int]) -> None:
-    """Take in the messages of one file with log times from the first to before the second bound; all are counted."""
+    """Add the messages of one file within the `bounds` of log time to the tallies, and check the counts of the whole file."""
     own = {key: tallies[channel.topic] for key, channel in file.channels.items()}
     passed_over = set()
     for key, channel in file.channels.items():

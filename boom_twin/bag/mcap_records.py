@@ -75,7 +75,7 @@ _UNPACK: dict[str, Callable[[bytes, int], bytes]] = {"": lambda data, limit: dat
 class ChunkPlace(NamedTuple):
     """Place of a chunk, or of messages outside chunks on end; fields as in ``ChunkIndex``.
 
-    `channels` are those that have messages in it; none if that is not known.
+    `channels` are the channels with messages in it; empty if unknown.
     """
 
     message_start_time: int
@@ -88,12 +88,12 @@ class ChunkPlace(NamedTuple):
 
 
 def by_place(chunks: Sequence[ChunkPlace]) -> list[ChunkPlace]:
-    """Return chunks in the order of the file; that of its index may be another."""
+    """Return chunks in the order of the file, which may differ from that of its index."""
     return sorted(chunks, key=attrgetter("chunk_start_offset"))
 
 
 class UnpackError(McapError):
-    """A chunk unpacks to more than its `UnpackBudget` allows."""
+    """Error of a chunk that unpacks to more than its `UnpackBudget` allows."""
 
 
 class UnpackBudget:
@@ -105,14 +105,14 @@ class UnpackBudget:
     Attributes
     ----------
     records : int
-        What is left of the reserve.
+        Records left in the reserve.
     """
 
     def __init__(self) -> None:
         self.records = 20_000
 
     def unpack(self, chunk: Chunk, limit: int) -> bytes:
-        """The first `limit` bytes of the content of a chunk; UnpackError if that, or what is in it, is too much."""
+        """Return the first `limit` bytes of the content of a chunk. Raise UnpackError for too many bytes or records."""
         own = int(RECORDS_PER_BYTE * len(chunk.data))
         for room in (_START, MOST_HELD + 1):
             content = _UNPACK[chunk.compression](chunk.data, min(limit, room))
@@ -139,7 +139,7 @@ def _records(content: bytes, most: int) -> int:
 
 
 def unpack(chunk: Chunk, budget: UnpackBudget) -> bytes:
-    """The content of a chunk, its size and checksum (where it has one) verified.
+    """Return the content of a chunk after verifying its size and, if it has one, its checksum.
 
     Raises
     ------
@@ -155,14 +155,14 @@ def unpack(chunk: Chunk, budget: UnpackBudget) -> bytes:
 
 
 def unpack_start(chunk: Chunk, budget: UnpackBudget) -> bytes:
-    """What can be unpacked of a chunk that may be cut off, at most one byte more than it states; nothing verified."""
+    """Return what unpacks of a chunk that may be cut off, at most one byte above its stated size. Nothing is verified."""
     if chunk.compression not in _UNPACK:
         raise McapError(f"compression = {chunk.compression!r}: only zstd, lz4 and none are known")
     return budget.unpack(chunk, chunk.uncompressed_size + 1)
 
 
 def bounds(content: bytes) -> Iterator[tuple[int, int, int]]:
-    """Opcode of every record in the content of a chunk, and where its body begins and ends; McapError at one not whole."""
+    """Yield opcode, start and end of the body of every record in the content of a chunk. McapError at a partial record."""
     place, size = 0, len(content)
     while place < size:
         start = place + PREFIX.size
@@ -178,12 +178,12 @@ def bounds(content: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def parts(content: bytes) -> Iterator[tuple[int, bytes]]:
-    """Opcode and body of every record in the content of a chunk; McapError at one that is not whole."""
+    """Return an iterator of opcode and body of every record in the content of a chunk. McapError at a partial record."""
     return ((opcode, content[start:end]) for opcode, start, end in bounds(content))
 
 
 def whole_parts(content: bytes) -> bytes:
-    """The start of `content` up to where its last whole record ends."""
+    """Return the start of `content` up to the end of its last whole record."""
     end = 0
     try:
         for _, _, place in bounds(content):
@@ -194,7 +194,7 @@ def whole_parts(content: bytes) -> bytes:
 
 
 def message_of(body: bytes) -> Message:
-    """A message from the body of its record."""
+    """Return a message from the body of its record."""
     channel, sequence, log_time, publish_time = MESSAGE_HEAD.unpack_from(body)
     return Message(
         channel_id=channel,
@@ -206,7 +206,7 @@ def message_of(body: bytes) -> Message:
 
 
 def record_of(opcode: int, body: bytes) -> McapRecord:
-    """A record of one of `KINDS` from its body; McapError if it does not fill that."""
+    """Return a record of one of `KINDS` from its body. Raise McapError if it does not fill the body."""
     stream = ReadDataStream(BytesIO(body))
     record: McapRecord = KINDS[opcode].read(stream)
     if stream.count != len(body):
@@ -215,7 +215,7 @@ def record_of(opcode: int, body: bytes) -> McapRecord:
 
 
 def by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> Counter[str]:
-    """Counts by channel, added up by the name of the topic."""
+    """Return counts by topic name from counts by channel."""
     topics: Counter[str] = Counter()
     for channel, count in counts.items():
         topics[channels[channel].topic] += count
@@ -223,7 +223,7 @@ def by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> Coun
 
 
 def outer_records(path: Path) -> Iterator[tuple[int, McapRecord]]:
-    """All records in the order of the file but those inside chunks, each with the offset behind it."""
+    """Yield all records outside chunks in the order of the file, each with the offset after it."""
     with open_received(path) as file:
         limit = min(MOST_HELD, path.stat().st_size)
         for record in StreamReader(file, validate_crcs=True, emit_chunks=True, record_size_limit=limit).records:
@@ -231,7 +231,7 @@ def outer_records(path: Path) -> Iterator[tuple[int, McapRecord]]:
 
 
 def heads(path: Path, chunks: Sequence[ChunkPlace]) -> Iterator[tuple[int, int, bytes]]:
-    """Channel, log time (ns) and encoded data of all messages in the order of the file, one piece in memory."""
+    """Yield channel, log time (ns) and encoded data of all messages in the order of the file, with one piece in memory."""
     budget = UnpackBudget()
     with open_received(path) as file:
         for place in by_place(chunks):
@@ -242,12 +242,12 @@ def heads(path: Path, chunks: Sequence[ChunkPlace]) -> Iterator[tuple[int, int, 
 
 
 def content_at(file: BinaryIO, place: ChunkPlace, budget: UnpackBudget) -> bytes:
-    """The records of a piece of a file: of a chunk, its checksum verified, or of messages outside chunks.
+    """Return the bytes of the records in a piece of a file: a chunk with verified checksum, or messages outside chunks.
 
     Raises
     ------
     BagError
-        It is more than memory is to hold.
+        The piece is larger than `MOST_HELD`.
     """
     if (size := max(place.chunk_length, place.uncompressed_size)) > MOST_HELD:
         remedy = "Write smaller chunks: `mcap compress --chunk-size 1048576 IN.mcap -o OUT.mcap`."
@@ -264,14 +264,14 @@ def content_at(file: BinaryIO, place: ChunkPlace, budget: UnpackBudget) -> bytes
 
 
 def chunk_records(chunk: Chunk, budget: UnpackBudget) -> list[McapRecord]:
-    """The messages and definitions inside a chunk, its checksum verified."""
+    """Return the messages and definitions inside a chunk after verifying its checksum."""
     with fault_named_by_times(chunk):
         return [record for opcode, body in parts(unpack(chunk, budget)) if (record := inner_record(opcode, body)) is not None]
 
 
 @contextmanager
 def fault_named_by_times(chunk: Chunk) -> Iterator[None]:
-    """Turn what the content of a chunk is at fault with into a McapError that names the chunk by its log times."""
+    """Turn errors of the content of a chunk into a McapError that names the chunk by its log times."""
     try:
         yield
     except PARSE_ERRORS as error:
@@ -280,7 +280,7 @@ def fault_named_by_times(chunk: Chunk) -> Iterator[None]:
 
 
 def inner_record(opcode: int, body: bytes) -> McapRecord | None:
-    """A message, a channel or a schema from the body of its record; None for any other record."""
+    """Return a message, a channel or a schema from the body of its record; None for any other record."""
     if opcode == Opcode.MESSAGE:
         return message_of(body)
     return record_of(opcode, body) if opcode in (Opcode.CHANNEL, Opcode.SCHEMA) else None

@@ -49,14 +49,14 @@ NOTES = "boom_twin"
 
 @dataclass(frozen=True, slots=True)
 class McapFile(SessionFile):
-    """What one .mcap file holds.
+    """Content of one .mcap file.
 
     Attributes
     ----------
     chunks : list of ChunkPlace
-        By the index of the file, or made by a walk through it.
+        Chunks from the index of the file, or from a walk through it.
     compression : str
-        Of its first chunk, or that it has no index.
+        Compression of its first chunk, or a note that it has no index.
     """
 
     chunks: list[ChunkPlace]
@@ -73,7 +73,7 @@ class McapFile(SessionFile):
             return NonSeekingReader(stream, record_size_limit=LARGEST).get_header().library, self.compression
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
-        """See `SessionFile`; in the order of the file, one piece in memory."""
+        """Yield messages as in `SessionFile`, in the order of the file, with one piece in memory."""
         return heads(self.path, self.chunks)
 
     def log_clock(self) -> LogClock:
@@ -86,7 +86,7 @@ class McapFile(SessionFile):
 
 
 def summarise(path: Path) -> McapFile:
-    """Look at one file: only at its summary if that is complete, else at all of it.
+    """Return the content of one file, from its summary if that is complete, else from all of its records.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def summarise(path: Path) -> McapFile:
 
 
 def _is_complete(summary: Summary, told: Statistics) -> bool:
-    """Return True if a summary with statistics alone tells what is in the file and where."""
+    """Return True if a summary with statistics gives all chunks, channels and schemas of the file."""
     return (
         0 < told.chunk_count == len(summary.chunk_indexes)
         and told.channel_message_counts.keys() <= summary.channels.keys()
@@ -140,13 +140,13 @@ _RUN = 2**20
 
 
 class _Pieces:
-    """Makes the table of the pieces of a file from its records."""
+    """Builder of the table of the pieces of a file from its records."""
 
     def __init__(self) -> None:
         self._table, self._run = list[ChunkPlace](), list[ChunkPlace]()
 
     def add(self, record: McapRecord, messages: list[Message], end: int) -> None:
-        """Take the next record in, which ends before the offset `end`, with the messages that it is or holds."""
+        """Add the next record, which ends before the offset `end`, with the messages in it."""
         if self._run and (not isinstance(record, Message) or end - self._run[0].chunk_start_offset > _RUN):
             self.finish()
         if not messages:
@@ -160,7 +160,7 @@ class _Pieces:
             self.finish()
 
     def finish(self) -> list[ChunkPlace]:
-        """Return the table with the messages so far."""
+        """Complete the open piece and return the table."""
         if self._run:
             starts, ends, offsets, lengths, sizes, _, channels = zip(*self._run, strict=True)
             found = frozenset[int]().union(*channels)
@@ -170,7 +170,7 @@ class _Pieces:
 
 
 def _walk(path: Path) -> McapFile:
-    """Look at all of a file, and compare its statistics, if it has them, with what is there."""
+    """Return the content of a file from all of its records. Compare its statistics, if any, with the messages found."""
     channels: dict[int, Channel] = {}
     schemas: dict[int, Schema] = {}
     notes: list[Metadata] = []

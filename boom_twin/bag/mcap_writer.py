@@ -45,23 +45,23 @@ _HEADS = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")
 
 
 class McapWriter:
-    """Writes one file; its end and its summary come with `finish`.
+    """Writer of one .mcap file; `finish` writes its end and its summary.
 
     Parameters
     ----------
     stream : BinaryIO
-        Empty; from now on only written to here, and not closed.
+        Empty stream, written by this object only from now on and not closed.
     profile, library : str
-        Of the file's header.
+        Fields of the file's header.
     chunk_size : int
         Bytes of records beyond which a chunk is complete.
     compression : CompressionType
-        Of the chunks.
+        Compression of the chunks.
 
     Raises
     ------
     OSError
-        From any method, where the stream does.
+        The stream raises it, in any method.
     """
 
     def __init__(self, stream: BinaryIO, profile: str, library: str, chunk_size: int, compression: CompressionType) -> None:
@@ -77,20 +77,20 @@ class McapWriter:
         stream.write(MCAP0_MAGIC + _encoded(Header(profile, library)))
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Write a metadata record; outside chunks, so it comes before messages that wait for their chunk."""
+        """Write a metadata record at once, before messages that wait for their chunk."""
         record, start = _encoded(Metadata(name, dict(values))), self._stream.tell()
         self._stream.write(record)
         self._metadata.append(MetadataIndex(start, len(record), name))
 
     def register_schema(self, name: str, encoding: str, definition: bytes) -> int:
-        """Add a message type; gives its number."""
+        """Add a message type and return its number."""
         self._schemas.append(Schema(id=len(self._schemas) + 1, data=definition, encoding=encoding, name=name))
         self._chunk.content += _encoded(self._schemas[-1])
         self._finish_full_chunk()
         return len(self._schemas)
 
     def register_channel(self, topic: str, encoding: str, schema: int, details: Mapping[str, str]) -> int:
-        """Add a topic, of the message type with that number; gives its own."""
+        """Add a topic with the message type of number `schema` and return its channel number."""
         number = len(self._channels) + 1
         self._channels.append(Channel(number, topic, encoding, dict(details), schema))
         self._chunk.content += _encoded(self._channels[-1])
@@ -98,13 +98,13 @@ class McapWriter:
         return number
 
     def add_message(self, channel: int, log_time: int, data: bytes, publish_time: int, sequence: int) -> None:
-        """Append a message to the channel with that number; times in ns."""
+        """Append a message to the channel with this number. Times are in ns."""
         head = MESSAGE_HEAD.pack(channel, sequence, log_time, publish_time)
         self._chunk.add(channel, log_time, PREFIX.pack(Opcode.MESSAGE, len(head) + len(data)) + head + data)
         self._finish_full_chunk()
 
     def add_block(self, channels: Integers, sequences: Integers, block: EncodedBlock) -> None:
-        """Append many messages, see `add_message`, of so many channels and sequence numbers, published at log time."""
+        """Append many messages as `add_message` does, each with its channel and sequence number. Publish time is log time."""
         lengths = np.empty(len(channels), np.int64)
         for rows in block.rows:
             lengths[rows.places] = rows.data.shape[1]
@@ -124,12 +124,12 @@ class McapWriter:
             first, begin = part.stop, end
 
     def flush(self) -> None:
-        """Complete the chunk, and give all to the system; a chunk without messages waits on."""
+        """Complete a chunk that has messages, and give all bytes to the operating system."""
         self._finish_chunk()
         self._stream.flush()
 
     def finish(self) -> None:
-        """Write the end of the file: summary, where its parts are, footer."""
+        """Write the end of the file: summary, offsets of its parts, footer."""
         self._finish_chunk()
         self._stream.write(_encoded(DataEnd(0)))
         place = start = self._stream.tell()
@@ -168,7 +168,7 @@ class McapWriter:
             self._finish_chunk()
 
     def _finish_chunk(self) -> None:
-        """Write the chunk and the index of each of its channels, if it has messages."""
+        """Write the open chunk and the index of each of its channels, if the chunk has messages."""
         if not self._chunk.entries:
             return
         chunk, self._chunk = self._chunk, _OpenChunk()
@@ -211,14 +211,14 @@ class McapWriter:
 
 
 class _OpenChunk:
-    """Records that wait to be packed.
+    """Records of a chunk that is not yet compressed.
 
     Attributes
     ----------
     content : bytearray
         The records.
     entries : dict of int to list of bytes
-        By channel, in the order of their first messages: log time and place of every message, as the index has them.
+        Index entries (log time and place of every message) by channel, in the order of their first messages.
     start, end : int
         First and last log time, ns.
     """
@@ -235,7 +235,7 @@ class _OpenChunk:
         self.content += record
 
     def add_block(self, channels: Integers, log_times: Integers, places: Integers, records: memoryview) -> None:
-        """Append messages whose records begin at `places` in `records`; at least one."""
+        """Append one or more messages whose records begin at `places` in `records`."""
         self._extend_span(int(log_times.min()), int(log_times.max()))
         entries = np.column_stack([log_times, places + len(self.content)]).astype("<u8").view(f"V{_INDEX_ENTRY.size}")
         for channel, entry in zip(channels.tolist(), entries[:, 0].tolist(), strict=True):
@@ -248,7 +248,7 @@ class _OpenChunk:
 
 
 def _heads(channels: Integers, sequences: Integers, log_times: Integers, lengths: Integers) -> Bytes:
-    """What stands before the data, of so many bytes, of each message, a row each."""
+    """Return the bytes before the data of each message, a row each. `lengths` are the bytes of the data."""
     heads = np.empty(len(channels), _HEADS)
     columns = (Opcode.MESSAGE, lengths + MESSAGE_HEAD.size, channels, sequences, log_times, log_times)
     for name, column in zip(_HEADS.names or (), columns, strict=True):
@@ -257,7 +257,7 @@ def _heads(channels: Integers, sequences: Integers, log_times: Integers, lengths
 
 
 def _scatter(rows: Bytes, target: Bytes, starts: Integers) -> None:
-    """Copy every row to where it begins in `target`."""
+    """Copy every row into `target` at its start."""
     kind = np.dtype((np.void, rows.shape[1]))  # so a row is one element, and copied as a whole
     places = np.ndarray(len(target) - kind.itemsize + 1, kind, target, strides=(1,))
     places[starts] = rows.view(kind)[:, 0]
@@ -271,7 +271,7 @@ def _encoded(*records: McapRecord) -> bytes:
 
 
 def _codec(compression: CompressionType) -> tuple[str, Pack]:
-    """Name and function of a compression, at the level that its library has by default."""
+    """Return name and function of a compression, at the default level of its library."""
     if compression is CompressionType.ZSTD:
         return "zstd", ZstdCompressor().compress
     return ("lz4", lz4_compress) if compression is CompressionType.LZ4 else ("", bytes)

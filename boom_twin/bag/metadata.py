@@ -50,7 +50,7 @@ class TopicMetadata(BaseModel):
 
 
 class TopicCount(BaseModel):
-    """How often one topic was recorded."""
+    """One topic and its number of messages."""
 
     topic_metadata: TopicMetadata
     message_count: int
@@ -66,7 +66,7 @@ class FileInformation(BaseModel):
 
 
 class BagMetadata(BaseModel):
-    """The whole of it; what older versions lack has a default, what newer ones add is not looked at."""
+    """Content of ``metadata.yaml``. Keys missing in older versions have defaults; keys added by newer ones are ignored."""
 
     version: int
     storage_identifier: str
@@ -83,7 +83,7 @@ class BagMetadata(BaseModel):
 
     @property
     def counts(self) -> Counter[str]:
-        """Messages by topic."""
+        """Number of messages by topic."""
         found: Counter[str] = Counter()
         for entry in self.topics_with_message_count:
             found[entry.topic_metadata.name] += entry.message_count
@@ -91,12 +91,12 @@ class BagMetadata(BaseModel):
 
     @property
     def file_names(self) -> list[str]:
-        """Names of the files, without the folders, of whatever system, before them."""
+        """Names of the files without their folders, which may be written as Windows paths."""
         return [PureWindowsPath(name).name for name in self.relative_file_paths]
 
     @property
     def notes(self) -> dict[str, str]:
-        """What the writer noted, as texts."""
+        """Notes of the writer (``custom_data``), as texts."""
         return {key: str(value) for key, value in (self.custom_data or {}).items()}
 
 
@@ -116,12 +116,12 @@ def refuse_packed(path: Path) -> None:
 
 
 def read_metadata(path: Path) -> BagMetadata:
-    """What a ``metadata.yaml`` says.
+    """Return the content of a ``metadata.yaml``.
 
     Raises
     ------
     BagError
-        If it is no such file, or its bag is stored in a way that is not read here (compressed as a whole).
+        It is no ``metadata.yaml`` of rosbag2, or its bag has a storage or a compression that is not read.
     """
     remedy = "Move it away: the files of the session can be read without it."
     document = read_plain(path, BagError, remedy, received=True)
@@ -152,12 +152,12 @@ def read_metadata(path: Path) -> BagMetadata:
 
 
 def write_metadata(path: Path, metadata: BagMetadata, sync: Callable[[int], None] = os.fsync) -> None:
-    """Write `metadata` as Jazzy does, all of it or nothing; the same values give the same bytes. `sync`: see `write_atomic`."""
+    """Write `metadata` as Jazzy does, atomically (see `write_atomic`). Equal values give equal bytes."""
     write_atomic(path, dump({_ROOT: metadata.model_dump()}), sync)
 
 
 def offered_qos(qos: Qos) -> list[dict[str, Any]]:
-    """`qos` as one offered profile, in the words of version 9."""
+    """Return `qos` as a list of one offered profile, in the format of version 9."""
     return [
         {
             "history": "keep_last",
@@ -182,7 +182,7 @@ _LONGEST = 100_000  # characters of YAML in one entry
 
 
 def profiles(value: Any) -> list[Qos]:
-    """The profiles of one topic, in the words of ``topics.yaml``; what cannot be read is left out.
+    """Return the QoS profiles of one topic as in ``topics.yaml``. A profile that cannot be read is left out.
 
     Parameters
     ----------
@@ -213,16 +213,16 @@ def _profile(entry: dict[Any, Any]) -> Qos | None:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """One topic as it stands in a bag.
+    """One topic in a bag.
 
     Attributes
     ----------
     topic, type : str
-        Absolute name; ``package/msg/Name``.
+        Absolute name, and type as ``package/msg/Name``.
     definition : bytes
-        Of the type and all types in it, in the language that `definition_encoding` names.
+        Definition of the type and all types in it, in the language `definition_encoding`.
     details : dict of str to str
-        Kept with the channel.
+        Metadata of the channel.
     qos : object
         Offered profiles, for ``metadata.yaml``.
     type_hash : str
@@ -240,14 +240,14 @@ class Recorded:
 
     @classmethod
     def offered(cls, topic: str, type_name: str, definition: str, qos: Qos, type_hash: str) -> Recorded:
-        """A topic that is offered with `qos`; its channel keeps that and the hash of the type, as rosbag2's do."""
+        """Return a topic offered with `qos`. Its channel keeps the QoS and the hash of the type, as in rosbag2."""
         profile = offered_qos(qos)
         details = {"offered_qos_profiles": dump(profile), "topic_type_hash": type_hash}
         return cls(topic, type_name, definition.encode(), details, profile, type_hash)
 
 
 def file_information(path: str, first: int, last: int, count: int) -> FileInformation:
-    """One file: name, first and last log time (ns), messages."""
+    """Return the entry of one file from its name, first and last log time (ns) and number of messages."""
     start, duration = Start(nanoseconds_since_epoch=first), Duration(nanoseconds=last - first)
     return FileInformation(path=path, starting_time=start, duration=duration, message_count=count)
 
@@ -259,7 +259,7 @@ def metadata_of(
     notes: Mapping[str, str],
     distro: str,
 ) -> BagMetadata:
-    """The metadata of a whole bag; `counts` are messages by place in `topics`."""
+    """Return the metadata of a whole bag. `counts` are messages by index in `topics`."""
     filled = [file for file in files if file.message_count]
     first = min((file.starting_time.nanoseconds_since_epoch for file in filled), default=0)
     last = max((file.starting_time.nanoseconds_since_epoch + file.duration.nanoseconds for file in filled), default=0)

@@ -32,7 +32,7 @@ from .time_window import WHOLE, TimeWindow
 
 
 def stored_files(path: Path, storage: str = "") -> list[Path]:
-    """The files of a session without metadata, or those of one storage only; BagError if there are none."""
+    """Return the files of a session without metadata, or only those of one storage. Raise BagError if there are none."""
     if path.is_file():
         return [path.resolve() if path.is_symlink() else path]  # the user's own word, unlike a link in a folder
     if not path.is_dir():
@@ -49,7 +49,7 @@ def stored_files(path: Path, storage: str = "") -> list[Path]:
 
 
 def check_listed(path: Path, named: list[Path]) -> None:
-    """Refuse to pass over a file that a recorder left behind when it was killed."""
+    """Raise BagError for a file that the metadata does not name: its recorder was killed."""
     if unlisted := sorted(file.name for file in path.iterdir() if file.suffix in STORAGES and file not in named):
         raise BagError(
             f"{path}: {FILE_NAME} does not name {', '.join(unlisted)}: the recorder was ended by force. "
@@ -58,7 +58,7 @@ def check_listed(path: Path, named: list[Path]) -> None:
 
 
 def sources(path: Path) -> tuple[list[Path], BagMetadata | None]:
-    """The .mcap files of a session: those that its metadata names, then all others by number; and the metadata."""
+    """Return the .mcap files of a session (first those that its metadata names, then others by number) and the metadata."""
     metadata: BagMetadata | None = None
     is_described = holds_file(path / FILE_NAME)
     try:
@@ -73,7 +73,7 @@ def sources(path: Path) -> tuple[list[Path], BagMetadata | None]:
 
 
 def _by_number(path: Path) -> list[tuple[int, str]]:
-    """Sorts ``session_10`` behind ``session_9``."""
+    """Return a sort key that places ``session_10`` after ``session_9``."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]
 
 
@@ -138,26 +138,26 @@ class TopicInfo:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """What a session holds.
+    """Content of a session.
 
     Attributes
     ----------
     path : Path
-        As it was given.
+        Path as given.
     files : tuple of SessionFile
     topics : tuple of TopicInfo
-        By name.
+        Topics, sorted by name.
     start, end : int
         First and last log time in nanoseconds; 0 without messages.
     checked : bool
-        Whether all its messages are under a checksum. If not (the default of ``ros2 bag record``), a flipped bit in
-        a value cannot be noticed.
+        True if all its messages are under a checksum. Without (the default of ``ros2 bag record``), a flipped bit in
+        a value cannot be detected.
     notes : dict of str to str
-        What the writer noted, for instance that the session is synthetic.
+        Notes of the writer, for instance that the session is synthetic.
     metadata : BagMetadata or None
-        What ``metadata.yaml`` says; None without one.
+        Content of ``metadata.yaml``; None without one.
     incomplete : str
-        Why it is not whole, in words, where its folder says so; else empty.
+        Reason why the session is not whole, if its folder says so; else empty.
     """
 
     path: Path
@@ -171,12 +171,12 @@ class Session:
     incomplete: str
 
     def find(self, name: str) -> TopicInfo | None:
-        """The topic of that name, with or without its leading slash."""
+        """Return a topic by its name, with or without its leading slash; None if it is missing."""
         return next((topic for topic in self.topics if topic.name.lstrip("/") == name.lstrip("/")), None)
 
 
 def clocks_set_back(session: Session) -> list[str]:
-    """Return a sentence on every file in which the recorder's clock was set back."""
+    """Return a sentence for every file in which the recorder's clock was set back."""
     found = []
     for file in session.files:
         with as_bag_error(file.path):
@@ -191,17 +191,17 @@ def clocks_set_back(session: Session) -> list[str]:
 
 
 def files_sha256(session: Session) -> str:
-    """SHA-256 over those of the files of a session, in their order."""
+    """Return the SHA-256 over the SHA-256 digests of the files of a session, in their order."""
     return sha256(b"".join(bytes.fromhex(sha256_of(file.path)) for file in session.files)).hexdigest()
 
 
 def scan(path: Path) -> Session:
-    """What the session at `path` holds; cheap, reads no messages where the files have a summary.
+    """Return the content of the session at `path`. Messages of a file with a summary are not read.
 
     Raises
     ------
     BagError
-        If there is none, a file is damaged or cut off, or its counts differ from ``metadata.yaml``.
+        There is no session, a file is damaged or cut off, or its counts differ from ``metadata.yaml``.
     """
     told = incompleteness(path)
     try:
@@ -240,16 +240,16 @@ def _scan(path: Path, incomplete: str) -> Session:
 
 
 def read(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE) -> Iterator[tuple[str, int, Any]]:
-    """The messages of some topics by log time.
+    """Return an iterator over the decoded messages of some topics, in the order of log times.
 
     Parameters
     ----------
     session : Session
-        From `scan`.
+        Result of `scan`.
     wanted : dict of str to str
         Message type by topic, with or without the leading slash.
     window : TimeWindow, optional
-        Only the messages in it.
+        Time window; messages outside it are left out.
 
     Returns
     -------
@@ -267,7 +267,7 @@ def read(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE
 
 
 def read_both(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE) -> Iterator[tuple[str, int, bytes, Any]]:
-    """As `read`, with the encoded message before the decoded one, which is None for a type that Jazzy does not have."""
+    """Return an iterator as `read` does, with the encoded message before the decoded one (None for a type unknown to Jazzy)."""
     return _one_by_one(read_blocks(session, wanted, window))
 
 
@@ -279,7 +279,7 @@ def _one_by_one(blocks: SessionBlocks) -> Iterator[tuple[str, int, bytes, Any]]:
 
 
 def read_blocks(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE) -> SessionBlocks:
-    """As `read`, many messages at a time, not decoded yet."""
+    """Return the messages that `read` gives as blocks of messages, not decoded yet."""
     asked: dict[str, str] = {}
     types: dict[str, str] = {}
     for name, type_name in wanted.items():
@@ -293,7 +293,7 @@ _AND = " and "
 
 
 def _topics(files: tuple[SessionFile, ...]) -> tuple[TopicInfo, ...]:
-    """The topics of all files together."""
+    """Return the topics of all files together, sorted by name."""
     counts: Counter[str] = Counter()
     types: dict[str, dict[str, None]] = {}
     for file in files:
@@ -304,7 +304,7 @@ def _topics(files: tuple[SessionFile, ...]) -> tuple[TopicInfo, ...]:
 
 
 def check_topic(session: Session, name: str, type_name: str) -> TopicInfo:
-    """The topic, if it is there, of that type and not empty."""
+    """Return the topic with this name. Raise BagError if it is missing, of another type or empty."""
     topic = session.find(name)
     if topic is None:
         names = [known.name for known in session.topics]

@@ -32,12 +32,12 @@ _REMEDY = "The file is damaged or was cut off: `rosbag reindex` or `rosbag fix` 
 
 @dataclass(frozen=True, slots=True)
 class Ros1File(SessionFile):
-    """What one .bag file holds; it has no checksums.
+    """Content of one .bag file, which has no checksums.
 
     Attributes
     ----------
     compression : str
-        Of its chunks.
+        Compression of its first chunk.
     """
 
     compression: str
@@ -52,7 +52,7 @@ class Ros1File(SessionFile):
         return "ROS 1", self.compression
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
-        """See `SessionFile`; by log time."""
+        """Yield messages as in `SessionFile`, in the order of log times."""
         convert = jazzy().ros1_to_cdr
         with _reader(self.path) as reader:
             for connection, time, data in reader.messages():
@@ -61,7 +61,7 @@ class Ros1File(SessionFile):
 
 
 def summarise(path: Path) -> Ros1File:
-    """Look at one file.
+    """Return the content of one file.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def summarise(path: Path) -> Ros1File:
 
 
 def _encoding(connection: Connection) -> str:
-    """CDR if the type is defined as in Jazzy, so that its messages can be converted."""
+    """Return `CDR` if the type is defined as in Jazzy, so that its messages can be converted; else `ENCODING`."""
     known = jazzy().fielddefs
     try:
         found = get_types_from_msg(str(connection.msgdef.data), connection.msgtype)
@@ -117,7 +117,7 @@ def _within(content: bytes) -> bytes:
 
 @contextmanager
 def _reader(path: Path) -> Iterator[Reader]:
-    """The open file, whose chunks unpack within limits; what is wrong with it becomes a BagError."""
+    """Open a file whose chunks unpack within limits. Errors of the file become a BagError."""
     bounded: dict[Callable[[bytes], bytes], Callable[[bytes], bytes]]
     bounded = {decompressors["bz2"]: _bz2, decompressors["lz4"]: _lz4}
     try:

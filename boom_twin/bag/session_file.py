@@ -24,7 +24,7 @@ CDR = "cdr"
 
 @dataclass(frozen=True, slots=True)
 class SessionFile(ABC):
-    """What one file holds.
+    """Content of one file of a session.
 
     Attributes
     ----------
@@ -32,11 +32,11 @@ class SessionFile(ABC):
     channels : dict of int to Channel
     schemas : dict of int to Schema
     counts : dict of int to int
-        Messages by channel.
+        Number of messages by channel.
     start, end : int
         First and last log time in nanoseconds; 0 without messages.
     checked : bool
-        Whether its messages are under a checksum and counted. If not, a flipped bit can pass without notice.
+        True if its messages are under a checksum and counted. If not, a flipped bit can pass undetected.
     notes : dict of str to str
     """
 
@@ -65,25 +65,25 @@ class SessionFile(ABC):
     @property
     @abstractmethod
     def storage(self) -> str:
-        """How it is stored: ``mcap``, ``sqlite3``, ``ros1`` or ``csv``."""
+        """Storage of the file: ``mcap``, ``sqlite3``, ``ros1`` or ``csv``."""
 
     @abstractmethod
     def written_by(self) -> tuple[str, str]:
-        """The program that wrote the file, in its own words, and the compression of its first chunk."""
+        """Return the program that wrote the file, by its own name, and the compression of its first chunk."""
 
     @abstractmethod
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
-        """Channel, log time (ns) and encoded data of all messages."""
+        """Yield channel, log time (ns) and encoded data of all messages."""
 
     def log_clock(self) -> LogClock:
-        """The clock of its recorder; here, of a storage that tells nothing but the order of log times."""
+        """Return the clock of the recorder. The default is for a storage whose only order is that of log times."""
         return NEVER_SET_BACK
 
     def blocks(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
-        """All messages but of the `passed` channels in the order of the node, many at a time; their sources are channels.
+        """Yield blocks of all messages, except of the `passed` channels, in the order in which the node took them.
 
-        That is by log time, or the order of the file where its `clock` was set back; log times are corrected for that.
-        Here `heads` must be in that order.
+        The sources of a block are channels. The order is that of log times, or that of the file if its `clock` was set
+        back; log times are then corrected. This default requires `heads` in that order.
         """
         found = (each for each in self.heads() if each[0] not in passed)
         while group := list(islice(found, TOGETHER)):
@@ -94,12 +94,12 @@ class SessionFile(ABC):
 
 
 def schema_of(number: int, type_name: str, definition: str = "") -> Schema:
-    """The schema of a message type; without a definition that of Jazzy, an empty one for a type that Jazzy lacks."""
+    """Return the schema of a message type. Without a definition it is that of Jazzy, empty for a type unknown to Jazzy."""
     if not definition and type_name in jazzy().types:
         definition, _ = jazzy().generate_msgdef(type_name, ros_version=2)
     return Schema(id=number, name=type_name, encoding="ros2msg", data=definition.encode())
 
 
 def channel_of(number: int, topic: str, encoding: str = CDR, metadata: Mapping[str, str] | None = None) -> Channel:
-    """A channel whose schema has its own number."""
+    """Return a channel whose schema has the number of the channel."""
     return Channel(id=number, topic=topic, message_encoding=encoding, schema_id=number, metadata=dict(metadata or {}))

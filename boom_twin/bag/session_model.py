@@ -26,16 +26,16 @@ LENGTHS_SINCE = 0, 2  # version from which the virtual rig's transducers read le
 
 @dataclass(frozen=True)
 class SessionScene:
-    """A scene, the text that describes it, and where that was taken from.
+    """A scene, its text, and the source of the text.
 
     Attributes
     ----------
     scene : Scene
     text : str
     source : str
-        A path, a place in a ``session.yaml``, or `DEFAULT_NAME`.
+        Path, place in a ``session.yaml``, or `DEFAULT_NAME`.
     oddities : tuple of Fault
-        What can be computed but looks odd.
+        Values that can be computed but are implausible.
     """
 
     scene: Scene
@@ -45,13 +45,13 @@ class SessionScene:
 
     @property
     def sha256(self) -> str:
-        """Of the text."""
+        """SHA-256 of the text."""
         return sha256(self.text)
 
 
 @dataclass(frozen=True)
 class SessionBaseline:
-    """A baseline, and where it was taken from."""
+    """A baseline and its source."""
 
     baseline: Baseline
     source: str
@@ -59,14 +59,14 @@ class SessionBaseline:
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """Topics and sensors, and where they were read from."""
+    """Topics and sensors, and their source."""
 
     topics: Topics
     source: str
 
 
 def scene_from(source: str | Path | None) -> SessionScene:
-    """The scene of a file; the package's own if there is none.
+    """Return the scene of a file, or that of the package if no file is given.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def scene_from(source: str | Path | None) -> SessionScene:
 
 
 def scene_of(session: Path, given: str | Path | None = None) -> SessionScene:
-    """The scene of a session: that of the file `given`; else that in its ``session.yaml``; else the package's own.
+    """Return the scene of a session: from the file `given`, else from its ``session.yaml``, else from the package.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def scene_of(session: Path, given: str | Path | None = None) -> SessionScene:
 
 
 def _changed(session: Path, own: KeptText) -> list[Fault]:
-    """That the text is not the one that was recorded."""
+    """Return a fault if the text is not the one that was recorded."""
     digest = _recorded_sha256(session)
     if digest is None or digest == sha256(own.text):
         return []
@@ -110,13 +110,13 @@ def _changed(session: Path, own: KeptText) -> list[Fault]:
 
 
 def _recorded_sha256(session: Path) -> str | None:
-    """That of the scene's text as it was when the session was made."""
+    """Return the SHA-256 of the scene's text at the time of the session; None if it was not kept."""
     digest = kept(session, "scene_sha256", "--scene")
     return None if digest is None else digest.text
 
 
 def baseline_of(session: Path, given: Path | None = None) -> SessionBaseline:
-    """What is known of a session's rig while all is well, found as its scene is by `scene_of`.
+    """Return the baseline (healthy state) of a session's rig, from the same sources as the scene in `scene_of`.
 
     Raises
     ------
@@ -136,23 +136,23 @@ def baseline_of(session: Path, given: Path | None = None) -> SessionBaseline:
 
 @dataclass(frozen=True, slots=True)
 class SessionSettings:
-    """Numbers of the twin, and where they were taken from."""
+    """Settings of the twin and their source."""
 
     settings: Settings
     source: str
 
     @property
     def others(self) -> dict[str, float]:
-        """Those that are not the package's own."""
+        """Settings that differ from the defaults of the package."""
         usual = Settings().model_dump()
         return {name: value for name, value in self.settings.model_dump().items() if value != usual[name]}
 
 
 def settings_of(session: Path, given: Path | None = None, namespace: str = "") -> SessionSettings:
-    """Return the numbers of a session's twin.
+    """Return the settings of a session's twin.
 
-    Those of the parameter file `given` for the node in `namespace`; else of the node that ran beside the recording; else the
-    package's own.
+    The source is the parameter file `given` for the node in `namespace`, else the node that ran beside the recording, else
+    the defaults of the package.
 
     Raises
     ------
@@ -172,21 +172,21 @@ def settings_of(session: Path, given: Path | None = None, namespace: str = "") -
 
 
 def mapping_of(session: Path, given: Path | None = None, joints: int | None = None, namespace: str = "") -> Mapped:
-    """The mapping of a session, found as its scene is by `scene_of`.
+    """Return the mapping of a session, from the same sources as the scene in `scene_of`.
 
     Parameters
     ----------
     session : Path
     given : Path, optional
     joints : int, optional
-        As for `boom_twin.messages.mapping.load_mapping`.
+        Number of joints, see `boom_twin.messages.mapping.load_mapping`.
     namespace : str
-        In which the node was: names without a leading slash are those of this namespace.
+        Namespace of the node, to which names without a leading slash are relative.
 
     Returns
     -------
     Mapped
-        The mapping, and where it is from.
+        The mapping and its source.
 
     Raises
     ------
@@ -208,17 +208,17 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
 
 @dataclass(frozen=True, slots=True)
 class SessionStrokes:
-    """What the stroke transducers of a session read, and what says so."""
+    """Quantity that the stroke transducers of a session read, and the source of this."""
 
     reading: StrokeReading
     source: str
 
 
 def strokes_of(session: Path | None, mapped: Mapped) -> SessionStrokes:
-    """Return what the stroke transducers of a session read, or of a running rig if that is None.
+    """Return the quantity that the stroke transducers of a session read; `session` is None for a running rig.
 
-    The mapping's ``reads`` is taken first, then ``strokes`` of ``session.yaml``. Who says nothing has lengths, but the virtual
-    rig gave drives before version 0.2.
+    The mapping's ``reads`` is taken first, then ``strokes`` of ``session.yaml``. The default is lengths; for the virtual rig
+    before version 0.2 it is drives.
 
     Raises
     ------

@@ -27,25 +27,25 @@ _HEAD = "# What this session was made with. scene_sha256 is of the text under sc
 
 @dataclass(frozen=True, slots=True)
 class SessionSheet:
-    """What a session was made with. What is None or empty is left out of the file.
+    """Metadata of a session: version, scene, settings and mapping. A field that is None or empty is left out of the file.
 
     Attributes
     ----------
     version : str
-        Of this package.
+        Version of this package.
     scene, baseline, parameters, mapping : str or None
-        Text of the scene file, of what is known of the rig while all is well, of the ROS parameter file, and of the file that
+        Text of the scene file, of the baseline (healthy state of the rig), of the ROS parameter file, and of the file that
         names topics and sensors.
     topics : dict of str to str or None
-        Type by topic that is to be recorded; None where it was not known at the start.
+        Type by topic to be recorded; None for a type unknown at the start.
     note, origin : str or None
-        Of the operator.
+        Note of the operator, and origin of the session.
     strokes : StrokeReading or None
-        What the stroke transducers read, where whoever makes the session knows it.
+        Quantity that the stroke transducers read; None if unknown.
     twin : dict of str to object
-        The parameters of the running twin; empty as long as there is none.
+        Parameters of the running twin; empty without a twin.
     started : datetime or None
-        None where nothing was recorded: a synthetic session.
+        Start of the recording; None for a synthetic session.
     """
 
     version: str
@@ -99,27 +99,27 @@ class SessionSheet:
 
 @dataclass(frozen=True, slots=True)
 class KeptText:
-    """A text of a ``session.yaml``, and its place in words."""
+    """A text of a ``session.yaml``, and a description of its place."""
 
     text: str
     source: str
 
 
 def sheet_path(session: Path) -> Path:
-    """Where the ``session.yaml`` of a session is, if it has one: in its directory, or beside its single file."""
+    """Return the path of the ``session.yaml`` of a session: in its directory, or beside its single file."""
     return (session if session.is_dir() else session.parent) / FILE_NAME
 
 
 def kept(session: Path, key: str, option: str) -> KeptText | None:
-    """The text that a session keeps under `key`; None if it keeps none. Whoever made the session chose it: trust nothing in it.
+    """Return the text that a session keeps under `key`; None without one. The text is untrusted input.
 
     Parameters
     ----------
     session : Path
     key : str
-        Of ``session.yaml``: scene, baseline, parameters, mapping.
+        Key of ``session.yaml``: scene, baseline, parameters, mapping, ..
     option : str
-        By which a user gives something else.
+        Option by which a user gives another text, for the error message.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def kept(session: Path, key: str, option: str) -> KeptText | None:
 
 
 def kept_parameters(session: Path) -> tuple[dict[str, Any], str]:
-    """The parameters of the twin that ran beside a recording, and their place in words; none where none ran.
+    """Return the parameters of the twin that ran beside a recording, and a description of their place; empty without a twin.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def kept_parameters(session: Path) -> tuple[dict[str, Any], str]:
 
 
 def missed_messages(session: Path) -> dict[str, int]:
-    """By topic, how many messages never reached the recorder of a session, as it counted at its end; those above 0."""
+    """Return the number of messages that never reached the recorder, by topic, as counted at its end; only those above 0."""
     try:
         counts = _value(sheet_path(session), "counts", "")
     except BagError:
@@ -160,7 +160,7 @@ def missed_messages(session: Path) -> dict[str, int]:
 
 
 def _value(path: Path, key: str, remedy: str) -> Any:
-    """What a ``session.yaml`` has under `key`; None where there is none."""
+    """Return the value of a ``session.yaml`` under `key`; None without file or key."""
     if not holds_file(path):
         return None
     document = read_plain(path, BagError, remedy, received=True)
@@ -170,7 +170,7 @@ def _value(path: Path, key: str, remedy: str) -> Any:
 
 
 def kept_origin(session: Path) -> dict[str, str]:
-    """The note ``origin`` of a ``session.yaml``, for storages that keep no notes; empty where none can be read."""
+    """Return the note ``origin`` of a ``session.yaml``, for storages without notes; empty if it cannot be read."""
     try:
         found = kept(session, "origin", "--scene")
     except BagError:
@@ -179,18 +179,18 @@ def kept_origin(session: Path) -> dict[str, str]:
 
 
 def rig_version(session: Path) -> str:
-    """Return the version of this package whose virtual rig made a session; empty if another made it, or that is not known."""
+    """Return the version of this package whose virtual rig made a session; empty for another or unknown origin."""
     path = sheet_path(session)
     return str(_value(path, "boom_twin", "")) if _value(path, "origin", "") == RIG_ORIGIN else ""
 
 
 def sha256(text: str) -> str:
-    """Digest of a text in UTF-8."""
+    """Return the SHA-256 of a text in UTF-8, as hexadecimal digits."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _block(text: str | None) -> str | None:
-    """A text to be written line by line, if YAML gives it again so; quoted if not."""
+    """Return a text as a YAML literal block if YAML reads it back unchanged, else as a quoted string."""
     if not text:
         return None
     block: str = LiteralScalarString(text)
@@ -212,12 +212,12 @@ _BEGUN, _ENDED = (re.compile(rb"^%b:" % key, re.MULTILINE) for key in (b"started
 
 
 def incompleteness(path: Path) -> str:
-    """Why a session or a result is incomplete, in words; empty if its folder does not say that it is.
+    """Return the reason why a session or a result is incomplete; empty if its folder does not mark it as incomplete.
 
     Parameters
     ----------
     path : Path
-        Of the folder or of a file in it; also ``bag`` in the folder of a replay, and ``A/bag`` in that of a comparison.
+        Folder or a file in it; also ``bag`` in the folder of a replay, and ``A/bag`` in that of a comparison.
     """
     folder = path if path.is_dir() else path.parent
     for place in (folder, *folder.resolve().parents[:2]):

@@ -30,12 +30,12 @@ _REMEDY = "The file is damaged or no rosbag2 storage: try `sqlite3 FILE .recover
 
 @dataclass(frozen=True, slots=True)
 class SqliteFile(SessionFile):
-    """What one .db3 file holds; it has no checksums.
+    """Content of one .db3 file, which has no checksums.
 
     Attributes
     ----------
     distro : str
-        Of ROS, where the file tells it.
+        ROS distribution; empty if the file does not name it.
     """
 
     distro: str
@@ -50,9 +50,10 @@ class SqliteFile(SessionFile):
         return f"rosbag2_storage_sqlite3{f' ({self.distro})' if self.distro else ''}", "none"
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
-        """See `SessionFile`; in the order of `blocks`.
+        """Yield messages as in `SessionFile`, in the order of `blocks`.
 
-        No more bytes than the file has are read of it: columns with a default, or generated, can give any number.
+        Raise BagError if the messages have more bytes than the file: columns with a default, or generated, can give any
+        number of bytes.
         """
         left, clock, newest = self.path.stat().st_size, self.log_clock(), 0
         with _database(self.path) as database:
@@ -80,12 +81,12 @@ class SqliteFile(SessionFile):
 
 
 def summarise(path: Path) -> SqliteFile:
-    """Look at one file.
+    """Return the content of one file.
 
     Raises
     ------
     BagError
-        It is not there, damaged, not closed by its recorder, or no storage of rosbag2.
+        The file is missing, damaged, not closed by its recorder, or no storage of rosbag2.
     """
     with _database(path) as database:
         tables = {str(name) for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
@@ -119,7 +120,7 @@ def _topic(path: Path, row: tuple[Any, ...]) -> tuple[int, str, str, str]:
 
 
 def _definitions(database: sqlite3.Connection) -> dict[str, str]:
-    """The definitions of messages by type, as far as they are in the language that is read."""
+    """Return the definitions of messages by type, for those in the language ``ros2msg``."""
     rows = database.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
     return {str(kind): str(text) for kind, encoding, text in rows if encoding == "ros2msg"}
 
@@ -131,7 +132,7 @@ def _distro(database: sqlite3.Connection) -> str:
 
 @contextmanager
 def _database(path: Path) -> Iterator[sqlite3.Connection]:
-    """The database in a file; what is wrong with it becomes a BagError."""
+    """Open the database in a file. Errors of the file become a BagError."""
     try:
         with open_received(path) as file:
             if (start := file.read(len(MAGIC))) != MAGIC:

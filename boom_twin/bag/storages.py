@@ -19,19 +19,19 @@ SUMMARISE: dict[str, Callable[[Path], SessionFile]] = {
 
 
 def summarise(path: Path) -> SessionFile:
-    """What one file holds; one whose name ends otherwise is taken for an .mcap.
+    """Return the content of one file. A file with an unknown suffix is read as .mcap.
 
     Raises
     ------
     BagError
-        It is not there, of another kind, cut off or damaged.
+        The file is missing, of another kind, cut off or damaged.
     """
     refuse_packed(path)
     return SUMMARISE.get(path.suffix.lower(), SUMMARISE[".mcap"])(path)
 
 
 def is_session(path: Path) -> bool:
-    """Whether there is a session at `path`, by the names of its files alone."""
+    """Return True if the names of the files at `path` are those of a session."""
     if path.is_dir():
         return any(file.suffix in STORAGES for file in path.iterdir())
     return path.suffix.lower() in SUMMARISE

@@ -29,12 +29,12 @@ from .metadata import Recorded, file_information, metadata_of
 
 
 def claim_directory(directory: Path) -> None:
-    """Make the directory; refuse one that holds anything but the mark of a result that is being built.
+    """Make the directory. Refuse one that holds anything except the mark of a result that is being built.
 
     Raises
     ------
     BagError
-        It is not empty, or cannot be made.
+        The directory is not empty, or cannot be made.
     """
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -59,9 +59,9 @@ METADATA_PAUSE = 10.0
 
 
 class BagWriter:
-    """Writes a bag; `close` completes it, `abandon` leaves it as it is.
+    """Writer of a bag; `close` completes it, `abandon` leaves it as it is.
 
-    Every method raises BagError if the disk is full or fails; then only `abandon` is left to do.
+    Every method raises BagError if the disk is full or fails. After that, call only `abandon`.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class BagWriter:
     compression : CompressionType, optional
         Of the chunks.
     distro : str, optional
-        Of ROS.
+        ROS distribution named in the metadata.
     chunk_size : int, optional
         Bytes of a chunk, before it is compressed.
 
@@ -107,23 +107,23 @@ class BagWriter:
 
     @property
     def has_messages(self) -> bool:
-        """Whether anything was written to the open file."""
+        """Return True if a message was written to the open file."""
         return self._span is not None
 
     @property
     def file(self) -> Path:
-        """The file that is being written."""
+        """Path of the open file."""
         return self.directory / file_name(len(self._files))
 
     def add(self, *topics: Recorded) -> list[int]:
-        """Register topics; gives the keys that `write` takes."""
+        """Register topics and return their keys for `write`."""
         first = len(self.topics)
         self.topics += topics
         self._register(list(topics))
         return list(range(first, len(self.topics)))
 
     def write(self, key: int, log_time: int, data: bytes, publish_time: int | None = None, sequence: int = 0) -> None:
-        """Append one encoded message of at most `LARGEST_MESSAGE`; times in ns, the publish time by default the log time."""
+        """Append one encoded message of at most `LARGEST_MESSAGE` bytes. Times are in ns; publish time defaults to log time."""
         self.counts[key] += 1
         self._extend_span(log_time, log_time, 1)
         published = log_time if publish_time is None else publish_time
@@ -133,7 +133,7 @@ class BagWriter:
             raise self.fault(error) from error
 
     def write_block(self, keys: Integers, block: EncodedBlock) -> None:
-        """Append many messages to the topics with these keys, numbered; the same bytes as by `write` of each of them."""
+        """Append many messages, numbered, to the topics with these keys. The bytes are those of `write` for each message."""
         if not len(keys):
             return
         sequences = np.empty_like(keys)
@@ -146,14 +146,14 @@ class BagWriter:
             self._writer.add_block(np.array(self._channels)[keys], sequences, block)
 
     def _extend_span(self, start: int, end: int, count: int) -> None:
-        """So many messages more, between these log times (ns)."""
+        """Add `count` messages between these log times (ns) to the span of the open file."""
         first, last, before = self._span or (start, end, 0)
         self._span = min(first, start), max(last, end), before + count
 
     def flush(self) -> int:
-        """Give all messages so far to the system, so that they survive the process; gives the descriptor of the open file.
+        """Give all messages so far to the operating system and return the descriptor of the open file.
 
-        They survive the loss of power once ``os.fsync`` has put that file on the disk.
+        The messages then survive this process. They survive a loss of power after ``os.fsync`` of that descriptor.
         """
         with self._as_bag_error():
             self._writer.flush()
@@ -161,26 +161,26 @@ class BagWriter:
 
     @property
     def completed(self) -> int:
-        """Files that are complete."""
+        """Number of complete files."""
         return len(self._files)
 
     @property
     def size(self) -> int:
-        """Bytes of the open file on the disk, without what is in memory."""
+        """Size of the open file on the disk, bytes, without data in memory."""
         return 0 if self._raw.closed else self._raw.tell()
 
     @property
     def written(self) -> int:
-        """Bytes of all files on the disk."""
+        """Size of all files on the disk, bytes."""
         return self._completed + self.size
 
     @property
     def first(self) -> int | None:
-        """The first log time (ns) of the open file; None without messages."""
+        """First log time (ns) of the open file; None without messages."""
         return self._span[0] if self._span else None
 
     def split(self) -> None:
-        """Complete the open file, tell of it in ``metadata.yaml`` unless that takes too long by now, and begin the next one."""
+        """Complete the open file and begin the next one. Update ``metadata.yaml`` unless its last update was too recent."""
         with self._as_bag_error():
             self._finish()
             if (began := time.monotonic()) >= self._due:
@@ -195,7 +195,7 @@ class BagWriter:
             self._write_metadata()
 
     def abandon(self) -> None:
-        """Let go of the open file; what waits in memory is given up."""
+        """Close the open file without its end; data in memory are lost."""
         with suppress(OSError):
             self._raw.close()
 
@@ -210,7 +210,7 @@ class BagWriter:
             self._register(self.topics)
 
     def _register(self, topics: list[Recorded]) -> None:
-        """All new schemas, then the channels, in the open file."""
+        """Write all new schemas, then the channels, into the open file."""
         for each in topics:
             schema = each.type, each.definition_encoding, each.definition
             if schema not in self._schemas:
@@ -240,12 +240,12 @@ class BagWriter:
             raise self.fault(error) from error
 
     def fault(self, error: OSError) -> BagError:
-        """What is told of a disk that is full or fails."""
+        """Return the error for a disk that is full or fails."""
         return BagError(f"{self.file}: cannot be written ({error.strerror}). Make room or choose another disk.")
 
 
 def file_name(number: int) -> str:
-    """Of the .mcap file with that number, from 0."""
+    """Return the name of the .mcap file with this number, which counts from 0."""
     return f"session_{number}.mcap"
 
 
@@ -253,25 +253,25 @@ FILE_NAME = file_name(0)
 
 
 def recorded(topic: Topic) -> Recorded:
-    """How a topic of ``topics.yaml`` stands in a bag."""
+    """Return a topic of ``topics.yaml`` as it is recorded in a bag."""
     definition, _ = jazzy().generate_msgdef(topic.type, ros_version=2)
     return Recorded.offered(topic.absolute, topic.type, definition, topic.qos, jazzy().hash_rihs01(topic.type))
 
 
 class SessionWriter:
-    """Writes a session of one file; use it as a context.
+    """Context manager that writes a session of one file.
 
-    Leaving the context completes the bag. After an exception it stays without its end, so that nobody takes it for whole;
-    `boom_twin.bag.recovery.recover` saves what was written.
+    Leaving the context completes the bag. After an exception the file keeps no end, so that it is not taken for whole;
+    `boom_twin.bag.recovery.recover` saves its messages.
 
     Parameters
     ----------
     directory : Path
         Made if it is not there.
     topics : dict of str to Topic
-        By any key; `write` takes that key. Names are made absolute.
+        Topics by any key, which `write` takes. Names are made absolute.
     notes : dict of str to str, optional
-        Kept in the file and in ``custom_data``; for instance that the session is synthetic, and of what origin.
+        Kept in the file and in ``custom_data``; for instance that the session is synthetic, and its origin.
     compression : CompressionType, optional
         Of the chunks.
     chunk_size : int, optional
@@ -301,12 +301,12 @@ class SessionWriter:
         self.write_encoded(key, stamp_ns, bytes(self._encode(msg, self._topics[key].type)))
 
     def write_encoded(self, key: str, stamp_ns: int, data: bytes) -> None:
-        """Append a message that is CDR already."""
+        """Append a message that is encoded as CDR."""
         number = self._keys[key]
         self._bag.write(number, stamp_ns, data, sequence=self._bag.counts[number] + 1)
 
     def write_block(self, block: EncodedBlock) -> None:
-        """Append many messages by the keys of their topics; the same bytes as of `write_encoded` for each of them."""
+        """Append many messages by the keys of their topics. The bytes are those of `write_encoded` for each message."""
         keys = np.empty(len(block.log_times), np.int64)
         for rows in block.rows:
             keys[rows.places] = self._keys[rows.key]

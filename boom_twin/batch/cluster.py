@@ -29,7 +29,7 @@ CONNECT = 20.0
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """What does sessions: `work` gives the row of one, `capacity` the number of those that may run at once."""
+    """Workers of a batch: `work` returns the row of one session, `capacity` the number of sessions that may run at once."""
 
     work: Callable[[SessionTask], Row]
     capacity: Callable[[], int]
@@ -38,14 +38,14 @@ class Workers:
 
 @contextmanager
 def connected(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
-    """Give the workers of the scheduler at an address, or those of this process, which opens no port.
+    """Yield the workers of the scheduler at an address, or those of this process, which opens no port.
 
     Parameters
     ----------
     scheduler : str, optional
-        Address, as ``tcp://host:8786``.
+        Address, such as ``tcp://host:8786``.
     workers : int, optional
-        Sessions at once on this machine; by default as many as it has cores.
+        Number of sessions at once on this machine; by default its number of cores.
 
     Raises
     ------
@@ -72,10 +72,10 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
 
 
 def on_dask(client: Client, work: Callable[[SessionTask], Row]) -> Workers:
-    """Return workers that have `work` done by those of a Dask cluster.
+    """Return workers that pass `work` to those of a Dask cluster.
 
-    A task whose workers end (killed, out of memory, a machine that is lost) goes to others. When Dask gives it up, that counts
-    as one of its attempts.
+    A task whose worker ends (killed, out of memory, a lost machine) goes to another worker. When Dask gives the task up, that
+    counts as one of its attempts.
     """
     from distributed import KilledWorker
 
@@ -96,10 +96,10 @@ def on_dask(client: Client, work: Callable[[SessionTask], Row]) -> Workers:
 
 
 def rows_of(workers: Workers, tasks: Sequence[SessionTask]) -> Iterator[Row]:
-    """Yield the rows of all tasks as they are done; what fails costs its own row only.
+    """Yield the rows of all tasks as they finish. A failed task does not affect other rows.
 
-    No more tasks are with a scheduler than its workers have threads: when a worker ends, Dask counts that against every task
-    that waits there, not only against the one that it had at work. Workers that come later are used, too.
+    A scheduler gets no more tasks than its workers have threads: when a worker ends, Dask counts that against every task
+    that waits there, not only against the running one. Workers that join later are used, too.
     """
     waiting, rows, threads = deque(tasks), SimpleQueue[Row](), list[Thread]()
 

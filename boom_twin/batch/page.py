@@ -34,7 +34,7 @@ table.sorted th { cursor: pointer } tr.failed td { background: #fff0e6 }
 </style>"""
 
 _TRENDS = ("residual_rms_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
-"""What figures begin with whose course over time is shown."""
+"""First part of the names of figures that are drawn over time."""
 _MOST_TRENDS = 24
 _WIDTH, _HEIGHT, _EDGE = 1000.0, 150.0, 14.0
 _SCALE, _DATES = 90.0, 24.0
@@ -43,7 +43,7 @@ _MINUTE = 60.0  # s; sessions that are nearer are drawn as near as they are
 
 
 def write_page(path: Path, rows: Sequence[Row]) -> None:
-    """Write the page beside the folder of the replays; it asks for nothing from elsewhere."""
+    """Write the page beside the folder of the replays. The page loads nothing from other files."""
     right, wrong = counts(rows)
     alarmed = sum(bool(row.get("alarms")) for row in rows)
     parts = [
@@ -101,7 +101,7 @@ def _time(stamp: int | None) -> str | None:
 
 
 def _trends(rows: Sequence[Row]) -> Iterable[str]:
-    """For every rig with several sessions, the figures that tell of wear, over time."""
+    """Yield drawings of wear-related figures over time, for every rig with several sessions."""
     rigs: dict[str, list[Row]] = {}
     for row in rows:
         if row["status"] == OK:
@@ -117,7 +117,7 @@ def _trends(rows: Sequence[Row]) -> Iterable[str]:
 
 
 def _trend(name: str, rows: Sequence[Row]) -> str:
-    """One figure over time, as a drawing; nothing for fewer than two values."""
+    """Return a drawing of one figure over time; empty for fewer than two values."""
     found = [
         (row["first_stamp_ns"] / SECOND, row[name], row.get(f"{name}_sigma") or 0.0) for row in rows if _is_number(row, name)
     ]
@@ -149,7 +149,7 @@ def _trend(name: str, rows: Sequence[Row]) -> str:
 
 
 def _axes(place: Callable[[float, float], tuple[float, float]], times: tuple[float, float], values: tuple[float, float]) -> str:
-    """Lines at the ends and the middle of what is shown, with their numbers; times (s) of the first and the last."""
+    """Return lines with their values at the ends and the middle of the range, and the first and last time (s)."""
     (low, high), marks = values, ""
     for value in (low, 0.5 * (low + high), high):
         (left, y), (right, _) = place(times[0], value), place(times[1], value)
@@ -163,7 +163,7 @@ def _axes(place: Callable[[float, float], tuple[float, float]], times: tuple[flo
 
 
 def _unit(name: str) -> str:
-    """Of a residual: that of its sensor; empty for what is a ratio."""
+    """Return the unit of a residual, which is that of its sensor; empty for other figures."""
     channel = name.removeprefix("residual_rms_")
     return "" if channel == name else next(iter(sensor_kind(channel).units))
 

@@ -29,14 +29,14 @@ _OWN = frozenset({MARK, TABLE, PAGE, ROWS, SESSIONS})
 
 @contextmanager
 def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
-    """The folder of a batch, made or gone on with, and locked: one batch at a time works in it.
+    """Make or reopen the folder of a batch and lock it against other batches.
 
     Parameters
     ----------
     out : Path
-        Not there, empty, or of an earlier batch.
+        Folder that is missing, empty, or of an earlier batch.
     sessions : sequence of Path
-        Those that are read: none may lie in `out`, nor `out` in one of them.
+        Sessions to be read. None may lie in `out`, nor `out` in one of them.
 
     Raises
     ------
@@ -75,22 +75,22 @@ def _lock(lock: int, out: Path) -> None:
 
 
 class BatchFolder:
-    """What is kept of a batch; see `batch_folder`."""
+    """Rows and replays of a batch in its folder; see `batch_folder`."""
 
     def __init__(self, folder: Path, lock: int) -> None:
         self.folder, self._lock = folder, lock
 
     def replay(self, key: str) -> Path:
-        """Where the replay of a session is."""
+        """Return the folder of the replay of a session."""
         return self.folder / SESSIONS / key
 
     def kept(self, key: str, fingerprint: str) -> Row | None:
-        """Return the row of a session if it is finished and the same was asked for; None otherwise.
+        """Return the row of a session if it is finished and its `fingerprint` is equal; None otherwise.
 
         Raises
         ------
         BagError
-            Its file is not as `keep` wrote it.
+            The file was changed since `keep` wrote it.
         """
         file = self.folder / ROWS / f"{key}.json"
         try:
@@ -104,11 +104,11 @@ class BatchFolder:
         return dict(row) if row["fingerprint"] == fingerprint else None
 
     def keep(self, row: Row) -> None:
-        """Write a finished row."""
+        """Write a finished row to its file."""
         write_atomic(self.folder / ROWS / f"{row['key']}.json", json.dumps(row | {DIGEST: _digest(row)}) + "\n")
 
     def mark(self, total: int, finished: int) -> None:
-        """Say how far the batch is."""
+        """Write the number of finished sessions and the state of the batch."""
         state = "complete" if finished == total else "unfinished: the same command goes on with it"
         told = {"command": "batch", "version": __version__, "sessions": total, "finished": finished, "state": state}
         os.truncate(self._lock, 0)
@@ -132,7 +132,7 @@ _ALWAYS: dict[str, str] = {
 
 
 def write_table(path: Path, rows: Sequence[Row]) -> None:
-    """Write all rows as Parquet, one a session: columns that a row lacks are null there."""
+    """Write all rows as Parquet, one for each session. A column that a row lacks is null there."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -154,6 +154,6 @@ def write_table(path: Path, rows: Sequence[Row]) -> None:
 
 
 def counts(rows: Sequence[Row]) -> tuple[int, int]:
-    """Rows that are right, and that failed."""
+    """Return the number of rows with a result and of failed rows."""
     right = sum(row["status"] == OK for row in rows)
     return right, len(rows) - right

@@ -28,30 +28,30 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class SessionTask:
-    """What is to be done with one session.
+    """Task of replaying one session.
 
     Attributes
     ----------
     key : str
-        Of its row.
+        Key of its row.
     session : str
-        Path.
+        Path of the session.
     out : str
         Folder of its replay.
     fingerprint : str
-        See `boom_twin.batch.sources.fingerprint`.
+        Digest, see `boom_twin.batch.sources.fingerprint`.
     scene, params, mapping, baseline : str or None
-        As for ``boom_twin replay``.
+        Paths as for ``boom_twin replay``.
     report, keep_bag : bool
-        Whether to write the report with its pictures, and to keep the replay's bag.
+        True to write the report with its pictures, and to keep the replay's bag.
     time, memory : float, int
-        Limits: seconds, and bytes of resident memory.
+        Limits in seconds and in bytes of resident memory.
     retries : int
-        How often a session that fails is tried again.
+        Number of further attempts if the session fails.
     start, duration : float, float or None
-        The window of the session, see `boom_twin.bag.time_window.TimeWindow`.
+        Window of the session, s, see `boom_twin.bag.time_window.TimeWindow`.
     calibrate : bool
-        Whether to estimate the scene's parameters from it as well, which takes it to be healthy.
+        True to estimate the scene's parameters from the session as well. That assumes a healthy rig.
     """
 
     key: str
@@ -73,7 +73,7 @@ class SessionTask:
 
 
 def run_task(task: SessionTask) -> Row:
-    """The row of a session, which is replayed in a process of its own; why, if it failed. The task of a Dask worker."""
+    """Replay a session in a process of its own and return its row, with the reason if it failed. Dask workers call this."""
     line = json.dumps(asdict(task)).encode() + b"\n"
     for attempt in range(1, task.retries + 2):
         found = run_supervised(python_command(__name__), line, Limits(task.time, task.memory))
@@ -84,7 +84,7 @@ def run_task(task: SessionTask) -> Row:
 
 
 def failed(task: SessionTask, reason: str, attempts: int) -> Row:
-    """The row of a session that gave no result."""
+    """Return the row of a session without a result."""
     return {**_head(task), "status": FAILED, "reason": reason, "attempts": attempts}
 
 
@@ -99,12 +99,12 @@ def _head(task: SessionTask) -> Row:
 
 
 def row_of(task: SessionTask) -> Row:
-    """Replay a session, and tell what came out.
+    """Replay a session and return its row.
 
     Raises
     ------
     BoomTwinError
-        As `boom_twin.offline.replay.replay`.
+        The replay fails, see `boom_twin.offline.replay.replay`.
     """
     from ..bag.reader import files_sha256
     from ..bag.session_model import scene_of, settings_of
@@ -150,7 +150,7 @@ def row_of(task: SessionTask) -> Row:
 
 
 def _calibrated(task: SessionTask, scene: Scene, settings: Settings, window: TimeWindow) -> Row:
-    """What `boom_twin.calibration.run.calibrate` makes of a session alone; why, if it makes nothing of it."""
+    """Return the parameters that `boom_twin.calibration.run.calibrate` estimates from one session, or the reason for none."""
     from ..calibration.run import BETWEEN, calibrate
 
     try:
@@ -169,7 +169,7 @@ ALARM = ("channel", "kind", "from_s", "to_s", "cause", "told")
 
 
 def main() -> int:
-    """Do the task that comes on stdin, and tell the row on stdout; exit code 1 with the reason on stderr if that fails."""
+    """Do the task given on stdin and print its row. If it fails, print the reason to stderr and return exit code 1."""
     task = SessionTask(**json.loads(sys.stdin.readline()))
     end_with_caller()
     try:

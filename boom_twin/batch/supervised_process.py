@@ -21,7 +21,7 @@ MOST_TOLD = 2000
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What a process, with all its children, may take: seconds, and bytes of resident memory."""
+    """Limits of a process with all its children: `time` in seconds, `memory` in bytes of resident memory."""
 
     time: float
     memory: int
@@ -29,16 +29,16 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a process.
+    """Result of a supervised process.
 
     Attributes
     ----------
     output : bytes
-        Of its stdout; whole only without a reason.
+        Content of its stdout; whole only if `reason` is empty.
     reason : str
-        Why it failed, one line; empty if it ended with 0.
+        Reason of the failure in one line; empty if it ended with code 0.
     peak : int
-        Largest resident memory that was seen, bytes: pages that its processes share are counted in each.
+        Largest observed resident memory, bytes. Pages that its processes share are counted in each.
     """
 
     output: bytes
@@ -47,15 +47,16 @@ class Outcome:
 
 
 def run_supervised(command: Sequence[str], task: bytes, limits: Limits) -> Outcome:
-    """Run `command` with one line on stdin, which then stays open: its end tells a process that its caller has gone.
+    """Run `command` with one line on stdin and return its result.
 
-    The process leads a group of its own, and all of the group is ended with it.
+    Stdin stays open: its end shows the process that its caller has ended. The process leads a group of its own, and all of
+    the group is ended with it.
 
     Parameters
     ----------
     command : sequence of str
     task : bytes
-        The line, with its end.
+        The line for stdin, with its line end.
     limits : Limits
     """
     with TemporaryFile() as out, TemporaryFile() as told:
@@ -81,7 +82,7 @@ def run_supervised(command: Sequence[str], task: bytes, limits: Limits) -> Outco
 
 
 def _watch(process: subprocess.Popen[bytes], limits: Limits) -> tuple[str, int]:
-    """Wait for the end; why it must be ended before, and the largest memory seen."""
+    """Wait for the end of a process. Return the limit that it passed (empty if none) and its largest observed memory, bytes."""
     end, peak = time.monotonic() + limits.time, 0
     while True:
         with suppress(subprocess.TimeoutExpired):
@@ -95,7 +96,7 @@ def _watch(process: subprocess.Popen[bytes], limits: Limits) -> tuple[str, int]:
 
 
 def _memory(pid: int) -> int:
-    """Resident memory of a process and all its children, bytes."""
+    """Return the resident memory of a process and all its children, bytes."""
     import psutil
 
     total = 0
@@ -117,7 +118,7 @@ def _cause(code: int) -> str:
 
 
 def end_with_caller() -> None:
-    """Called by the process, once it has read its line: from now on it ends, with its group, when its caller does."""
+    """End this process and its group when its caller ends. Call it after the line on stdin is read."""
     Thread(target=_wait_for_end, name="caller", daemon=True).start()
 
 

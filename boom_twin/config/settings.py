@@ -68,7 +68,7 @@ def _pattern(name: str) -> str:
 
 
 def _dotted(values: Any, block: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield names and values; blocks inside become parts of the names: ``a.b``."""
+    """Yield names and values. Names of inner blocks become parts of the names: ``a.b``."""
     for key, value in values.items():
         if isinstance(value, dict):
             yield from _dotted(value, f"{block}{key}.")
@@ -77,7 +77,7 @@ def _dotted(values: Any, block: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def checked(table: type[Table], values: dict[str, Any], source: str, others: Iterable[str] = ()) -> Table:
-    """A table with these values; UsageError names every value that is out of bounds, or unknown here and among `others`."""
+    """Return a table with these values. UsageError names every value out of bounds or unknown here and among `others`."""
     try:
         return table(**values)
     except ValidationError as error:
@@ -93,7 +93,7 @@ def checked(table: type[Table], values: dict[str, Any], source: str, others: Ite
 
 
 def nearest(name: str, known: Sequence[str]) -> str:
-    """The known name that is most like one that is not."""
+    """Return the known name that is most similar to an unknown one."""
     return get_close_matches(name, known, n=1, cutoff=0.0)[0]
 
 
@@ -102,7 +102,7 @@ Probability = Annotated[float, Field(gt=0, lt=1)]
 
 
 class Thresholds(BaseModel):
-    """What ``/diagnostics`` judges by; SI units. They can change at any time, and have no part in what is predicted."""
+    """Thresholds of ``/diagnostics``, in SI units. They can change at any time and do not affect the prediction."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -135,7 +135,7 @@ class Thresholds(BaseModel):
 
 
 def load_thresholds(path: Path, namespace: str = "") -> Thresholds:
-    """Return the thresholds of a ROS parameter file, see `read_parameters`; its other parameters are passed over."""
+    """Return the thresholds of a ROS parameter file, see `read_parameters`. Its other parameters are ignored."""
     values = read_parameters(path, namespace)
     return checked(Thresholds, {name: value for name, value in values.items() if name in Thresholds.model_fields}, str(path))
 
@@ -154,7 +154,7 @@ Limit = Annotated[float, Field(ge=1e-6, le=1e9, allow_inf_nan=False), LIVE]
 
 
 class Settings(BaseModel):
-    """Numbers of the twin; SI units. Defaults are those of ``msg_config/twin.yaml``, which tells what each one does."""
+    """Settings of the twin, in SI units. ``msg_config/twin.yaml`` has the defaults and explains each setting."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -181,50 +181,50 @@ class Settings(BaseModel):
     @classmethod
     @cache
     def live_names(cls) -> tuple[str, ...]:
-        """What can change while the twin runs."""
+        """Return the names of the settings that can change while the twin runs."""
         return tuple(name for name, field in cls.model_fields.items() if LIVE in field.metadata)
 
     @property
     def live(self) -> dict[str, float]:
-        """The values of `live_names`."""
+        """Values of the settings `live_names`."""
         return {name: getattr(self, name) for name in self.live_names()}
 
     @property
     def load(self) -> tuple[float, float]:
-        """Payload and line fill."""
+        """Payload (kg) and line fill (kg/m)."""
         return self.payload, self.line_fill
 
     @property
     def limits(self) -> dict[str, float]:
-        """The live values without the load."""
+        """Values of the live settings except payload and line fill."""
         return {name: value for name, value in self.live.items() if name not in ("payload", "line_fill")}
 
     def tuned(self, live: Mapping[str, float]) -> Settings:
-        """These settings with other live values; UsageError if one is out of bounds, or not live."""
+        """Return these settings with other live values. Raise UsageError if one is out of bounds or not live."""
         if fixed := sorted(set(live) - set(self.live_names())):
             known = ", ".join(self.live_names())
             raise UsageError(f"{', '.join(fixed)}: fixed while the twin runs. What can change: {known}.")
         return checked(Settings, {**self.model_dump(), **live}, "change of settings")
 
     def noise(self, kind: SensorKind) -> tuple[float, float]:
-        """Standard deviation of the noise and resolution of the sensors of a stream, in their SI unit."""
+        """Return the standard deviation of the noise and the resolution of the sensors of a stream, in their SI unit."""
         return getattr(self, kind.noise), getattr(self, kind.resolution) if kind.resolution else 0.0
 
     def variance(self, kind: SensorKind) -> float:
-        """Noise and rounding of one reading of the sensors of a stream, in the square of their SI unit."""
+        """Return the variance (noise and rounding) of one reading of a stream's sensors, in the square of their SI unit."""
         sigma, resolution = self.noise(kind)
         return sigma**2 + resolution**2 / 12.0
 
     @property
     def stroke_variance(self) -> float:
-        """Noise and rounding of a stroke, m^2."""
+        """Variance of a stroke reading (noise and rounding), m^2."""
         return self.stroke_sigma**2 + self.stroke_resolution**2 / 12.0
 
 
 def load_settings(path: Path | None = None, namespace: str = "") -> Settings:
     """Return the settings of a ROS parameter file, see `read_parameters`; the package's own if no path is given.
 
-    Parameters of the node alone (`NODE_ONLY`), of ``/diagnostics`` and of rclpy (`ROS_OWN`) are passed over.
+    Parameters of the node alone (`NODE_ONLY`), of ``/diagnostics`` and of rclpy (`ROS_OWN`) are ignored.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ def load_settings(path: Path | None = None, namespace: str = "") -> Settings:
     Returns
     -------
     Settings
-        Complete: what the file does not name has its default.
+        All settings; one that the file does not name has its default.
 
     Raises
     ------

@@ -60,12 +60,12 @@ KEPT = {"scene": "scene:=FILE", "mapping": "mapping:=FILE"}
 
 
 def generate_launch_description() -> LaunchDescription:
-    """The arguments above, the twin on simulated time, and the player; all ends with the session."""
+    """Return the arguments above, the twin on simulated time and the player. All of them end with the session."""
     return LaunchDescription([*ARGUMENTS, OpaqueFunction(function=twin), OpaqueFunction(function=player)])
 
 
 def twin(context: LaunchContext) -> list[LaunchDescriptionEntity]:
-    """``twin.launch.py`` on the session's clock; scene and mapping are the session's where none are given."""
+    """Return ``twin.launch.py`` on the session's clock. Scene and mapping default to those of the session."""
     given = {name: LaunchConfiguration(name).perform(context) for name in PASSED_ON}
     bag = Path(LaunchConfiguration("bag").perform(context))
     publishable(scan(bag))  # raises if nothing of it can be played
@@ -77,7 +77,7 @@ def twin(context: LaunchContext) -> list[LaunchDescriptionEntity]:
 
 
 def kept_files(bag: Path, names: list[str]) -> dict[str, str]:
-    """What the session keeps of these, as paths of files that last as long as this process."""
+    """Return the files (``scene``, ``mapping``) that the session keeps, as paths that last as long as this process."""
     texts = {name: own.text for name in names if (own := kept(bag, name, KEPT[name])) is not None}
     if not texts:
         return {}
@@ -89,7 +89,7 @@ def kept_files(bag: Path, names: list[str]) -> dict[str, str]:
 
 
 def player(context: LaunchContext) -> list[LaunchDescriptionEntity]:
-    """The session's inputs and its clock, once the node listens, and the recorder if there is one."""
+    """Return the player of the session's inputs and clock, which waits for the node and for the recorder, if any."""
     bag, record = (LaunchConfiguration(name).perform(context) for name in ("bag", "record"))
     names = ("rate", "start", "wait", "namespace")
     options = [part for name in names for part in (f"--{name}", LaunchConfiguration(name).perform(context))]

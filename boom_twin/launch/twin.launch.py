@@ -56,12 +56,12 @@ Values = dict[str, Any]
 
 
 def generate_launch_description() -> LaunchDescription:
-    """The arguments above, and what they start."""
+    """Return the arguments above and the actions that they start."""
     return LaunchDescription([*ARGUMENTS, OpaqueFunction(function=everything)])
 
 
 def everything(context: LaunchContext) -> list[LaunchDescriptionEntity]:
-    """All that is asked for; what cannot be found or used is told before anything starts."""
+    """Return all requested actions. Raise an error for a missing package or an invalid file before anything starts."""
     given = {each.name: LaunchConfiguration(each.name).perform(context) for each in ARGUMENTS}
     check_packages(given)
     values = parameters(given)
@@ -81,7 +81,7 @@ def everything(context: LaunchContext) -> list[LaunchDescriptionEntity]:
 def parameters(given: Given) -> Values:
     """Return the node's parameters: arguments that are given, else those of the file, else the defaults.
 
-    They are given to the node as one set: a name with wildcards in the file could win over an argument.
+    The node gets one set of parameters, because a name with wildcards in the file could win over an argument.
     """
     values = PARAMETERS | read_parameters(Path(given["params_file"]), given["namespace"])
     for name in filter(given.get, PARAMETERS):
@@ -90,7 +90,7 @@ def parameters(given: Given) -> Values:
 
 
 def check_packages(given: Given) -> None:
-    """Raise BoomTwinError if a package is missing that something asked for is in."""
+    """Raise BoomTwinError if the package of a requested action is missing."""
     needed = {"boom_twin": "source install/setup.bash of its workspace"}
     for name, package in (("state_publisher", "robot_state_publisher"), ("rviz", "rviz2")):
         if is_set(given, name):
@@ -103,17 +103,17 @@ def check_packages(given: Given) -> None:
 
 
 def is_set(given: Given, name: str) -> bool:
-    """Whether a flag is true."""
+    """Return True if a flag is ``true``."""
     return given[name] == "true"
 
 
 def as_launched(values: Values) -> Values:
-    """Return parameters for launch, which would read a text as YAML."""
+    """Return parameters with texts marked as such, because launch would read a text as YAML."""
     return {name: ParameterValue(value, value_type=str) if isinstance(value, str) else value for name, value in values.items()}
 
 
 def twin(given: Given, values: Values) -> Node:
-    """The node; it configures and activates itself. Without it nothing else goes on."""
+    """Return the node, which configures and activates itself. The launch ends when the node ends."""
     return Node(
         package="boom_twin",
         executable="twin_node",
@@ -126,7 +126,7 @@ def twin(given: Given, values: Values) -> Node:
 
 
 def state_publisher(given: Given, values: Values, scene: Scene) -> Node:
-    """TF up to the deflected tip, driven by the twin's joint states."""
+    """Return ``robot_state_publisher``, which sends TF up to the deflected tip from the twin's joint states."""
     own = {name: values[name] for name in ("frame_prefix", "use_sim_time")}
     own |= {"robot_description": urdf(scene), "ignore_timestamp": is_set(given, "ignore_timestamp")}
     return Node(
@@ -139,7 +139,7 @@ def state_publisher(given: Given, values: Values, scene: Scene) -> Node:
 
 
 def rviz(given: Given, values: Values) -> IncludeLaunchDescription:
-    """RViz, as ``rviz.launch.py`` starts it."""
+    """Return RViz as ``rviz.launch.py`` starts it."""
     source = PythonLaunchDescriptionSource([ThisLaunchFileDir(), "/rviz.launch.py"])
     own = {"frame_prefix": values["frame_prefix"], "use_sim_time": str(values["use_sim_time"]).lower()}
     arguments = {name: given[name] for name in ("rviz_config", "namespace")} | own
@@ -147,7 +147,7 @@ def rviz(given: Given, values: Values) -> IncludeLaunchDescription:
 
 
 def recorder(given: Given, values: Values) -> ExecuteProcess:
-    """The recorder beside the node, with all that the node is given."""
+    """Return the recorder beside the node, with the node's scene, parameters, mapping and namespace."""
     check_lasting(Path(given["record"]))
     options = {
         "--out": given["record"],

@@ -23,7 +23,7 @@ _LENGTHS = {order: struct.Struct(f"{order}I") for order in "<>"}
 
 
 def has_header(schema: Schema) -> bool:
-    """Whether messages of that definition begin with a ``std_msgs/Header``."""
+    """Return True if messages with this definition begin with a ``std_msgs/Header``."""
     for line in schema.data.decode(errors="replace").splitlines():
         if words := line.split("#")[0].split():
             return words[0] in ("std_msgs/Header", "std_msgs/msg/Header", "Header")
@@ -31,7 +31,7 @@ def has_header(schema: Schema) -> bool:
 
 
 def stamp_in(data: bytes) -> int | None:
-    """``header.stamp`` in nanoseconds of a message that begins with a header; None if it is too short for one."""
+    """Return ``header.stamp`` (ns) of a message that begins with a header; None if the message is too short."""
     order = _ORDERS.get(data[:2])
     if order is None or len(data) < _ORIGIN + 8:
         return None
@@ -40,12 +40,12 @@ def stamp_in(data: bytes) -> int | None:
 
 
 def names_in(data: bytes) -> tuple[tuple[str, ...], int]:
-    """``name`` of a sensor_msgs/JointState, and where it ends in `data`.
+    """Return ``name`` of a sensor_msgs/JointState, and the offset of its end in `data`.
 
     Raises
     ------
     ValueError, struct.error, KeyError
-        If the message is not whole.
+        The message is not whole.
     """
     length = _LENGTHS[_ORDERS[data[:2]]]
     place = _string(data, _ORIGIN + 8, length)[1]  # after frame_id
@@ -61,7 +61,7 @@ def names_in(data: bytes) -> tuple[tuple[str, ...], int]:
 
 
 def _string(data: bytes, place: int, length: struct.Struct) -> tuple[str, int]:
-    """The string at `place`, and where it ends."""
+    """Return the string at `place`, and the offset of its end."""
     (size,) = length.unpack_from(data, place)
     end = place + 4 + size
     if end > len(data):
@@ -76,7 +76,7 @@ _BEFORE_FORCE = 25  # doubles of an Imu before its linear acceleration
 
 
 class Joints(NamedTuple):
-    """What is read of a sensor_msgs/JointState: its names and one of the arrays."""
+    """Fields read from a sensor_msgs/JointState: its names and one of its arrays."""
 
     name: tuple[str, ...]
     position: tuple[float, ...] = ()
@@ -92,7 +92,7 @@ class Vector(NamedTuple):
 
 
 class Force(NamedTuple):
-    """What is read of a sensor_msgs/Imu."""
+    """Fields read from a sensor_msgs/Imu."""
 
     frame: str
     linear_acceleration: Vector
@@ -100,7 +100,7 @@ class Force(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """How a message was laid out that was decoded; the next one may be as that one was."""
+    """Layout of a decoded message, which later messages may share."""
 
     size: int
     head: bytes
@@ -110,13 +110,13 @@ class Layout(NamedTuple):
     make: Callable[[tuple[float, ...]], Joints | Force]
 
     def is_of(self, data: bytes) -> bool:
-        """Whether `data` is laid out like this."""
+        """Return True if `data` has this layout."""
         if len(data) != self.size or data[:2] != _LITTLE or data[_ORIGIN + _TIME : self.end] != self.head:
             return False
         return not self.later or all(data[at : at + len(part)] == part for at, part in self.later)
 
     def read_stamped(self, data: bytes) -> tuple[int, Joints | Force]:
-        """Its stamp (ns) and the message."""
+        """Return stamp (ns) and fields of a message with this layout."""
         seconds, nanoseconds, *_ = found = self.stamped.unpack_from(data, _ORIGIN)
         return seconds * SECOND + nanoseconds, self.make(found[2:])
 
@@ -126,16 +126,16 @@ MOST_LAYOUTS = 8
 
 
 class CdrDecoder:
-    """Reads the messages of one topic.
+    """Decoder of the messages of one topic.
 
     Parameters
     ----------
     type_name : str
         ``sensor_msgs/msg/JointState`` or ``sensor_msgs/msg/Imu``.
     decode : callable, optional
-        Decodes a message that is laid out in another way than the one before.
+        Decodes a message whose layout is not known yet.
     field : str
-        Of a JointState: which array is read, ``position`` or ``effort``.
+        Array of a JointState to read, ``position`` or ``effort``.
     """
 
     def __init__(self, type_name: str, decode: Callable[[bytes, str], Any] = decode, field: str = _POSITION) -> None:
@@ -143,7 +143,7 @@ class CdrDecoder:
         self._layouts: list[Layout] = []
 
     def read(self, data: bytes) -> tuple[int, Any]:
-        """Stamp (ns) and message, which has the fields that `boom_twin.messages.sample_decoder.SampleDecoder` reads.
+        """Return stamp (ns) and message with the fields that `boom_twin.messages.sample_decoder.SampleDecoder` reads.
 
         Raises
         ------
@@ -163,14 +163,14 @@ class CdrDecoder:
 
 
 def layout_of(data: bytes, type_name: str, field: str) -> Layout | None:
-    """How a message is laid out that could be decoded, of a type that `CdrDecoder` reads; None if it is big-endian."""
+    """Return the layout of a message that was decoded, of a type that `CdrDecoder` reads; None if it is big-endian."""
     if data[:2] != _LITTLE:
         return None
     return _force_layout(data) if type_name == TYPES[Stream.IMU] else _joints_layout(data, field)
 
 
 def _joints_layout(data: bytes, field: str) -> Layout:
-    """Of a JointState: header, names, and the number of positions come before these, then velocities and efforts alike."""
+    """Return the layout of a JointState: header, names, then positions, velocities and efforts, each after its length."""
     names, place = names_in(data)
     place += -(place - _ORIGIN) % 4
     end, lengths, found = place + 4, list[tuple[int, bytes]](), {}
@@ -191,7 +191,7 @@ def _joints_layout(data: bytes, field: str) -> Layout:
 
 
 def _force_layout(data: bytes) -> Layout:
-    """Of an Imu: after the header all has its place."""
+    """Return the layout of an Imu, whose fields after the header have fixed offsets."""
     end = _ORIGIN + _TIME + 4 + int.from_bytes(data[_ORIGIN + _TIME : _ORIGIN + _TIME + 4], "little")
     at = end + -(end - _ORIGIN) % 8 + 8 * _BEFORE_FORCE
     numbers, frame = struct.Struct("<4d"), _string(data, _ORIGIN + _TIME, _LENGTHS["<"])[0]
@@ -199,7 +199,7 @@ def _force_layout(data: bytes) -> Layout:
 
 
 def _stamped(at: int, numbers: struct.Struct) -> struct.Struct:
-    """Stamp, and numbers from `at` on, of a message from after its encapsulation."""
+    """Return the structure of a stamp and of numbers at offset `at`, read from after the encapsulation."""
     return struct.Struct(f"<iI{at - _ORIGIN - _TIME}x{numbers.format.removeprefix('<')}")
 
 

@@ -43,23 +43,23 @@ _SEE = "See the comments in msg_config/topics.yaml."
 
 
 def load_mapping(path: Path | None = None, joints: int | None = None) -> Topics:
-    """The topics and sensors of a YAML file; the package's own if no path is given.
+    """Return the topics and sensors of a YAML file, or those of the package if no path is given.
 
     Parameters
     ----------
     path : Path, optional
     joints : int, optional
-        Of the scene, if that is known: then channels that it does not have are faults too.
+        Number of joints of the scene, if known. Channels beyond it are then faults, too.
 
     Returns
     -------
     Topics
-        Every topic and sensor; what the file does not name is the package's own.
+        All topics and sensors; those that the file does not name are from the package.
 
     Raises
     ------
     UsageError
-        The file cannot be read, or something in it cannot be used: all faults, each with path, value, bound and remedy.
+        The file cannot be read, or has faults: the message lists each with path, value, bound and remedy.
     """
     if path is None:
         return load_topics()
@@ -67,7 +67,7 @@ def load_mapping(path: Path | None = None, joints: int | None = None) -> Topics:
 
 
 def mapping_from(document: Any, source: str, joints: int | None = None) -> Topics:
-    """The topics and sensors of a document read from `source`; UsageError with all faults, as `load_mapping`."""
+    """Return the topics and sensors of a document read from `source`. UsageError lists all faults, as in `load_mapping`."""
     if not isinstance(document, dict | None):
         raise UsageError(f"{source}: a list or a value: keys inputs, outputs, sensors are needed. {_SEE}")
     usual_values = default_document()
@@ -92,14 +92,14 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
 
 
 def _merged(base: Any, own: Any) -> Any:
-    """`own`, with what it leaves out as in `base`."""
+    """Return `own`, with missing keys taken from `base`."""
     if not (isinstance(base, dict) and isinstance(own, dict)):
         return own
     return {**base, **{key: _merged(base.get(key), value) for key, value in own.items()}}
 
 
 def _role_faults(values: dict[str, Any], usual_values: dict[str, Any]) -> list[Fault]:
-    """Roles that are not known, which are taken out of `values`, and types that are not those of their roles."""
+    """Return faults for unknown roles and for types other than those of their roles. Remove unknown roles from `values`."""
     faults: list[Fault] = []
     types = {role.value: type_name for role, type_name in TYPES.items()}
     for side in ("inputs", "outputs"):
@@ -116,7 +116,7 @@ def _role_faults(values: dict[str, Any], usual_values: dict[str, Any]) -> list[F
 
 
 def _sensors(values: Any) -> tuple[dict[str, Sensor], dict[str, str], list[Fault]]:
-    """The sensors that can be used by themselves, the names of all, and the faults."""
+    """Return the sensors that are valid by themselves, the names of all, and the faults."""
     if not isinstance(values, dict):
         return {}, {}, [Fault("sensors", values, "a block of channels is needed", _SEE)]
     sensors: dict[str, Sensor] = {}
@@ -145,14 +145,14 @@ def _sensors(values: Any) -> tuple[dict[str, Sensor], dict[str, str], list[Fault
 
 
 def _known_channels() -> str:
-    """All names that a channel can have."""
+    """Return all possible names of channels, for a message."""
     kinds = SENSORS.values()
     *most, last = [name for kind in kinds for name in (kind.channels(0) or (f"{kind.stem}_1", f"{kind.stem}_2 .."))]
     return f"{', '.join(most)} and {last}"
 
 
 def _fault(detail: ErrorDetails, *before: str) -> Fault:
-    """A pydantic error in the words of the file; `before` leads to what was validated."""
+    """Return a pydantic error as a fault of the file. `before` is the path of the validated value in the file."""
     place = [*before, *map(str, detail["loc"])]
     if detail["type"] == "extra_forbidden":
         near = get_close_matches(place[-1], _model_at(place).model_fields, n=1, cutoff=0.0)
@@ -162,7 +162,7 @@ def _fault(detail: ErrorDetails, *before: str) -> Fault:
 
 
 def _model_at(place: list[str]) -> type[BaseModel]:
-    """What the key at `place` stands in."""
+    """Return the model that has the key at `place`."""
     if place[0] == "sensors" and len(place) > 1:
         return Sensor
     if "qos" in place[:-1]:
@@ -171,7 +171,7 @@ def _model_at(place: list[str]) -> type[BaseModel]:
 
 
 def _name_faults(topics: Topics) -> Iterator[Fault]:
-    """Names that two topics have; only strokes and angles may, if their QoS is the same."""
+    """Yield faults for names that two topics share. Strokes and angles may share a name if their QoS is equal."""
     present: dict[str, Topic] = {f"inputs.{stream.value}": topic for stream, topic in topics.inputs.items()}
     present |= {f"outputs.{key.value}": topic for key, topic in topics.outputs.items()} | {"events": topics.events}
     users: dict[str, str] = {}
@@ -186,7 +186,7 @@ def _name_faults(topics: Topics) -> Iterator[Fault]:
 
 
 def _input_faults(topics: Topics) -> Iterator[Fault]:
-    """Yield a delay of the strokes, whose stamps are those of all outputs, and ``reads`` of another input."""
+    """Yield faults for a delay of the strokes, whose stamps all outputs have, and for ``reads`` of another input."""
     for stream, topic in topics.inputs.items():
         if topic.reads is not None and stream is not Stream.STROKES:
             yield Fault(f"inputs.{stream.value}.reads", topic.reads.value, "only cylinder_strokes has it", "Remove the key.")

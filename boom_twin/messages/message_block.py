@@ -13,18 +13,18 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MessageBlock:
-    """Encoded messages in the order in which they are to be taken.
+    """Encoded messages in the order of processing.
 
     Attributes
     ----------
     content : bytes
-        Has all of them, and maybe more.
+        Bytes of all messages; may hold others.
     sources : ndarray of int64, shape (k,)
-        Where each one is from; numbers with a meaning to whoever made the block.
+        Source of each message, a number defined by the maker of the block.
     log_times : ndarray of uint64, shape (k,)
-        Nanoseconds.
+        Log time of each message, ns.
     starts, ends : ndarray of int64, shape (k,)
-        Where each one stands in `content`.
+        Offsets of the start and the end of each message in `content`.
     """
 
     content: bytes
@@ -37,16 +37,16 @@ class MessageBlock:
         return len(self.starts)
 
     def chosen(self, rows: slice | Integers) -> MessageBlock:
-        """Some of them, in the order of `rows`."""
+        """Return the messages at `rows`, in that order."""
         return MessageBlock(self.content, self.sources[rows], self.log_times[rows], self.starts[rows], self.ends[rows])
 
     def data(self, row: int) -> bytes:
-        """One encoded message."""
+        """Return one encoded message."""
         return self.content[self.starts[row] : self.ends[row]]
 
 
 def gather(content: bytes, places: Integers, size: int) -> NDArray[np.uint8]:
-    """So many bytes from each of some places on, which has them; shape (places, size)."""
+    """Return `size` bytes from each of the `places` in `content`; shape (places, size)."""
     if len(places) == 0:
         return np.empty((0, size), np.uint8)
     windows: NDArray[np.uint8] = np.ndarray((len(content) - size + 1, size), np.uint8, content, strides=(1, 1))
@@ -54,7 +54,7 @@ def gather(content: bytes, places: Integers, size: int) -> NDArray[np.uint8]:
 
 
 def joined(blocks: Sequence[MessageBlock]) -> MessageBlock:
-    """The messages of all blocks, a block after the other."""
+    """Return the messages of all blocks as one block, in the order of the blocks."""
     if len(blocks) == 1:
         return blocks[0]
     if not blocks:
@@ -68,6 +68,6 @@ def joined(blocks: Sequence[MessageBlock]) -> MessageBlock:
 
 
 def by_log_time(block: MessageBlock) -> MessageBlock:
-    """The same in the order of log times, those of equal times as they stand."""
+    """Return the messages sorted by log time. Messages of equal log time keep their order."""
     times = block.log_times
     return block if (times[1:] >= times[:-1]).all() else block.chosen(np.argsort(times, kind="stable"))

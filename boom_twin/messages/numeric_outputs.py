@@ -20,10 +20,10 @@ from .topic_table import Output
 
 
 class NumericOutput(NamedTuple):
-    """An output that every prediction, or estimate, gives one message of: what is put into an empty message, and which numbers.
+    """Output with one message for every prediction or estimate, and the numbers that its message has.
 
-    ``put`` gets the message and the fields, which it places where numbers stand; ``numbers`` names these in the same order, see
-    `boom_twin.messages.prediction_numbers.number_names`, with a minus where the message has the opposite.
+    ``put`` gets an empty message and places the fields for numbers in it. ``numbers`` names these numbers in that order, see
+    `boom_twin.messages.prediction_numbers.number_names`. A minus before a name reverses the sign in the message.
     """
 
     output: Output
@@ -32,7 +32,7 @@ class NumericOutput(NamedTuple):
 
 
 def put_vector(msg: Any, fields: NumberFields) -> None:
-    """x and z of a Vector3Stamped."""
+    """Place the fields of x and z in a Vector3Stamped."""
     fill_xz(msg.vector, fields.row(2))
 
 
@@ -67,7 +67,7 @@ def _put_modes(msg: Any, fields: NumberFields) -> None:
 
 
 def _put_covariance(holder: Any, fields: NumberFields) -> None:
-    """Of x, z and the turn about y; the triangle that the numbers have comes first, then what mirrors it."""
+    """Place the covariance of x, z and the turn about y. The upper triangle by rows comes first, then its mirrored entries."""
     table, (rows, columns) = np.zeros((6, 6)), np.triu_indices(3)
     places = np.array([0, 2, 4])
     table[places[rows], places[columns]] = fields.row(6)
@@ -80,13 +80,13 @@ TURNED = "covariance_xa", "covariance_ya"  # have the other sign in a message, w
 
 
 def _covariance(kind: str) -> tuple[str, ...]:
-    """Return the numbers of `_put_covariance`."""
+    """Return the names of the numbers of `_put_covariance`."""
     xx, xy, xa, yy, ya, aa = (f"{'-' if entry in TURNED else ''}{kind}{entry}" for entry in COVARIANCE)
     return xx, xy, xa, yy, ya, aa, xy, xa, ya
 
 
 def _motion(kind: str) -> tuple[str, ...]:
-    """Return the numbers of `_put_estimate`."""
+    """Return the names of the numbers of `_put_estimate`."""
     return f"estimate_{kind}_x", f"estimate_{kind}_y", f"-estimate_angular_{kind}", *_covariance(f"{kind}_")
 
 
@@ -109,23 +109,23 @@ ESTIMATED = (
 
 
 class Selection(NamedTuple):
-    """Some numbers of a row, each with its sign: places, and 1 or -1; both shape (selected,)."""
+    """Selection of numbers of a row: their places and their signs (1 or -1), both of shape (selected,)."""
 
     places: Integers
     signs: Array
 
     @classmethod
     def named(cls, names: Sequence[str], joints: int) -> Selection:
-        """By `NumericOutput.numbers`, of a boom with so many joints."""
+        """Return the selection of `NumericOutput.numbers` for a boom with `joints` joints."""
         places = {name: place for place, name in enumerate(number_names(joints))}
         chosen = np.array([places[name.removeprefix("-")] for name in names], np.int64)
         return cls(chosen, np.array([-1.0 if name.startswith("-") else 1.0 for name in names]))
 
     @classmethod
     def of_all(cls, width: int) -> Selection:
-        """All of a row of so many, as they are."""
+        """Return the selection of all `width` numbers of a row, with unchanged signs."""
         return cls(np.arange(width), np.ones(width))
 
     def of(self, numbers: Array) -> Array:
-        """They, from columns of numbers, shape (all, k); shape (selected, k)."""
+        """Return the selected numbers, shape (selected, k), from columns of numbers, shape (all, k)."""
         return np.asarray(numbers[self.places] * self.signs[:, np.newaxis])

@@ -47,13 +47,13 @@ SECONDS, NANOSECONDS = range(2)  # of a stamp in a message
 
 
 def number_names(joints: int) -> tuple[str, ...]:
-    """Names of the numbers, of a boom with so many joints, in the order of a row. SI."""
+    """Return the names of the numbers (SI units) for a boom with `joints` joints, in the order of a row."""
     own = [f"{kind}_{i}" for kind in ("joint", "stroke", "force") for i in range(1, joints + 1)]
     return *TIP_NUMBERS, *own, *TIP_JOINTS, *ESTIMATED_NUMBERS, *TURN
 
 
 class Chain(NamedTuple):
-    """What of the boom the numbers need: pivot of its first joint (2,), m; lengths of its sections (n,), m."""
+    """Geometry of the boom: pivot of its first joint, shape (2,), m, and lengths of its sections, shape (n,), m."""
 
     pivot: Array
     lengths: Array
@@ -61,11 +61,11 @@ class Chain(NamedTuple):
 
 @by_reference
 class Layout(NamedTuple):
-    """Messages that are written together, one behind the other, and which numbers stand where.
+    """Layout of messages that are written together, one after the other, and the places of numbers in them.
 
-    numbers : scratch, a row of them. turns : scratch, (n + 1, 3). chosen, signs : of every number that is written. doubles,
-    words : all the messages, as numbers of eight and of four bytes. places : of every number among the doubles. stamps : of
-    every stamp among the words.
+    numbers : scratch, a row of numbers. turns : scratch, shape (n + 1, 3). chosen, signs : index in the row and sign of every
+    written number. doubles, words : bytes of all messages, as numbers of eight and of four bytes. places : index of every
+    written number in `doubles`. stamps : index of every stamp in `words`.
     """
 
     numbers: Array
@@ -85,7 +85,7 @@ class Layout(NamedTuple):
 
 @inner
 def write_turns(numbers, turns):
-    """Angles whose sine and cosine are needed, shape (n + 1, 3, ..): of every section, then half the estimate's."""
+    """Write the angle (rad) of every section, then half the estimate's, into `turns`, shape (n + 1, 3, ..)."""
     n = turns.shape[0] - 1
     turns[0, 0] = numbers[JOINTS]
     for i in range(1, n):
@@ -95,7 +95,7 @@ def write_turns(numbers, turns):
 
 @inner
 def derive(pivot, lengths, turns, numbers):
-    """Write the tip's joints, and half the estimate's turn; `turns` have their cosines and sines behind them."""
+    """Write the tip's joints, and sine and cosine of half the estimate's angle. `turns` has angle, cosine and sine."""
     n = turns.shape[0] - 1
     x, y = lengths[0] * turns[0, 1], lengths[0] * turns[0, 2]
     for i in range(1, n):
@@ -111,7 +111,7 @@ def derive(pivot, lengths, turns, numbers):
 def number_columns(
     chain: Chain, p: Prediction | PredictionBlock | None, e: Estimate | EstimateBlock | None, count: int
 ) -> Array:
-    """Numbers of so many predictions and of the estimates beside them, a column for each, shape (all, count); NaN without."""
+    """Return the numbers of `count` predictions and their estimates, a column for each, shape (all, count); NaN if missing."""
     joints = len(chain.lengths)
     numbers = np.full((len(number_names(joints)), count), math.nan)
     if p is not None:
@@ -126,7 +126,7 @@ def number_columns(
 
 
 def _stack(numbers: Array, parts: Sequence[Array | float]) -> None:
-    """Write parts, each of a number or more for every column, one below the other."""
+    """Write parts one below the other. A part has one or more rows, with a number for every column."""
     at = 0
     for part in parts:
         rows = np.reshape(part, (-1, numbers.shape[1]))
@@ -135,7 +135,7 @@ def _stack(numbers: Array, parts: Sequence[Array | float]) -> None:
 
 
 def _derive_columns(chain: Chain, numbers: Array) -> None:
-    """Write what follows from others of many rows of numbers, shape (all, k)."""
+    """Write the numbers that follow from others, for columns of numbers, shape (all, k)."""
     turns = np.zeros((len(chain.lengths) + 1, 3, numbers.shape[1]))
     write_turns(numbers, turns)
     angles = turns[:, 0].ravel().tolist()
@@ -155,7 +155,7 @@ def _derived(joints: int) -> tuple[int, ...]:
 
 @inner
 def one_nan(numbers, place):
-    """Of all NaN take the one that every program has: which of two a sum has is up to the compiler."""
+    """Replace a NaN by `math.nan`, because the compiler decides which of two NaN a sum has."""
     if math.isnan(numbers[place]):
         numbers[place] = math.nan
 
@@ -168,13 +168,13 @@ def write_messages(chain, row, pins, estimate, stamp, m):
     ----------
     chain : Chain
     row : ndarray
-        Of the prediction, see `boom_twin.kernels.result_row`.
+        Row of the prediction, see `boom_twin.kernels.result_row`.
     pins : int
-        Pins with clearance.
+        Number of pins with clearance.
     estimate : ndarray, shape (WIDTH,)
-        Beside it.
+        Row of the estimate at the stamp of the prediction.
     stamp : int
-        ns, in all headers.
+        Stamp in all headers, ns.
     m : Layout
     """
     n = m.turns.shape[0] - 1
@@ -204,14 +204,14 @@ def write_messages(chain, row, pins, estimate, stamp, m):
 
 @kernel
 def write_residuals(values, sigmas, row, stamp, m):
-    """Write a message of residuals, of which a layout has all channels three times.
+    """Write a message of residuals. Its layout has every channel three times: residual, normalised, standard deviation.
 
     Parameters
     ----------
     values, sigmas : ndarray, shape (k, w)
         Residuals and their standard deviations; those of `row` are written.
     stamp : int
-        ns.
+        Stamp of the message, ns.
     m : Layout
     """
     n = m.chosen.shape[0] // 3
@@ -223,7 +223,7 @@ def write_residuals(values, sigmas, row, stamp, m):
 
 @inner
 def put_numbers(m, stamp):
-    """Put numbers and stamp where they stand in the messages."""
+    """Write numbers and stamp at their places in the messages."""
     for k in range(m.chosen.shape[0]):
         m.doubles[m.places[k]] = m.signs[k] * m.numbers[m.chosen[k]]
     seconds = stamp // SECOND

@@ -32,7 +32,7 @@ OK, WARN, ERROR = range(3)
 
 
 def encode_health(health: Health, frame: str = FRAME) -> bytes:
-    """A diagnostic_msgs/DiagnosticArray in CDR, with the stamp of `health`; see ``topics.yaml`` for its values."""
+    """Return `health` as a diagnostic_msgs/DiagnosticArray in CDR, with its stamp; see ``topics.yaml`` for its values."""
     msg = new_message(TYPES[Output.HEALTH])
     fill_header(msg.header, health.stamp, frame)
     msg.status = [_status(alarm) for alarm in health.alarms]
@@ -40,7 +40,7 @@ def encode_health(health: Health, frame: str = FRAME) -> bytes:
 
 
 def decode_health(msg: Any) -> tuple[Alarm, ...]:
-    """The alarms of such a message, see `boom_twin.health.alarms.alarm_of`; a status that is none is left out."""
+    """Return the alarms of a DiagnosticArray, see `boom_twin.health.alarms.alarm_of`. A status without an alarm is left out."""
     found = []
     for status in msg.status:
         try:
@@ -65,7 +65,7 @@ FROM_REST, NEW = "from_rest", 2.0
 
 
 def encode_changes(change: Change, frame: str = FRAME) -> bytes:
-    """The message of a change, in CDR."""
+    """Return the message of a change in CDR."""
     values = {FROM_REST: NEW if change.is_new else float(change.from_rest), **change.settings, **change.zeros}
     msg = new_message(TYPES[Output.CHANGES])
     fill_header(msg.header, change.stamp, frame)
@@ -74,12 +74,12 @@ def encode_changes(change: Change, frame: str = FRAME) -> bytes:
 
 
 def decode_changes(msg: Any) -> Change:
-    """The change of a message.
+    """Return the change in a decoded message.
 
     Raises
     ------
     BagError
-        It has names or values that a change cannot have.
+        The message has names or values that a change cannot have.
     """
     values = dict(zip(msg.name, map(float, msg.position), strict=False))
     from_rest = values.pop(FROM_REST, 0.0)
@@ -96,16 +96,16 @@ Messages = list[tuple[Output, bytes]]
 
 
 class ReportEncoder:
-    """Writes messages as CDR, to be published or kept in a bag; the same reports in the same order give the same bytes.
+    """Encoder of reports as messages in CDR, to publish or to record. Equal reports in equal order give equal bytes.
 
     Parameters
     ----------
     scene : Scene
-        What the reports are about.
+        Scene of the reports.
     settings : Settings
-        How ``shape`` is drawn.
+        Settings of the drawing ``shape``.
     frame : str
-        In all headers: that of the base.
+        Frame in all headers, that of the base.
     """
 
     def __init__(self, scene: Scene, settings: Settings, frame: str = FRAME) -> None:
@@ -130,24 +130,25 @@ class ReportEncoder:
             jazzy().get_msgdef(TYPES[output])
 
     def warm_up(self) -> None:
-        """Compile what encodes the reports of a twin sample by sample; else the first of them does."""
+        """Compile the encoder of single reports now; without this call, the first report compiles it."""
         residuals = [(self._residual_template(names), 3 * len(names)) for names in self._channels.values()]
         self._compiled = RowEncoder(self._chain, [*self._predicted, *self._estimated], residuals)
 
     def fill(self, report: Report, is_wanted: Callable[[Output], bool] = lambda output: True) -> Messages:
-        """The messages of one report.
+        """Return the messages of one report.
 
         Parameters
         ----------
         report : Report
         is_wanted : callable
-            Of which outputs; all by default.
+            Returns True for an output that is wanted; by default for all.
 
         Returns
         -------
         list of (Output, bytes)
-            Those of `PREDICTED`, ``joint_states``, those of `ESTIMATED`, and ``shape`` where it has one, if there is a
-            prediction; ``residuals`` for each set of them; ``health`` and ``tip_uncertainty`` (m) where there is news of it.
+            With a prediction: the outputs `PREDICTED`, ``joint_states``, `ESTIMATED`, and ``shape`` if it has one.
+            ``residuals`` for each set of residuals. ``changes`` with a change. ``health`` and ``tip_uncertainty`` (m) with
+            new health.
         """
         rows: ReportRows | None = report.rows
         if rows is None:
@@ -164,7 +165,7 @@ class ReportEncoder:
         return messages
 
     def _fill_rows(self, rows: ReportRows, is_wanted: Callable[[Output], bool]) -> Messages:
-        """Of prediction, estimate and residuals, straight from the rows that these would be made of."""
+        """Return the messages of prediction, estimate and residuals, encoded from the rows of the report by compiled code."""
         if self._compiled is None:
             self.warm_up()
         assert self._compiled is not None
@@ -180,7 +181,7 @@ class ReportEncoder:
         return messages
 
     def _fill_numbers(self, report: Report, is_wanted: Callable[[Output], bool]) -> Messages:
-        """Of prediction, estimate and residuals."""
+        """Return the messages of prediction, estimate and residuals, encoded without compiled code."""
         p, e, messages = report.prediction, report.estimate, Messages()
         told = [(each.stamp, outputs) for each, outputs in ((p, self._predicted), (e, self._estimated)) if each is not None]
         numbers = number_columns(self._chain, p, e, 1) if told else np.zeros((0, 1))
@@ -195,7 +196,7 @@ class ReportEncoder:
         return messages
 
     def fill_block(self, block: ReportBlock) -> EncodedBlock:
-        """The messages of many reports: those that `fill` gives of one after the other."""
+        """Return the messages of many reports, equal to those of `fill` for one report after the other."""
         p, residuals, found = block.predictions, block.residuals, EncodedBlockBuilder()
         turn = len(self._predicted)  # of estimates among the messages of one sample; residuals follow
         first = turn + len(self._estimated)
@@ -225,7 +226,7 @@ class ReportEncoder:
         return Template(TYPES[key], msg, fields)
 
     def _joint_states(self, names: list[str], count: int) -> Template:
-        """Joints first, cylinders after them, those of the tip and passive ones last; only cylinders have an effort."""
+        """Return a template with joints, cylinders, joints of the tip and passive joints. Only cylinders have an effort."""
         others = len(names) - 2 * count
 
         def put(msg: Any, fields: NumberFields) -> None:
@@ -236,7 +237,7 @@ class ReportEncoder:
         return self._template(Output.JOINT_STATES, put)
 
     def _fill_joint_states(self, stamp: int, numbers: Array, is_shaped: bool) -> bytes:
-        """Of numbers, shape (all, 1); with the passive joints where there is a shape."""
+        """Return the joint states of numbers, shape (all, 1), with passive joints if `is_shaped`."""
         _, template, chosen = self._predicted[-1]
         own = chosen.of(numbers)[:, 0]
         if not is_shaped:
@@ -245,7 +246,7 @@ class ReportEncoder:
         return self._all_joints.fill(stamp, [*own, *passive])
 
     def _shaped_joint_states(self, stamps: Integers, numbers: Array) -> Bytes:
-        """With the passive joints, a row for each of the stamps (ns), of numbers, shape (all, k)."""
+        """Return joint states with passive joints, a row for each of the stamps (ns), from numbers, shape (all, k)."""
         _, _, chosen = self._predicted[-1]
         joints = numbers[JOINTS : JOINTS + len(self._chain.lengths)]
         passive = np.array([self._passive.positions(column) for column in joints.T])
@@ -253,12 +254,12 @@ class ReportEncoder:
         return self._all_joints.fill_rows(stamps, np.concatenate([chosen.of(numbers), others]))
 
     def _fill_residuals(self, residuals: Residuals) -> bytes:
-        """Named channels: ``position`` residual, ``velocity`` normalised residual, ``effort`` standard deviation."""
+        """Return a message of residuals: ``position`` residual, ``velocity`` normalised, ``effort`` standard deviation."""
         template = self._residual_template(residuals.names)
         return template.fill(residuals.stamp, _residual_numbers(residuals.values, residuals.sigmas))
 
     def _residual_rows(self, residuals: ResidualBlock) -> Iterator[tuple[Integers, Bytes]]:
-        """Of all residuals, by rows of the block, each stream apart."""
+        """Yield rows of the block and their messages of residuals, one stream after the other."""
         for code in set(residuals.streams.tolist()):
             rows, names = np.flatnonzero(residuals.streams == code), self._channels[STREAMS[code]]
             values, sigmas = (array[rows, : len(names)] for array in (residuals.values, residuals.sigmas))
@@ -283,5 +284,5 @@ def _has_shape(prediction: Prediction | None) -> bool:
 
 
 def _residual_numbers(values: Array, sigmas: Array) -> Array:
-    """Residual, normalised residual, standard deviation of all channels; of many residuals a column for each."""
+    """Return residuals, normalised residuals and standard deviations of all channels; a column for each of many residuals."""
     return np.concatenate([values.T, (values / sigmas).T, sigmas.T])

@@ -19,7 +19,7 @@ DOUBLE, WORD = 8, 4  # bytes
 
 
 class _Group(NamedTuple):
-    """Messages that are written together; `layout` is held, see `boom_twin.kernels.jit.hold`, `views` are of each message."""
+    """Messages that are written together. `layout` is held, see `boom_twin.kernels.jit.hold`; `views` has a view of each."""
 
     layout: Any
     views: list[memoryview]
@@ -27,7 +27,7 @@ class _Group(NamedTuple):
 
 
 def _group(parts: Sequence[tuple[Template, Selection]], width: int, turns: int = 0) -> _Group:
-    """Of templates and what is filled in, from rows of so many numbers; what CDR aligns to eight bytes is so here too."""
+    """Return the group of messages of templates, filled from rows of `width` numbers. Doubles of CDR stay aligned."""
     ends = ORIGIN + np.cumsum([-(-template.size // DOUBLE) * DOUBLE for template, _ in parts])
     starts = [ORIGIN, *ends[:-1].tolist()]
     data, numbers = np.zeros(ends[-1] + ORIGIN, np.uint8), np.zeros(width)
@@ -50,20 +50,20 @@ def _group(parts: Sequence[tuple[Template, Selection]], width: int, turns: int =
 
 
 class RowEncoder:
-    """Writes the messages of `ReportRows`.
+    """Encoder of the messages of `ReportRows`.
 
     Parameters
     ----------
     chain : Chain
     outputs : sequence of (Output, Template, Selection)
-        Of prediction and estimate, in the order in which a report gives them.
+        Outputs of prediction and estimate, in the order of a report.
     residuals : sequence of (Template, int)
-        Of every stream, and how many fields it has: values, normalised values and deviations of all channels.
+        Template of every stream, and its number of fields: values, normalised values and deviations of all channels.
 
     Attributes
     ----------
     numbers : ndarray, shape (all,)
-        Of what was encoded last, see `boom_twin.messages.prediction_numbers.number_names`.
+        Numbers that were encoded last, see `boom_twin.messages.prediction_numbers.number_names`.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class RowEncoder:
         self._write_residuals = write_residuals.for_types_of(table, table, 0, 0, layout)
 
     def fill(self, rows: ReportRows, is_wanted: Callable[[Output], bool]) -> list[tuple[Output, bytes]]:
-        """The messages of prediction and estimate that are wanted; `rows` have a prediction."""
+        """Return the wanted messages of prediction and estimate. `rows` must have a prediction."""
         wanted = [each for each in zip(self._keys, self._group.views, strict=True) if is_wanted(each[0])]
         if not wanted:
             return []
@@ -91,7 +91,7 @@ class RowEncoder:
         return [(key, bytes(view)) for key, view in wanted]
 
     def fill_residuals(self, rows: ReportRows) -> list[bytes]:
-        """The messages of residuals."""
+        """Return the messages of residuals."""
         found = []
         for row, (code, stamp) in enumerate(zip(rows.streams, rows.stamps, strict=True)):
             group = self._residuals[code]

@@ -20,7 +20,7 @@ AXES = ("x", "y", "z")
 
 
 class Sensor(BaseModel):
-    """One channel: quantity = sign * scale * (reading - zero), in the unit. The keys are explained in ``topics.yaml``."""
+    """Sensor of one channel: quantity = sign * scale * (reading - zero), in `unit`. ``topics.yaml`` explains the keys."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -33,23 +33,23 @@ class Sensor(BaseModel):
 
 
 def number_of(channel: str) -> int:
-    """Of a channel, or of a name, ``cylinder_i`` or ``joint_i``: i."""
+    """Return the number i of a channel or name such as ``cylinder_i`` or ``joint_i``."""
     return int(channel.rpartition("_")[2])
 
 
 def usual(channel: str) -> dict[str, Any]:
-    """Name and unit of a channel that no mapping names."""
+    """Return the default name and unit of a channel."""
     kind, end = sensor_kind(channel), channel.rpartition("_")[2]
     return {"name": end if kind.is_imu else f"{kind.named}_{end}", "unit": kind.unit}
 
 
 def factor(channel: str, sensor: Sensor) -> float:
-    """By what reading minus zero is multiplied."""
+    """Return the factor of (reading - zero): sign, scale and conversion of the unit to SI."""
     return sensor.sign * sensor.scale * sensor_kind(channel).units[sensor.unit]
 
 
 def kind_faults(channel: str, given: Mapping[str, Any]) -> Iterator[Fault]:
-    """What a channel of this kind cannot have, of the keys as they stand in the file."""
+    """Yield faults for keys, as in the file, that a channel of this kind cannot have."""
     kind, place = sensor_kind(channel), f"sensors.{channel}"
     if (unit := given.get("unit", kind.unit)) not in list(kind.units):
         yield Fault(f"{place}.unit", unit, f"it must be one of {', '.join(kind.units)}", "Use scale for any other.")
@@ -60,15 +60,15 @@ def kind_faults(channel: str, given: Mapping[str, Any]) -> Iterator[Fault]:
 
 
 def set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Iterator[Fault]:
-    """Channels that a boom of so many joints does not have, and names that two channels of one topic have.
+    """Yield faults for channels beyond the joints of the boom, and for names that two channels of one topic share.
 
     Parameters
     ----------
     names : mapping of str to str
-        The names of the channels that a mapping lists; all others have their usual ones.
+        Names of the channels that a mapping lists; all others have their default names.
     joints : int
     is_shared : bool
-        Whether strokes and angles come by one topic.
+        True if strokes and angles come by one topic.
     """
     known = channels_of(joints)
     for channel in names:
@@ -91,7 +91,7 @@ DEFAULT_FILE = Path(__file__).parent.parent / "msg_config" / "topics.yaml"
 
 
 class Output(StrEnum):
-    """What the twin publishes."""
+    """Outputs that the twin publishes."""
 
     TIP_DISPLACEMENT = "tip_displacement"
     TIP_POSITION = "tip_position"
@@ -144,7 +144,7 @@ class Qos(_Entry):
 
 
 class Topic(_Entry):
-    """One topic; the keys are explained at the top of ``topics.yaml``."""
+    """Topic with its type and QoS. The top of ``topics.yaml`` explains the keys."""
 
     name: Annotated[str, Field(pattern=r"^(~/|/)?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*$")]
     type: str
@@ -155,7 +155,7 @@ class Topic(_Entry):
 
     @property
     def absolute(self) -> str:
-        """The name in a bag: relative to ``/``, private to ``/boom_twin``."""
+        """Name in a bag: a relative name begins with ``/``, a private one with ``/boom_twin``."""
         if self.name.startswith("~/"):
             return f"/{NODE}/{self.name[2:]}"
         return self.name if self.name.startswith("/") else f"/{self.name}"
@@ -164,8 +164,7 @@ class Topic(_Entry):
 class InputTopic(Topic):
     """One topic of readings.
 
-    ``delay``: by how much its stamps are later than the readings, s. ``reads``, of strokes: what transducers read, if that is
-    said.
+    ``delay`` is the time from reading to stamp, s. ``reads`` is the quantity that stroke transducers read, if known.
     """
 
     delay: Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)] = 0.0
@@ -173,7 +172,7 @@ class InputTopic(Topic):
 
 
 class EventTopic(Topic):
-    """Where an operator's marks go."""
+    """Topic of the operator's marks."""
 
     type: Literal["rcl_interfaces/msg/Log"]
 
@@ -182,7 +181,7 @@ OneTopic = TypeVar("OneTopic", bound=Topic)
 
 
 class Topics(_Entry):
-    """All topics by role, frame of the outputs, sensors that are not as usual; `boom_twin.messages.mapping` reads them."""
+    """All topics by role, frame of the outputs, and sensors that differ from the defaults; see `boom_twin.messages.mapping`."""
 
     frame: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_/.-]*$", max_length=200)]
     inputs: dict[Stream, InputTopic]
@@ -196,19 +195,19 @@ class Topics(_Entry):
 
     @property
     def is_shared(self) -> bool:
-        """Whether strokes and angles come by one topic."""
+        """Return True if strokes and angles come by one topic."""
         return self.inputs[Stream.STROKES].absolute == self.inputs[Stream.ANGLES].absolute
 
     @property
     def heard(self) -> dict[str, list[Stream]]:
-        """The streams of every input topic, by its name; strokes first."""
+        """Streams of every input topic by its name; strokes first."""
         found: dict[str, list[Stream]] = {}
         for stream in Stream:
             found.setdefault(self.inputs[stream].name, []).append(stream)
         return found
 
     def renamed(self, name: Callable[[Topic], str]) -> Topics:
-        """These topics, each by the name that `name` gives of it."""
+        """Return these topics, each with the name that `name` returns for it."""
 
         def new(topic: OneTopic) -> OneTopic:
             return topic.model_copy(update={"name": name(topic)})
@@ -217,27 +216,27 @@ class Topics(_Entry):
         return self.model_copy(update={"inputs": inputs, "outputs": outputs, "events": new(self.events)})
 
     def in_namespace(self, namespace: str) -> Topics:
-        """These topics by the names that they have if the node is in `namespace` (``/`` is none)."""
+        """Return these topics with their names for a node in `namespace` (``/`` is none)."""
         space = f"/{namespace.strip('/')}" if namespace.strip("/") else ""
         return self.renamed(lambda topic: topic.name if topic.name.startswith("/") else f"{space}{topic.absolute}")
 
     def of_joints(self, ranges: Iterable[Sequence[float]]) -> Topics:
-        """Return these topics with the `ranges` (deg) of a scene's joints, by which an encoder's whole turns are known."""
+        """Return these topics with the `ranges` (deg) of a scene's joints, which resolve the whole turns of an encoder."""
         return self.model_copy(update={"ranges": tuple((radians(low) - GIVE, radians(high) + GIVE) for low, high in ranges)})
 
     def delay(self, stream: Stream) -> int:
-        """By how much the stamps of a stream are later than its readings, ns."""
+        """Return the time from the readings of a stream to their stamps, ns."""
         return round(self.inputs[stream].delay * SECOND)
 
     def sensors_of(self, stream: Stream, joints: int) -> dict[str, Sensor]:
-        """The sensors of a stream by channel, in the order of its samples."""
+        """Return the sensors of a stream by channel, in the order of its samples."""
         return {name: self.sensors.get(name) or Sensor(**usual(name)) for name in SENSORS[stream].channels(joints)}
 
     def beyond(self, stream: Stream, joints: int, names: Iterable[str]) -> list[str]:
-        """Those of `names` by which a message tells of cylinders or joints that a boom with so many joints does not have.
+        """Return those of `names` that number a cylinder or joint beyond the joints of the boom.
 
-        ``cylinder_5`` of four; not if a channel reads that name, nor if `sensors` has every channel of the stream: then
-        whoever wrote the mapping has said which of the names are the boom's.
+        An example is ``cylinder_5`` with four joints. A name that a channel reads is left out. The result is empty if the
+        mapping names every channel of the stream, because it then says which names are the boom's.
         """
         kind = SENSORS[stream]
         if kind.ends or all(channel in self.sensors or channel in self.absent for channel in kind.channels(joints)):
@@ -247,27 +246,27 @@ class Topics(_Entry):
         return [name for name in names if numbered.fullmatch(name) and number_of(name) > joints and name not in used]
 
     def reading(self, reads: StrokeReading) -> Topics:
-        """Return these topics with strokes that are so read."""
+        """Return these topics with stroke transducers that read the quantity `reads`."""
         strokes = self.inputs[Stream.STROKES].model_copy(update={"reads": reads})
         return self.model_copy(update={"inputs": {**self.inputs, Stream.STROKES: strokes}})
 
     @property
     def stroke_reading(self) -> StrokeReading:
-        """What stroke transducers read: as the mapping says, else lengths."""
+        """Quantity that stroke transducers read: that of the mapping, else lengths."""
         return self.inputs[Stream.STROKES].reads or StrokeReading.LENGTH
 
     def mounts(self, joints: int) -> list[Mount | None]:
-        """Where the inclinometers of a boom sit, one entry for each joint; None is an encoder."""
+        """Return the mounts of a boom's inclinometers, one entry for each joint; None is an encoder."""
         return [sensor.absolute for sensor in self.sensors_of(Stream.ANGLES, joints).values()]
 
 
 @cache
 def load_topics() -> Topics:
-    """The topics of the package, read once; sensors as usual."""
+    """Return the topics of the package with default sensors; the file is read once."""
     return Topics.model_validate(default_document())
 
 
 @cache
 def default_document() -> Any:
-    """What the package's own file says; not to be changed."""
+    """Return the content of the package's own file. Do not modify it."""
     return read_plain(DEFAULT_FILE, UsageError, "Install the package anew.")

@@ -26,23 +26,23 @@ os.umask(_umask)
 
 
 def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] = os.fsync) -> None:
-    """Write a file by way of a temporary one beside it, which is put on the disk and then renamed.
+    """Write a file as a temporary one beside it, which is synced to the disk and then renamed.
 
-    Whoever opens `path`, also after a kill or the loss of power, finds the old content or the new one. What is no
-    regular file (``/dev/stdout``, a pipe) is written to as it is; of a symbolic link, its target is replaced.
+    `path` has the old content or the new one at any time, also after a kill or the loss of power. A path that is no
+    regular file (``/dev/stdout``, a pipe) is written to directly. The target of a symbolic link is replaced.
 
     Parameters
     ----------
     path : Path
     content : str or bytes
-        Text is encoded as UTF-8, what is no character in it (a path's bytes) as an escape.
+        Text is encoded as UTF-8; surrogates in it (bytes of a path) become escapes.
     sync : callable, optional
-        Puts on the disk what has the descriptor that it is given.
+        Syncs the file with the given descriptor to the disk.
 
     Raises
     ------
     BagError
-        It cannot be written; `path` is then as it was.
+        The file cannot be written; `path` is then unchanged.
     """
     data = content.encode(errors="backslashreplace") if isinstance(content, str) else content
     try:
@@ -60,22 +60,22 @@ def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] =
 
 
 def check_target(path: Path, sources: Sequence[Path], own: bytes | Callable[[bytes], bool] | None = None) -> None:
-    """Refuse to replace a file that is read, one of a recording, or one that another wrote; to be asked before the work begins.
+    """Refuse to replace a source, a file of a recording, or a file that another program wrote. Call it before the work.
 
     Parameters
     ----------
     path : Path
-        If it is a symbolic link, its target is judged: that is what `write_atomic` replaces.
+        File to be written. The target of a symbolic link is checked, because `write_atomic` replaces it.
     sources : sequence of Path
-        What is read.
+        Files that are read.
     own : bytes or callable, optional
-        How an earlier result of the same command begins, which is replaced, or whether what begins so (the first `HEAD` bytes)
-        is one. None: any file is replaced.
+        First bytes of an earlier result of the same command, which may be replaced; or a function that returns True for
+        the first `HEAD` bytes of one. None: any file may be replaced.
 
     Raises
     ------
     UsageError
-        Names the file.
+        The file must not be replaced; the message names it.
     """
     for source in sources:
         if path.resolve() == source.resolve() or (path.exists() and source.exists() and path.samefile(source)):
@@ -94,19 +94,19 @@ def check_target(path: Path, sources: Sequence[Path], own: bytes | Callable[[byt
 
 
 def check_new(path: Path, sources: Sequence[Path]) -> None:
-    """As `check_target`, of a file that is never replaced: none may be there but an empty one."""
+    """Refuse to write a file that exists and is not empty. Otherwise check it as `check_target` does."""
     check_target(path, sources)
     if path.is_file() and path.stat().st_size:
         raise UsageError(f"{path}: is there already, and is not written over. Name another file.")
 
 
 def _is_recording(path: Path) -> bool:
-    """Whether the name is one of a recording, also of one that rosbag2 packed as a whole (``.mcap.zstd``)."""
+    """Return True if the name is that of a recording, also of one that rosbag2 compressed as a whole (``.mcap.zstd``)."""
     return not _RECORDINGS.isdisjoint(path.suffixes[-2:])
 
 
 def sync_folder(folder: Path, sync: Callable[[int], None] = os.fsync) -> None:
-    """Put the names in a folder on the disk, where its file system can do that."""
+    """Sync the entries of a folder to the disk, if its file system supports that."""
     handle = os.open(folder, os.O_RDONLY)
     try:
         sync(handle)
@@ -136,5 +136,5 @@ def _replace(path: Path, data: bytes, sync: Callable[[int], None]) -> None:
 
 
 def _mode(path: Path) -> int:
-    """The permissions of the file that is replaced, or those of a new one."""
+    """Return the permissions of the file that is replaced, or those of a new one."""
     return stat.S_IMODE(path.stat().st_mode) if path.exists() else 0o666 & ~_umask

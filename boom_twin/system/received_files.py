@@ -35,12 +35,12 @@ def real_path(path: Path) -> Path:
 
 
 def holds_file(path: Path) -> bool:
-    """Whether there is a file at `path` that `open_received` would open; False if nothing is there.
+    """Return True if `open_received` can open a file at `path`; False if nothing is there.
 
     Raises
     ------
     BagError
-        There is something else than a regular file: a link, a directory, a pipe, a socket, a device.
+        The path is no regular file: a link, a directory, a pipe, a socket, a device.
     """
     try:
         mode = path.lstat().st_mode
@@ -58,9 +58,9 @@ def open_received(path: Path) -> BufferedReader:
     Raises
     ------
     BagError
-        It is no regular file: a link, a directory, a pipe, a socket, a device.
+        The path is no regular file: a link, a directory, a pipe, a socket, a device.
     OSError
-        It is not there, or cannot be read.
+        The file is missing or cannot be read.
     """
     if not holds_file(path):
         raise FileNotFoundError(ENOENT, os.strerror(ENOENT), str(path))
@@ -72,7 +72,7 @@ def open_received(path: Path) -> BufferedReader:
 
 
 def _without_links(path: str, flags: int) -> int:
-    """Open what was looked at before: if it has been exchanged since, neither follow it nor wait for it."""
+    """Open a checked path. If it was exchanged since the check, neither follow a link nor wait for a pipe."""
     return os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY)
 
 
@@ -84,6 +84,6 @@ def _check_regular(path: Path, mode: int) -> None:
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of a file, a block at a time; errors as of `open_received`."""
+    """Return the SHA-256 of a file, read in blocks. Errors are those of `open_received`."""
     with open_received(path) as file:
         return file_digest(file, "sha256").hexdigest()

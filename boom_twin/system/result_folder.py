@@ -37,15 +37,15 @@ _WRITABLE = 0o222  # mode of a folder that somebody may write to
 
 @dataclass(frozen=True, slots=True)
 class ResultKind:
-    """What a command writes.
+    """Kind of result: the command and the files that it writes.
 
     Attributes
     ----------
     command : str
     files : tuple of str
-        Patterns of the paths of its files in the folder.
+        Patterns for the paths of its files in the folder.
     is_replaced : bool
-        Whether a later run replaces it. If not, it is a recording: it keeps no manifest, and nothing replaces it.
+        True if a later run replaces the result. If not, it is a recording, which has no manifest and is never replaced.
     """
 
     command: str
@@ -53,18 +53,18 @@ class ResultKind:
     is_replaced: bool
 
     def has(self, name: str) -> bool:
-        """Whether a path is one of its files, or of its drafts of them."""
+        """Return True if a path is one of its files, or a draft beside them."""
         last = name.rpartition("/")[2]
         is_draft = last.startswith(".") and last.endswith(DRAFT) and _folders(name)[0] in _folders(*self.files)
         return is_draft or any(name.count("/") == each.count("/") and fnmatchcase(name, each) for each in self.files)
 
     def has_folder(self, name: str) -> bool:
-        """Whether a path, with a slash behind, is a folder that some of its files lie in."""
+        """Return True if a path, with a slash at its end, is a folder of some of its files."""
         return name in _folders(*self.files)
 
 
 def _folders(*names: str) -> list[str]:
-    """The folders that files lie in, innermost first, each with a slash behind; ``./`` is the result's own."""
+    """Return the folders of files, innermost first, each with a slash at its end; ``./`` is the folder of the result."""
     return [f"{parent}/" for name in names for parent in Path(name).parents]
 
 
@@ -82,7 +82,7 @@ RESPONSE = ResultKind("response", ("response.*", "steady_state.*", "resonance_ma
 
 
 def study(kind: str) -> ResultKind:
-    """What a study of that kind writes: its name is what the names of all its files begin with."""
+    """Return the result kind of a study, whose files all have names that begin with `kind`."""
     return ResultKind(f"study {kind}", (f"{kind}.json", f"{kind}.md", f"{kind}*.png"), is_replaced=True)
 
 
@@ -94,24 +94,24 @@ class UnfinishedResult:
     lock: int
 
     def inner(self, name: str) -> UnfinishedResult:
-        """A folder in it, for a part of the result."""
+        """Return a new folder in it, for a part of the result."""
         (self.folder / name).mkdir()
         return UnfinishedResult(self.folder / name, self.lock)
 
 
 @contextmanager
 def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Iterator[UnfinishedResult]:
-    """Build a folder of results; it becomes `out` when the block is left without an exception.
+    """Build a folder of results, which is renamed to `out` if the block ends without an exception.
 
-    After an exception nothing of it is kept, and `out` is as it was.
+    After an exception the new folder is removed, and `out` is unchanged.
 
     Parameters
     ----------
     out : Path
-        Not there, empty, or an earlier result of the same command.
+        Folder that is missing, empty, or an earlier result of the same command.
     kind : ResultKind
     sources : sequence of Path
-        What the command reads: none of it may lie in `out`, nor `out` in a session.
+        Files and folders that the command reads. None may lie in `out`, nor `out` in a session.
 
     Raises
     ------
@@ -147,16 +147,17 @@ def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Itera
 
 
 def is_unfinished(folder: Path) -> bool:
-    """Whether a folder says that its results are not whole."""
+    """Return True if a folder is marked as unfinished and has no manifest."""
     return (folder / UNFINISHED).is_file() and not (folder / MANIFEST).is_file()
 
 
 def check_lasting(out: Path) -> None:
-    """Refuse a place in what a command is building or left unfinished: its next run would remove what is put there.
+    """Refuse a place inside an unfinished result, because the next run of its command would remove files there.
 
     Raises
     ------
     BagError
+        The place lies in an unfinished result.
     """
     place = real_path(out)
     if (found := next(filter(is_unfinished, (place, *place.parents)), None)) is not None:
@@ -168,7 +169,7 @@ def check_lasting(out: Path) -> None:
 
 
 def _check_apart(out: Path, folder: Path, sources: Sequence[Path]) -> None:
-    """Refuse a folder that is, holds, or lies in what is read; by identity, whatever the spelling."""
+    """Refuse a folder that is a source, holds one, or lies in one. Paths are compared by identity, not by spelling."""
     for source in sources:
         real = real_path(source)
         session = real if real.is_dir() else real.parent
@@ -180,7 +181,7 @@ def _check_apart(out: Path, folder: Path, sources: Sequence[Path]) -> None:
 
 
 def _check_links(folder: Path, sources: Sequence[Path]) -> None:
-    """Refuse a folder with a file that a source is a link to: it would be removed with an earlier result."""
+    """Refuse a folder with a file that a source links to, because it would be removed with an earlier result."""
     own: dict[tuple[int, int], str] = {}
     for name in _entries(folder):
         with suppress(FileNotFoundError):  # a draft of another run, at work there
@@ -197,7 +198,7 @@ def _identity(path: Path) -> tuple[int, int]:
 
 
 def _check_earlier(folder: Path, kind: ResultKind) -> None:
-    """Refuse a folder that is neither empty nor a result of the same command, as it was written."""
+    """Refuse a folder unless it is empty or an unchanged result of the same command."""
     if folder.exists() and not folder.is_dir():
         raise BagError(f"{folder}: is no folder. Choose another name.")
     entries = _entries(folder)
@@ -222,7 +223,7 @@ def _check_earlier(folder: Path, kind: ResultKind) -> None:
 
 
 def _entries(folder: Path) -> list[str]:
-    """Paths of all files in a folder, and of its folders with a slash behind, without files of the system."""
+    """Return the paths of all files and folders in a folder, except files of the system. Folders end with a slash."""
     found: list[str] = []
     for place, folders, files in os.walk(folder):
         inside = Path(place).relative_to(folder)
@@ -233,7 +234,7 @@ def _entries(folder: Path) -> list[str]:
 
 
 def _manifest(folder: Path) -> tuple[str, dict[str, str]]:
-    """Command, and SHA-256 by file, of a result that is complete or was being removed; empty where nothing tells."""
+    """Return command and SHA-256 by file of a result that is complete or partly removed; empty without a manifest."""
     for name in (MANIFEST, UNFINISHED):
         try:
             content = json.loads((folder / name).read_bytes()[:_LARGEST])
@@ -255,7 +256,7 @@ def _sha256(path: Path) -> str:
 
 @contextmanager
 def _locked(building: Path, kind: ResultKind) -> Iterator[int]:
-    """The folder to build in, which is made, locked and marked as unfinished."""
+    """Make the folder to build in, lock it and mark it as unfinished."""
     marker = building / UNFINISHED
     try:
         building.parent.mkdir(parents=True, exist_ok=True)
@@ -278,7 +279,7 @@ def _locked(building: Path, kind: ResultKind) -> Iterator[int]:
 
 
 def _mark(lock: int, marker: Path, kind: ResultKind) -> None:
-    """Write into the open marker whose it is; where it cannot be written, it is removed, with the folder if that is empty."""
+    """Write the name of the command into the open marker. If that fails, remove marker and folder if the folder has no more."""
     note = {"command": kind.command, "state": "unfinished; if no such command runs, a run that was stopped left this"}
     try:
         os.truncate(lock, 0)
@@ -303,7 +304,7 @@ def _is_taken(lock: int, marker: Path) -> bool:
 
 
 def _check_left(building: Path, kind: ResultKind) -> None:
-    """Refuse what no killed run of the same command can have left."""
+    """Refuse a folder that a killed run of the same command cannot have left."""
     entries = _entries(building)
     remedy = "Move it away, or choose another folder: results are built there"
     if entries and entries != [UNFINISHED] and _command(building) != kind.command:
@@ -317,7 +318,7 @@ def _check_left(building: Path, kind: ResultKind) -> None:
 
 
 def _command(building: Path) -> str:
-    """The command that left an unfinished result; empty if it does not say."""
+    """Return the command that left an unfinished result; empty if its marker does not name it."""
     try:
         return str(json.loads((building / UNFINISHED).read_bytes()[:_LARGEST])["command"])
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
@@ -325,7 +326,7 @@ def _command(building: Path) -> str:
 
 
 def _clear(building: Path, kind: ResultKind) -> None:
-    """Take away what a run has written, the manifest first, but not the marker."""
+    """Remove the files that a run has written, the manifest first, and keep the marker."""
     _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
 
 
@@ -338,7 +339,7 @@ def _remove(folder: Path, names: Sequence[str]) -> None:
 
 
 def _remove_empty(folder: Path) -> None:
-    """Remove a folder that holds nothing but files of the system; another is left as it is."""
+    """Remove a folder that holds only files of the system."""
     with suppress(OSError):
         if not _entries(folder):
             for name in OF_THE_SYSTEM:
@@ -350,7 +351,7 @@ def _remove_empty(folder: Path) -> None:
 
 
 def _complete(building: Path, kind: ResultKind) -> None:
-    """Put all on the disk, then list it in the manifest."""
+    """Sync all files to the disk, then list them in the manifest."""
     files = [name for name in _entries(building) if not name.endswith("/") and name != UNFINISHED]
     for name in files:
         if not kind.has(name):
@@ -364,7 +365,7 @@ def _complete(building: Path, kind: ResultKind) -> None:
 
 
 def _settle(place: Path, replaced: Path, kind: ResultKind) -> None:
-    """Put right what a kill left between two renames; refuse a place that is not free."""
+    """Complete a replacement that a kill interrupted between two renames. Refuse a place that is not free."""
     _check_earlier(replaced, kind)
     if replaced.exists() and not place.exists():
         replaced.rename(place)
@@ -373,7 +374,7 @@ def _settle(place: Path, replaced: Path, kind: ResultKind) -> None:
 
 
 def _discard(folder: Path) -> None:
-    """Remove an earlier result: its manifest becomes the mark of something unfinished, which goes last."""
+    """Remove an earlier result. Its manifest becomes the marker of an unfinished result and is removed last."""
     try:
         with suppress(FileNotFoundError):
             (folder / MANIFEST).rename(folder / UNFINISHED)

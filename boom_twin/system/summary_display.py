@@ -12,12 +12,12 @@ from ..errors import UsageError
 
 
 class SummaryDisplay:
-    """Base of results: a line as `repr`, a small table in a notebook, both of `summary_rows`."""
+    """Base of results that shows `summary_rows` as a line (`repr`) or as a small table in a notebook."""
 
     __slots__ = ()
 
     def summary_rows(self) -> Mapping[str, str]:
-        """What matters most, in words, by name."""
+        """Return the most important values as texts, by name."""
         raise NotImplementedError
 
     def __repr__(self) -> str:
@@ -32,12 +32,12 @@ class SummaryDisplay:
 
 
 def numbers(values: Any, factor: float = 1.0, digits: int = 4) -> str:
-    """Numbers with so many significant digits, commas between them."""
+    """Return numbers as text with `digits` significant digits, separated by commas."""
     return ", ".join(f"{factor * value:.{digits}g}" for value in np.atleast_1d(values).tolist())
 
 
 def data_frame(columns: Mapping[str, Any]) -> Any:
-    """The columns as a ``pandas.DataFrame``.
+    """Return the columns as a ``pandas.DataFrame``.
 
     Raises
     ------

@@ -25,22 +25,22 @@ LONGEST = _FIELDS.size + 4 + _SIZE.size
 
 @dataclass(frozen=True, slots=True)
 class ChunkHead:
-    """What a chunk says about itself.
+    """Head of a chunk record.
 
     Attributes
     ----------
     offset : int
-        Of the record in the file.
+        Offset of the record in the file.
     opcode, length : int
-        Of the record; the length counts from after these two.
+        Opcode and length of the record; the length counts from after these two fields.
     start, end : int
-        Log times, ns.
+        First and last log time, ns.
     unpacked, crc : int
-        Size and checksum of the content; a checksum of 0 is none.
+        Size (bytes) and checksum of the unpacked content; a checksum of 0 is none.
     compression : str
-        Empty where the name is not known.
+        Name of the compression as stated; empty for none.
     head, size : int
-        Bytes up to the packed content, and of it.
+        Bytes before the packed content, and bytes of the packed content.
     """
 
     offset: int
@@ -56,7 +56,7 @@ class ChunkHead:
 
     @property
     def is_certain(self) -> bool:
-        """Whether its two lengths agree: no other bytes look like that by chance."""
+        """Return True if its two lengths agree, as they do not by chance in other bytes."""
         return PREFIX.size + self.length == self.head + self.size
 
     @property
@@ -69,7 +69,7 @@ class ChunkHead:
 
 
 def head_at(file: BinaryIO, offset: int) -> ChunkHead | None:
-    """The head of a chunk at `offset`; None if nothing like one is there."""
+    """Return the head of a chunk at `offset`; None if the bytes there are not like one."""
     file.seek(offset)
     raw = file.read(LONGEST)
     if len(raw) < _FIELDS.size + _SIZE.size:
@@ -84,7 +84,7 @@ def head_at(file: BinaryIO, offset: int) -> ChunkHead | None:
 
 
 class UnsoundError(McapError):
-    """What does not fit in a chunk; `start` is what its own sizes unpack to, so that nobody unpacks it again."""
+    """Error of a damaged chunk; `start` is the content that its stated sizes unpack to, kept for further use."""
 
     def __init__(self, reason: str, start: bytes = b"") -> None:
         super().__init__(reason)
@@ -92,9 +92,9 @@ class UnsoundError(McapError):
 
 
 def sound_content(file: BinaryIO, head: ChunkHead, size: int, budget: UnpackBudget) -> tuple[bytes, int]:
-    """Content of a chunk in a file of `size` bytes, and the offset after it.
+    """Return the content of a chunk in a file of `size` bytes, and the offset after the chunk.
 
-    With a checksum, everything else in the head may be wrong; without, all of it must fit.
+    With a checksum, any other field of the head may be wrong. Without a checksum, all fields must fit.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def sound_content(file: BinaryIO, head: ChunkHead, size: int, budget: UnpackBudg
 
 
 def _fitting_content(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> bytes:
-    """Content of a chunk without a checksum; UnsoundError if anything does not fit."""
+    """Return the content of a chunk without a checksum. Raise UnsoundError if a length, a size or a record does not fit."""
     if not head.is_certain:
         raise UnsoundError("its lengths do not agree")
     try:
@@ -138,12 +138,12 @@ def _fitting_content(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> b
 
 
 def unverified_start(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> bytes:
-    """The whole records at the start of a chunk that is cut off; no checksum vouches for them.
+    """Return the whole records at the start of a chunk that is cut off. No checksum verifies them.
 
     Raises
     ------
     UnpackError
-        It unpacks to more than `budget` allows.
+        The chunk unpacks to more than `budget` allows.
     """
     try:
         content = _unpacked(file, head, min(head.size, MOST_HELD), head.compression, min(head.unpacked, MOST_HELD), budget)
@@ -155,7 +155,7 @@ def unverified_start(file: BinaryIO, head: ChunkHead, budget: UnpackBudget) -> b
 
 
 def _readings(head: ChunkHead, size: int) -> Iterator[tuple[int, str]]:
-    """Packed size and compression that are possible, those that the head states first."""
+    """Yield the possible pairs of packed size and compression, those stated by the head first."""
     room = min(size - head.offset - head.head, MOST_HELD)
     packed = dict.fromkeys(each for each in (head.size, PREFIX.size + head.length - head.head) if 0 < each <= room)
     known = [head.compression] if head.compression in _COMPRESSIONS else list(_COMPRESSIONS)

@@ -24,17 +24,17 @@ _INDEXES = {Opcode.STATISTICS, Opcode.CHUNK_INDEX}
 
 @dataclass(slots=True)
 class FileDefinitions:
-    """What one file says about its messages.
+    """Definitions, notes and counts of one damaged file.
 
     Attributes
     ----------
     channels, schemas : dict
-        By their numbers; those under a checksum go first.
+        Channels and schemas by number; a definition under a checksum replaces one without.
     notes : dict of str to str
     told : Counter or None
-        Messages by topic as a sound summary has them.
+        Number of messages by topic from a sound summary.
     is_summed : bool
-        Whether all bytes up to the end of the data are under a checksum that fits.
+        True if a checksum over all bytes up to the end of the data fits.
     listed : Counter of (int, int, int)
         Chunks in the index of a sound summary, by first and last log time (ns) and size of the content.
     """
@@ -47,7 +47,7 @@ class FileDefinitions:
     listed: Counter[tuple[int, int, int]] = field(default_factory=Counter)
 
     def topic(self, channel: int, metadata: BagMetadata | None) -> Recorded | None:
-        """The topic of a channel; None if its definition is lost."""
+        """Return the topic of a channel; None if its definition is lost."""
         found = self.channels.get(channel)
         schema = self.schemas.get(found.schema_id) if found else None
         if found is None or schema is None:
@@ -68,10 +68,10 @@ class FileDefinitions:
 
 
 def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
-    """Walk through a file once for everything but its messages.
+    """Return the definitions, notes and counts of a file from one walk through it.
 
-    A definition counts if its chunk's or the summary's checksum fits, or if none is there to deny it; if `unverified`,
-    one at the start of a chunk that is cut off or wrong counts too.
+    A definition is used if the checksum of its chunk or of the summary fits, or if there is no checksum. With `unverified`,
+    a definition at the start of a chunk that is cut off or fails its checksum is used too.
 
     Raises
     ------

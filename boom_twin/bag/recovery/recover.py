@@ -31,23 +31,24 @@ MOST_FAULTS = 1000
 
 @dataclass(slots=True)
 class Recovery:
-    """What a rescue brought.
+    """Result of a recovery: counts of saved and lost messages, and faults.
 
     Attributes
     ----------
     saved : Counter
-        Messages by topic, counted in the new session after it was written.
+        Number of messages by topic, counted in the new session after it was written.
     unvouched : Counter
-        Those of them that were under no checksum.
+        Number of saved messages by topic that were under no checksum.
     lost : dict of str to int, or None
-        By topic; None where no sound count of the source says how many there were.
+        Number of lost messages by topic; None if the source has no sound count.
     nameless : int
-        Sound messages that were left out, because the definition of their topic is lost.
+        Number of sound messages left out because the definition of their topic is lost.
     copies : int
-        Messages that were left out, because they stand in a chunk that is the copy of one before it.
+        Number of messages left out because their chunk is a copy of an earlier one.
     faults : list of (Path, Fault)
-        The first `MOST_FAULTS`.
+        The first `MOST_FAULTS` faults.
     fault_count : int
+        Number of all faults.
     """
 
     saved: Counter[str] = field(default_factory=Counter)
@@ -59,25 +60,25 @@ class Recovery:
     fault_count: int = 0
 
     def note(self, path: Path, fault: DamagedBytes) -> None:
-        """Count a fault; the first ones are kept."""
+        """Count a fault, and keep it if it is among the first `MOST_FAULTS`."""
         self.fault_count += 1
         if len(self.faults) < MOST_FAULTS:
             self.faults.append((path, fault))
 
 
 def recover(path: Path, out: Path, unverified: bool = False) -> Recovery:
-    """Write what can be saved of the session at `path` into the new directory `out`, or nothing; `path` is only read.
+    """Write all recoverable messages of the session at `path` into the new directory `out`, or nothing. `path` is only read.
 
     Parameters
     ----------
     path, out : Path
     unverified : bool
-        Save also the whole messages at the start of chunks that were cut off or whose checksum does not fit.
+        Also save the whole messages at the start of chunks that are cut off or whose checksum does not fit.
 
     Returns
     -------
     Recovery
-        What was saved, and a count of what was not.
+        Counts of the messages that were saved and lost.
 
     Raises
     ------
@@ -130,7 +131,7 @@ def _copy(
     metadata: BagMetadata | None,
     unverified: bool,
 ) -> None:
-    """Copy the messages of one file; those of a chunk that is the copy of another are left out."""
+    """Copy the messages of one file. Chunks that are copies of earlier ones are left out."""
     own: dict[int, int] = {}
     seen: Counter[bytes] = Counter()
     for piece in scan_damaged(file, unverified, definitions.channels):
@@ -157,10 +158,10 @@ def _copy(
 
 
 def _is_copy(piece: SoundRecords, definitions: FileDefinitions, seen: Counter[bytes]) -> bool:
-    """Whether a piece is a chunk that was `seen` before, and more often than the recorder wrote it.
+    """Return True if a piece is a chunk that was `seen` more often than the recorder wrote it.
 
-    Equal messages in one chunk were recorded as they stand there. So were equal chunks (a clock that stands still gives
-    such), if the checksum of all data fits, or as many as a sound index lists.
+    Equal messages within one chunk are recorded ones. Equal chunks (as from a clock that stands still) are recorded ones
+    if the checksum of all data fits, or up to the number that a sound index lists.
     """
     head = piece.chunk
     if head is None or definitions.is_summed:
@@ -171,7 +172,7 @@ def _is_copy(piece: SoundRecords, definitions: FileDefinitions, seen: Counter[by
 
 
 def _key(bag: BagWriter, keys: dict[tuple[str, str, bytes], int], topic: Recorded) -> int:
-    """The key of a topic in the new bag; two channels of one topic become one."""
+    """Return the key of a topic in the new bag. Two channels of one topic become one."""
     identity = topic.topic, topic.type, topic.definition
     if identity not in keys:
         (keys[identity],) = bag.add(topic)
@@ -179,7 +180,7 @@ def _key(bag: BagWriter, keys: dict[tuple[str, str, bytes], int], topic: Recorde
 
 
 def _copy_sheet(path: Path, out: Path) -> None:
-    """Keep what the session was recorded with, for a replay: scene and mapping."""
+    """Copy ``session.yaml``, whose scene and mapping a replay needs."""
     sheet = sheet_path(path)
     if holds_file(sheet) and sheet.stat().st_size <= LARGEST:
         with open_received(sheet) as file:
@@ -187,7 +188,7 @@ def _copy_sheet(path: Path, out: Path) -> None:
 
 
 def _count(out: Path) -> Counter[str]:
-    """Messages by topic, from reading all of the new session."""
+    """Return the number of messages by topic, counted by reading all of the new session."""
     saved: Counter[str] = Counter()
     for file in scan(out).files:
         for channel, _, _ in file.heads():
@@ -198,7 +199,7 @@ def _count(out: Path) -> Counter[str]:
 def _lost(
     saved: Mapping[str, int], all_definitions: list[FileDefinitions], metadata: BagMetadata | None, files: list[Path]
 ) -> dict[str, int] | None:
-    """What is missing of the source's own count, if there is a sound one that can be true."""
+    """Return the lost messages by topic against the first count of the source that is no smaller than the saved messages."""
     for told in _counts_told(all_definitions, metadata, files):
         if all(told.get(topic, 0) >= count for topic, count in saved.items()):
             return {topic: told[topic] - saved.get(topic, 0) for topic in told}
@@ -208,7 +209,7 @@ def _lost(
 def _counts_told(
     all_definitions: list[FileDefinitions], metadata: BagMetadata | None, files: list[Path]
 ) -> Iterator[Counter[str]]:
-    """The counts by the files' summaries, if all have one; by the metadata, if it knows of all files."""
+    """Yield the counts of the files' summaries, if all have one, and of the metadata, if it names all files."""
     counts = [definitions.told for definitions in all_definitions]
     if None not in counts:
         yield sum((each for each in counts if each is not None), Counter[str]())

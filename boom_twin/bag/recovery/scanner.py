@@ -22,16 +22,16 @@ _START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)
 
 @dataclass(frozen=True, slots=True)
 class SoundRecords:
-    """Whole records, one behind the other.
+    """Whole records that follow each other.
 
     Attributes
     ----------
     offset : int
     vouched : bool
-        Whether the checksum of their chunk fits.
+        True if the checksum of their chunk fits.
     content : bytes
     chunk : ChunkHead or None
-        Of the chunk whose whole content they are.
+        Head of the chunk, if the records are its whole content.
     """
 
     offset: int
@@ -42,7 +42,7 @@ class SoundRecords:
 
 @dataclass(frozen=True, slots=True)
 class DamagedBytes:
-    """Bytes that cannot be used, and why."""
+    """Bytes that cannot be used, and the reason."""
 
     offset: int
     length: int
@@ -52,15 +52,15 @@ class DamagedBytes:
 def scan_damaged(
     path: Path, unverified: bool = False, channels: Container[int] | None = None
 ) -> Iterator[SoundRecords | DamagedBytes]:
-    """All of a file in order; one chunk in memory at a time.
+    """Yield all bytes of a file in order as sound records and damaged bytes, with one chunk in memory at a time.
 
     Parameters
     ----------
     path : Path
     unverified : bool
-        Take the whole records, too, from the start of a chunk whose checksum does not fit or cannot be verified.
+        Also yield the whole records at the start of a chunk whose checksum does not fit or cannot be verified.
     channels : container of int, optional
-        Those that are known: messages of others outside chunks are not looked for behind damage.
+        Known channels. After damage, messages outside chunks are searched for in these channels only.
     """
     size, budget = path.stat().st_size, UnpackBudget()
     with open_received(path) as file:
@@ -80,7 +80,7 @@ def scan_damaged(
 def _next(
     file: BinaryIO, offset: int, size: int, unverified: bool, budget: UnpackBudget
 ) -> tuple[list[SoundRecords | DamagedBytes], int | None]:
-    """What begins at `offset`, and where the next record begins; None where that is not known."""
+    """Return the pieces that begin at `offset`, and the offset of the next record (None if unknown)."""
     head = head_at(file, offset)
     if head is None:
         record = _whole_record(file, offset, size)
@@ -106,13 +106,13 @@ def _next(
 
 
 def _broken(head: ChunkHead, length: int, reason: str, start: bytes) -> list[SoundRecords | DamagedBytes]:
-    """A chunk that is not sound, behind the whole records at its start."""
+    """Return a damaged chunk as damaged bytes, preceded by the whole records at its start, if any."""
     fault = DamagedBytes(head.offset, length, f"{head}: {reason}")
     return [SoundRecords(head.offset, False, start), fault] if start else [fault]
 
 
 def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:
-    """The record at `offset`, if it is one of those outside chunks and fills its length exactly; else nothing."""
+    """Return the bytes of the record at `offset` if it is whole and of a kind outside chunks; else no bytes."""
     file.seek(offset)
     raw = file.read(PREFIX.size)
     if len(raw) < PREFIX.size:
@@ -129,7 +129,7 @@ def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:
 
 
 def _fills(opcode: int, body: bytes) -> bool:
-    """Whether a record can be read and fills its body."""
+    """Return True if a record can be read and fills its body."""
     try:
         record_of(opcode, body)
     except PARSE_ERRORS:
@@ -138,7 +138,7 @@ def _fills(opcode: int, body: bytes) -> bool:
 
 
 def _may_begin(file: BinaryIO, offset: int, size: int) -> bool:
-    """Whether a record, a part of one, or the end of the file may be at `offset`."""
+    """Return True if a record, a part of one, or the end of the file may be at `offset`."""
     file.seek(offset)
     raw = file.read(PREFIX.size)
     if len(raw) < PREFIX.size:
@@ -148,13 +148,13 @@ def _may_begin(file: BinaryIO, offset: int, size: int) -> bool:
 
 
 def _ends(file: BinaryIO, offset: int) -> bool:
-    """Whether nothing but the last magic bytes is at `offset`."""
+    """Return True if the magic bytes of the end of the file are at `offset`."""
     file.seek(offset)
     return file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
 
 
 def _behind(file: BinaryIO, offset: int, size: int, channels: Container[int]) -> int:
-    """The next offset from which on the file can be read again; its size if there is none."""
+    """Return the next offset at which the file can be read again; the size of the file if there is none."""
     while offset < size:
         file.seek(offset)
         block = file.read(BLOCK + PREFIX.size - 1)
@@ -166,7 +166,7 @@ def _behind(file: BinaryIO, offset: int, size: int, channels: Container[int]) ->
 
 
 def _is_start(file: BinaryIO, offset: int, size: int, channels: Container[int]) -> bool:
-    """Whether a chunk, the end of the data, or a message of a known channel followed by a record is at `offset`."""
+    """Return True if a chunk, the end of the data, or a known channel's message followed by a record is at `offset`."""
     file.seek(offset)
     raw = file.read(PREFIX.size + MESSAGE_HEAD.size)
     opcode, length = PREFIX.unpack_from(raw)
