@@ -103,7 +103,7 @@ class Batch:
         return out
 
     def _may_have_lanes(self, steps: int) -> bool:
-        """Whether booms go side by side: with ideal pins, compiled, and if what it takes to put them there pays."""
+        """Return True if booms may go side by side: pins are ideal, code is compiled, and there are enough steps and booms."""
         return not self.plans[0].pins and steps >= FEWEST_STEPS and len(self.plans) > 1 and run_lanes.is_compiled
 
     @cached_property

@@ -23,7 +23,7 @@ from ..scene.segmentation import flexible_parts
 from ..types import Array
 
 PLACES = (0.0, 0.5, 1.0)
-"""Of the stations of a part, over its length."""
+"""Places of the stations of a part, over its length."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Station:
 
     @property
     def key(self) -> str:
-        """The same as a part of names of columns: ``section_1_at_0.60`` or ``section_1_at_5.92_outboard``."""
+        """Section and place as a part of column names: ``section_1_at_0.60`` or ``section_1_at_5.92_outboard``."""
         return f"section_{self.section + 1}_at_{self.place:.2f}" + (f"_{self.side}" if self.side else "")
 
 

@@ -26,7 +26,7 @@ POSTURE_STEP = 0.03  # m of stroke after which the influence of the tip's force 
 
 @dataclass(frozen=True)
 class BendingStresses:
-    """At k stations at one instant.
+    """Bending moments and stresses at k stations at one instant.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class BendingStressModel:
         return self._influence
 
     def at(self, prediction: Prediction, estimate: Estimate | None) -> BendingStresses:
-        """Of one prediction and the estimate beside it, as a `boom_twin.types.Report` has both."""
+        """Return the stresses of one prediction and the estimate beside it, as a `boom_twin.types.Report` has both."""
         assert prediction.moments is not None
         influence = np.full((len(self.stations), 2), np.nan)
         if estimate is not None and estimate.load.any():  # until anything is measured it is exactly zero

@@ -9,7 +9,7 @@ from ..types import Array
 
 
 class ColumnStatistics:
-    """Of all finite values of each column so far.
+    """Mean, standard deviation and root mean square of all finite values of each column so far.
 
     Parts are combined as by Chan et al. 1983, doi 10.1080/00031305.1983.10483115.
 
@@ -44,7 +44,7 @@ class ColumnStatistics:
 
     @property
     def mean(self) -> list[float | None]:
-        """None where there is no value, as in the others."""
+        """Means; None where there is no value, as in the other statistics."""
         return self._told(self._mean)
 
     @property

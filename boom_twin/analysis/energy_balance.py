@@ -61,7 +61,7 @@ class Energies:
         self._pins = [SimpleNamespace(**{name: row[name].item() for name in CLEARANCE.names or ()}) for row in t.clearances]
 
     def kinetic(self, state: State) -> float:
-        """Of all mass points and inertias, J."""
+        """Return the kinetic energy of all mass points and inertias, J."""
         return float(0.5 * self._plan.masses @ state.history[V] ** 2)
 
     def weight(self, state: State) -> float:
@@ -69,11 +69,11 @@ class Energies:
         return float(-self._plan.weights @ state.history[X])
 
     def strain(self, state: State) -> float:
-        """Of bent and stretched beams, J."""
+        """Return the strain energy of bent and stretched beams, J."""
         return float(0.5 * state.z @ self._stiffness @ state.z)
 
     def oil(self, state: State) -> float:
-        """Of the oil springs, J."""
+        """Return the energy of the oil springs, J."""
         return float(0.5 * self._oil(state.drives[0])[0] @ self._stretch(state) ** 2)
 
     def _stretch(self, state: State) -> Array:
@@ -86,9 +86,9 @@ class Energies:
         return stiffnesses, lags * stiffnesses
 
     def contact(self, state: State) -> float:
-        """Of contacts, J; of linearised pins, their springs.
+        """Return the energy of contacts, J; for linearised pins that of their springs.
 
-        Of a contact it is K times the integral of d^e over the gap, dg = (1 + s^2/(4 d^2)) dd.
+        For a contact it is K times the integral of d^e over the gap, dg = (1 + s^2/(4 d^2)) dd.
         """
         total = 0.0
         for row, memory in zip(self._pins, state.contacts, strict=True):
@@ -108,7 +108,7 @@ class Energies:
         return self.kinetic(state) + potential
 
     def powers(self, state: State) -> Array:
-        """Of the drives, into the boom; of damping and of contact, out of it; shape (3,), W."""
+        """Return the power of the drives into the boom, and of damping and of contact out of it; shape (3,), W."""
         return np.array([self.drive_power(state), self.damping_power(state), self.contact_power(state)])
 
     def drive_power(self, state: State) -> float:
@@ -147,7 +147,7 @@ class Energies:
 
 @dataclass(frozen=True)
 class EnergyBalance:
-    """Where the energy of a motion went, J.
+    """Energy balance of a motion; energies in J.
 
     Attributes
     ----------

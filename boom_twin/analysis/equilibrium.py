@@ -106,7 +106,10 @@ def beyond_validity(scene: Scene, away: float) -> tuple[str, ...]:
 
 
 def motion_beyond_validity(scene: Scene, strokes: Array, tip: Array, angles: Array | None) -> tuple[str, ...]:
-    """The same for the worst of some instants of a motion; strokes (m, n), tip (m, 2) in m; angles (n,) near the first, rad."""
+    """Return the sentence of `beyond_validity` for the worst of some instants of a motion.
+
+    `strokes` (m, n) and `tip` (m, 2) are in m; `angles` (n,) are near the first joint angles, rad.
+    """
     rows: NDArray[np.int64] = np.linspace(0, len(tip) - 1, INSTANTS).astype(np.int64)
     rows = np.unique(np.append(rows, np.argmax(np.hypot(*(tip - tip[0]).T))))
     worst, near = 0.0, angles
@@ -317,7 +320,7 @@ def write_drives(cylinders: Any, oils: Any, forces: Array, lengths: Array) -> No
 
 
 def travel_words(i: int, most: float) -> str:
-    """What strokes cylinder `i` (0-based) has, and what to do about another."""
+    """Return a sentence with the stroke range of cylinder `i` (0-based), and the remedy for another stroke."""
     return f"cylinder {i + 1} travels 0 to {most:g} m. Give in m by how much it is longer than closed_length."
 
 
@@ -381,7 +384,7 @@ def _gradually(state: State, step: float, least: float, rests: Callable[[float, 
 
 
 def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> bool:
-    """Solve for equilibrium under `load` times gravity from the present guess; whether there is a stable one."""
+    """Solve for equilibrium under `load` times gravity from the present guess; return True if there is a stable one."""
     loaded = replace(plan, tables=plan.tables._replace(gravity=load * plan.tables.gravity))
     scheme, still = prepare(REST, 0.0, 0.0, work.weights), np.zeros(plan.joints)
     for cylinder in plan.tables.cylinders:  # angles of barrels and rods within half a turn, whatever was tried
@@ -392,7 +395,7 @@ def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> b
 
 
 def is_stable(plan: Plan, state: State, work: Work) -> bool:
-    """Whether energy has a minimum here: as many negative pivots as there are forces among the unknowns."""
+    """Return True if energy has a minimum here: as many negative pivots as there are forces among the unknowns."""
     try:
         return negative_pivots(plan, state, work, 0.0) == constraints(plan)
     except SolverError:

@@ -111,13 +111,13 @@ BY_ROWS = 1.5  # error over the change that every second row makes: 1/3 for smoo
 
 
 def step_errors(course: DriveCourse, own: Run, dt: float) -> tuple[EstimatedError, ...]:
-    """What steps of at most `dt` (s) added to the motion `own`; `differences` tells of what."""
+    """Return the errors that steps of at most `dt` (s) added to the motion `own`; `differences` names the quantities."""
     rows, finer = np.arange(len(course.times)), 8 if course.plan.pins else 2
     return _compared(course.times, own.rows, course.stepped(rows, dt, finer), BY_STEPS)
 
 
 def row_errors(course: DriveCourse, own: Run) -> tuple[EstimatedError, ...]:
-    """What may lie between the rows of the motion `own`; nothing for less than three rows.
+    """Return the errors of the curve between the rows of the motion `own`; nothing for less than three rows.
 
     Rows are left out in both ways, the odd ones and the even ones, because a kink shows in one of them only.
     """

@@ -64,7 +64,7 @@ def free_vibrations(dt: float, values: Array, most_lags: int | None = None) -> l
 
 
 def is_free(each: Vibration) -> bool:
-    """Whether a vibration decays, as none does that a load keeps up."""
+    """Return True if a vibration decays; one that a load keeps up does not."""
     return each.damping > DECAYS * each.damping_sigma
 
 

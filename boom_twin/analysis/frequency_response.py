@@ -31,7 +31,7 @@ from .equilibrium import rest_at, strokes_and_angles
 from .modal import drive_at_rest
 
 SHAPES = 5
-"""In which a flexible part bends at least, see `with_all_shapes`."""
+"""Least number of shapes in which a flexible part bends, see `with_all_shapes`."""
 LARGE = 1e4  # times a load of 1 N or 1 m: static forces and lengths are rounded to 1e-16 of themselves
 SMALL = np.array([1.0, 1e-6])  # N, m of a drive: loads that leave the tangents as they are, see `harmonic_response`
 UPWARD = (0.0, 1.0)  # N
@@ -76,7 +76,7 @@ class FrequencyResponse(SummaryDisplay):
 
     @property
     def tip_acceleration(self) -> ComplexArray:
-        """Of the tip, m/s^2, shape (k, 2)."""
+        """Acceleration of the tip, m/s^2, shape (k, 2)."""
         return np.asarray(-((2.0 * math.pi * self.frequencies[:, None]) ** 2) * self.tip)
 
     def channels(self) -> dict[str, ComplexArray]:
@@ -134,9 +134,10 @@ def with_all_shapes(scene: Scene) -> Scene:
 
 
 def pins_at_rest(plan: Plan, state: State, work: Work) -> Array:
-    """What holds the journals of all pins with clearance at rest (see `Work.hold`), and its derivative by the rate s of motion.
+    """Return the pin forces at rest and their tangents, and the derivative of these by the rate s of motion.
 
-    Both of shape (pins, columns), stacked; `work` has the state's positions.
+    Both are of shape (pins, columns), see `Work.hold`, and are stacked. The pins are those with clearance. `work` has the
+    state's positions.
 
     Raises
     ------
@@ -224,7 +225,7 @@ class LinearisedBoom:
         )
 
     def _linear_increments(self, rates: ComplexArray, loads: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        """What `_increments` gives, of the size that is best for `harmonic_response`."""
+        """Return `_increments` under `loads`, solved at the size of load that is best for `harmonic_response`."""
         if not self.plan.pins:
             increments, tip = self._increments(rates, LARGE * loads)
             return increments / LARGE, tip / LARGE

@@ -52,7 +52,7 @@ STENCIL = ((2.0, -1.0), (1.0, 8.0), (-1.0, -8.0), (-2.0, 1.0))  # of the fourth-
 
 @dataclass(frozen=True)
 class InitialState:
-    """Where a boom is at one instant, and how it moves.
+    """Position and velocity of a boom at one instant.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class InitialState:
     contacts: Array
 
     def changed(self, **coordinates: tuple[float, float]) -> InitialState:
-        """The same with other coordinates: name -> (value, rate); UsageError for a name that there is not."""
+        """Return a copy with other coordinates: name -> (value, rate); UsageError for a name that there is not."""
         values, rates = self.values.copy(), self.rates.copy()
         for name, (value, rate) in coordinates.items():
             if name not in self.names:
@@ -130,7 +130,7 @@ def _derivative(at: Callable[[float], Array], fastest: float) -> Array:
 
 
 def state_now(plan: Plan, state: State) -> InitialState:
-    """What `state` holds, as the start of another motion."""
+    """Return the content of `state` as the start of another motion."""
     rates = state.history[V, : len(plan.names)] * plan.tables.moving
     return InitialState(plan.names, state.z.copy(), rates, state.contacts.copy())
 
@@ -202,7 +202,7 @@ def _drive(plan: Plan, times: Array, strokes: Array, after: float) -> tuple[Arra
 
 
 def _place_moving(plan: Plan, state: State, work: Work, initial: InitialState) -> None:
-    """Positions and velocities of all mass points into the history of `state`."""
+    """Write positions and velocities of all mass points into the history of `state`."""
     fastest = float(np.max(np.abs(initial.rates)))
 
     def at(share: float) -> Array:
@@ -217,7 +217,7 @@ def _place_moving(plan: Plan, state: State, work: Work, initial: InitialState) -
 
 
 def _check_loops(plan: Plan, state: State, work: Work, initial: InitialState, length: Array, rate: Array) -> None:
-    """UsageError if links do not meet, or an incompressible cylinder is not as long, or as fast, as its drive."""
+    """Raise UsageError if links do not meet, or an incompressible cylinder is not as long, or as fast, as its drive."""
 
     def at(share: float) -> Array:
         state.z[:] = initial.values + share * initial.rates
@@ -242,7 +242,7 @@ def _check_loops(plan: Plan, state: State, work: Work, initial: InitialState, le
 
 
 def _check_drives(plan: Plan, state: State, work: Work, length: Array) -> None:
-    """UsageError if springs are not as long as the state's own forces make them: the drives begin somewhere else."""
+    """Raise UsageError if springs are not as long as the state's own forces make them: the drives begin elsewhere."""
     cylinders = plan.tables.cylinders
     forces = state.z[cylinders.z]
     began = work.position[cylinders.history] - plan.compliances_and_lags(length)[0] * forces
@@ -255,13 +255,13 @@ def _check_drives(plan: Plan, state: State, work: Work, length: Array) -> None:
 
 
 def _incompressible(plan: Plan) -> NDArray[np.bool_]:
-    """Which cylinders have neither k nor oil, shape (n,)."""
+    """Return a mask of the cylinders that have neither k nor oil, shape (n,)."""
     cylinders = plan.tables.cylinders
     return np.asarray((cylinders.compliance == 0.0) & (cylinders.oil < 0))
 
 
 def _open_loops(plan: Plan, state: State, work: Work) -> Array:
-    """By how much links miss each other (m, two a six-bar), then lengths (m) of incompressible cylinders."""
+    """Return how far links miss each other (m, two a six-bar), then lengths (m) of incompressible cylinders."""
     t, z, found = plan.tables, state.z, []
     for k in np.flatnonzero(t.operations.kind == JOINT_B):
         joint, linkage, turns = (row[t.operations[k].row] for row in (t.joints, t.linkages, state.turns))

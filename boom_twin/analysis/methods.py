@@ -38,7 +38,7 @@ Drive = Callable[[Array], tuple[Array, Array]]
 
 @dataclass(frozen=True)
 class Method:
-    """How a step is made; UsageError if there is no such method.
+    """Method by which a step is made; UsageError if there is no such method.
 
     Attributes
     ----------

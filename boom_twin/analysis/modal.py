@@ -168,12 +168,12 @@ def along(plan: Plan, state: State, work: Work, increments: Array, read: Callabl
 
 
 def _nudge(plan: Plan, increments: Array) -> float:
-    """Of how many `increments` of the unknowns derivatives are taken."""
+    """Return the multiple of `increments` of the unknowns by which derivatives are taken."""
     return NUDGE / max(float(np.max(plan.tables.scale * np.abs(increments))), 1e-300)
 
 
 def damping_ratio(plan: Plan, mode: Mode) -> float:
-    """Of critical, by the power that oil dampers and beams take from the mode at its own frequency."""
+    """Return the damping ratio, by the power that oil dampers and beams take from the mode at its own frequency."""
     t, omega = plan.tables, 2.0 * np.pi * mode.frequency
     compliances, lags = plan.compliances_and_lags(mode.drives)
     loss = sum((lags * compliances * mode.increments[t.cylinders.z] ** 2).tolist())

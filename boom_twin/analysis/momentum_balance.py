@@ -48,14 +48,14 @@ class Momenta:
         self._turns = np.array([at + 2 for at in triples] + rotary, dtype=np.int64)
 
     def momentum(self, state: State) -> Array:
-        """N s, N s, N m s; shape (3,)."""
+        """Return momentum and moment of momentum, N s, N s, N m s; shape (3,)."""
         impulses = self._plan.masses * state.history[V]
         found = self._wrench(state, impulses)
         found[2] += impulses[self._turns].sum()
         return found
 
     def forces(self, state: State) -> Array:
-        """Of weight and base, N, N, N m; shape (3,)."""
+        """Return force and moment of weight and base, N, N, N m; shape (3,)."""
         return self._wrench(state, self._plan.weights) + self._base(state)
 
     def _wrench(self, state: State, forces: Array) -> Array:
@@ -70,7 +70,7 @@ class Momenta:
         return float(joint.x), float(joint.y)
 
     def _base(self, state: State) -> Array:
-        """What the base exerts: a force at the pivot and one at the barrel pin of cylinder 1, and torques of friction there."""
+        """Return force and moment of the base: at the pivot and the barrel pin of cylinder 1, with friction torques there."""
         t, work = self._plan.tables, self._work
         place(t, state, work)
         motion = Motion(1.0, 0.0, work.position - state.history[A], state.history[V].copy())
@@ -86,7 +86,7 @@ class Momenta:
 
 @dataclass(frozen=True)
 class MomentumBalance:
-    """How far the momentum of a motion is from the impulses of weight and base.
+    """Gap between the momentum of a motion and the impulses of weight and base.
 
     Attributes
     ----------

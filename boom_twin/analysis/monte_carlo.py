@@ -50,7 +50,7 @@ class SampledMotions:
     doubtful: int
 
     def columns(self) -> dict[str, Array]:
-        """Of every quantity mean, standard deviation and the quantiles `LOWER` and `UPPER` over the samples, by row.
+        """Return mean, standard deviation and the quantiles `LOWER` and `UPPER` of every quantity over the samples, by row.
 
         Returns
         -------
@@ -66,7 +66,7 @@ class SampledMotions:
 
     @cached_property
     def samples(self) -> dict[str, Array]:
-        """Of every sample its parameters and its extremes, (c,) each."""
+        """Parameters and extremes of every sample, (c,) each."""
         motion = self.motions
         forces = {name: values for name, values in motion.items() if name.startswith("cylinder_force_")}
         return self.parameters | {

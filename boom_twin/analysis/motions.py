@@ -102,7 +102,7 @@ def motion_of(scene: Scene, posture: str | None = None, duration: float = DURATI
 
 
 def quintic(x: T) -> tuple[T, T, T]:
-    """From 0 to 1 over x in [0, 1] with two derivatives, which vanish at both ends."""
+    """Return a rise from 0 to 1 over x in [0, 1] with two derivatives, which vanish at both ends."""
     y = 1.0 - x
     return x * x * x * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * (x * y) * (x * y), 60.0 * x * y * (y - x)
 
@@ -113,7 +113,7 @@ def _arch_strokes() -> tuple[float, ...]:
 
 
 def _is_default(scene: Scene, first: Array) -> bool:
-    """Whether the cylinders stand as those of the default scene in its arch."""
+    """Return True if the cylinders stand as those of the default scene in its arch."""
     expected = _arch_strokes()
     return len(scene.joints) == len(expected) and bool(np.allclose(first, expected, rtol=0.0, atol=1e-9))
 
@@ -178,7 +178,7 @@ class StopMotion:
 
     @property
     def still(self) -> float:
-        """From here on the drives hold, s."""
+        """Time from which the drives hold, s."""
         return self.stop + self.brake
 
     @property

@@ -208,7 +208,7 @@ def course_of(
     start: InitialState | None = None,
     name: str = "stroke",
 ) -> DriveCourse:
-    """What `simulate` steps through: the drive, checked, and the boom at its first row; arguments and errors as there.
+    """Return the checked drive and the boom at its first row, for `simulate` to step through; arguments and errors as there.
 
     Errors call the strokes by `name`.
     """
@@ -241,7 +241,7 @@ def drives_of(plan: Plan, times: Array, lengths: Array, forces: Array) -> Array:
 def _doubts(
     times: Array, dt: float, own: Run, by_steps: tuple[EstimatedError, ...], by_rows: tuple[EstimatedError, ...]
 ) -> Iterator[str]:
-    """What the motion `own` in steps of `dt` (s), rows at `times` (s), itself gives reason to doubt."""
+    """Yield warnings that the motion `own` gives of itself; steps of `dt` (s), rows at `times` (s)."""
     apart = float(np.diff(times, prepend=times[0]).max())
     yield from ringing(own.jolt, own.shake, own.square)
     yield from warnings_of(by_steps, f"the step of {dt:g} s is coarse", "take a smaller step")

@@ -48,7 +48,7 @@ class PeriodicLoad:
 
     @property
     def times(self) -> Array:
-        """Of the forces, s, shape (m,)."""
+        """Times of the forces, s, shape (m,)."""
         return self.period * np.arange(len(self.forces)) / len(self.forces)
 
 

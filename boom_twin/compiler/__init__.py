@@ -1,1 +1,1 @@
-"""From a scene to a compiled boom: where every number sits in memory."""
+"""Compiler from a scene to a boom: the place of every number in memory."""

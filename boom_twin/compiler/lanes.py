@@ -17,7 +17,7 @@ ALIGNED = 64  # bytes, a line of the cache
 
 
 def groups_of(booms: int) -> int:
-    """How many groups so many booms are; the last may have fewer."""
+    """Return the number of groups that hold so many booms; the last group may have fewer."""
     return -(-booms // WIDTH)
 
 

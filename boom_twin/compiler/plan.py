@@ -97,7 +97,7 @@ class Plan:
         return len(self.tables.joints)
 
     def compliances_and_lags(self, drives: Array) -> tuple[Array, Array]:
-        """1/k (m/N; 0 if incompressible) and d/k (s) of the cylinders with their `drives` so long (m); all of shape (n,)."""
+        """Return 1/k (m/N; 0 if incompressible) and d/k (s) of cylinders whose `drives` are so long (m); all of shape (n,)."""
         t = self.tables
         found = [compliance_and_lag(row, t.oils, drive) for row, drive in zip(t.cylinders, drives, strict=True)]
         return np.array([compliance for compliance, _ in found]), np.array([lag for _, lag in found])

@@ -1,1 +1,1 @@
-"""How the boom behaves: compiled numerics."""
+"""Compiled numerics of the boom's mechanics."""

@@ -49,7 +49,7 @@ def source_hash(root: Path = ROOT) -> str:
 
 
 def cache_folder() -> Path:
-    """Where kernels of this source state are kept: in ``NUMBA_CACHE_DIR``, else in ``boom_twin`` of the user's cache folder.
+    """Return the folder of kernels of this source state, in ``NUMBA_CACHE_DIR``, else in ``boom_twin`` of the user's cache.
 
     A relative path in ``XDG_CACHE_HOME`` counts as none, as its specification says.
     """
@@ -60,7 +60,10 @@ def cache_folder() -> Path:
 
 
 def fault_of(folder: Path) -> str | None:
-    """Why machine code from `folder`, which is made if needed, is not to be trusted or cannot be kept; None if all is well."""
+    """Return why machine code from `folder` is not to be trusted or cannot be kept; None if all is well.
+
+    The folder is made if needed.
+    """
     if not folder.is_absolute():
         return f"{folder} is a relative path: give NUMBA_CACHE_DIR an absolute one"
     try:
@@ -77,13 +80,13 @@ def fault_of(folder: Path) -> str | None:
 
 
 def is_kept(name: str) -> bool:
-    """Whether compiled code of the kernel with this full name is kept on this computer, and may be used."""
+    """Return True if compiled code of the kernel with this full name is kept on this computer, and may be used."""
     folder = cache_folder()
     return fault_of(folder) is None and any(folder.glob(f"{name}-*{SUFFIX}"))
 
 
 def _writers(state: os.stat_result, may_be_sticky: bool = False) -> str | None:
-    """Who but the user and root can write something, in words with the remedy; None if nobody."""
+    """Return who but the user and root can write something, in words with the remedy; None if nobody."""
     if state.st_uid not in (os.getuid(), 0):
         return f"belongs to user {state.st_uid}: set NUMBA_CACHE_DIR to a folder of your own"
     if may_be_sticky and state.st_mode & stat.S_ISVTX:  # as /tmp: others may add entries, but not exchange them
@@ -94,7 +97,7 @@ def _writers(state: os.stat_result, may_be_sticky: bool = False) -> str | None:
 
 
 def _is_own_group(number: int) -> bool:
-    """Whether a group holds nobody but the user, or root: by its name and its members."""
+    """Return True if a group holds nobody but the user, or root, by its name and its members."""
     if number == 0:
         return True
     try:
@@ -172,10 +175,10 @@ class KernelCache:
             write_checked(self._path(signature, compiled.codegen), kept)
 
     def enable(self) -> None:
-        """It always is."""
+        """Do nothing, for the cache is always enabled."""
 
     def flush(self) -> None:
-        """Nothing is kept in memory."""
+        """Do nothing, for nothing is kept in memory."""
 
     def _path(self, signature: Any, codegen: Any) -> Path:
         key = repr((self._version, str(signature), codegen.magic_tuple()))
@@ -189,7 +192,7 @@ def _symbols(library: Any) -> list[str]:
 
 
 def _is_there(callee: Any, engine: Any) -> bool:
-    """Whether the machine code of a kernel that is called is there; it is loaded, or compiled, if need be."""
+    """Load or compile a kernel that is called, if need be; return True if its machine code is there."""
     kernel = getattr(sys.modules.get(callee.module) or import_module(callee.module), callee.name, None)
     if kernel is not None:
         kernel.dispatcher.compile(callee.arguments)
@@ -213,7 +216,7 @@ def _read_when_linked(library: Any, intermediate: bytes) -> None:
 
 
 def read_checked(path: Path) -> bytes | None:
-    """What `write_checked` wrote; None if nothing is there, it is not as it was written, or others can write it."""
+    """Return what `write_checked` wrote; None if nothing is there, it is not as it was written, or others can write it."""
     try:
         with open(path, "rb", opener=_without_links) as file:
             state = os.fstat(file.fileno())

@@ -1,4 +1,4 @@
-"""What compiled code holds: a function that runs inside kernels only is copied into each, a kernel is called where it stands.
+"""Inlining in kernels: a function that runs inside kernels only is copied into each, a kernel is called where it stands.
 
 numba copies every function into each that calls it, with all that is below, optimises and translates it there once more: the
 sweep stood in seven kernels, and compiling these copies was two thirds of all compiling.
@@ -67,14 +67,14 @@ class InlinedCode(KernelCode):
 
     @property
     def codegen(self) -> InlinedCode:
-        """Where `set_env` is looked for."""
+        """Object in which numba looks for `set_env`."""
         return self
 
     def set_env(self, name: str, env: Any) -> None:
-        """There is no machine code that would raise an exception with what `env` holds."""
+        """Do nothing, for there is no machine code that would raise an exception with what `env` holds."""
 
     def get_pointer_to_function(self, name: str) -> int:
-        """0: there is no machine code."""
+        """Return 0, for there is no machine code."""
         self._ensure_finalized()
         return 0
 

@@ -27,7 +27,7 @@ DOCUMENTED = frozenset({"nogil", "error_model"})
 COMPILING = "compiling the model, about a minute; done once for this version and kept in %s"
 NOT_KEPT = "compiling the model, about a minute each time, because compiled code is not kept: %s"
 LAYOUT = 0x1 | 0x2 | 0x100 | 0x400
-"""Of an array's flags those that its type depends on: C and Fortran order, aligned, writeable."""
+"""Flags of an array that its type depends on: C and Fortran order, aligned, writeable."""
 CONFIG_FILE = ".numba_config.yaml"
 """numba takes its settings from this file in the working directory, which may be a received session's."""
 LANES = "lanes"
@@ -57,7 +57,7 @@ def _numba() -> Any:
 
 @cache
 def _folder() -> Path | None:
-    """Where compiled kernels are kept, None if nowhere; says so if that is nowhere, or an empty folder."""
+    """Return the folder of compiled kernels, None if there is none; log a warning if there is none or it is empty."""
     folder = cache_folder()
     if (fault := fault_of(folder)) is not None:
         _tell_not_kept(fault)
@@ -68,7 +68,7 @@ def _folder() -> Path | None:
 
 
 def could_be_kept(kernel: Kernel) -> bool:
-    """Whether compiled code of `kernel` is kept on this computer, and is not there yet; the first use makes it."""
+    """Return True if compiled code of `kernel` can be kept on this computer and is not there yet; the first use makes it."""
     name = f"{kernel.py_func.__module__}.{kernel.py_func.__qualname__}"
     return fault_of(cache_folder()) is None and not is_kept(name)
 
@@ -92,7 +92,7 @@ def _register_references() -> None:
 
 
 def _known(options: dict[str, Any]) -> dict[str, Any]:
-    """Those options that this numba has; it can compile without the ones that are not documented, only slower code."""
+    """Return the options that this numba has; without those that are not documented it only compiles slower code."""
     try:
         from numba.core.cpu import CPUTargetOptions
     except ImportError:
@@ -101,7 +101,7 @@ def _known(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _kind(value: Any) -> Any:
-    """What numba's type of an argument depends on; found fifty times as fast as that type."""
+    """Return all that numba's type of an argument depends on, fifty times as fast as that type."""
     if isinstance(value, np.ndarray):
         return type(value), value.dtype, value.ndim, value.flags.num & LAYOUT
     if isinstance(value, HeldFields):
@@ -158,18 +158,18 @@ class Kernel:
 
     @property
     def is_compiled(self) -> bool:
-        """Whether calls run compiled code, not plain Python."""
+        """Return True if calls run compiled code, not plain Python."""
         return hasattr(self.dispatcher, "overloads")
 
     def _compiler(self) -> dict[str, Any]:
-        """Which compiler instead of numba's own."""
+        """Return the options that name the compiler instead of numba's own."""
         from .inlining import KernelCompiler
 
         return {"pipeline_class": KernelCompiler}
 
     @property
     def _numba_type_(self) -> Any:
-        """What numba takes this object for when it meets it in a kernel."""
+        """Type that numba gives this object in a kernel."""
         return self.dispatcher._numba_type_
 
     def __call__(self, *arguments: Any) -> Any:
@@ -239,7 +239,7 @@ referenced = _Intrinsic(".references", "referenced", lambda fields: fields)
 """A named tuple made in a kernel, as one that came `by_reference`; Python gets it back as it is."""
 _copy_fields = _Intrinsic(".references", "copy_fields", lambda fields, room: 0)
 some = _Intrinsic(".lanes", "some", bool)
-"""Whether a condition holds: of `boom_twin.kernels.lanes`, in any of them."""
+"""Return True if a condition holds; for one of `boom_twin.kernels.lanes`, if it holds in any lane."""
 select = _Intrinsic(".lanes", "select", lambda condition, a, b: a if condition else b)
 """`a` where a condition holds, else `b`: of `boom_twin.kernels.lanes`, in each lane by itself."""
 
@@ -280,7 +280,7 @@ def write_fields(fields, room):
 
 
 def hold(value: Any) -> Any:
-    """What stands for a named tuple in calls of compiled code, if that takes it by reference; anything else as it is.
+    """Return a stand-in for a named tuple that compiled code takes by reference; anything else as it is.
 
     Its fields are written once, here, and not with every call. It stands for this very tuple: what its arrays hold may change.
     """

@@ -39,7 +39,7 @@ class Lanes(Type):
         return Conversion.safe if isinstance(other, (Number, Boolean)) else None
 
     def unify(self, typingctx: Any, other: Any) -> Any:
-        """With a number: lanes."""
+        """Return lanes if `other` is a number, else None."""
         return self if isinstance(other, Number) else None
 
 
@@ -55,7 +55,7 @@ class Mask(Type):
         return Conversion.safe if isinstance(other, Boolean) else None
 
     def unify(self, typingctx: Any, other: Any) -> Any:
-        """With a truth value: a mask."""
+        """Return a mask if `other` is a truth value, else None."""
         return self if isinstance(other, Boolean) else None
 
 
@@ -64,7 +64,7 @@ class LanedRecord(Record):
 
     @property
     def dtype(self) -> Any:
-        """Bytes: numpy has no numbers like these."""
+        """Type of plain bytes, for numpy has no numbers like these."""
         return np.dtype((np.void, self.size))
 
 
@@ -198,7 +198,7 @@ def _compared(predicate: str, unordered: bool = False) -> Any:
 
 
 def _outermost(predicate: str) -> Any:
-    """As Python's `max` and `min`: a value takes the place of the one before if it compares so to it."""
+    """Return a reduction like Python's `max` and `min`: a value replaces the one before if it compares so to it."""
 
     def reduced(builder: Any, *values: Any) -> Any:
         return reduce(
@@ -258,7 +258,7 @@ def real_part(context: Any, builder: Any, kind: Lanes, value: Any) -> Any:
 
 @intrinsic
 def some(_: Any, condition: Any) -> Any:
-    """Whether `condition` holds in a lane."""
+    """Return True if `condition` holds in any lane."""
 
     def write(context: Any, builder: Any, of: Any, arguments: Any) -> Any:
         if not isinstance(of.args[0], Mask):

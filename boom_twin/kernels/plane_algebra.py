@@ -132,7 +132,7 @@ def condense(s, p, coupling, block, force, m, n):
 
 @inner
 def condense_forces(p, coupling, block, force, m, n):
-    """What `condense` does with p and force, by the gains and the factors that it left in coupling and block."""
+    """Condense p and force as `condense` does, by the gains and the factors that it left in coupling and block."""
     for j in range(m):
         value = p[j]
         for k in range(n):

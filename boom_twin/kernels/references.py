@@ -102,7 +102,7 @@ def unbox_reference(of: Reference, value: Any, c: Any) -> NativeValue:
 
 
 def _is_tuple(c: Any, value: Any) -> Any:
-    """Whether a Python object is a tuple, by the flag that Python gives its class and those below it."""
+    """Emit the test that a Python object is a tuple, by the flag that Python gives that class and its subclasses."""
     word = c.pyapi.ulong
     flags_of = cgutils.get_or_insert_function(c.builder.module, ir.FunctionType(word, [c.pyapi.pyobj]), "PyType_GetFlags")
     kind = c.pyapi.object_type(value)
@@ -147,5 +147,5 @@ def register(kind: type) -> None:
 
 @typeof_impl.register(HeldFields)
 def type_of_held(value: HeldFields, c: Any) -> Any:
-    """As that of the named tuple itself."""
+    """Return the type of the named tuple itself."""
     return typeof_impl(value.fields, c)

@@ -45,7 +45,7 @@ class Results(NamedTuple):
 
 
 class Estimates(NamedTuple):
-    """What the estimator adds to a row: strokes (n,) in m, their variances (n,) in m^2, tip of the rigid boom (2,) in m."""
+    """Estimates added to a row: strokes (n,) in m, their variances (n,) in m^2, tip of the rigid boom (2,) in m."""
 
     strokes: Array
     variances: Array
@@ -86,7 +86,7 @@ def prediction_width(joints: int, pins: int) -> int:
 
 
 class Places(NamedTuple):
-    """Where all of this stands in a row with estimates."""
+    """Places of all quantities in a row with estimates."""
 
     joints: slice
     cylinder_forces: slice

@@ -111,7 +111,7 @@ class Tables(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """How histories give accelerations and velocities: a = gain (x - hat), v = rate x + offset.
+    """Coefficients by which histories give accelerations and velocities: a = gain (x - hat), v = rate x + offset.
 
     renew : whether a sweep makes tangents anew, or only forces, with the tangents that `Condensed` holds.
     """
@@ -125,7 +125,7 @@ class Motion(NamedTuple):
 
 @by_reference
 class State(NamedTuple):
-    """What the boom remembers from step to step.
+    """State of the boom between steps.
 
     z : (unknowns,) coordinates and forces, see the tables.
     history : (depth, histories) of every unknown and then of every mass point; rows: see `kernels.integrators`.
@@ -149,7 +149,7 @@ class State(NamedTuple):
 
 @by_reference
 class Condensed(NamedTuple):
-    """What a sweep in condenses (`kernels.transfer.riccati_sweep.sweep_in`), for those that go on from it.
+    """Result of an inward sweep (`kernels.transfer.riccati_sweep.sweep_in`), for the sweeps that go on from it.
 
     gains : (operations, rows, SLOTS) decrements of the condensed unknowns by increments of the cut, and
     free : (operations, rows) those that do not depend on it.

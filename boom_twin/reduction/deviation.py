@@ -27,7 +27,7 @@ WIDTH = 1e-7  # relative, of a frequency's bracket
 
 @dataclass(frozen=True)
 class StrokeCourse:
-    """Where models are compared: strokes at rest and a move, the same for all.
+    """Course on which all models are compared: strokes at rest and a move.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class StrokeCourse:
 
 @dataclass(frozen=True)
 class Response:
-    """What a model says on a course.
+    """Response of a model on a course.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ def _at_rest(plan: Plan, course: StrokeCourse, frequencies: int) -> tuple[Array,
 
 
 def deviation(model: Response, full: Response, course: StrokeCourse) -> Deviation:
-    """Of a model from the full one."""
+    """Return the deviation of a model from the full one."""
     if model.status != "ok":
         return Deviation(np.inf, "", np.inf, np.inf)
     rest = np.linalg.norm(model.rest - full.rest, axis=1)

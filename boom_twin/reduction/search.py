@@ -28,7 +28,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Proposal:
-    """What was found.
+    """Result of a search: the lean scene and its deviation.
 
     Attributes
     ----------
@@ -116,13 +116,13 @@ class _Search:
         return edited(self.start, self.edits)
 
     def size(self, edits: tuple[Edit, ...]) -> float:
-        """Of the start after `edits`, see `reduction.deviation`."""
+        """Return the size of the first model after `edits`, see `reduction.deviation`."""
         if edits not in self.sizes:
             self.sizes[edits] = size(edited(self.start, edits))
         return self.sizes[edits]
 
     def measured(self, edits: tuple[Edit, ...]) -> Deviation:
-        """Of the start after `edits`, from the full model."""
+        """Return the deviation of the first model after `edits` from the full model."""
         if edits not in self.known:
             self.progress(f"{len(self.known)} models measured, {len(self.edits)} edits kept")
             found = answer(edited(self.start, edits), self.course)
@@ -130,7 +130,7 @@ class _Search:
         return self.known[edits]
 
     def round(self) -> bool:
-        """Try everything that is still there, the cheapest error first; whether anything could go."""
+        """Try everything that is still there, the cheapest error first; return True if anything could go."""
         before, self.next = self.edits, None
         queue = [entry for number, part in enumerate(self._parts()) if (entry := self._priced(number, *part))]
         heapq.heapify(queue)

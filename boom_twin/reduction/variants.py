@@ -140,7 +140,7 @@ def variants(scene: Scene) -> tuple[Variant, ...]:
 
 
 def _distinct(found: Iterator[Variant]) -> Iterator[Variant]:
-    """Without those that edit what an earlier one edits: "all sections" where there is only one that has the part."""
+    """Yield variants, but none that edits what an earlier one edits: "all sections" where only one has the part."""
     seen = set()
     for variant in found:
         if variant.edits not in seen:

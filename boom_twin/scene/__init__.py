@@ -1,4 +1,4 @@
-"""What is there: validated parts and the boom, their words, units and bounds."""
+"""Validated parts of a scene and the boom that they make, with their keys, units and bounds."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ LISTS = ("sections", "joints", "pins")
 
 @dataclass(frozen=True)
 class Validated(Generic[Root]):
-    """What a document holds.
+    """Content of a document, with the faults of its values.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ def validated(document: Document, form: Format[Root]) -> Validated[Root]:
 
 
 def _counts_faulty(detail: ErrorDetails) -> bool:
-    """Whether a list is called too short because its entries are faulty, which is told of each."""
+    """Return True if a list is called too short because its entries are faulty; each of them has a fault of its own."""
     return detail["type"] == "too_short" and detail["loc"] in (("sections",), ("joints",)) and len(detail["input"]) > 0
 
 

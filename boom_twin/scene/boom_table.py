@@ -110,7 +110,7 @@ TABLE = Format(
 """What a table may hold."""
 
 PAIRS = {"x": 0, "y": 1, "start": 0, "end": 1, "low": 0, "high": 1, "along": 0, "left": 1}
-"""What a column of one of two numbers ends with, as in C_x, beam_end, range_deg_low."""
+"""Ending of the name of a column that holds one of two numbers, as in C_x, beam_end, range_deg_low."""
 TABLES = (".csv", ".tsv", ".txt")
 """Names of files with a row for every section end so; the cells lie apart by commas, semicolons or tabs."""
 TABLE_FILE = Kind("table", "boom_twin init --example-table")
@@ -145,7 +145,7 @@ def checked_table(document: Document, source: str) -> BoomTable:
 
 
 def _faults(document: Document, table: BoomTable) -> list[Fault]:
-    """Walls that fill their box, rods as thick as the bore, a material without density, not a joint for every section."""
+    """Return faults: walls that fill their box, rods as thick as the bore, no density, not a joint for every section."""
     found = []
     for i, section in enumerate(table.sections):
         if 2.0 * section.wall >= min(section.height, section.width):
@@ -165,7 +165,7 @@ def _faults(document: Document, table: BoomTable) -> list[Fault]:
 
 
 def _pipes_of_some(document: Document, table: BoomTable) -> list[Fault]:
-    """Where some sections have a pipe, and nothing is said of that of the others: they would have none."""
+    """Return a fault for each section without `pipe`, if others have one and none is given for the whole boom."""
     without = [i for i, section in enumerate(table.sections) if section.pipe is None]
     if "pipe" in table.model_fields_set or not 0 < len(without) < len(table.sections):
         return []
@@ -255,7 +255,7 @@ def csv_document(text: str, source: str) -> Document:
 
 
 def _refuse_twins(names: list[str], columns: list[re.Match[str] | None], source: str) -> None:
-    """SceneError where two columns are of the same key: the second would overwrite the first."""
+    """Raise SceneError if two columns are of the same key: the second would overwrite the first."""
     seen: dict[tuple[str, str | None], int] = {}
     for number, column in enumerate(columns):
         if column is not None and (before := seen.setdefault((column[1], column[2]), number)) != number:
@@ -264,7 +264,7 @@ def _refuse_twins(names: list[str], columns: list[re.Match[str] | None], source:
 
 
 def _letters(column: int) -> str:
-    """What a spreadsheet calls a column, counted from 0: A to Z, AA, .."""
+    """Return the spreadsheet name of a column, counted from 0: A to Z, AA, .."""
     return (_letters(column // 26 - 1) if column > 25 else "") + chr(ord("A") + column % 26)
 
 
@@ -311,7 +311,7 @@ def _put(document: Document, place: Place, value: Any, line: int) -> None:
 
 
 def frozen(value: Any) -> Any:
-    """Lists as tuples, as the reader of YAML gives them."""
+    """Return a value with tuples for its lists, as the reader of YAML gives them."""
     if isinstance(value, dict):
         return {key: frozen(item) for key, item in value.items()}
     return tuple(map(frozen, value)) if isinstance(value, list) else value

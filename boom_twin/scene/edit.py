@@ -179,7 +179,7 @@ def edited(scene: Scene, edits: Iterable[Edit]) -> Scene:
 
 
 def merged(edits: Iterable[Edit]) -> tuple[Edit, ...]:
-    """The same result with one edit a key, the last one, in the order of the places."""
+    """Return edits of the same result with only the last one of each key, in the order of the places."""
     last = {edit.place: edit for edit in edits}
     return tuple(last[place] for place in sorted(last, key=lambda place: [str(step) for step in place]))
 

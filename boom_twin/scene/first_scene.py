@@ -206,7 +206,7 @@ def _delay(table: BoomTable, first: float) -> float:
 
 
 def _postures(table: BoomTable) -> list[str]:
-    """Those of the table, or the boom as straight as its ranges allow, and in the middle of them."""
+    """Return the lines of the table's postures, else of the boom as straight as its ranges allow and amid its ranges."""
     if table.postures:
         return ["postures:", *(f"  {yaml_text(name)}: {_list(angles)}" for name, angles in table.postures.items())]
     ranges = np.array([joint.range_deg for joint in table.joints])
@@ -230,7 +230,7 @@ def _block(values: Mapping[str, float | list[float]]) -> str:
 
 
 def _shown(value: str | float | tuple[float, ...]) -> str:
-    """As YAML writes it: a word, a number, or a list of numbers."""
+    """Return a value as YAML writes it: a word, a number, or a list of numbers."""
     return value if isinstance(value, str) else _list(value) if isinstance(value, tuple) else _number(value)
 
 

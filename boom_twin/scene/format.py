@@ -1,4 +1,4 @@
-"""What describes a kind of file: its outermost block, and the meaning, home and inner blocks of all keys."""
+"""Description of a kind of file: its outermost block, and the meaning, home and inner blocks of all keys."""
 
 from __future__ import annotations
 

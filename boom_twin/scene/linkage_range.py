@@ -86,7 +86,7 @@ def joint_pins(scene: Scene, i: int, phi: Array) -> dict[str, Array]:
 
 
 def rod_pin_of(pins: dict[str, Array]) -> str:
-    """Which of the pins of a joint holds the rod."""
+    """Return the name of the pin of a joint that holds the rod."""
     return next(name for name in ("R", "Q", "rod_pin") if name in pins)
 
 

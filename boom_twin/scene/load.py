@@ -144,14 +144,14 @@ def _examine_values(values: Mapping[str, Any]) -> tuple[Scene, list[Fault]]:
 
 
 def examine(source: str | Path | None = None) -> tuple[Scene, list[Fault]]:
-    """Like `load_scene`, with the oddities returned instead of issued as warnings."""
+    """Load a scene like `load_scene`, but return the warnings instead of issuing them."""
     if source is None:
         return examine_text(default_text(), DEFAULT_NAME)
     return examine_text(read_text(Path(source)), str(source))
 
 
 def examine_text(text: str, name: str, whole: bool = False) -> tuple[Scene, list[Fault]]:
-    """Like `examine`, of a scene's text; `name` is what it is called in errors; `whole`: a checksum says it is not cut off."""
+    """Load a scene from its text like `examine`; `name`: its name in errors; `whole`: a checksum says it is not cut off."""
     cut, unmarked = (None, None) if whole else missing_end_mark(text)
     if cut is not None:
         raise SceneError(name, (cut,))
@@ -170,7 +170,7 @@ def examine_text(text: str, name: str, whole: bool = False) -> tuple[Scene, list
 
 
 def _implausible(draft: Draft, scene: Scene, findings: list[Finding]) -> list[Finding]:
-    """What does not fit together; one cause one warning, so nothing of a block of which something else is told already."""
+    """Return warnings of values that do not fit together, none for a block that has a finding already."""
     more: list[Finding] = []
     told = {_block(finding) for finding in findings}
     for check in PLAUSIBILITY:

@@ -87,7 +87,7 @@ class Section(Part):
 
     @property
     def section_modulus(self) -> float | None:
-        """2 I / height, m^3: a bending moment over it is the stress in the flanges; None without I or height."""
+        """Section modulus 2 I / height, m^3: bending moment over stress in the flanges; None without I or height."""
         return None if self.I is None or self.height is None else 2.0 * self.I / self.height
 
 
@@ -140,12 +140,12 @@ class Cylinder(Part):
 
     @property
     def is_compressible(self) -> bool:
-        """Whether it has an oil spring."""
+        """Return True if the cylinder has an oil spring."""
         return self.k is not None or self.oil is not None
 
 
 class Joint(Part):
-    """What turns one section: kind A (slider-crank), B1, B2 or B3 (six-bar).
+    """Joint that turns one section: kind A (slider-crank), B1, B2 or B3 (six-bar).
 
     C, D relative to the outboard pivot of the section before, E to the pivot of its own section (m); link lengths
     lL, lR (m) and masses mL, mR (kg); R places the rod pin on a link (B2, B3). ``range_deg`` is in degrees. ``side`` of D->E on
@@ -172,7 +172,7 @@ class Joint(Part):
 
 
 class ContactLaw(Part):
-    """How journal and bush touch: law, exponent, restitution, Coulomb friction; a bush of another material (E in Pa)."""
+    """Contact of journal and bush: law, exponent, restitution, Coulomb friction; a bush of another material (E in Pa)."""
 
     law: LawName = "lankarani-nikravesh"
     exponent: Annotated[float, Field(ge=1.3, le=3)] = 1.5
@@ -282,17 +282,17 @@ class Scene(SummaryDisplay, Part):
         return self.modes if own is None else own
 
     def has_axial(self, index: int) -> bool:
-        """Whether the flexible parts of section `index` (0-based) stretch."""
+        """Return True if the flexible parts of section `index` (0-based) stretch."""
         own = self.sections[index].axial
         return self.axial if own is None else own
 
     def has_geometric(self, index: int) -> bool:
-        """Whether the flexible parts of section `index` (0-based) have geometric stiffness."""
+        """Return True if the flexible parts of section `index` (0-based) have geometric stiffness."""
         own = self.sections[index].geometric
         return self.geometric if own is None else own
 
     def is_flexible(self, index: int) -> bool:
-        """Whether section `index` (0-based) bends."""
+        """Return True if section `index` (0-based) bends."""
         return self.sections[index].beam is not None and self.modes_of(index) > 0
 
 
@@ -311,7 +311,7 @@ def section_depth(scene: Scene, i: int) -> float:
 
 
 def refuse_clearance(scene: Scene, model: str) -> None:
-    """UsageError if `scene` has pins with clearance, which `model` (as a reader would call it) does not know."""
+    """Raise UsageError if `scene` has pins with clearance, which `model` (as a reader would call it) does not know."""
     pins = () if scene.clearance is None else scene.clearance.pins
     if pins:
         names = ", ".join(pin.at for pin in pins)

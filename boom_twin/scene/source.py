@@ -11,7 +11,7 @@ from .load import load_scene
 from .schema import Scene
 
 SceneSource = Scene | Mapping[str, Any] | str | Path | None
-"""What functions take for a boom; a mapping has the keys of a scene file."""
+"""Forms in which functions accept a boom; a mapping has the keys of a scene file."""
 
 
 def as_scene(source: SceneSource) -> Scene:

@@ -44,7 +44,7 @@ def converted(value: Any, unit: str | None) -> Any:
 
 
 def misfit(text: str, unit: str | None) -> str | None:
-    """Why a text that is a number with a unit cannot be a value in `unit`; None for any other text."""
+    """Return why a text that is a number with a unit cannot be a value in `unit`; None for any other text."""
     found = _parts(text)
     if found is None:
         return None
@@ -88,7 +88,7 @@ def _unit(text: str) -> Unit | None:
 
 
 def _is_angle(unit: Unit) -> bool:
-    """Whether a unit is one of angles, which pint takes for pure numbers, as radians are."""
+    """Return True if a unit is one of angles; pint takes these for pure numbers, as radians are."""
     root = _registry().get_root_units(unit)[1]
     return unit.dimensionless and root == _registry().radian
 

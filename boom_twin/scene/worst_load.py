@@ -39,7 +39,7 @@ class _Reach:
 
 
 def worst_loads(scene: Scene) -> list[tuple[WorstLoad, WorstLoad]]:
-    """Of every cylinder the largest push and the largest pull; 0 N where it never pushes, or never pulls.
+    """Return the largest push and the largest pull of every cylinder; 0 N where it never pushes, or never pulls.
 
     Joint angles are taken in steps of a degree. There is no ground, and sections may cross each other.
     """
@@ -65,7 +65,7 @@ def _reach(scene: Scene, i: int) -> _Reach:
 
 
 def _turning(scene: Scene) -> Array:
-    """What weighs on section j with all that hangs at its end turns it with, shape (n, 360): N m by its heading."""
+    """Return the gravity moment of section j and of all that hangs at its end, shape (n, 360): N m by its heading."""
     gx, gy = gravity_in_base(scene)
     headings, rows = np.radians(CIRCLE), []
     beyond = 0.0 if scene.tip is None else scene.tip.payload or 0.0

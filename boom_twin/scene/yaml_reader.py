@@ -75,7 +75,7 @@ class Document:
 
 
 class Kind(NamedTuple):
-    """What a file is to be, and the command that prints one to start from."""
+    """Expected kind of a file, and the command that prints one to start from."""
 
     name: str
     example: str
@@ -127,7 +127,7 @@ def parse(text: str, source: str, kind: Kind = SCENE) -> Document:
 
 
 def _not_utf8(data: bytes, error: UnicodeDecodeError) -> tuple[str, str]:
-    """What a file is instead of UTF-8 text, and what to do."""
+    """Return what a file is instead of UTF-8 text, and the remedy."""
     if data.startswith((b"PK", b"\xd0\xcf\x11\xe0")):  # zip, as .xlsx and .ods; .xls
         return "this is not a text file but a spreadsheet's own or an archive", "Save a spreadsheet as `CSV UTF-8`."
     if b"\0" in data:
@@ -144,7 +144,7 @@ def _refusal(kind: Kind, source: str, bound: str, remedy: str) -> SceneError:
 
 
 def _syntax_fault(text: str, error: Exception) -> Fault:
-    """What the YAML parser stumbled over, with the line that it names."""
+    """Return the syntax error of the YAML parser as a fault, with the line that it names."""
     line, what, rows = None, "brackets nested too deeply", text.splitlines()
     if isinstance(error, MarkedYAMLError):
         mark = error.problem_mark or error.context_mark
@@ -240,9 +240,9 @@ def with_end_mark(text: str) -> str:
 
 
 def missing_end_mark(text: str) -> tuple[Fault | None, Fault | None]:
-    """What is wrong with the end of a scene file: a fault that stops, an oddity that is only told, or neither.
+    """Return a fault if the end of a scene file is cut off, and a warning if it may be; None for either that does not apply.
 
-    Many files that were written by hand have no mark: it is a note, and a warning where not even the last line ends.
+    Many files that were written by hand have no mark. That is a note, and a warning where not even the last line ends.
     """
     lines = text.splitlines()
     number = max((i for i, line in enumerate(lines, 1) if line.strip()), default=0)

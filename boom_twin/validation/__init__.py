@@ -1,1 +1,1 @@
-"""What the twin is checked against: virtual rig, reference models, studies."""
+"""Checks of the twin: virtual rig, reference models, studies."""

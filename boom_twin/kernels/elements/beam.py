@@ -88,7 +88,7 @@ USUAL_TURN, USUAL_RHO, USUAL_LOCAL = StackArray(TURN_ROWS, 5), StackArray(5, 2),
 
 @inner
 def is_usual(row):
-    """Whether a part has the usual sizes."""
+    """Return True if a part has the usual sizes."""
     return row.bending == USUAL.bending and row.axial == USUAL.axial and row.points == USUAL.points
 
 
@@ -114,7 +114,7 @@ def turn_points(row, part, sizes, q, turn):
 
 @inner
 def stretch_of(sizes, q):
-    """1 + eps, or 1 for a part without axial strain."""
+    """Return the stretch 1 + eps, or 1 for a part without axial strain."""
     return 1.0 + q[sizes.bending] if sizes.axial else 1.0
 
 

@@ -61,7 +61,7 @@ CYLINDER_PART = np.dtype(
 
 @inner
 def oil_compliance(oil, stroke):
-    """1/k (m/N) of the oil shut in at `stroke` (m): two columns, each of compliance V/(B A^2), that act side by side.
+    """Return 1/k (m/N) of the oil shut in at `stroke` (m): two columns, each of compliance V/(B A^2), side by side.
 
     Beyond the end stops, which noise of the strokes may reach, it stays as it is there.
     """
@@ -73,7 +73,7 @@ def oil_compliance(oil, stroke):
 
 @inner
 def compliance_and_lag(row, oils, drive):
-    """1/k (m/N) and tau (s) of a cylinder whose drive is `drive` (m) long."""
+    """Return 1/k (m/N) and tau (s) of a cylinder whose drive is `drive` (m) long."""
     if row.oil < 0:
         return row.compliance, row.lag
     oil = oils[row.oil]

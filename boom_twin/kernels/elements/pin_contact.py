@@ -43,7 +43,7 @@ PIVOT, LINK_L_PIN, LINK_R_PIN, Q_PIN, ROD_END_PIN, BARREL_END_PIN = map(np.int64
 
 
 class Journal(NamedTuple):
-    """Where a journal is in its bush, and how it moves.
+    """Position and velocity of a journal in its bush.
 
     x, y : offset, m. vx, vy : its velocity, m/s. before_x, before_y : that at the start of the step, m/s.
     turning : of the journal in the bush, rad/s. axis_x, axis_y : first axis of what the linearisation is fixed to.
@@ -61,7 +61,7 @@ class Journal(NamedTuple):
 
 
 class PinForce(NamedTuple):
-    """What holds a journal back, and its turning.
+    """Contact force and friction torque that hold a journal back, and their derivatives.
 
     x, y : force, N. xx, xy, yy : its tangent by the offset, N/m.
     torque : of friction, N m. torque_x, torque_y, torque_turn : its derivatives by the offset (N) and by the turning (N m).
@@ -151,7 +151,7 @@ def restitution_of(loss: float) -> float:
 
 
 def _impact(chi: float, u: float) -> float:
-    """G(u) of `restitution_of`."""
+    """Return G(u) of `restitution_of`."""
     free = (1.0 - LEAST_SHARE) / chi if chi > 0.0 else math.inf
     within, beyond = max(u, -free), max(-u - free, 0.0)
     if chi < 1e-3:
@@ -162,7 +162,7 @@ def _impact(chi: float, u: float) -> float:
 
 
 def bisect(is_below: Callable[[float], bool], low: float, high: float) -> float:
-    """Where `is_below` turns from true to false."""
+    """Return the place between `low` and `high` where `is_below` turns from true to false."""
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if is_below(middle) else (low, middle)

@@ -256,7 +256,7 @@ def coarseness(t, state, work, condensed, scheme):
 
 @inner
 def unstiffened(t, work, condensed, k, ax, ay):
-    """(M A + K)^-1 M A times (ax, ay), with the tangents of a pass for pin `k`: M A + K is what was condensed there."""
+    """Return (M A + K)^-1 M A times (ax, ay), with the tangents of a pass for pin `k`: M A + K is what was condensed there."""
     row, hold = t.clearances[k], work.hold[k]
     if row.place >= ROD_END_PIN:
         xx, xy, yy = condensed.ends[k, 0, 0], condensed.ends[k, 0, 1], condensed.ends[k, 1, 1]

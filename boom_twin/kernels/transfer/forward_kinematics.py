@@ -47,7 +47,7 @@ def link_frame(side, linkage, turns):
 
 @inner
 def origin_of(t, z, joint, side, x, y):
-    """Where the pin of link L or R would be if its body's vector to it were zero, the pivot of the head being (x, y)."""
+    """Return where the pin of link L or R would be if its body's vector to it were zero; (x, y): pivot of the head."""
     if side == LINK_L:
         dx, dy = offset_of(t, z, joint, LINK_L_PIN)
         return x + dx, y + dy

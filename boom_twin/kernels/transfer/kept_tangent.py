@@ -50,26 +50,26 @@ GAIN, SHARE_LEAD, CORRECTED, TRAVEL = range(4)
 
 @inner
 def forget_all(work):
-    """No tangent and no correction is kept: another boom or another motion begins."""
+    """Forget tangent and corrections, for another boom or another motion begins."""
     work.kept[GAIN], work.kept[SHARE_LEAD], work.kept[CORRECTED] = 0.0, LEAD, 0.0
 
 
 @inner
 def forget_tangent(work):
-    """The next step begins with a new tangent."""
+    """Forget the tangent, so that the next step begins with a new one."""
     work.kept[GAIN] = 0.0
 
 
 @inner
 def may_keep(work, gain):
-    """Whether the kept tangent is good enough for a step of a scheme with `gain`."""
+    """Return True if the kept tangent is good enough for a step of a scheme with `gain`."""
     near = max(work.kept[SHARE_LEAD], LEAD) * (work.kept[TRAVEL] + detuning(work, gain)) < MOST_SHARE
     return near & (work.kept[GAIN] != 0.0)
 
 
 @inner
 def detuning(work, gain):
-    """By how much the gain that the tangent is for is off `gain`, as the travel (rad) that at first counts as much."""
+    """Return how far the gain of the kept tangent is off `gain`, as the travel (rad) that at first counts as much."""
     return abs(work.kept[GAIN] - gain) / gain / LEAD
 
 
@@ -101,13 +101,13 @@ def step_error(t, state, work, gain):
 
 @inner
 def is_rough(tolerance):
-    """Whether less exactness is asked for than usual, so that the lead may fall to what passes show."""
+    """Return True if the tolerance is larger than usual, so that the lead may fall to what passes show."""
     return tolerance > EXACT
 
 
 @inner
 def is_converged(t, state, work, size, before, renewed, tolerance, gain):
-    """Whether a pass with an increment of `size` (rad) was the last of a step.
+    """Return True if a pass with an increment of `size` (rad) was the last of a step.
 
     before : increment of the pass before it in this step, or 0. renewed : whether the tangent was new, so that what is left is
     about the square of `size`. Below the tolerance an increment that does not get smaller is rounding. gain : of the scheme.

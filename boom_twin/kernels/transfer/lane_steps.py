@@ -35,7 +35,7 @@ FAILED, PASSES = 0, 1  # columns of `ends`
 
 @by_reference
 class LaneCourse(NamedTuple):
-    """What groups of booms follow, and what comes of it; all are lanes.
+    """Drive motions of groups of booms and the rows that result; all are lanes.
 
     drives, rates : (groups, steps in all, n), m and m/s. out : (groups, rows, row_width), see `time_step.run`.
     ends : (groups, 2): 1 for a boom that failed, which is to be stepped alone; its passes.
@@ -51,7 +51,7 @@ class LaneCourse(NamedTuple):
 
 @inner
 def solve(t, state, work, scheme, renew):
-    """One Newton pass: increments into `work.dz`; whether no system was singular in all lanes."""
+    """Solve one Newton pass: increments into `work.dz`; return False if a system was singular in all lanes."""
     motion = Motion(scheme.gain, scheme.rate, work.hat, work.offset, renew)
     clear_cut(work, FREE)
     solved, _, _ = sweep_in(
@@ -64,7 +64,7 @@ def solve(t, state, work, scheme, renew):
 
 @inner
 def solve_renewing(t, state, work, kept, scheme, renew, going):
-    """As `solve`, with new tangents in the lanes that `renew` them; the others keep theirs."""
+    """Solve like `solve`, with new tangents in the lanes that `renew` them; the others keep theirs."""
     work.kept[GAIN] = select(renew, scheme.gain, work.kept[GAIN])
     work.kept[TRAVEL] = select(renew, 0.0, work.kept[TRAVEL])
     for i in range(state.z.shape[0]):

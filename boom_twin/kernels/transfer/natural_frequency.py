@@ -54,7 +54,7 @@ def count_below(t, state, work, position, drive, still, omega, scratch):
 
 @inner
 def condense(t, state, work, motion, drive, still):
-    """Sweep the whole boom in; status, and negative pivots of beams."""
+    """Sweep the whole boom in; return status, and negative pivots of beams."""
     clear_cut(work, FREE)
     load_pins(t, state, work, motion)
     status, negative, _ = sweep_in(t, state, work, motion, drive, still, ROOT, t.operations.shape[0], FREE, work.condensed)
@@ -94,9 +94,9 @@ def bisect_frequency(t, state, work, position, drive, still, base, number, low, 
 
 @inner
 def negative_eigenvalues(blocks, scratch):
-    """Of small symmetric matrices (k, m, m) whose rows differ by many orders of magnitude: balanced first, signs stay.
+    """Return the number of negative eigenvalues of small symmetric matrices (k, m, m); `NOT_COUNTED` if one is not finite.
 
-    `NOT_COUNTED` if one is not finite.
+    Their rows differ by many orders of magnitude. They are balanced first, which keeps the signs.
     """
     count, m = 0, blocks.shape[1]
     for k in range(blocks.shape[0]):

@@ -67,7 +67,7 @@ def beam_operation(t, state, work, condensed, motion, row, operation, c, sn, m):
 
 @inner
 def clear_cut(work, m):
-    """Nothing outboard: S = 0, p = 0 in m slots."""
+    """Set S = 0 and p = 0 in m degrees of freedom, for a cut with nothing outboard."""
     for i in range(m):
         work.p[i] = 0.0
         for j in range(m):

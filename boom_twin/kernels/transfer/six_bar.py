@@ -268,7 +268,7 @@ def _condense_loop(work, condensed, index, operation, count, size):
 
 @inner
 def _condense_loop_forces(work, condensed, operation, count, size):
-    """What `_condense_loop` does with forces, by the gains and the factors that it left."""
+    """Condense forces as `_condense_loop` does, by the gains and the factors that it left."""
     p, g, right, others, gains = work.p, work.g, work.right, size - count, condensed.gains[operation]
     for i in range(others):
         p[i] = g[i if i < SECTION else i + count]

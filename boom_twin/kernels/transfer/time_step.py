@@ -128,7 +128,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
 
 @inner
 def advance_again(t, state, work, scheme, drive, drive_rate, tolerance, passes, longest, product, keep):
-    """As `advance`; a step that fails with a kept tangent is made once more, with new ones. Gives status and passes."""
+    """Advance like `advance`; repeat a step that fails with a kept tangent once, with new ones. Return status and passes."""
     total, may_use = 0, keep
     while True:
         status, count, _ = advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longest, product, may_use)

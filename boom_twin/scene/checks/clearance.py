@@ -53,7 +53,7 @@ def names_of(index: int, joint: Joint) -> list[str]:
 
 
 def _unknown(at: str, joints: tuple[Joint | None, ...], there: list[str]) -> tuple[str, str]:
-    """Why there is no such pin, and what there is."""
+    """Return why there is no such pin, and the names that exist."""
     form = re.fullmatch(r"(cylinder|joint)_(\d+)\.(\w+)", at)
     if form is None or form[3] not in PLACES[form[1]]:
         return "not the name of a pin", "Write cylinder_i. with rod or barrel, or joint_i. with pivot, link_L, link_R or Q."

@@ -24,7 +24,10 @@ SPECIFIC_STIFFNESS = (8e6, 1.2e8)  # E / rho, m^2/s^2: glass fibre 1e7, metals 2
 
 
 def density(scene: Scene) -> float | None:
-    """Of the material, kg/m^3; of steel where none is given and E is that of steel. None where it does not fit E."""
+    """Return the density of the material, kg/m^3; None if it does not fit E.
+
+    A density that is not given is that of steel if E is that of steel, else None.
+    """
     known, stiffness = scene.material.rho, scene.material.E
     if known is None:
         return STEEL if _between(stiffness, STEEL_E, 1.0) else None
@@ -37,7 +40,7 @@ def gyration(section: Section) -> float | None:
 
 
 def material(draft: Draft, scene: Scene) -> Iterator[Finding]:
-    """Young's modulus against the density."""
+    """Check Young's modulus against the density."""
     rho = scene.material.rho
     if rho is not None and not _between(scene.material.E, SPECIFIC_STIFFNESS, rho):
         low, high = (limit * rho for limit in SPECIFIC_STIFFNESS)

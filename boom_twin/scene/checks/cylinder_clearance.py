@@ -1,7 +1,7 @@
-"""Whether a cylinder stays clear of the pins of its joint and of the section that carries it, over the range of the joint.
+"""Check that a cylinder stays clear of the pins of its joint and of its carrier section, over the range of the joint.
 
 A cylinder lies amid the section, where the pivot's pin and those of the links pass through. Its barrel is taken as thick as its
-bore and two walls, its rod as thick as it is, a pin as half the bore. Only `oil` tells them: a cylinder with `k` is not judged.
+bore and two walls, its rod as thick as it is, a pin as half the bore. Only `oil` gives them: a cylinder with `k` is not judged.
 """
 
 from __future__ import annotations

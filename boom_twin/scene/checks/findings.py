@@ -136,7 +136,7 @@ def _length_fault(document: Document, detail: ErrorDetails, place: Place, give: 
 
 
 def _what(value: Any) -> str:
-    """What kind of value this is, in a newcomer's words."""
+    """Return the kind of a value, in a newcomer's words."""
     if isinstance(value, bool):
         return "true or false"
     if isinstance(value, str):
@@ -149,7 +149,7 @@ def _what(value: Any) -> str:
 
 
 def _number_remedy(value: Any, give: str) -> str:
-    """What to do about a value that should be a number."""
+    """Return the remedy for a value that should be a number."""
     if not isinstance(value, str):
         return give
     text = value.strip()

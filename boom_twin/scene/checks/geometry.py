@@ -12,7 +12,7 @@ TOLERANCE = 1e-9
 
 
 def pins(draft: Draft) -> Iterator[Finding]:
-    """D on the rigid head of the section before, E on the rigid root of its own, C near the section before."""
+    """Check that D is on the rigid head of the section before, E on the rigid root of its own, C near the section before."""
     for i, joint in enumerate(draft.joints):
         if i > 0 and joint is not None:
             before, own = draft.section(i - 1), draft.section(i)
@@ -60,7 +60,7 @@ def _c_nearby(draft: Draft, i: int, joint: Joint, before: Section) -> Iterator[F
 
 
 def thin_parts(draft: Draft) -> Iterator[Finding]:
-    """Pins just beside an end of the beam, which cut off a sliver of it."""
+    """Yield warnings of pins just beside an end of the beam, which cut off a sliver of it."""
     for i, section in enumerate(draft.sections):
         if section is None:
             continue
@@ -80,7 +80,7 @@ def _sliver(draft: Draft, section: Section, place: Place, value: Point, x: float
 
 
 def centres(draft: Draft) -> Iterator[Finding]:
-    """Centres of mass, and the rod pin, near their section."""
+    """Check that centres of mass, and the rod pin, are near their section."""
     for i, section in enumerate(draft.sections):
         if section is None:
             continue
@@ -97,5 +97,5 @@ def centres(draft: Draft) -> Iterator[Finding]:
 
 
 def _far(length: float, point: tuple[float, float]) -> bool:
-    """Whether a point is more than a quarter of the length beyond the section's ends, or half of it beside."""
+    """Return True if a point is more than a quarter of the length beyond the section's ends, or half of it beside."""
     return not -0.25 * length <= point[0] <= 1.25 * length or abs(point[1]) > 0.5 * length

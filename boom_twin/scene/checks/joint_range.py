@@ -81,7 +81,7 @@ def lengths_over(joint: Joint, row: np.record) -> tuple[Array, Array]:
 
 
 def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array, lengths: Array) -> Iterator[Finding]:
-    """One warning of all that a part of the range is not good for, with the part that is."""
+    """Yield one warning of all that a part of the range is not good for, with the part that is."""
     closed, reached = np.isfinite(lengths), _reached(joint, lengths)
     shortest, longest = float(np.nanmin(lengths)), float(np.nanmax(lengths))
     within = np.where(reached, lengths, np.nan)
@@ -108,7 +108,7 @@ def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array
 
 
 def _dead_centres(joint: Joint, row: np.record, degrees: Array, reached: Mask) -> tuple[Mask, list[str]]:
-    """Where the joint is next to a dead centre, and that in words."""
+    """Return a mask of the angles next to a dead centre, and the sentences that say so."""
     angles = np.radians(degrees)
     with np.errstate(invalid="ignore"):
         levers = np.abs(cylinder_length(row, angles)[1])
@@ -139,7 +139,7 @@ def _narrow_words(joint: Joint, degrees: Array, within: Array, tight: Mask) -> s
 
 
 def _turned_over(joint: Joint, row: np.record, degrees: Array) -> str:
-    """What would let the six-bar do the whole range if it were meant the other way up; nothing if that does not help."""
+    """Return the remedy for a six-bar that does the whole range if it is the other way up; empty if it does not."""
     if joint.kind == "A":
         return ""
     side = "left" if joint.side == "right" else "right"
@@ -161,7 +161,7 @@ def _reach_words(joint: Joint, shortest: float, longest: float) -> str:
 
 
 def _sizes_to_meet(row: np.record, degrees: Array) -> str:
-    """Which lengths of the links do not fit the distances of D and E over the range."""
+    """Return the link lengths that do not fit the distance of D and E over the range, in words."""
     apart = np.abs((row.ex + 1j * row.ey) * np.exp(1j * np.radians(degrees)) - (row.dx + 1j * row.dy))
     least, most = float(apart.min()), float(apart.max())
     total, difference = float(row.length_l + row.length_r), abs(float(row.length_l - row.length_r))
@@ -171,7 +171,7 @@ def _sizes_to_meet(row: np.record, degrees: Array) -> str:
 
 
 def _turns(lengths: Array) -> NDArray[np.int64]:
-    """Where lengths, NaN out of reach, stop growing or shrinking."""
+    """Return the indices at which lengths, NaN out of reach, stop growing or shrinking."""
     slope = np.sign(np.diff(lengths))
     return np.flatnonzero(slope[1:] * slope[:-1] < 0) + 1
 
@@ -192,12 +192,12 @@ def usable(degrees: Array, lengths: Array) -> tuple[float, float]:
 
 
 def _down(length: float) -> float:
-    """To whole millimetres below."""
+    """Return the length (m) rounded down to whole millimetres."""
     return math.floor(1e3 * length) / 1e3
 
 
 def _up(length: float) -> float:
-    """To whole millimetres above."""
+    """Return the length (m) rounded up to whole millimetres."""
     return math.ceil(1e3 * length) / 1e3
 
 
@@ -214,7 +214,7 @@ def geometry_of(draft: Draft, i: int) -> np.record | None:
 
 
 def _reached(joint: Joint, lengths: Array) -> Mask:
-    """Where the cylinder can be as long as the geometry asks; False where links do not meet."""
+    """Return a mask of the angles at which the cylinder can be as long as the geometry asks; False where links do not meet."""
     strokes = lengths - joint.cylinder.closed_length
     return (strokes >= -TOLERANCE) & (strokes <= joint.cylinder.max_stroke + TOLERANCE)
 
@@ -248,7 +248,7 @@ def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, r
 
 
 def intervals(degrees: Array, mask: Mask) -> str:
-    """Where on a grid of angles a mask holds: ``-5 to 12.3 deg, 40 to 85 deg``."""
+    """Return the intervals of a grid of angles in which a mask holds: ``-5 to 12.3 deg, 40 to 85 deg``."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     pairs = zip(edges[::2], edges[1::2] - 1, strict=True)
     return ", ".join(f"{degrees[first]:.1f} to {degrees[last]:.1f} deg" for first, last in pairs)

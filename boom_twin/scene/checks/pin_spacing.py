@@ -1,7 +1,7 @@
-"""Whether the pins of a six-bar keep clear of each other over the range of the joint.
+"""Check that the pins of a six-bar keep clear of each other over the range of the joint.
 
 A pin goes through the whole width of the boom, so two of them need room beside each other in whatever planes the links lie. A
-link that runs over the pivot is none of this: it lies beside the section, and in most six-bars that turn 165 degrees it does.
+link may run over the pivot, for it lies beside the section. In most six-bars that turn 165 degrees it does.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ ROOM = 1.25  # between the centres of two pins, over the diameter: a quarter of 
 
 
 def spaced_pins(draft: Draft, scene: Scene) -> Iterator[Finding]:
-    """Of every six-bar the two pins that come closest against the room that they need."""
+    """Yield a warning for each six-bar whose two closest pins have less room than they need."""
     for i, joint in enumerate(scene.joints):
         degrees = grid_of(joint)
         pins, needed = joint_pins(scene, i, np.radians(degrees)), ROOM * pin_diameter(scene, i)

@@ -24,7 +24,7 @@ LINE = (1e-3, 2.0)  # oil between piston and valve, of what the chamber takes
 
 
 def rigid_parts(draft: Draft, scene: Scene) -> Iterator[Finding]:
-    """Roots and heads."""
+    """Check roots and heads."""
     for i, section in enumerate(scene.sections):
         ends = section.beam or (section.length, section.length)
         spans = {"root": (0.0, ends[0]), "head": (ends[1], section.length)}
@@ -56,7 +56,7 @@ def _part(
 def _part_mass(
     draft: Draft, scene: Scene, place: tuple[str, int, str], mass: float, size: tuple[float, float]
 ) -> Iterator[Finding]:
-    """Not less than a share of as much beam, not more than a solid block of the beam's depth all round."""
+    """Yield a warning if a part is lighter than a share of as much beam, or heavier than a solid block of its depth."""
     section, rho = scene.sections[place[1]], density(scene)
     (length, depth), lightest = size, 0.0
     if section.rho_A is not None and length > LONG_PART * section.length:
@@ -68,7 +68,7 @@ def _part_mass(
 
 
 def moving_parts(draft: Draft, scene: Scene) -> Iterator[Finding]:
-    """Links and cylinders."""
+    """Check links and cylinders."""
     for i, (section, joint) in enumerate(zip(scene.sections, scene.joints, strict=True)):
         per_metre = _mass_per_metre(section)
         for key, length in (("mL", joint.lL), ("mR", joint.lR)):

@@ -32,9 +32,10 @@ TAKES = frozenset(
 
 
 def stretched_boom(draft: Draft, scene: Scene, odd: Sequence[str]) -> list[Finding]:
-    """What only all parts together tell, estimated by `boom_twin.scene.straight_boom`; `odd` are paths that are told already.
+    """Return the first implausibility that only all parts together show, estimated by `boom_twin.scene.straight_boom`.
 
-    The first of payload, pressure, oil, frequency and damping that is odd is told: it is the cause of what follows.
+    Payload, pressure, oil, frequency and damping are checked in this order: the first that is irregular causes what follows.
+    `odd` are paths that have a finding already.
     """
     if any(path.rpartition(".")[2] in TAKES for path in odd):
         return []
@@ -63,7 +64,7 @@ def _frequency(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Find
 
 
 def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
-    """Of every part by itself, then of all together; nothing where no damping is named at all."""
+    """Yield warnings of the damping of each part, then of all together; none where no damping is given at all."""
     if not len(found.frequencies):
         return
     parts: list[tuple[Place, float, float]] = []
@@ -98,7 +99,7 @@ def _damping_of_all(draft: Draft, scene: Scene, found: StraightBoom, part: tuple
 
 
 def _pressure(draft: Draft, scene: Scene, _found: StraightBoom) -> Iterator[Finding]:
-    """Of the oil under the boom's weight in the posture that is worst for it: pushing on the bore, pulling on the ring."""
+    """Yield warnings of oil pressure under the boom's weight in the worst posture: pushing on the bore, pulling on the ring."""
     if all(joint.cylinder.oil is None for joint in scene.joints):
         return
     for i, (joint, loads) in enumerate(zip(scene.joints, worst_loads(scene), strict=True)):

@@ -23,7 +23,7 @@ NEEDED = {"A": (), "B1": LINK_KEYS, "B2": (*LINK_KEYS, "R"), "B3": (*LINK_KEYS, 
 
 
 def counts(draft: Draft) -> Iterator[Finding]:
-    """One joint, and one angle of every posture, for each section."""
+    """Check that each section has one joint, and one angle in every posture."""
     number = len(draft.sections)
     if number == 0:
         return

@@ -140,7 +140,7 @@ class RigFault:
         return f"{self.cause}:{self.kind}{size}" + (f"@{self.onset:g}{ramp}{end}" if self.onset or ramp or end else "")
 
     def share(self, times: Array) -> Array:
-        """How much of it is there at `times` (m,) in s: 0 before the onset, 1 in full."""
+        """Return the share of the fault at `times` (m,) in s: 0 before the onset, 1 in full."""
         return self._begun(times, self.onset) - self._begun(times, self.end)
 
     def _begun(self, times: Array, at: float) -> Array:
@@ -150,12 +150,12 @@ class RigFault:
 
     @property
     def is_there_at_first(self) -> bool:
-        """Whether it is there in full from the start."""
+        """Return True if the fault is there in full from the start."""
         return self.onset == self.ramp == 0.0
 
     @property
     def is_physical(self) -> bool:
-        """Whether it is of the boom, not of a sensor."""
+        """Return True if the fault is one of the boom, not of a sensor."""
         return self.kind in _PHYSICAL
 
     @property
@@ -165,7 +165,7 @@ class RigFault:
 
     @property
     def is_constant(self) -> bool:
-        """Whether it is there in full from the start to the end."""
+        """Return True if the fault is there in full from the start to the end."""
         return self.is_there_at_first and self.end == math.inf
 
     @property
@@ -198,7 +198,7 @@ def parse(text: str) -> RigFault:
 
 
 def check(faults: Sequence[RigFault], scene: Scene, duration: float) -> None:
-    """UsageError if a fault is of a part that `scene` has not, or begins after `duration` (s), or two change one thing."""
+    """Raise UsageError if a fault is of a part that `scene` lacks, or begins after `duration` (s), or two change one thing."""
     parts = len(scene.joints)
     changing = [fault.cause for fault in faults if fault.is_physical and not fault.is_constant]
     for fault in faults:
@@ -304,7 +304,7 @@ def _with_one(session: RigSession, fault: RigFault, rng: np.random.Generator) ->
 
 
 def _readings(cause: str) -> str:
-    """Which readings of a session a fault of a sensor is in; their truth has the same name."""
+    """Return the name of the session's readings that a fault of a sensor is in; their truth has the same name."""
     if cause.startswith("cylinder_force"):
         return "forces"
     return "joints" if cause.startswith("joint") else "strokes"

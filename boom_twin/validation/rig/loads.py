@@ -133,7 +133,7 @@ class WindLoad:
 
 RigLoad = PumpLoad | WindLoad
 KINDS: dict[str, tuple[Callable[..., RigLoad], int, int]] = {"pump": (PumpLoad, 2, 3), "wind": (WindLoad, 1, 2)}
-"""By the word that a load begins with: its class, and how many numbers it takes at least and at most."""
+"""Kinds of load by the word that a load begins with: class, and least and greatest count of its numbers."""
 
 
 def _onset(onset: float) -> str:
@@ -165,7 +165,7 @@ def parse(text: str) -> RigLoad:
 
 
 def check(loads: Sequence[RigLoad], duration: float) -> None:
-    """UsageError if a load begins after `duration` (s)."""
+    """Raise UsageError if a load begins after `duration` (s)."""
     for load in loads:
         if load.onset >= duration:
             raise UsageError(f"load {load}: begins at {load.onset:g} s, must be before the end at {duration:g} s.")

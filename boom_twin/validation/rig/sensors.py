@@ -50,7 +50,7 @@ class Sensors:
 
 
 def noise_free(rate: float = RATE) -> Sensors:
-    """The same sampling instants, the true values."""
+    """Return sensors that read the true values at the same sampling instants."""
     exact = dict.fromkeys((field.name for field in fields(Sensors) if field.name.endswith(("_sigma", "_resolution"))), 0.0)
     return replace(Sensors(rate), **exact)
 
@@ -72,7 +72,7 @@ def read(true: Array, sigma: float, resolution: float, rng: np.random.Generator)
 
 
 def specific_force(acceleration: Array, angle: Array, gravity: Point) -> Array:
-    """What an ideal accelerometer on the tip reads: acceleration minus gravity in the tip's axes.
+    """Return the reading of an ideal accelerometer on the tip: acceleration minus gravity in the tip's axes.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ SIX_BARS: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class _Sizes:
-    """Of every section, all of shape (n,): length (m), mass per metre (kg/m), mass (kg), moment at its inboard pivot (N m).
+    """Sizes of every section, shape (n,): length (m), mass per metre (kg/m), mass (kg), moment at its inboard pivot (N m).
 
     `modulus` is that of the material (Pa).
     """

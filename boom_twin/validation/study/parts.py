@@ -194,7 +194,7 @@ def _row(found: PartsStudy, part: VariantCost) -> Sequence[object]:
 
 
 def bars(found: PartsStudy) -> Bars:
-    """What the picture shows: all but single sections with more modes than they have."""
+    """Return the bars of the picture: all but single sections with more modes than they have."""
 
     def shown(part: VariantCost) -> bool:
         single = part.variant.kind == "modes" and len(part.variant.edits) == 1

@@ -58,7 +58,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def provenance(**more: object) -> str:
-    """One paragraph: when, where and with which versions; `more` follows, then that the parameters are surrogates."""
+    """Return one paragraph: when, where and with which versions; `more` follows, then that the parameters are surrogates."""
     told = {**machine(), **more}
     return ", ".join(f"{name} {value}" for name, value in told.items() if value is not None) + f". {SYNTHETIC}\n"
 
@@ -78,7 +78,7 @@ def _text(value: object) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Only dict, list, str, int, finite float, bool and None."""
+    """Return a value made of dict, list, str, int, finite float, bool and None only."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = dataclasses.asdict(value)
     if hasattr(value, "tolist"):

@@ -132,7 +132,7 @@ class Equations:
         return np.asarray(k * (placed.lengths.value - length) + self.d * (placed.lengths.rate - rate))
 
     def _stiffness(self, lengths: Array) -> Array:
-        """Of the oil springs, N/m, of drives so long (m)."""
+        """Return the stiffness of the oil springs, N/m, for drives so long (m)."""
         return np.array([oil_stiffness(j.cylinder, float(at)) for j, at in zip(self.scene.joints, lengths, strict=True)])
 
     def _generalised(self, placed: PlacedBoom, q: Array, v: Array) -> Array:
@@ -219,7 +219,7 @@ def root(a: Jet) -> Jet:
 
 
 def inverse(a: Jet) -> Jet:
-    """1 / a."""
+    """Return 1 / a."""
     return a.through(1.0 / a.v, -1.0 / a.v**2, 2.0 / a.v**3)
 
 

@@ -14,7 +14,7 @@ from ....types import Array
 
 
 class Bodies:
-    """Of a scene: first all links L, then all links R, barrels, rods.
+    """Bodies of a scene: first all links L, then all links R, barrels, rods.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Bodies:
 
 
 def _rod_pin(joint: Joint) -> tuple[float, float]:
-    """On link L from D (B1, B2), or on link R from E (B3), in m along and to the left."""
+    """Return the rod pin on link L from D (B1, B2), or on link R from E (B3), in m along and to the left."""
     along, aside = joint.R or (0.0, 0.0)
     if joint.kind == "B1":
         return joint.lL or 0.0, 0.0
@@ -146,9 +146,9 @@ def pins(scene: Scene, index: int) -> dict[str, Point]:
 
 
 def rigid_masses(scene: Scene, index: int, x0: float, x1: float) -> list[RigidPart]:
-    """What a rigid stretch of section `index` weighs; centres in the axes of the section.
+    """Return the rigid parts of a stretch of section `index` that have mass; centres in the axes of the section.
 
-    The named part that belongs to it, the beam if it does not bend, and the line's fill.
+    They are the named part that belongs to it, the beam if it does not bend, and the line's fill.
     """
     section, fill = scene.sections[index], scene.line_fill or 0.0
     whole = x1 - x0 == section.length
@@ -193,7 +193,7 @@ def link_headings(joint: Joint, relative: float) -> tuple[float, float]:
 
 
 def _side(joint: Joint) -> float:
-    """1 where pin Q lies left of D->E, -1 where it lies right of it."""
+    """Return 1 where pin Q lies left of D->E, -1 where it lies right of it."""
     return {"left": 1.0, "right": -1.0}[joint.side or "left"]
 
 

@@ -69,7 +69,7 @@ class SegmentTables:
 
 @dataclass
 class _Draft:
-    """What has been laid down so far; rows of `links` are (length, turning coordinates, stretching coordinate)."""
+    """Chain under construction; rows of `links` are (length, turning coordinates, stretching coordinate)."""
 
     links: list[tuple[float, tuple[int, ...], int | None]] = field(default_factory=list)
     masses: list[tuple[int, float, float, float, float, float]] = field(default_factory=list)

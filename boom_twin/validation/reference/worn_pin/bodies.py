@@ -56,7 +56,7 @@ class Lever:
         return _placed(bodies, Point(self.pivot, 0j, 0j) + turn.arm(self.pin))
 
     def tip_at(self, phi: float) -> complex:
-        """Complex, m."""
+        """Return the place of the tip, complex, m."""
         return self.pivot + Turn(phi, 1.0, 0.0).arm(self.tip).value
 
 
@@ -84,7 +84,7 @@ class SixBar:
         return _placed(bodies, self._fixed(rod_pin(joint, angle, left, right)))
 
     def tip_at(self, phi: float) -> complex:
-        """Complex, m."""
+        """Return the place of the tip, complex, m."""
         return self.pivot + Turn(phi, 1.0, 0.0).arm(self.tip).value
 
     def _fixed(self, point: Point) -> Point:
@@ -122,15 +122,15 @@ class OilCylinder:
         return still + self.rod_mass * (length - self.rod_com) ** 2
 
     def moment(self, length: float) -> float:
-        """Of mass about the barrel pin, kg m."""
+        """Return the first moment of mass about the barrel pin, kg m."""
         return self.barrel_mass * self.barrel_com + self.rod_mass * (length - self.rod_com)
 
     def tension(self, length: float, rate: float, drive: tuple[float, float]) -> float:
-        """Of the oil (N), at length and rate of the drive."""
+        """Return the tension of the oil (N), at length and rate of the drive."""
         return self.k * (length - drive[0]) + self.d * (rate - drive[1])
 
     def energy(self, length: float, psi: float, rate: float, swing: float, drive: float, gravity: complex) -> float:
-        """Of motion, oil and weight, J, at a length of the drive."""
+        """Return the energy of motion, oil and weight, J, at a length of the drive."""
         moving = self.rod_mass * rate**2 + self.inertia(length) * swing**2
         return 0.5 * moving + 0.5 * self.k * (length - drive) ** 2 - dot(gravity, self.moment(length) * exp(1j * psi))
 

@@ -76,11 +76,11 @@ class Contact:
     slip: float = 1e-2
 
     def gap(self, offset: complex) -> float:
-        """|offset| - c, m: negative in flight."""
+        """Return the gap |offset| - c, m: negative in flight."""
         return abs(offset) - self.clearance
 
     def penetration(self, gap: float) -> float:
-        """d, m."""
+        """Return the penetration d, m."""
         if self.smoothing == 0.0:
             return max(gap, 0.0)
         long = hypot(gap, self.smoothing)
@@ -105,7 +105,7 @@ class Contact:
         return complex(-pressure * outward * (1.0 + 1j * self.friction * tanh(along.imag / self.slip)))
 
     def resting_offset(self, force: complex) -> complex:
-        """Where a pin lies still that presses on the bush with `force` (N, complex, not 0): along it, m."""
+        """Return the offset (m) of a pin at rest that presses on the bush with `force` (N, complex, not 0), along the force."""
         size = abs(force)
         depth = (size / self.stiffness) ** (1.0 / self.exponent)
         return complex((self.clearance + depth - 0.25 * self.smoothing**2 / depth) * force / size)

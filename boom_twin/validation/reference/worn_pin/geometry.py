@@ -44,7 +44,7 @@ class Point:
         return Point(self.value + other.value, self.first + other.first, self.second + other.second)
 
     def seen_from(self, origin: complex, heading: float) -> Point:
-        """In axes where this point's own stand at `origin`, turned by `heading`."""
+        """Return this point in axes in which its own stand at `origin`, turned by `heading`."""
         turn = exp(1j * heading)
         return Point(origin + turn * self.value, turn * self.first, turn * self.second)
 
@@ -89,7 +89,7 @@ def links(joint: Document, phi: float) -> tuple[Turn, Turn]:
 
 
 def rod_pin(joint: Document, phi: float, left: Turn, right: Turn) -> Point:
-    """Where the rod is pinned, a `Point` over phi, given the links there."""
+    """Return the rod pin, a `Point` over phi, given the links there."""
     if joint["kind"] == "B3":
         return on_right(joint, phi, right, joint["lR"] - complex(*joint["R"]))
     return on_left(joint, left, complex(*joint["R"]) if joint["kind"] == "B2" else joint["lL"])
@@ -134,13 +134,13 @@ def pins(document: Document, headings: Headings, index: int) -> tuple[complex, c
 
 
 def cylinder_length(document: Document, headings: Headings, index: int) -> float:
-    """Pin to pin, m."""
+    """Return the length of cylinder `index`, pin to pin, m."""
     barrel, rod = pins(document, headings, index)
     return abs(rod - barrel)
 
 
 def levers(document: Document, headings: Headings, step: float = 1e-5) -> Complexes:
-    """How the tip moves per metre of each cylinder, the others held: complex, shape (n,), by central differences.
+    """Return the tip's travel per metre of each cylinder, the others held: complex, shape (n,), by central differences.
 
     To first order this times (clearance + penetration) is the tip's shift by the play of a pin that lies on its side: a
     pulled cylinder acts as if longer by that, a pushed one as if shorter.
@@ -169,7 +169,7 @@ def outboard(document: Document, headings: Headings, index: int) -> Mass:
 
 
 def gravity(document: Document) -> complex:
-    """In the base's axes, complex, m/s^2."""
+    """Return gravity in the base's axes, complex, m/s^2."""
     return complex(*document["gravity"]) * exp(-1j * document["base"].get("inclination", 0.0))
 
 

@@ -20,7 +20,7 @@ Piece = tuple[Any, float | None]
 
 @dataclass(frozen=True)
 class Episode:
-    """From a touch to the release, or to the end of the motion.
+    """Contact from a touch to the release, or to the end of the motion.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ def _pieces(
 
 
 def _events(gap: Gap, touching: bool) -> tuple[Any, Any]:
-    """Of the gap's change of sign, which ends a piece, and of its maxima."""
+    """Return the events of the gap's change of sign, which ends a piece, and of its maxima."""
     last: dict[float, tuple[float, float]] = {}
 
     def once(time: float, state: Array) -> tuple[float, float]:

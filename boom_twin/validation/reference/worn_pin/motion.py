@@ -152,7 +152,7 @@ class PinnedBoom:
         return self._pin(length, exp(1j * psi), turn, speed, swing, self.part.at(phi).pin)
 
     def energy(self, drive: float, state: Array) -> float:
-        """Of motion, weight and oil, J; not of the contact."""
+        """Return the energy of motion, weight and oil, J, without that of the contact."""
         phi, length, psi, turn, speed, swing = state
         placed = self.part.at(phi)
         own = 0.5 * placed.inertia * turn**2 - dot(self.gravity, placed.height)

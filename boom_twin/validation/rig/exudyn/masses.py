@@ -27,7 +27,7 @@ class Gathered:
 
 @dataclass(slots=True)
 class Lumps:
-    """What a body bears for its neighbours: lumps that resist acceleration, and lumps that weigh."""
+    """Lumps that a body bears for its neighbours: those that resist acceleration, and those that weigh."""
 
     inertia: list[Lump] = field(default_factory=list)
     weight: list[Lump] = field(default_factory=list)
@@ -40,7 +40,7 @@ class Lumps:
 
 @dataclass(frozen=True, slots=True)
 class LumpedMasses:
-    """What bodies bear for cylinders and links that are no bodies.
+    """Lumps that bodies bear for cylinders and links that are no bodies.
 
     Attributes
     ----------
@@ -55,11 +55,11 @@ class LumpedMasses:
 
     @classmethod
     def none(cls, count: int) -> LumpedMasses:
-        """No lumps yet, for `count` sections."""
+        """Return lists without lumps for `count` sections."""
         return cls([{} for _ in range(count)], [Lumps() for _ in range(count)])
 
     def on_section(self, index: int, x: float) -> Lumps:
-        """What section `index` (0-based) bears at `x` (m)."""
+        """Return the lumps that section `index` (0-based) bears at `x` (m)."""
         return self.sections[index].setdefault(x, Lumps())
 
 

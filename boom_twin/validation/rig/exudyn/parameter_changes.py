@@ -19,7 +19,7 @@ _BODY = "RigidBody2D"
 
 
 class ParameterChanges:
-    """What differs between a boom and changed ones, and how much of it is there at every step.
+    """Differences between a boom and changed ones, and the share of them at every step.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class ParameterChanges:
         self._last: list[float] = [0.0] * len(changed)
 
     def of(self, number: int, name: str) -> Array:
-        """By how much parameter `name` of an object is more than at rest, shape (count + 1,) or ()."""
+        """Return by how much parameter `name` of an object is more than at rest, shape (count + 1,) or ()."""
         found = np.zeros(())
         for share, more in zip(self._shares, self._more.get(number, []), strict=False):
             found = found + share * more.get(name, 0.0)

@@ -46,18 +46,18 @@ class Bush:
     entry: float | None = None
 
     def spring(self, _s: Any, _t: float, _i: int, offset: Array, rate: Array, _k: Any, _d: Any, _o: Any) -> list[float]:
-        """What draws hole and journal together (N), of the journal's offset (m) and its rate (m/s); called by Exudyn."""
+        """Return the force (N) that draws hole and journal together, at the journal's offset (m) and rate (m/s), to Exudyn."""
         if self.held:
             return [HOLD * offset[0], HOLD * offset[1], 0.0]
         force = self.contact.force(complex(offset[0], offset[1]), complex(rate[0], rate[1]), self.entry)
         return [-force.real, -force.imag, 0.0]
 
     def offset(self, system: Any) -> complex:
-        """Of the journal in the hole, m, as the system stands."""
+        """Return the offset of the journal in the hole, m, as the system stands."""
         return self._between(system, exudyn.OutputVariableType.Position)
 
     def watch(self, system: Any) -> None:
-        """Before a step: note whether they touch, and how fast they came."""
+        """Note before a step whether hole and journal touch, and their speed of approach."""
         offset = self.offset(system)
         if self.contact.gap(offset) < 0.0:
             self.entry = None
@@ -66,7 +66,7 @@ class Bush:
             self.entry = abs((rate * offset.conjugate()).real) / abs(offset)
 
     def release(self, system: Any) -> None:
-        """At rest: let the journal go, from where it presses on the hole."""
+        """Let the journal go at rest, from where it presses on the hole."""
         held = self.offset(system)
         shift = self.contact.resting_offset(HOLD * held) - held if held else 0j
         start = np.array(system.systemData.GetODE2Coordinates(exudyn.ConfigurationType.Initial))
@@ -99,7 +99,7 @@ def contact_of(scene: Scene, pin: Pin) -> Contact:
 
 
 def refuse_other_pins(scene: Scene) -> None:
-    """UsageError if `scene` has pins with play that the virtual rig does not know, or a rod that is too light for one."""
+    """Raise UsageError if `scene` has pins with play that the virtual rig does not know, or a rod that is too light for one."""
     for index, joint in enumerate(scene.joints):
         owners = (f"cylinder_{index + 1}", f"joint_{index + 1}")
         other = [pin.at for owner in owners for pin in scene.pins_of(owner) if not pin.at.endswith(".rod")]

@@ -31,7 +31,7 @@ class Link:
 
     @property
     def lump(self) -> Lump:
-        """Its mass about its middle."""
+        """Mass of the link about its middle."""
         return Lump(self.mass, (0.0, 0.0), self.mass * self.length**2 / 12)
 
 

@@ -45,7 +45,7 @@ class Scheme:
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """What a motion took.
+    """Computing time and Newton passes of a motion.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Effort:
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """What is done to a boom, count + 1 rows of it, one for the start and one for every step.
+    """Inputs to a boom in count + 1 rows, one for the start and one for every step.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Course:
 
 
 def step_through(boom: Boom, course: Course, step: float, output_step: float, scheme: Scheme) -> Effort:
-    """From the boom's equilibrium through a course; then load and parameters are again those of the equilibrium."""
+    """Step a boom from its equilibrium through a course; then load and parameters are again those of the equilibrium."""
     count = len(course.strokes) - 1
     feeding = _feed(boom, course, step)
     settings = _settings(count, step, output_step, scheme)
@@ -128,7 +128,7 @@ def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> An
 
 
 def _feed(boom: Boom, course: Course, step: float) -> list[float]:
-    """Before every step, hand the drives that move their lengths without force at its end; returns the seconds it takes.
+    """Hand the moving drives, before every step, their lengths without force at its end; return the seconds that this takes.
 
     All drives get those of the start at once. Pins with play note then whether they touch. Load and changed parameters are
     those of the step's end, too.
@@ -179,7 +179,10 @@ def _rests(boom: Boom, index: int, course: Course) -> list[float]:
 
 
 def _stiffness(boom: Boom, index: int, course: Course) -> Array:
-    """Of an oil spring at the start and after every step, N/m: that of its drive's stroke, changed in the same proportion."""
+    """Return the stiffness of an oil spring at the start and after every step, N/m.
+
+    It is that of its drive's stroke, changed in the same proportion.
+    """
     stiffness = oil_stiffness(_cylinder(boom, index), course.strokes[:, index])
     return np.asarray(stiffness + course.changes.of(boom.drives[index][0], "stiffness") * (stiffness / stiffness[0]))
 

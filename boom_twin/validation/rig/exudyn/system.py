@@ -100,11 +100,11 @@ class Boom:
         return self.marker(station.body, (place[0] - station.x, place[1]))
 
     def pin(self, one: int, other: int) -> None:
-        """Two markers share their place."""
+        """Let two markers share their place."""
         self.system.AddObject(items.ObjectJointRevolute2D(markerNumbers=[one, other]))
 
     def loosen(self, bush: Bush) -> None:
-        """Two markers touch as journal and bush."""
+        """Let two markers touch as journal and bush."""
         self.system.AddObject(
             items.ObjectConnectorCartesianSpringDamper(markerNumbers=[*bush.sides], springForceUserFunction=bush.spring)
         )
@@ -115,7 +115,7 @@ class Boom:
         return int(self.system.AddNode(items.NodeRigidBody2D(referenceCoordinates=[*place, angle])))
 
     def rod(self, one: int, other: int, length: float) -> None:
-        """Two markers keep their distance."""
+        """Let two markers keep their distance."""
         self.system.AddObject(items.ObjectConnectorDistance(markerNumbers=[one, other], distance=length))
 
     def body(self, node: int, mass: float, com: Point, inertia: float, weight: Gathered | None = None) -> int:
@@ -135,7 +135,7 @@ class Boom:
         self.system.SetLoadParameter(self.tip_load, "loadVector", [*load, 0.0])
 
     def weigh(self, body: int) -> None:
-        """Gravity on a body or beam."""
+        """Put gravity on a body or beam."""
         marker = self.system.AddMarker(items.MarkerBodyMass(bodyNumber=body))
         self.system.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=self.gravity))
 

@@ -236,7 +236,7 @@ def _curve(found: Convergence, line: ErrorCurve, measure: int) -> Curve:
 
 
 def _orbits(path: Path, scene: Scene, posture: str | None) -> None:
-    """Of the violent stop that the costs are measured in."""
+    """Write a picture of the journals' orbits in the violent stop that the costs are measured in."""
     contact, drive = treated(scene, "contact"), hard_stop(scene, posture)
     moved, plan = integrate_with(contact, drive, VIOLENT, STEP, angles=drive.angles), compile_scene(contact)
     lost = np.sum(np.diff(moved.pins[:, :, 3], axis=0) < 0.0, axis=0)

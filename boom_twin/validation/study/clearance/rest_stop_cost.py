@@ -48,7 +48,7 @@ class Shift:
 
     @property
     def jump(self) -> float:
-        """Of the tip at the switch to the ideal pin, m."""
+        """Jump of the tip at the switch to the ideal pin, m."""
         return float(self.shifts[-1])
 
     @property
@@ -206,7 +206,7 @@ class Cost:
 
 
 def costs(scene: Scene, posture: str | None, quick: bool = False) -> list[Cost]:
-    """No pin, the first rod's, all rods', and those of all joints too; least of several runs that lie apart."""
+    """Return costs of play in no pin, the first rod's, all rods', and all joints' too; least of several runs that lie apart."""
     cases = list(_cases(scene))
     gentle, least = QUICK_GENTLE if quick else GENTLE, np.full((len(cases), 2), np.inf)
     for _ in range(QUICK_REPEATS if quick else REPEATS):
@@ -216,7 +216,7 @@ def costs(scene: Scene, posture: str | None, quick: bool = False) -> list[Cost]:
 
 
 def hard_stop(scene: Scene, posture: str | None) -> StopMotion:
-    """To full speed and to a stop as no operator would."""
+    """Return a motion to full speed and to a stop, harder than any operator would make it."""
     return replace(halt(scene, posture, HARD_BRAKE), ramp=RAMP, stop=STOP)
 
 

@@ -78,7 +78,7 @@ class Peer:
 
     @property
     def model(self) -> str:
-        """How the boom is made."""
+        """Model of the boom, in words."""
         return f"Exudyn, {self.elements} element{'s' if self.elements > 1 else ''}{', lumped' if self.lumped else ''}"
 
     @property

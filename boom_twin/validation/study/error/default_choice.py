@@ -19,7 +19,7 @@ def find(rows: Sequence[Row], case: Own) -> Row | None:
 
 
 def paragraph(rows: Sequence[Row], scene: Scene) -> str:
-    """Whether the default is on the front, and what its step, rho, passes and modes buy."""
+    """Return a list in Markdown: the default against the front, and the effect of its step, rho, passes and modes."""
     row = find(rows, Own())
     if row is None:
         return "The default failed on this motion; see below.\n"
@@ -59,7 +59,7 @@ def _step(rows: Sequence[Row], row: Row) -> str:
 
 
 def _rho(rows: Sequence[Row]) -> str:
-    """What damping costs in error, and which methods get worse when the step gets smaller."""
+    """Return a sentence on the error that damping costs, and on methods that get worse when the step gets smaller."""
     usual = Own().method
     told = []
     for row in of(rows, Own):
@@ -108,7 +108,7 @@ def _passes(rows: Sequence[Row]) -> str:
 
 
 def _modes(rows: Sequence[Row], row: Row, scene: Scene) -> str:
-    """What each further shape buys, at the default step."""
+    """Return a sentence on the error and run time of each number of modes, at the default step."""
     told, listed = [], []
     for modes in range(1, 7):
         shapes, cantilever = (find(rows, Own(modes=modes, basis=basis)) for basis in ("end-shapes", "cantilever"))

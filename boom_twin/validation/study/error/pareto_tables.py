@@ -66,7 +66,7 @@ class Match:
 
 
 def matches(rows: Sequence[Row], kind: type = Peer) -> list[Match]:
-    """At equal error of the tip."""
+    """Return the fastest own row and the fastest of the other kind at equal errors of the tip."""
     own, other = of(rows, Own), of(rows, kind)
     return [Match(most, fastest(own, most), fastest(other, most)) for most in EQUAL]
 
@@ -81,7 +81,7 @@ class PairedTiming:
 
     @property
     def medians(self) -> tuple[float, float]:
-        """Of the own runs and of the other's."""
+        """Medians of the own runs and of the other's."""
         return statistics.median(self.own), statistics.median(self.other)
 
     @property
@@ -91,7 +91,7 @@ class PairedTiming:
 
     @property
     def told(self) -> dict[str, object]:
-        """Everything as one flat object."""
+        """Flat dict of all results."""
         own, other = self.medians
         return {
             "step_s": self.case.step, "elements": self.case.elements, "exudyn_method": self.case.label,
@@ -205,7 +205,7 @@ def _column(case: Case) -> float:
 
 
 def failures_table(rows: Iterable[Row]) -> str:
-    """What did not go through, and why."""
+    """Return a table of the cases that failed, and why."""
     return table(("method", "status"), [(name(row.case), _why(row)) for row in rows if not row.good])
 
 

@@ -32,7 +32,7 @@ def load_rig() -> tuple[ModuleType | None, str]:
 
 
 def build() -> str:
-    """Which build of Exudyn is loaded."""
+    """Return the build of Exudyn that is loaded, in words."""
     return "without range checks" if "exudyn.exudynCPPfast" in sys.modules else "with range checks"
 
 
@@ -76,11 +76,11 @@ class Problem:
 
     @property
     def apart(self) -> tuple[float, float] | None:
-        """How far the references are from each other: tip (mm), acceleration (relative)."""
+        """Distance of the references from each other: tip (mm), acceleration (relative)."""
         return None if self.exudyn is None else self.own.path.away(self.exudyn.path)
 
     def errors(self, path: Path) -> tuple[tuple[float, float], tuple[float, float] | None]:
-        """Against the own and the independent reference."""
+        """Return the errors of `path` against the own and the independent reference."""
         return path.away(self.own.path), None if self.exudyn is None else path.away(self.exudyn.path)
 
 

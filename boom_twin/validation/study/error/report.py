@@ -67,7 +67,7 @@ def report(problem: Problem, rows: Sequence[Row], duel: PairedTiming | None) -> 
 
 
 def _setting(problem: Problem) -> str:
-    """What was moved, what the errors are, and what the times are."""
+    """Return a paragraph on the motion, the errors and the times."""
     own, other = problem.own, problem.exudyn
     if other is None or problem.apart is None:
         second = f"There is no independent reference: {problem.missing}"
@@ -112,7 +112,7 @@ def _equal(problem: Problem, rows: Sequence[Row], duel: PairedTiming | None) -> 
 
 
 def _segments(rows: Sequence[Row]) -> str:
-    """What cutting into segments alone errs by: the rows of Radau at the least tolerance."""
+    """Return the error of cutting into segments alone, by the rows of Radau at the least tolerance."""
     listed = [row for row in of(rows, Stiff) if isinstance(row.case, Stiff) and row.case.solver == "Radau" and row.good]
     least = min((row.case.tolerance for row in listed if isinstance(row.case, Stiff)), default=0.0)
     told = [

@@ -35,7 +35,7 @@ class Timed:
 
 @dataclass(frozen=True)
 class Row:
-    """What one case gave; NaN where it failed.
+    """Result of one case; NaN where it failed.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Row:
 
     @property
     def good(self) -> bool:
-        """Whether the case went through to finite numbers."""
+        """Return True if the case went through to finite numbers."""
         return self.status == "ok" and math.isfinite(self.tip_mm) and math.isfinite(self.seconds)
 
 

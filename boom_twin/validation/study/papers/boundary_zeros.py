@@ -81,7 +81,7 @@ class HeldBoom:
         self._angles, self._drive = angles, self._plan.closed_lengths + strokes
 
     def torque(self, angle: float) -> float:
-        """N m that the held pivot bears with section 1 at `angle` (rad)."""
+        """Return the torque (N m) that the held pivot bears with section 1 at `angle` (rad)."""
         plan, t = self._plan, self._plan.tables
         state, work = plan.state(), plan.work()
         clamp_pins(state)

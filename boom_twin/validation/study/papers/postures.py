@@ -84,7 +84,7 @@ def worn(scene: Scene) -> Scene:
 
 
 def run_own(scene: Scene, posture: str, pins: str, span: float) -> PostureRun:
-    """By this model."""
+    """Run one posture by this model."""
     drive, one = stop_in(scene, posture), worn(scene) if pins == "worn" else ideal(scene)
     found: MethodRun = integrate_with(one, drive, span, STEP, round(ROW / STEP), angles=drive.angles)
     gaps = np.array([pin.radial_clearance for pin in one.clearance.pins]) if one.clearance else np.zeros(0)
@@ -93,7 +93,7 @@ def run_own(scene: Scene, posture: str, pins: str, span: float) -> PostureRun:
 
 
 def run_peer(scene: Scene, posture: str, pins: str, span: float, step: float) -> PostureRun:
-    """By Exudyn: geometrically exact beams, contact by user functions."""
+    """Run one posture by Exudyn: geometrically exact beams, contact by user functions."""
     from ...rig.exudyn.solve import at_rest, move
 
     drive, one = stop_in(scene, posture), worn(scene) if pins == "worn" else ideal(scene)
@@ -115,7 +115,7 @@ def run_peer(scene: Scene, posture: str, pins: str, span: float, step: float) ->
 
 
 def compare(own: PostureRun, peer: PostureRun) -> Comparison:
-    """How far two programs are apart, up to the first flight of a journal in either."""
+    """Compare two programs, up to the first flight of a journal in either."""
     flying = np.flatnonzero(((own.penetration < -NEAR) | (peer.penetration < -NEAR)).any(axis=1))
     until = int(flying[0]) if len(flying) else len(own.times)
     apart = np.linalg.norm(own.tip - peer.tip, axis=1)

@@ -188,7 +188,7 @@ def _numbers(found: PapersStudy) -> dict[str, object]:
 
 
 def slope(found: PapersStudy) -> float:
-    """Of the low-speed form's error over the speed, in logarithms, over the two slowest moves."""
+    """Return the slope of the low-speed form's error over the speed, in logarithms, over the two slowest moves."""
     speeds, errors = np.log(found.speeds[:2, 0]), np.log(found.speeds[:2, 1])
     return float((errors[1] - errors[0]) / (speeds[1] - speeds[0]))
 

@@ -88,7 +88,7 @@ def swept(plan: Plan, state: State, work: Work, step: Step, forces: Array, one: 
 
 
 def difference(one: Array, other: Array) -> float:
-    """Of two transfer matrices as a share of the larger, after displacements and forces were scaled to be alike."""
+    """Return the difference of two transfer matrices as a share of the larger, with displacements and forces scaled alike."""
     ratio = np.sqrt(np.abs(one[3:6, :3]).max() / np.abs(one[:3, 3:6]).max())
     scale = np.array([1.0, 1.0, 1.0, ratio, ratio, ratio, 1.0])
     a, b = (matrix / scale[:, None] * scale for matrix in (one, other))

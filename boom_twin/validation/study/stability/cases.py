@@ -14,8 +14,8 @@ from . import setups as made
 from .setups import Setup, dead_stop, first_cylinder, one_cylinder, smooth, to_the_ends
 
 Truth = Literal["fine steps", "equilibrium", "swing", "none"]
-"""What is right: the default method at an eighth of the step; the equilibrium of the last strokes; a vibration that does not
-grow about a mean that stays; nothing, because there is no solution."""
+"""Reference of a case: the default method at an eighth of the step; the equilibrium of the last strokes; a vibration that does
+not grow about a mean that stays; nothing, because there is no solution."""
 
 
 @dataclass(frozen=True)

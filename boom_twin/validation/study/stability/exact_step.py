@@ -94,7 +94,7 @@ def _riccati(plan: Plan, state: State, work: Work, motion: Motion, drive: Array)
 
 
 def _plain(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> bool:
-    """Lost digits are what is measured, so that status does not count."""
+    """Return True if the plain product gives finite increments; its status does not count, as lost digits are measured."""
     product = new_product(plan.tables)
     plain_pass(plan.tables, state, work, motion, drive, np.zeros(plan.joints), product)
     return bool(np.isfinite(work.dz).all())
@@ -157,7 +157,7 @@ class _System:
         return np.asarray(x), change
 
     def condition(self) -> float:
-        """Estimate from the factors."""
+        """Return the condition number, estimated from the factors."""
         norm = np.abs(self.whole).sum(axis=0).max()
         inverse, _ = linalg.lapack.dgecon(self.factors[0], norm)
         return float(1.0 / inverse) if inverse > 0.0 else math.inf

@@ -202,12 +202,12 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
 
 
 def _only(scene: Scene, posture: str) -> Scene:
-    """With no posture but this one; UsageError if there is no such posture."""
+    """Return the scene with no posture but this one; UsageError if there is no such posture."""
     return scene.model_copy(update={"postures": {posture: section_angles(scene, posture)}})
 
 
 def _stuck(rows: Sequence[CaseResult], case: Case) -> bool:
-    """Whether a case did not start for want of an equilibrium."""
+    """Return True if a case did not start for want of an equilibrium."""
     return any(row.case is case and NO_EQUILIBRIUM in row.cells["default"].facts.status for row in rows)
 
 

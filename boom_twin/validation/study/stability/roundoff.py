@@ -114,7 +114,7 @@ class TurnUp:
 
     @property
     def turned_up_above_target(self) -> bool:
-        """Whether the error rises again before it has been below `TARGET`."""
+        """Return True if the error rises again before it has been below `TARGET`."""
         rises = np.flatnonzero(np.diff(self.errors) > 0.0)
         return bool(rises.size and self.errors[rises[0]] > TARGET)
 

@@ -36,7 +36,7 @@ FINER, FINEST = 8, 5e-6  # steps of what is right: an eighth, but not below this
 
 @dataclass(frozen=True)
 class Cell:
-    """What came of one method in one case."""
+    """Result of one method in one case."""
 
     facts: Facts
     verdict: CaseVerdict
@@ -85,7 +85,7 @@ def _facts(case: Case, setup: Setup, method: Method, judge: Callable[[MethodRun]
 
 
 def _judge(case: Case, setup: Setup) -> tuple[Callable[[MethodRun], Facts], str]:
-    """How a motion of the case is judged, and that in words.
+    """Return the function that judges a motion of the case, and its reference in words.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def _fine(setup: Setup) -> float:
 
 
 def _right(setup: Setup) -> tuple[MethodRun, int]:
-    """What is right, and how many rows of the case's motion there are to one of its."""
+    """Return the reference motion, and how many rows of the case's motion there are to one of its rows."""
     step = _fine(setup)
     every, stride = max(round(setup.step / step), 1), max(round(step / setup.step), 1)
     return integrate_with(setup.scene, setup.drive, setup.duration, step, every, RIGHT, angles=setup.angles), stride

@@ -33,7 +33,7 @@ def cylinders(scene: Scene, stiffness: float | None) -> Scene:
 
 
 def bending(scene: Scene, factor: float) -> Scene:
-    """All sections with `factor` times their second moment of area."""
+    """Return the scene with `factor` times the second moment of area of all sections."""
     return _sections(scene, lambda s: s if s.I is None else s.model_copy(update={"I": factor * s.I}))
 
 
@@ -71,18 +71,18 @@ def with_modes(scene: Scene, count: int) -> Scene:
 
 
 def undamped(scene: Scene) -> Scene:
-    """No damping in beams or cylinders."""
+    """Return the scene without damping in beams and cylinders."""
     calm = _sections(scene, lambda s: s.model_copy(update={"beta": None}))
     return _joints(calm, lambda j: j.model_copy(update={"cylinder": j.cylinder.model_copy(update={"d": None})}))
 
 
 def lighter_gravity(scene: Scene, share: float) -> Scene:
-    """`share` of the scene's gravity."""
+    """Return the scene with `share` of its gravity."""
     return scene.model_copy(update={"gravity": (share * scene.gravity[0], share * scene.gravity[1])})
 
 
 def posed(scene: Scene, headings: tuple[float, ...]) -> Scene:
-    """With a posture ``case`` at section angles `headings` (deg)."""
+    """Return the scene with a posture ``case`` at section angles `headings` (deg)."""
     return scene.model_copy(update={"postures": {"case": headings}})
 
 
@@ -118,7 +118,7 @@ SAMPLES = 1001  # of a joint's range
 
 @dataclass(frozen=True)
 class Setup:
-    """What a case steps through.
+    """Scene, drive and steps of a case.
 
     Attributes
     ----------

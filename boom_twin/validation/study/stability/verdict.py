@@ -17,7 +17,7 @@ Word = Literal["holds", "degrades", "fails", "refuses"]
 
 @dataclass(frozen=True)
 class Facts:
-    """What a motion shows against what is right. NaN where a quantity has no meaning in the case.
+    """Deviations of a motion from its reference. NaN where a quantity has no meaning in the case.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ def verdict(facts: Facts) -> CaseVerdict:
 
 
 def _grade(name: str, value: float) -> Word:
-    """Infinite is beyond every bound; NaN is a quantity without meaning here."""
+    """Return the grade of a value. Infinite is beyond every bound; NaN is a quantity without meaning here."""
     degrades, fails, _ = BOUNDS[name]
     if value > fails or math.isinf(value):
         return "fails"
@@ -205,14 +205,14 @@ def _spread(values: Array) -> float:
 
 
 def _rms(values: Array) -> float:
-    """Of the length of the rows (m, c); infinite if any is not finite, 0 without rows."""
+    """Return the rms length of the rows (m, c); infinite if any is not finite, 0 without rows."""
     if not values.size:
         return 0.0
     return float(np.sqrt(np.mean(np.sum(values**2, axis=-1)))) if np.isfinite(values).all() else math.inf
 
 
 def _path(motion: MethodRun) -> float:
-    """How far the tip gets from where it starts, m."""
+    """Return the largest distance of the tip from where it starts, m."""
     return max(_largest(motion.tip - motion.tip[0]), SHORTEST_PATH)
 
 
