@@ -30,7 +30,7 @@ NAMES, METHODS, ASIDE = 4.6, 0.85, 0.8  # widths, inches
 
 @dataclass(frozen=True)
 class MatrixRow:
-    """A row of the matrix: `marks` (keys of MARKS), one a method."""
+    """Row of the matrix: `marks` (keys of MARKS), one a method."""
 
     group: str
     name: str

@@ -29,7 +29,7 @@ END_TIMEOUT = 2 * DISK_PATIENCE
 LOOK = 1.0
 """Seconds between looks at whether all have found each other."""
 LISTENERS = 2
-"""Of every input: node and recorder."""
+"""Subscribers of every input: node and recorder."""
 
 
 class DemoProcess:
@@ -54,7 +54,7 @@ class DemoProcess:
             self._process = subprocess.Popen(command, stdout=file, stderr=file, pass_fds=(lock,))
 
     def output(self) -> str:
-        """All that it said so far."""
+        """Return all output so far."""
         return self._log.read_text(encoding="utf-8")
 
     def check(self) -> None:
@@ -106,7 +106,7 @@ class DemoProcesses:
         return self._children[-1]
 
     def _beside(self, name: str) -> Path:
-        """Where a file of this run goes."""
+        """Return the path of a file of this run."""
         return self.recorded.with_name(f"{self.recorded.name}.{name}")
 
     def check(self) -> None:
@@ -150,7 +150,7 @@ class DemoProcesses:
 
 @contextmanager
 def _new(path: Path) -> Iterator[TextIO]:
-    """A file that is not there yet, to be written."""
+    """Create a file that must not be there yet, and provide it for writing within a context."""
     try:
         with path.open("x", encoding="utf-8") as file:
             yield file
@@ -160,7 +160,7 @@ def _new(path: Path) -> Iterator[TextIO]:
 
 
 def _free(folder: Path) -> Path:
-    """The folder, or with a number behind its name if it, or a file that goes beside it, is there already."""
+    """Return `folder`, with a number behind its name if it, or a file that goes beside it, is there already."""
     taken = {entry.name for entry in folder.parent.iterdir()}
     numbered = (folder.with_name(f"{folder.name}_{number}") for number in count(2))
     return next(

@@ -66,7 +66,7 @@ class Services:
         self._services += [node.create_service(Trigger, f"~/{name}", partial(_tell, text)) for name, text in texts.items()]
 
     def close(self) -> None:
-        """Offer them no more."""
+        """Withdraw the services."""
         for service in self._services:
             self._node.destroy_service(service)
 
@@ -82,7 +82,7 @@ class Services:
         return response
 
     def _limit(self, name: str) -> None:
-        """Refuse what would keep the node busy with starts from rest."""
+        """Raise UsageError if a service that restarts the model from static equilibrium is called again too soon."""
         now = time.monotonic()
         if FROM_REST.fullmatch(name):
             if now - self._called.get(name, -PAUSE) < PAUSE:
@@ -110,7 +110,7 @@ LOG_PERIOD = 1.0
 
 
 class StartLog:
-    """Logs from when on the model goes on with other settings, zeros or from rest.
+    """Log of the changes from which on the model runs with other settings or zeros, or restarts from static equilibrium.
 
     Parameters
     ----------
