@@ -72,7 +72,7 @@ COMPLETING = "_ARGCOMPLETE"
 
 
 class Command(Protocol):
-    """A module of one command."""
+    """Module of one command."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Declare the arguments of the command."""

@@ -19,7 +19,7 @@ OTHER_USER = (
 
 @dataclass(frozen=True, slots=True)
 class Peers:
-    """The publishers of an input, or the subscribers of an output.
+    """Publishers of an input, or subscribers of an output.
 
     Attributes
     ----------

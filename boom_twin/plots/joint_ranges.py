@@ -131,7 +131,10 @@ def _joint(axes: Axes, scene: Scene, i: int) -> None:
 
 
 def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | None) -> None:
-    """One position; names of the pins where it has a colour, bright around them, for links and cylinders lie below."""
+    """Draw one position of a joint's mechanism; name its pins if `colour` is given.
+
+    The names have a bright outline, because links and cylinders lie below them.
+    """
     from matplotlib.patheffects import withStroke
 
     joint, alpha = bones.joints[i], 0.12 if colour is None else 0.4
@@ -154,7 +157,7 @@ def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | 
 
 
 def _named(joint: JointPins) -> dict[str, Array]:
-    """Pins by the letters of the scene."""
+    """Return the pins of a joint by the names that the scene gives them."""
     six_bar = {"D": joint.d, "E": joint.e, "Q": joint.q}
     ends = {"base pin": joint.barrel_pin, "rod_pin": joint.rod_pin} if joint.d is None else {"C": joint.barrel_pin}
     if joint.kind in ("B2", "B3"):

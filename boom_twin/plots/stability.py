@@ -135,7 +135,7 @@ LOOKS = {"ideal": (GREY, 2.4), "contact": (ORANGE, 1.3), "spring-damper": (BLUE,
 
 @dataclass(frozen=True)
 class Trace:
-    """The tip in one posture with one kind of pins (a key of `LOOKS`): s, vertical displacement m, acceleration m/s^2."""
+    """Tip in one posture with one kind of pins (a key of `LOOKS`): s, vertical displacement m, acceleration m/s^2."""
 
     posture: str
     model: str

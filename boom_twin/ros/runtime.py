@@ -40,7 +40,7 @@ OTHER_REMEDY = "Check the environment variables ROS_*."
 
 @contextmanager
 def ros(arguments: Sequence[str] | None = None) -> Iterator[None]:
-    """rclpy, started with the process's or the given ROS arguments, and shut down at the end.
+    """Provide rclpy within a context, started with the process's or the given ROS arguments.
 
     rclpy's own signal handlers are left out: they close the context at once, and then a node can no longer say that it
     is going. What a signal does is up to Python, see `boom_twin.ros.startup`. Fast DDS takes its profiles from the file that
@@ -101,9 +101,9 @@ def spin(node: Node, queue: ReceiveQueue, is_over: Callable[[], bool]) -> None:
 
 @contextmanager
 def callback_turns(node: Node, is_due: Callable[[], bool]) -> Iterator[Callable[[], None]]:
-    """Give a function that lets the callbacks of `node` run until `is_due`, which is asked every `WAKE` s, or sooner.
+    """Provide a function that lets the callbacks of `node` run until `is_due`, which is asked every `WAKE` s, or sooner.
 
-    By the events executor, whose turns a timer ends from here, see `spin`; by the single-threaded one where that one is missing
+    The events executor runs them, whose turns a timer ends, see `spin`; the single-threaded one where that one is missing
     or fails.
     """
     turn, executors = Future(), [_events_executor, SingleThreadedExecutor]

@@ -37,7 +37,7 @@ def on_stop_signal(act: Callable[[], None]) -> None:
 
 
 class InterruptedWorkError(KeyboardInterrupt):
-    """A piece of work took too long to end by itself.
+    """Interruption of a piece of work that took too long to end by itself.
 
     A class of its own: a KeyboardInterrupt proper that passes through ``exec`` of a text, as dataclasses are made by, lets
     Python end the process as killed by SIGINT even where it was caught.

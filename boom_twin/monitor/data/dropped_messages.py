@@ -16,7 +16,7 @@ LONGEST = 200
 
 
 class MalformedError(Exception):
-    """A message that cannot be used; the text says why."""
+    """Error of a message that cannot be used; the text states why."""
 
 
 @dataclass(slots=True)

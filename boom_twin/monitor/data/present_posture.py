@@ -1,6 +1,6 @@
 """Natural frequencies and tip response of the model in the posture that is shown.
 
-They are computed again only if the boom has moved, in a thread beside the server, so that no sample waits for them.
+The model is evaluated again only if the boom has moved, in a thread beside the server, so that no sample waits for it.
 """
 
 from __future__ import annotations

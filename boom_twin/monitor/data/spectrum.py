@@ -33,7 +33,7 @@ MOST_POINTS = 40_000
 
 @dataclass(frozen=True, slots=True)
 class Peak:
-    """A peak of the spectrum: frequency (Hz), damping ratio (NaN if not to be had), density ((m/s^2)^2/Hz)."""
+    """Peak of the spectrum: frequency (Hz), damping ratio (NaN if not known), density ((m/s^2)^2/Hz)."""
 
     frequency: float
     damping: float
@@ -42,7 +42,7 @@ class Peak:
 
 @dataclass(frozen=True, slots=True)
 class Spectrum:
-    """Frequencies (k,) in Hz, one-sided densities (k, c) in (m/s^2)^2/Hz, peaks of their sum by frequency."""
+    """Spectrum: frequencies (k,) in Hz, one-sided densities (k, c) in (m/s^2)^2/Hz, peaks of their sum by frequency."""
 
     frequencies: Array
     densities: Array

@@ -167,7 +167,7 @@ SETTLE = 1.0
 
 
 def main() -> int:
-    """Run the demonstration; returns the exit code, 1 if no output arrived."""
+    """Run the demonstration; return the exit code, 1 if no output arrived."""
     args = _arguments()
     try:
         require_rclpy()

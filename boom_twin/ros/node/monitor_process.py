@@ -53,7 +53,7 @@ class MonitorProcess:
         self._timer = node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def close(self) -> None:
-        """End it."""
+        """End the process."""
         self._timer.destroy()
         end_process(self._process, END_TIMEOUT)
 

@@ -25,9 +25,11 @@ INACTIVE = "the node is not active, so nothing is measured. Activate it first."
 
 
 class Services:
-    """``~/reset``, ``~/acknowledge`` and by sensor ``~/rezero/joint_i``, ``cylinder_i``, ``cylinder_force_i``, ``tip_imu``.
+    """Services of the node, all of type std_srvs/Trigger.
 
-    Besides, ``~/scene`` and ``~/baseline`` answer with the texts that the model was built from. All are std_srvs/Trigger.
+    ``~/reset``, ``~/acknowledge`` and by sensor ``~/rezero/joint_i``, ``cylinder_i``, ``cylinder_force_i``, ``tip_imu``.
+
+    ``~/scene`` and ``~/baseline`` answer with the texts that the model was built from.
 
     Parameters
     ----------
