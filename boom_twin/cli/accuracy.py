@@ -16,7 +16,7 @@ NAMES = {"angles": Stream.ANGLES, "imu": Stream.IMU, "forces": Stream.FORCES}
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """``--sensors``."""
+    """Declare ``--sensors``."""
     parser.add_argument(
         "--sensors",
         metavar="NAME,..",
@@ -26,7 +26,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def sensors_of(text: str) -> list[Stream]:
-    """The sensors that are named; UsageError for a name that is none."""
+    """Return the sensors named in `text`; raise UsageError for an unknown name."""
     names = [name.strip() for name in text.split(",") if name.strip()]
     for name in names:
         if name not in NAMES:
@@ -35,19 +35,19 @@ def sensors_of(text: str) -> list[Stream]:
 
 
 def sets_of(sensors: list[Stream]) -> list[tuple[Stream, ...]]:
-    """None of them, and every selection, fewest first; each once."""
+    """Return every selection of sensors once, fewest first, the empty one included."""
     found = [chosen for count in range(len(sensors) + 1) for chosen in combinations(sensors, count)]
     return list(dict.fromkeys(found))
 
 
 def words(chosen: tuple[Stream, ...]) -> str:
-    """A selection as it is written on the command line."""
+    """Return a selection as it is written on the command line."""
     names = {stream: name for name, stream in NAMES.items()}
     return ",".join(names[stream] for stream in chosen) or "strokes only"
 
 
 def table(scene: Scene, sensors: list[Stream]) -> tuple[dict[str, Any], list[str]]:
-    """The accuracy at every posture: as values for ``--json``, and as lines."""
+    """Return the accuracy at every posture, as values for ``--json`` and as lines."""
     values: dict[str, Any] = {}
     acting = "an unknown load of 0.25 % of the boom's weight comes and goes at the tip"
     lines = ["", f"Accuracy of the estimate at rest, while {acting} (standard deviations)"]

@@ -14,7 +14,7 @@ SESSION = "a rosbag2 directory, a directory of its files, or one file: .mcap, .d
 
 
 def positive(text: str) -> float:
-    """A number above 0."""
+    """Parse a number above 0."""
     value = not_negative(text)
     if value == 0.0:
         raise ArgumentTypeError(f"{text}: must be > 0")
@@ -22,7 +22,7 @@ def positive(text: str) -> float:
 
 
 def not_negative(text: str) -> float:
-    """A finite number of at least 0."""
+    """Parse a finite number of at least 0."""
     try:
         value = float(text)
     except ValueError:
@@ -33,20 +33,20 @@ def not_negative(text: str) -> float:
 
 
 def add_mapping(parser: ArgumentParser) -> None:
-    """``--mapping``, for `boom_twin.bag.session_model.mapping_of`."""
+    """Declare ``--mapping``, for `boom_twin.bag.session_model.mapping_of`."""
     told = "topics and sensors; by default as the session was recorded, else what `boom_twin mapping` prints"
     parser.add_argument("--mapping", metavar="FILE", type=Path, help=told)
 
 
 def add_window(parser: ArgumentParser) -> None:
-    """``--start`` and ``--duration``, for `window_of`."""
+    """Declare ``--start`` and ``--duration``, for `window_of`."""
     begin = "begin so many seconds after the first sample (0); the model then starts at rest there"
     parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help=begin)
     parser.add_argument("--duration", type=positive, metavar="S", help="read so many seconds (all)")
 
 
 def window_of(args: Namespace) -> TimeWindow:
-    """The part of a session that arguments name."""
+    """Return the part of a session that the arguments name."""
     from ..bag.time_window import TimeWindow
 
     return TimeWindow(args.start, args.duration)

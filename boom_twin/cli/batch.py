@@ -49,7 +49,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def at_least(least: int) -> Callable[[str], int]:
-    """Reads a whole number that is not below `least`."""
+    """Return a parser of whole numbers of at least `least`."""
 
     def read(text: str) -> int:
         if not text.isdecimal() or int(text) < least:
@@ -140,7 +140,7 @@ def _kept(args: Namespace, folder: BatchFolder, task: SessionTask) -> Row | None
 
 
 def _shown(rows: Iterator[Row], before: int, total: int) -> Iterator[Row]:
-    """The rows, with their progress."""
+    """Yield the rows and show their progress."""
     progress = progress_of(total, "sessions", "batch", before)
     for row in rows:
         yield row

@@ -50,7 +50,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Calibrate; write, tell."""
+    """Calibrate; write the scene and print the result."""
     from ..bag.reader import scan
 
     code = _calibrate(args)
@@ -60,7 +60,7 @@ def run(args: Namespace) -> int:
 
 
 def _scene(args: Namespace) -> SessionScene:
-    """The scene that all sessions have; UsageError if theirs differ."""
+    """Return the scene of all sessions; raise UsageError if theirs differ."""
     from ..bag.session_model import scene_of
 
     found = open_session_scene(args.bags[0], args.scene)
@@ -71,7 +71,7 @@ def _scene(args: Namespace) -> SessionScene:
 
 
 def _sources(args: Namespace) -> list[Path]:
-    """All that is read."""
+    """Return the paths of all files that are read."""
     return [Path(path) for path in (*args.bags, args.scene, args.params, args.mapping) if path is not None]
 
 
@@ -136,7 +136,7 @@ def _tell_tenths(lines: TenthLines) -> Progress:
 
 
 def _draw(found: Calibration, out: Path) -> list[Path]:
-    """Pictures beside the scene."""
+    """Draw pictures beside the scene."""
     from ..calibration.output import picture_paths, shown
     from ..plots.session import Interval, held_out_picture, parameters_picture
 

@@ -28,7 +28,7 @@ SIZE_B = "angles of section and two links, pin force (2), cylinder force"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Scene, ``--json``, what a search for the leanest model takes."""
+    """Declare the scene, ``--json``, and the options of a search for the leanest model."""
     add_scene(parser)
     add_json(parser)
     parser.add_argument("--strict", action="store_true", help="warnings are errors: the exit code is 1 if there are any")
@@ -75,7 +75,7 @@ def _draw(path: Path, scene: Scene, name: str) -> Path:
 
 
 def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str, Any]:
-    """The account as one flat object."""
+    """Return the account as one flat object."""
     sections, joints = account.sections, account.joints
     return {
         "scene": name,
@@ -109,7 +109,7 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
 
 
 def _restitutions(scene: Scene) -> dict[str, float]:
-    """What is asked of the contact law, and what it gives; nothing without clearance."""
+    """Return the restitution asked of the contact law, and the one that it gives; empty without clearance."""
     if scene.clearance is None:
         return {}
     law = scene.clearance.contact
@@ -117,7 +117,7 @@ def _restitutions(scene: Scene) -> dict[str, float]:
 
 
 def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault]) -> list[str]:
-    """Lines of text for a reader."""
+    """Return lines of text for a reader."""
     kinds = " + ".join(joint.kind for joint in account.joints)
     count = len(account.sections)
     lines = [f"{name}: this scene can be used"]
@@ -247,7 +247,7 @@ def _unknowns(account: Account) -> list[str]:
 
 
 def _table(rows: list[list[str]], left: int = 1) -> list[str]:
-    """Aligned columns, the first `left` of them to the left, the others to the right."""
+    """Return aligned columns, the first `left` of them to the left, the others to the right."""
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     lines = []
     for row in rows:

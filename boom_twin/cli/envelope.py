@@ -26,7 +26,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 class Quantity(NamedTuple):
-    """A column of the envelope: key of ``--json``, words, values by posture, factor and name of the unit that people read."""
+    """Column of the envelope: key of ``--json``, words, values by posture, factor and name of the unit that people read."""
 
     key: str
     words: str
@@ -51,7 +51,7 @@ def run(args: Namespace) -> int:
 
 
 def _examined(scene: Scene, folder: Path | None) -> tuple[dict[str, Any], list[str]]:
-    """What ``--json`` prints and what people read; files of it in `folder`."""
+    """Compute the envelope; return the values of ``--json`` and the lines of text; write files into `folder`, if given."""
     from ..analysis.envelope import envelope
     from ..offline.progress import progress_of
 
@@ -73,7 +73,7 @@ def _examined(scene: Scene, folder: Path | None) -> tuple[dict[str, Any], list[s
 
 
 def quantities_of(found: Envelope) -> list[Quantity]:
-    """All columns of numbers, in the order of the table; without stresses of sections that have no height."""
+    """Return all columns of numbers, in the order of the table; without stresses of sections that have no height."""
     columns = [Quantity("deflection_m", "tip deflection", found.deflections, 1e3, "mm")]
     for key, words, values, factor, unit in (
         ("cylinder_{}_force_N", "cylinder {} force", found.forces, 1e-3, "kN"),
@@ -128,7 +128,7 @@ def _write(folder: Path, found: Envelope, quantities: list[Quantity], values: di
 
 
 def _csv(found: Envelope, quantities: list[Quantity]) -> str:
-    """One row a posture, SI units; angles in degrees."""
+    """Return one row for each posture, SI units; angles in degrees."""
     stream = io.StringIO()
     table = csv.writer(stream, lineterminator="\n")
     angles = [f"section_{i + 1}_deg" for i in range(found.angles.shape[1])]

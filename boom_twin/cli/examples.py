@@ -36,6 +36,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
 
 
 def epilog_of(command: str) -> str:
-    """The lines below the options; none for a command without examples."""
+    """Return the lines below the options; none for a command without examples."""
     lines = [f"  boom_twin {example}" for example in EXAMPLES.get(command, ())]
     return "\n".join(["examples:", *lines]) if lines else ""

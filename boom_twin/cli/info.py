@@ -26,7 +26,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Read the session once and tell."""
+    """Read the session once and print what it holds."""
     from ..bag.inspect import inspect
     from ..bag.session_model import mapping_of, strokes_of
 
@@ -39,7 +39,7 @@ def run(args: Namespace) -> int:
 
 
 def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: SessionStrokes) -> dict[str, Any]:
-    """All that is known; lists have one entry for each of ``topics``."""
+    """Return all that is known of a session; lists have one entry for each of ``topics``."""
     from ..bag.advice import missing, names_extra, names_missing, remarks
 
     session, metadata, tallies = info.session, info.session.metadata, info.tallies
@@ -88,19 +88,19 @@ def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: Session
 
 
 def _gap_at(tally: Tally, start: int) -> float | None:
-    """Where the largest gap begins, seconds after the first log time of the session."""
+    """Return where the largest gap begins, in seconds after the first log time of the session."""
     return (tally.gap_after - start) * NANO if tally.gap else None
 
 
 def _skew(tally: Tally, which: int) -> float | None:
-    """Log time minus stamp, s: least (0), most (1) or mean (2)."""
+    """Return log time minus stamp, s: least (0), most (1) or mean (2)."""
     if not tally.skewed:
         return None
     return tally.skews[which] * NANO / (tally.skewed if which == 2 else 1)
 
 
 def as_text(info: BagInfo, scene: SessionScene, told: dict[str, Any]) -> list[str]:
-    """What `as_json` has `told`, for people; a name or note with a line break makes no line of its own."""
+    """Return the lines of text for `told`, the result of `as_json`. A line break in a name or note makes no line of its own."""
     made = {True: "synthetic", False: "not said to be synthetic", None: "not noted"}[told["synthetic"]]
     files = f"{len(told['files'])} {'file' if len(told['files']) == 1 else 'files'}"
     distro = told["distro"] or "distribution not noted"
@@ -130,13 +130,13 @@ def as_text(info: BagInfo, scene: SessionScene, told: dict[str, Any]) -> list[st
 
 
 def _part(info: BagInfo, told: dict[str, Any]) -> str:
-    """Of which part of the session that is, where it is not all of it."""
+    """Return in words which part of the session is read; empty if it is all of it."""
     whole = told["session_duration_s"] == told["duration_s"]
     return "" if whole else f": the part from {info.window.start:g} s on, of {told['session_duration_s']:.3f} s"
 
 
 def _table(info: BagInfo) -> list[str]:
-    """One line for each topic."""
+    """Return a table with one line for each topic."""
     wide = max((len(tally.name) for tally in info.tallies), default=5)
     kind = max((len(tally.type) for tally in info.tallies), default=4)
     lines = [

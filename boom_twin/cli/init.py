@@ -63,7 +63,7 @@ def run(args: Namespace) -> int:
 
 
 def _next(scene: Path, source: str, warnings: int) -> str:
-    """What to do after the scene is written."""
+    """Return in words what to do after the scene is written."""
     if not warnings:
         picture = str(scene.with_suffix(".png"))
         check = shlex.join(["boom_twin", "check", str(scene), "--strict", "--picture", picture])
@@ -73,7 +73,7 @@ def _next(scene: Path, source: str, warnings: int) -> str:
 
 
 def _asked() -> dict[str, Any]:
-    """The values of a table, each asked for until it is one."""
+    """Ask for the values of a table and return them."""
     print("Dimensions as on the drawing: `8500 mm`, `8.5`, two numbers as `1320 mm, -264 mm`. An empty line takes [..].")
     values: dict[str, Any] = {"base": {}, "sections": [], "joints": []}
     values["description"] = _line("description [none]: ") or "Boom described by boom_twin init."
@@ -101,7 +101,7 @@ def _questions_of_all() -> Iterator[tuple[Place, str | None]]:
 
 
 def _questions_of_section(values: dict[str, Any], i: int) -> Iterator[tuple[Place, str | None]]:
-    """Keys of section and joint `i`, the joint's by its kind, which is asked for first."""
+    """Yield the keys of section and joint `i` with their defaults. Those of the joint depend on its kind, asked first."""
     section, joint = ("sections", i), ("joints", i)
     for key in ("length", "beam", "height", "width", "wall", *(["rod_pin"] if i == 0 else [])):
         yield (*section, key), None
@@ -133,7 +133,7 @@ def _is_at(path: str, place: Place) -> bool:
 
 
 def _line(prompt: str) -> str:
-    """One line of the answers."""
+    """Ask for one line and return it."""
     print(prompt, end="", flush=True)
     line = sys.stdin.readline()
     if not line:

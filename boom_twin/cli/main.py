@@ -59,7 +59,7 @@ COMMANDS: dict[str, str] = {
     "study": "reports on the methods: error against run time",
     "rig": "make a synthetic session on the virtual rig (extra peers)",
 }
-"""What each command does; it is the module of that name in `boom_twin.cli`, with what `Command` has."""
+"""Purpose of each command. The command is the module of that name in `boom_twin.cli`, with the functions of `Command`."""
 
 # New objects between two searches for garbage. Modules hold none, and looking through those of numba again and again takes
 # 0.05 s, once more at the exit 0.09 s: hence also gc.freeze().
@@ -72,17 +72,17 @@ COMPLETING = "_ARGCOMPLETE"
 
 
 class Command(Protocol):
-    """A module of one command."""
+    """Module of one command."""
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Declare the arguments of the command."""
 
     def run(self, args: Namespace) -> int:
-        """Do it; returns the exit code."""
+        """Run the command and return the exit code."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code.
+    """Run one command and return the exit code.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _main(arguments: Sequence[str]) -> int:
-    """Run one command; whatever it prints, of whatever file or message, cannot steer the terminal."""
+    """Run one command; escape its output, so that no file or message can steer the terminal."""
     out, told = (_printable(stream, name) for stream, name in ((sys.stdout, "standard output"), (sys.stderr, "")))
     with redirect_stdout(out), redirect_stderr(told):
         try:
@@ -111,7 +111,7 @@ def _main(arguments: Sequence[str]) -> int:
 
 
 def _printable(stream: TextIO | None, name: str) -> TextIO:
-    """Return a stream for all that is printed; it leads nowhere if the caller has closed it."""
+    """Return a stream for all that is printed; it discards everything if the caller has closed the stream."""
     return cast(TextIO, PrintableStream(stream or open(os.devnull, "w", encoding="utf-8"), name))
 
 
@@ -139,7 +139,7 @@ def _command(name: str) -> Command:
 
 
 def _parser(arguments: Sequence[str]) -> ArgumentParser:
-    """The parser of all commands; only the module of the command that is named gets imported."""
+    """Return the parser of all commands; only the module of the command that is named gets imported."""
     parser = CommandParser(prog="boom_twin", description=DESCRIPTION, epilog=EXIT_CODES)
     parser.add_argument("--version", action="version", version=f"boom_twin {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
@@ -165,50 +165,50 @@ def _complete(parser: ArgumentParser) -> None:
 
 
 def add_scene(parser: ArgumentParser) -> None:
-    """The scene file, as ``--scene`` or as a positional argument; without it, the default scene."""
+    """Declare the scene file, as ``--scene`` or as a positional argument; without it, the default scene."""
     either = parser.add_mutually_exclusive_group()
     either.add_argument("--scene", metavar="SCENE", help="scene file (YAML); without it, the default scene")
     either.add_argument("scene", nargs="?", default=SUPPRESS, metavar="SCENE", help="the same, without --scene before it")
 
 
 def add_session_scene(parser: ArgumentParser) -> None:
-    """``--scene`` of a command that reads a session; see `open_session_scene`."""
+    """Declare ``--scene`` of a command that reads a session; see `open_session_scene`."""
     told = "scene file (YAML); without it, the one that the session was made with, else the default scene"
     parser.add_argument("--scene", metavar="SCENE", help=told)
 
 
 def add_params(parser: ArgumentParser) -> None:
-    """``--params``, see `open_session_settings`."""
+    """Declare ``--params``, see `open_session_settings`."""
     parser.add_argument(
         "--params", metavar="FILE", type=Path, help="ROS parameter file (as recorded, else the package's twin.yaml)"
     )
 
 
 def add_json(parser: ArgumentParser) -> None:
-    """``--json``: stdout holds exactly one flat JSON object."""
+    """Declare ``--json``: stdout holds exactly one flat JSON object."""
     parser.add_argument("--json", action="store_true", help="print one flat JSON object on stdout, nothing else there")
 
 
 def add_ros_args(parser: ArgumentParser) -> None:
-    """``--namespace`` and ``--ros-args``, for `ros_arguments`."""
+    """Declare ``--namespace`` and ``--ros-args``, for `ros_arguments`."""
     add_namespace(parser, "ROS namespace of the twin: --namespace front is short for --ros-args -r __ns:=/front")
     told = "namespace, remappings and enclave, as for any node: -r cylinder_strokes:=/rig/strokes -e /boom_twin/recorder"
     parser.add_argument("--ros-args", nargs=REMAINDER, default=[], help=told)
 
 
 def add_namespace(parser: ArgumentParser, told: str) -> None:
-    """``--namespace``."""
+    """Declare ``--namespace``."""
     parser.add_argument("--namespace", metavar="NAME", default="", help=told)
 
 
 def ros_arguments(args: Namespace) -> list[str]:
-    """What rclpy is to be started with, or a further process of this package."""
+    """Return the ROS arguments for rclpy, or for a further process of this package."""
     namespace = args.namespace.strip("/")
     return ["--ros-args", *(["-r", f"__ns:=/{namespace}"] if namespace else []), *args.ros_args]
 
 
 def open_scene(source: str | None) -> Scene:
-    """The scene of an argument; its warnings go to stderr, one line each."""
+    """Return the scene of an argument; its warnings go to stderr, one line each."""
     from ..scene.load import examine
 
     scene, oddities = examine(source)
@@ -219,7 +219,7 @@ def open_scene(source: str | None) -> Scene:
 
 
 def open_session_scene(session: str | Path, source: str | None) -> SessionScene:
-    """The scene of a session, see `boom_twin.bag.session_model.scene_of`; which was taken goes to stderr, with its warnings."""
+    """Return the scene of a session, see `boom_twin.bag.session_model.scene_of`; its source and warnings go to stderr."""
     from ..bag.session_model import scene_of
 
     found = scene_of(Path(session), source)
@@ -229,7 +229,7 @@ def open_session_scene(session: str | Path, source: str | None) -> SessionScene:
 
 
 def open_session_settings(session: str | Path, params: Path | None, namespace: str = "") -> Settings:
-    """Return the numbers of a session's twin, see `boom_twin.bag.session_model.settings_of`; unusual ones go to stderr."""
+    """Return the settings of a session's twin, see `boom_twin.bag.session_model.settings_of`; unusual ones go to stderr."""
     from ..bag.session_model import settings_of
 
     found = settings_of(Path(session), params, namespace)
@@ -246,7 +246,7 @@ def tell(oddities: Iterable[Fault], source: str | None) -> None:
 
 
 def warn_incomplete(session: Session) -> None:
-    """Say on stderr if a session is not whole, its recorder's clock was set back, or what that did not get."""
+    """Warn on stderr if a session is incomplete, its recorder's clock was set back, or messages never reached the recorder."""
     from ..bag.reader import clocks_set_back
     from ..bag.session_sheet import missed_messages
 
@@ -260,7 +260,7 @@ def warn_incomplete(session: Session) -> None:
 
 
 def print_result(is_json: bool, values: Mapping[str, Any], lines: Iterable[str]) -> None:
-    """Print what came out: `values` as JSON, or `lines` for people."""
+    """Print a result: `values` as JSON, or `lines` for people."""
     if is_json:
         print_json(values)
     else:
@@ -273,7 +273,7 @@ def print_json(values: Mapping[str, Any]) -> None:
 
 
 def plain_values(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values as JSON has them; a number that is not finite becomes None."""
+    """Return values as JSON has them; a number that is not finite becomes None."""
     return {key: _plain(value) for key, value in values.items()}
 
 

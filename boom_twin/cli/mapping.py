@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """It takes none."""
+    """Declare no arguments."""
 
 
 def run(args: Namespace) -> int:

@@ -34,14 +34,14 @@ if TYPE_CHECKING:
 PORT = 8420
 ACTS = ("mark", "acknowledge", "acknowledge-at-node", "record")
 NICE = 5
-"""By how much it gives way to the node on the same machine."""
+"""Nice value of the monitor, by which it gives way to the node on the same machine."""
 
 BACKLOG = 128
 """Connections that may wait to be taken; the kernel turns away more."""
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """What is shown, to whom, and what may be done."""
+    """Declare which feed is shown, who may open the page, and what viewers may do."""
     parser.add_argument(
         "--bag",
         metavar="BAG",
@@ -94,21 +94,21 @@ def run(args: Namespace) -> int:
 
 
 def _passed_on(args: Namespace) -> list[str]:
-    """What `boom_twin record` is to know of what this was started with."""
+    """Return the options that this command passes on to `boom_twin record`."""
     options = {"--scene": args.scene, "--mapping": args.mapping, "--baseline": args.baseline, "--params": args.params}
     given = [part for option, value in options.items() if value for part in (option, str(value))]
     return [*given, *ros_arguments(args)]
 
 
 def _lower_priority() -> None:
-    """Let the node run first, and do not interrupt it in the midst of a step."""
+    """Lower this process's priority, so that the node runs first and is not interrupted in the midst of a step."""
     os.nice(NICE)
     if hasattr(os, "SCHED_BATCH"):  # Linux: does not preempt others when it wakes up
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
 
 def _sessions(args: Namespace) -> SessionList:
-    """The sessions of ``--bag``, the first one open."""
+    """Return the sessions of ``--bag``, the first one open."""
     from ..bag.reader import scan
     from ..monitor.data.bag_feed import bag_feed
     from ..monitor.data.session_list import SessionList, sessions_in
@@ -126,7 +126,7 @@ def _sessions(args: Namespace) -> SessionList:
 
 @contextmanager
 def _live_feed(args: Namespace) -> Iterator[Feed]:
-    """Of the topics."""
+    """Provide the feed of the live topics within a context."""
     from ..ros.startup import require_rclpy
 
     require_rclpy()
@@ -182,7 +182,7 @@ async def _run(args: Namespace, server: Any, token: str) -> None:
 
 
 async def _listen(connections: Any, host: str, port: int | None) -> Any:
-    """At `port`; without one at the usual one, or at any if that is taken."""
+    """Listen at `port`; without one at the usual port, or at any free port if that is taken."""
     import asyncio
 
     listen = partial(asyncio.get_running_loop().create_server, connections, host, backlog=BACKLOG)

@@ -10,7 +10,7 @@ from typing import NoReturn
 
 
 class DefaultsFormatter(RawDescriptionHelpFormatter):
-    """Adds the default of an option that has one, unless its help tells it already; keeps the lines of examples."""
+    """Help formatter that adds the default of an option unless its help states it, and keeps the lines of examples."""
 
     def _get_help_string(self, action: Action) -> str | None:
         told, default = action.help, action.default
@@ -22,7 +22,7 @@ class DefaultsFormatter(RawDescriptionHelpFormatter):
         return told if is_told else f"{told} ({text.replace('%', '%%')})"
 
     def add_argument(self, action: Action) -> None:
-        """As of the base class, which forgets how far in commands stand, and breaks the line of the longest."""
+        """Add an argument, and count the indentation of commands, which the base class forgets, so that no line breaks."""
         super().add_argument(action)
         for command in self._iter_indented_subactions(action):
             length = self._current_indent + len(self._format_action_invocation(command))
@@ -30,7 +30,7 @@ class DefaultsFormatter(RawDescriptionHelpFormatter):
 
 
 class CommandParser(ArgumentParser):
-    """A parser whose errors name the nearest option or choice."""
+    """Parser whose errors name the nearest option or choice."""
 
     def __init__(self, *args: object, **options: object) -> None:
         options.setdefault("formatter_class", DefaultsFormatter)
@@ -40,14 +40,14 @@ class CommandParser(ArgumentParser):
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: Namespace | None = None
     ) -> tuple[Namespace, list[str]]:
-        """As of `ArgumentParser`; what a command does not know ends here, where its options are known."""
+        """Parse arguments as `ArgumentParser` does; report unknown ones here, where the options of the command are known."""
         found, extra = super().parse_known_args(args, namespace)
         if extra:
             self.error(f"unrecognized arguments: {' '.join(extra)}{self._near(extra[0], list(self._option_string_actions))}")
         return found, extra
 
     def error(self, message: str) -> NoReturn:
-        """Tell usage and message, with the nearest choice where one was wrong, and exit with 2."""
+        """Print usage and message, with the nearest choice if one was wrong, and exit with 2."""
         wrong = message.partition("invalid choice: ")[2].split("'")[1:2]
         known = [str(choice) for action in self._actions for choice in action.choices or ()]
         super().error(message + (self._near(wrong[0], known) if wrong else ""))

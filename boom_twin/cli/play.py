@@ -29,7 +29,7 @@ BAR = "{l_bar}{bar}| {n:.1f}/{total:.1f} s"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """The session, and how it is played."""
+    """Declare the session, and how it is played."""
     parser.add_argument("bag", metavar="BAG", type=Path, help="rosbag2 directory, or a file: .mcap, .db3, .bag of ROS 1, .csv")
     parser.add_argument("--rate", type=positive, default=1.0, metavar="R", help="session time over real time (1)")
     parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help="begin so many seconds in (0)")
@@ -53,7 +53,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Play, and tell on stderr what was sent."""
+    """Play, and print on stderr what was sent."""
     require_rclpy()
     from ..ros.bag.player import Player
     from ..ros.runtime import ros
@@ -81,7 +81,7 @@ def run(args: Namespace) -> int:
 
 
 def _play(player: Player, args: Namespace, length: float) -> None:
-    """Once or for ever; the space bar of a terminal pauses."""
+    """Play once or for ever; the space bar of a terminal pauses."""
     is_paused = False
 
     def is_held() -> bool:
@@ -111,7 +111,7 @@ def _play(player: Player, args: Namespace, length: float) -> None:
 
 
 def _check_listeners(unmatched: list[str], unheard: list[str], topics: int, args: Namespace) -> None:
-    """Refuse to play to nobody; warn of single topics that too few listen to."""
+    """Raise BoomTwinError if nobody listens to any topic; warn of single topics with too few listeners."""
     if len(unheard) == topics:
         raise BoomTwinError(
             f"nobody listened within {args.wait:g} s. Start twin_node, check ROS_DOMAIN_ID and namespace, or play anyway "
@@ -122,9 +122,9 @@ def _check_listeners(unmatched: list[str], unheard: list[str], topics: int, args
 
 
 class Keys:
-    """Use it as a context; it gives no keys where stdin is no terminal, or that of another program.
+    """Keys of the terminal within a context; none if stdin is no terminal, or that of another program.
 
-    Leaving the context gives the terminal back as it was.
+    Leaving the context restores the terminal's settings.
     """
 
     def __init__(self) -> None:
@@ -142,18 +142,18 @@ class Keys:
 
     @property
     def are_read(self) -> bool:
-        """Whether there is a terminal."""
+        """Return True if keys of a terminal are read."""
         return self._before is not None
 
     def pressed(self) -> str:
-        """The keys since the last call."""
+        """Return the keys pressed since the last call."""
         if self._before is None or not _is_ours() or not select.select([sys.stdin], [], [], 0.0)[0]:
             return ""
         return os.read(sys.stdin.fileno(), 100).decode(errors="replace")
 
 
 def _is_ours() -> bool:
-    """Whether stdin is a terminal and this process in its foreground."""
+    """Return True if stdin is a terminal and this process is in its foreground."""
     try:
         if not sys.stdin.isatty():
             return False

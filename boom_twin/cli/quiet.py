@@ -10,7 +10,7 @@ KEPT = ("warning", "boom_twin ", "usage:", "open ")
 
 
 class QuietStream(TextIOBase):
-    """A text stream that passes on only lines that begin with one of `KEPT`.
+    """Text stream that passes on only lines that begin with one of `KEPT`.
 
     Parameters
     ----------

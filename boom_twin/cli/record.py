@@ -34,7 +34,7 @@ _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Where to, and what."""
+    """Declare where to record to, and which topics."""
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="directory of the bag, new or empty")
     what = parser.add_mutually_exclusive_group()
     what.add_argument("--only", choices=["inputs", "outputs"], help="what goes into the twin, or what it publishes (both)")
@@ -58,7 +58,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Record until Ctrl-C, SIGTERM or the end of the duration, and tell on stderr what came."""
+    """Record until Ctrl-C, SIGTERM or the end of the duration, and print on stderr what was received."""
     require_rclpy()
     from ..bag.async_writer import FileSplit, Storage
     from ..bag.session_sheet import incompleteness
@@ -109,7 +109,7 @@ def run(args: Namespace) -> int:
 
 
 def _sheet(args: Namespace) -> SessionSheet:
-    """What is known before anything is recorded; the files that are given must be valid."""
+    """Return the session metadata known before recording starts. The files that are given must be valid."""
     from ..bag.session_model import scene_from
     from ..health.baseline import load_baseline
 
@@ -131,9 +131,9 @@ def _sheet(args: Namespace) -> SessionSheet:
 
 
 def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any], frame: str, given_mapping: str) -> SessionSheet:
-    """With what the running twin tells of itself; what was given instead stays, and the difference is told.
+    """Return the session metadata with what the running twin reports. Given texts stay, and a difference is reported.
 
-    The prefix that it puts before the `frame` of the mapping becomes part of the mapping, so that a replay has it too.
+    The prefix that the twin puts before the `frame` of the mapping becomes part of the mapping, so that a replay has it too.
     """
     from ..ros.bag.recorder import TEXTS
     from ..ros.bag.subscriptions import with_mapped
@@ -162,7 +162,7 @@ def _say(text: str) -> None:
 
 
 def _tell(counts: list[Count]) -> None:
-    """One line for each topic."""
+    """Print one line for each topic."""
     _say(" received   written  never arrived")
     for count in counts:
         missed = "unknown" if count.missed is None else str(count.missed)
@@ -170,7 +170,7 @@ def _tell(counts: list[Count]) -> None:
 
 
 def _wanted(args: Namespace, known: Topics) -> list[RequestedTopic]:
-    """The topics of the command line, or the chosen ones of the mapping."""
+    """Return the topics of the command line, or the chosen ones of the mapping."""
     from ..ros.bag.subscriptions import RequestedTopic, requested_topics
 
     inputs: dict[str, Topic] = {topic.absolute: topic for topic in known.inputs.values()}
@@ -182,7 +182,7 @@ def _wanted(args: Namespace, known: Topics) -> list[RequestedTopic]:
 
 
 def long_enough(text: str) -> float:
-    """Seconds of a file."""
+    """Parse the length of a file in seconds."""
     value = positive(text)
     if value < SHORTEST:
         raise ArgumentTypeError(f"{text}: must be at least {SHORTEST:g} s: completing a file takes a while")
@@ -190,7 +190,7 @@ def long_enough(text: str) -> float:
 
 
 def size(text: str) -> int:
-    """Bytes, with k, M or G for powers of 1024."""
+    """Parse a number of bytes, with k, M or G for powers of 1024."""
     match = re.fullmatch(r"(\d+(?:\.\d+)?)([kMG]?)B?", text)
     if match is None:
         raise ArgumentTypeError(f"{text!r} is not a size like 500M or 2G")

@@ -32,7 +32,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Save, and tell what was saved and what was lost."""
+    """Save a sound session, and print what was saved and what was lost."""
     from ..bag.recovery.recover import recover
 
     outcome = recover(Path(args.bag), Path(args.out), args.unverified)
@@ -46,7 +46,7 @@ def run(args: Namespace) -> int:
 
 
 def as_json(outcome: Recovery, out: str) -> dict[str, Any]:
-    """The count; lists have one entry for each of ``topics``, null in ``lost`` is unknown."""
+    """Return the counts; lists have one entry for each of ``topics``, null in ``lost`` is unknown."""
     topics = sorted({*outcome.saved, *(outcome.lost or {})})
     return {
         "path": out,
@@ -62,7 +62,7 @@ def as_json(outcome: Recovery, out: str) -> dict[str, Any]:
 
 
 def as_text(outcome: Recovery, told: dict[str, Any]) -> list[str]:
-    """What `as_json` has `told`, for people."""
+    """Return the lines of text for `told`, the result of `as_json`."""
     wide = max(len(topic) for topic in told["topics"])
     lines = [f"{'topic':{wide}}  {'saved':>9}  {'no checksum':>11}  {'lost':>9}"]
     for row, topic in enumerate(told["topics"]):

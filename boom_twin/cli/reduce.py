@@ -37,7 +37,7 @@ MEANING = {
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """``--need``, and the options that go with it."""
+    """Declare ``--need``, and the options that go with it."""
     purpose = "propose the leanest model whose tip stays so near to this scene's (mm, cm, m)"
     parser.add_argument("--need", type=tip_error, metavar="tip=1mm", help=purpose)
     parser.add_argument("--out", type=Path, metavar="LEAN", help="with --need: write the lean scene file here")
@@ -46,7 +46,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def refuse_misuse(args: Namespace) -> None:
-    """UsageError for an option that goes with ``--need``, without it, and for writing over a file."""
+    """Raise UsageError for an option that needs ``--need``, without it, and for writing over a file."""
     for option in ("out", "against"):
         if args.need is None and getattr(args, option) is not None:
             raise UsageError(f"--{option} {getattr(args, option)}: goes with --need only. Add --need tip=1mm.")
@@ -55,7 +55,7 @@ def refuse_misuse(args: Namespace) -> None:
 
 
 def tip_error(text: str) -> float:
-    """The value of ``--need`` in m; ArgumentTypeError if it is not of the form ``tip=1mm``."""
+    """Return the value of ``--need`` in m; raise ArgumentTypeError if it is not of the form ``tip=1mm``."""
     match = NEED.fullmatch(text)
     if match is None:
         raise ArgumentTypeError(f"{text!r}: {FORM}")
@@ -70,7 +70,7 @@ def tip_error(text: str) -> float:
 
 
 def search(scene: Scene, most: float, against: Scene | None) -> Proposal:
-    """Look for the leanest model, telling on stderr how it goes."""
+    """Search for the leanest model, with progress on stderr."""
     from ..reduction.search import propose
 
     shown = sys.stderr.isatty()
@@ -87,7 +87,7 @@ def search(scene: Scene, most: float, against: Scene | None) -> Proposal:
 
 
 def summary(found: Proposal, most: float) -> dict[str, Any]:
-    """Keys that ``--need`` adds to the flat object of ``check``."""
+    """Return the keys that ``--need`` adds to the flat object of ``check``."""
     return {
         "need_tip_m": most,
         "lean_edits": [str(edit) for edit in found.edits],
@@ -110,7 +110,7 @@ def summary(found: Proposal, most: float) -> dict[str, Any]:
 
 
 def report(scene: Scene, found: Proposal, most: float) -> list[str]:
-    """Lines of text for a reader."""
+    """Return lines of text for a reader."""
     off, course, (full, lean) = found.deviation, found.course, found.seconds
     lines = ["", f"Leanest model found that keeps the tip within {_length(most)}"]
     width = max((len(str(edit)) for edit in found.edits), default=0)
@@ -127,7 +127,7 @@ def report(scene: Scene, found: Proposal, most: float) -> list[str]:
 
 
 def write(source: str | None, scene: Scene, found: Proposal, most: float, out: Path) -> None:
-    """The lean scene as a file: the text of `source` (None: the default scene) with the edits made."""
+    """Write the lean scene as a file: the text of `source` (None: the default scene) with the edits made."""
     from ..scene.edit import rewritten
 
     text = default_text() if source is None else read_text(Path(source))
@@ -152,5 +152,5 @@ def _meaning(scene: Scene, edit: Edit) -> str:
 
 
 def _length(value: float) -> str:
-    """In mm, with three digits."""
+    """Return a length in mm, with three digits."""
     return f"{1e3 * value:.3g} mm"

@@ -67,7 +67,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Replay, draw, and say what came out."""
+    """Replay, draw, and print the result."""
     from ..offline.replay import replay_into
     from ..offline.sample_table import SampleTable, check_kind, table_file
     from ..report.evaluation import Evaluator
@@ -118,7 +118,7 @@ def run(args: Namespace) -> int:
 
 
 def flat(summary: dict[str, Any]) -> dict[str, Any]:
-    """A summary as one flat object: of its counts one key each, of its alarms one list for each of their keys."""
+    """Return a summary as one flat object: one key for each count, one list for each key of its alarms."""
     found = {key: value for key, value in summary.items() if key not in ("events", "alarms", "lost_contacts")}
     for group in ("events", "lost_contacts"):
         found |= {f"{group}_{name.replace(' ', '_')}": count for name, count in summary.get(group, {}).items()}
@@ -127,7 +127,7 @@ def flat(summary: dict[str, Any]) -> dict[str, Any]:
 
 
 def _write(args: Namespace, result: Replay, found: Evaluation, scene: SessionScene, out: Path) -> list[Path]:
-    """Pictures and report, as they are wanted; with the file of the figures."""
+    """Write pictures and report, as they are wanted; return these files and the file of the figures."""
     from ..offline.history import draw
     from ..report.page import Subject, write_report
 
@@ -142,7 +142,7 @@ def _write(args: Namespace, result: Replay, found: Evaluation, scene: SessionSce
 
 
 def as_text(summary: dict[str, Any]) -> list[str]:
-    """A short table."""
+    """Return the lines of a short table."""
     from ..health.sensor_monitor import noise_as_text
     from ..offline.replay import alarm_as_text
 
@@ -177,7 +177,7 @@ def as_text(summary: dict[str, Any]) -> list[str]:
 
 
 def _errors(summary: dict[str, Any]) -> list[str]:
-    """Errors against the truth, of the prediction and of the estimate beside it."""
+    """Return lines on the errors against the truth, of the prediction and of the estimate."""
     lines = [
         f"tip error          {1e3 * summary['tip_error_rms_m']:.2f} mm rms against the truth",
         f"acceleration error {summary['tip_acceleration_error_rms_m_s2']:.3f} m/s^2 rms against the truth",

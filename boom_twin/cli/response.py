@@ -32,7 +32,7 @@ FAR_WORN = 1e-4  # m, the same on pins with clearance
 
 @dataclass(frozen=True)
 class Answer:
-    """What one run of the command found: keys of the JSON, lines for people, columns of the CSV, how to draw it, doubts."""
+    """Result of one run of the command: keys of the JSON, lines for people, columns of the CSV, drawing function, warnings."""
 
     name: str
     values: dict[str, Any]
@@ -74,7 +74,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def _pump(text: str) -> tuple[float, ...]:
-    """Two or three numbers between colons."""
+    """Parse two or three numbers between colons."""
     try:
         found = tuple(float(part) for part in text.split(":"))
     except ValueError:
@@ -85,7 +85,7 @@ def _pump(text: str) -> tuple[float, ...]:
 
 
 def _rates(text: str) -> tuple[float, float, int]:
-    """Lowest, highest, count."""
+    """Parse lowest rate, highest rate (Hz) and number of rates."""
     try:
         low, high, count = text.split(":")
         found = float(low), float(high), int(count)
@@ -124,7 +124,7 @@ def run(args: Namespace) -> int:
 
 
 def _check_options(args: Namespace) -> None:
-    """Refuse what would be passed over."""
+    """Raise UsageError for options that would be ignored."""
     grid = {"--from": args.low != LOW, "--to": args.high != HIGH, "--points": args.points != POINTS}
     mapped = {"--rates": args.rates != RATES, "--steps": args.steps != STEPS}
     is_map = args.map is not None
@@ -139,7 +139,7 @@ def _place(args: Namespace) -> str:
 
 
 def _response(scene: Scene, args: Namespace) -> Answer:
-    """Frequency response over even points of the logarithm, and at the natural frequencies among them."""
+    """Return the frequency response at logarithmically even points, and at the natural frequencies among them."""
     from ..analysis.equilibrium import statics
     from ..analysis.frequency_response import UPWARD, frequency_response, with_all_shapes
     from ..plots.frequency_response import response_picture
@@ -195,7 +195,7 @@ def _undamped(frequencies: Array) -> tuple[str, ...]:
 
 
 def _resonances(found: FrequencyResponse, static: FrequencyResponse, natural: Array, bounded: Flags) -> list[str]:
-    """A line for the static limit and every natural frequency."""
+    """Return a line for the static limit and for every natural frequency."""
     lines = ["frequency Hz   tip x m     tip y m     acceleration m/s2   largest cylinder force N   largest moment N m"]
     rows = [(0.0, static, 0)] + [(f, found, int(np.searchsorted(found.frequencies, f))) for f in natural[bounded]]
     for frequency, response, k in rows:
@@ -296,7 +296,7 @@ def _map(scene: Scene, args: Namespace) -> Answer:
 
 
 def _large(scene: Scene, swing: float) -> tuple[str, ...]:
-    """A swing at which the boom does not answer in proportion."""
+    """Return a warning if the swing is so large that the boom does not respond in proportion."""
     if scene.clearance is not None and scene.clearance.pins and swing > FAR_WORN:
         told = f"the largest swing is {swing:.2g} m; beyond {FAR_WORN:g} m journals may roll in their bushes or leave them, and"
         return (f"{told} a boom on pins with clearance does not answer in proportion. Simulate it",)

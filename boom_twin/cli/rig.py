@@ -44,7 +44,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 class ListFaults(Action):
-    """Prints the faults and ends, whatever else is given."""
+    """Action that prints the faults and ends, whatever else is given."""
 
     def __call__(self, parser: ArgumentParser, *_: object) -> NoReturn:
         """See `argparse.Action`."""
@@ -55,7 +55,7 @@ class ListFaults(Action):
 
 
 def _recorded(text: str) -> set[str]:
-    """The sensors that are named in a list; UsageError if there are no such."""
+    """Return the sensors that are named in a list; raise UsageError for an unknown one."""
     found = {name.strip() for name in text.split(",") if name.strip()}
     if unknown := sorted(found - set(SENSORS)):
         raise UsageError(f"--sensors {text}: {', '.join(unknown)} is no sensor of the rig. Give some of {', '.join(SENSORS)}.")
@@ -63,7 +63,7 @@ def _recorded(text: str) -> set[str]:
 
 
 def _refuse_unrecorded(causes: list[str], recorded: set[str]) -> None:
-    """UsageError if a fault is of a sensor that is not recorded."""
+    """Raise UsageError if a fault is of a sensor that is not recorded."""
     for cause in causes:
         for stem, sensors in (("joint_", "angles"), ("cylinder_force_", "forces")):
             if cause.startswith(stem) and sensors not in recorded:

@@ -63,7 +63,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def _share(text: str) -> float:
-    """A number from 0 to 1."""
+    """Parse a number from 0 to 1."""
     if (value := not_negative(text)) > 1.0:
         raise ArgumentTypeError(f"{text}: must be at most 1")
     return value
@@ -121,7 +121,7 @@ def _sources(args: Namespace) -> list[Path]:
 
 
 def _check_targets(targets: dict[str, str | None]) -> None:
-    """Refuse two options that would write the same file."""
+    """Raise UsageError if two options would write the same file."""
     seen: dict[Path, str] = {}
     for option, target in targets.items():
         if target and seen.setdefault(Path(target).resolve(), option) != option:
@@ -129,7 +129,7 @@ def _check_targets(targets: dict[str, str | None]) -> None:
 
 
 def _check_sampling(args: Namespace) -> None:
-    """Refuse what does not go with ``--samples``, or only with it."""
+    """Raise UsageError for options that do not go with ``--samples``, or only with it."""
     if args.samples is None:
         if args.vary:
             raise UsageError(f"--vary {args.vary[0]}: goes with --samples N. Add it, or leave --vary out.")
@@ -179,7 +179,7 @@ def _deviation(text: str) -> tuple[str, float]:
 
 
 def _start(args: Namespace, scene: Scene, first: Array, angles: Array | None) -> InitialState | None:
-    """State of ``--start``; None for rest."""
+    """Return the state of ``--start``; None for rest."""
     from ..analysis.initial_state import read_state, undeflected
 
     if args.joint_rates is not None and args.start != "undeflected":
@@ -198,7 +198,7 @@ def _start(args: Namespace, scene: Scene, first: Array, angles: Array | None) ->
 
 
 def as_json(result: Simulation, out: str, balances: Balances | None) -> dict[str, object]:
-    """What was done, and its figures; with the balances of energy and momentum where they were asked for."""
+    """Return the figures of a simulation; with the balances of energy and momentum, if given."""
     x, y = result.tip[:, 0], result.tip[:, 1]
     told: dict[str, object] = {
         "out": out,
@@ -223,7 +223,7 @@ def as_json(result: Simulation, out: str, balances: Balances | None) -> dict[str
 
 
 def as_text(result: Simulation, out: str, start: str, balances: Balances | None) -> list[str]:
-    """The same for people."""
+    """Return the lines of text with the figures of a simulation."""
     told = as_json(result, out, balances)
     (x, y), (end_x, end_y) = result.tip[0, :2], result.tip[-1, :2]
     began = {"rest": "started at rest ", "undeflected": "undeflected     "}.get(start, "went on         ")
@@ -249,7 +249,7 @@ def _draw_orbits(args: Namespace, scene: Scene, result: Simulation) -> None:
 
 
 def _is_earlier(start: bytes) -> bool:
-    """Whether a file that begins so holds results of any boom, and is no drive and no session."""
+    """Return True if a file with this beginning holds results of a boom, and is no drive and no session."""
     names = start.partition(b"\n")[0].decode(errors="replace").split(",")
     is_replay = any(name.startswith("measured_") for name in names)
     return names[0] == "t_s" and not is_replay and any(name.startswith("tip_x_m") for name in names)
@@ -273,7 +273,7 @@ def read_history(path: Path, n: int, stems: Sequence[str]) -> tuple[Array, Array
 
 
 def odd_in_drive(times: Array, strokes: Array, stem: str = "stroke") -> list[str]:
-    """Return what is odd and likely meant otherwise, with place and remedy: times in ms, strokes that jump."""
+    """Return warnings of a drive that was probably meant otherwise, with place and remedy: times in ms, strokes that jump."""
     steps, found = np.diff(times), []
     if not len(steps) or not (steps > 0.0).all():
         return []  # `simulate` refuses it

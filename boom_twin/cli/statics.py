@@ -25,7 +25,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def numbers(text: str) -> list[float]:
-    """Numbers between commas."""
+    """Parse numbers between commas."""
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
@@ -45,7 +45,7 @@ def run(args: Namespace) -> int:
 
 
 def as_json(found: Equilibrium) -> dict[str, object]:
-    """The keys of a result; `warnings` only where there are any."""
+    """Return the keys of a result; `warnings` only if there are any."""
     told: dict[str, object] = {
         "stroke_m": found.strokes,
         "length_m": found.lengths,
@@ -59,7 +59,7 @@ def as_json(found: Equilibrium) -> dict[str, object]:
 
 
 def as_text(found: Equilibrium) -> list[str]:
-    """A short table, one joint a line."""
+    """Return the lines of a short table, one joint a line."""
     (x, y), (dx, dy) = found.tip, found.tip - found.tip_rigid
     lines = [
         f"tip            x {x:.4f} m, y {y:.4f} m",

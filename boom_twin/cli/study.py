@@ -18,7 +18,7 @@ KINDS: dict[str, tuple[str, str]] = {
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """A parser for every kind."""
+    """Declare a parser for every kind."""
     from .main import add_scene
 
     kinds = parser.add_subparsers(dest="kind", metavar="KIND", required=True)
@@ -34,7 +34,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Compute and write the report; prints the files."""
+    """Compute and write the report; print its files."""
     from ..system.result_folder import result_folder, study
     from .main import open_scene
 

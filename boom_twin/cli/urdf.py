@@ -9,7 +9,7 @@ from .main import add_scene, open_scene
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """The scene."""
+    """Declare the scene."""
     add_scene(parser)
 
 

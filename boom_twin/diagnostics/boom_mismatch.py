@@ -19,10 +19,12 @@ FAR = radians(10.0)
 
 
 class OtherBoom:
-    """Judges the medians of the angles' residuals, from the first window on in which most encoders tell something.
+    """Test for a session of another boom, by the medians of the angles' residuals.
+
+    It judges the first window in which most encoders give information.
 
     An encoder that stands still to the last bit may be dead, and tells nothing about the boom. One that is far off may be
-    wrong; when more than half of them are, it is the scene. Once that is judged, it is not asked again: what comes later is a
+    wrong. If more than half of them are, it is the scene. The test is made once, because a later difference is a
     fault of the rig.
     """
 
@@ -33,13 +35,13 @@ class OtherBoom:
         self._residuals: list[Array] = []
 
     def took(self, sample: Sample, report: Report) -> str:
-        """The twin made `report` of `sample`; gives why the session is of another boom, empty as long as nothing says so."""
+        """Take the `report` of `sample`; return why the session is of another boom, empty as long as nothing shows that."""
         values = [sample.values] if sample.stream is Stream.ANGLES else []
         found = [each.values for part in report.all for each in part.residuals if each.stream is Stream.ANGLES]
         return self.take(sample.stamp, values, found)
 
     def take(self, stamp: int, values: Iterable[Array], residuals: Iterable[Array]) -> str:
-        """As `took`, of several samples: the newest stamp (ns), and rows of angles and of their residuals (n,) in rad."""
+        """Take several samples and return as `took`: newest stamp (ns), rows of angles and of their residuals (n,) in rad."""
         if self._is_judged:
             return ""
         self._values.extend(values)
@@ -48,7 +50,7 @@ class OtherBoom:
         return self.judge() if stamp - self._begin > WINDOW else ""
 
     def judge(self) -> str:
-        """Why the session up to now is of another boom; what was judged is forgotten."""
+        """Return why the session up to now is of another boom, empty if it is not shown; forget what was judged."""
         values, residuals = self._values, self._residuals
         self._begin, self._values, self._residuals = 0, [], []
         if self._is_judged or len(values) < FEWEST or len(residuals) < FEWEST:
@@ -70,7 +72,10 @@ class OtherBoom:
 
 
 def _likely(readings: Mapping[int, tuple[float, float]]) -> str:
-    """What else readings may be, by what they are and how far off (rad): degrees or of the other sign; else nothing."""
+    """Return a remedy if the readings fit as degrees or with the other sign, else an empty text.
+
+    `readings` holds reading and residual (rad) by joint, 0-based.
+    """
     for key, read in (("unit: deg", radians), ("sign: -1", neg)):
         if all(abs(read(value) - (value - off)) < FAR for value, off in readings.values()):
             mapping = f"sensors: {{joint_{min(readings) + 1}: {{{key}}}}}"

@@ -12,7 +12,7 @@ from ..config.settings import Thresholds
 
 
 class Level(IntEnum):
-    """How a component is; the numbers are those of diagnostic_msgs/DiagnosticStatus."""
+    """Level of a component; the numbers are those of diagnostic_msgs/DiagnosticStatus."""
 
     OK = 0
     WARN = 1
@@ -22,7 +22,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """State of one component.
+    """Status of one component.
 
     Attributes
     ----------
@@ -43,14 +43,14 @@ class Status:
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Above these a quantity has that level, or below these if it is `low` that is bad; NaN is no limit."""
+    """Limits above which a quantity has a level, or below which if it is `low` that is bad; NaN is no limit."""
 
     warn: float = nan
     error: float = nan
     low: bool = False
 
     def level(self, value: float, held: Level, release: float) -> Level:
-        """The level of `value`, where a level that is `held` is left at `release` times its limit (if low: over `release`)."""
+        """Return the level of `value`. A level that is `held` is left at `release` times its limit (if low: over `release`)."""
         for level, limit in ((Level.ERROR, self.error), (Level.WARN, self.warn)):
             share = release if level <= held else 1.0
             if value < limit / share if self.low else value > limit * share:
@@ -59,14 +59,14 @@ class Bounds:
 
 
 class Hysteresis:
-    """The level of one quantity; a NaN is no reason to change it to a worse one."""
+    """Level of one quantity with hysteresis and debounce time; a NaN never makes it worse."""
 
     def __init__(self) -> None:
         self.level = Level.OK
         self._agreed: float | None = None
 
     def update(self, value: float, bounds: Bounds, thresholds: Thresholds, now: float, at_once: bool = False) -> Level:
-        """The level at the time `now` (s, of a clock that only goes forward); `at_once`: a worse level need not last."""
+        """Return the level at the time `now` (s, of a clock that only goes forward); `at_once`: a worse level need not last."""
         seen = bounds.level(value, self.level, thresholds.release)
         if seen == self.level or self._agreed is None:
             self._agreed = now
@@ -78,7 +78,7 @@ class Hysteresis:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """When and by what components are judged.
+    """Time and thresholds of an evaluation of components.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Evaluation:
 
 
 class ComponentJudge:
-    """Judges one component again and again: `begin`, any number of `check` and `note`, `finish`.
+    """Judge of one component, used again and again: `begin`, any number of `check` and `note`, `finish`.
 
     Parameters
     ----------
@@ -110,21 +110,21 @@ class ComponentJudge:
 
     @property
     def level(self) -> Level | None:
-        """As it was told last; None before."""
+        """Level that was reported last; None before the first report."""
         return self._level
 
     def begin(self, at: Evaluation) -> None:
-        """A new evaluation."""
+        """Begin a new evaluation."""
         self._at = at
         self._faults: list[tuple[Level, str]] = []
         self._values: dict[str, str | int | float] = {}
 
     def note(self, key: str, value: str | int | float) -> None:
-        """Tell a value that is not judged."""
+        """Report a value that is not judged."""
         self._values[key] = value
 
     def check(self, key: str, value: float, bounds: Bounds, words: str, at_once: bool = False) -> None:
-        """Judge a value, and tell it with its bounds.
+        """Judge a value, and report it with its bounds.
 
         Parameters
         ----------
@@ -146,18 +146,18 @@ class ComponentJudge:
         self.fault(level, self._words.get(key, words))
 
     def check_age(self, age: float, limit: float, words: str) -> None:
-        """Stale if nothing came for longer than `limit`, s; with the next message all is well."""
+        """Set the level STALE if nothing came for longer than `limit`, s. It ends with the next message."""
         self._values |= {"age_s": age, "age_s_stale": limit}
         if age > limit:
             self.fault(Level.STALE, words)
 
     def fault(self, level: Level, words: str) -> None:
-        """A level that needs no judging."""
+        """Set a level that needs no judging."""
         if level != Level.OK:
             self._faults.append((level, words))
 
     def finish(self, message: str) -> Status:
-        """The worst of it; `message` if all is well."""
+        """Return the status with the worst level of this evaluation; `message` if all is well."""
         faults = sorted(self._faults, key=lambda fault: -fault[0])
         level = faults[0][0] if faults else Level.OK
         if level != self._level:

@@ -20,11 +20,11 @@ from .levels import Bounds, ComponentJudge, Evaluation, Level, Status
 HOLD = 1.0
 """Seconds for which a failure is shown."""
 LOAD_WINDOW, LOAD_INTERVAL = 40 * SECOND, SECOND // 50
-"""Of the load at the tip that is looked at, ns: from when, and how far apart."""
+"""Window and interval of the estimates of the load at the tip, ns."""
 
 
 class ModelWatch:
-    """Counts what the model does, and judges it.
+    """Judge of the model, with counts of its predictions and failures.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class ModelWatch:
         self.begin(0.0)
 
     def begin(self, now: float) -> None:
-        """The model is started at the time `now`, s of a clock that only goes forward."""
+        """Reset the counts, because the model starts at the time `now`, s of a clock that only goes forward."""
         self.predictions = self.failures = self.broken = 0
         self._predicted_at = self._unfed_at = now  # newest looks with a prediction, and without strokes
         self._counts: Mapping[str, str | int] = {}  # of that with a prediction
@@ -47,7 +47,7 @@ class ModelWatch:
         self._busy, self._longest = 0.0, 0.0
 
     def took(self, report: Report, duration: float) -> None:
-        """The twin made `report` of a sample in so many seconds."""
+        """Count a `report` that the twin made in `duration` seconds."""
         self._busy += duration
         if report.is_predicted:
             self._steps += 1
@@ -59,17 +59,17 @@ class ModelWatch:
             self._fail(report.status)
 
     def worked(self, duration: float) -> None:
-        """The twin was busy for so many seconds beside its samples."""
+        """Add `duration` seconds for which the twin was busy beside its samples."""
         self._busy += duration
 
     def break_down(self, reason: str) -> None:
-        """A message could not be handled."""
+        """Count a message that could not be handled."""
         self.broken += 1
         self._fail(reason)
 
     @property
     def has_failed(self) -> bool:
-        """Whether there is a failure that was not told yet, and none is shown."""
+        """Return True if a failure is not reported yet and no failure is shown."""
         return self._new and self._judge.level != Level.ERROR
 
     def _fail(self, reason: str) -> None:
@@ -78,7 +78,7 @@ class ModelWatch:
     def status(
         self, values: Mapping[str, str | int], is_active: bool, is_fed: bool, at: Evaluation, words: Mapping[str, str]
     ) -> Status:
-        """State of the model.
+        """Return the status of the model.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class ModelWatch:
         return judge.finish("following the strokes")
 
     def _why(self, values: Mapping[str, str | int], words: Mapping[str, str]) -> str:
-        """What has been counted most since the newest prediction, in words; empty if nothing was."""
+        """Return in words what was counted most since the newest prediction; empty if nothing was."""
         new = {key: value - int(self._counts.get(key, 0)) for key, value in values.items() if isinstance(value, int)}
         most = max(new, key=lambda key: new[key], default="")
         if not most or new[most] <= 0:
@@ -127,7 +127,7 @@ class ModelWatch:
         return f": {new[most]} times {name} ({words.get(name, 'see the counts')})"
 
     def _check_load(self, thresholds: Thresholds, now: float) -> None:
-        """Time of a step against the time there is for it."""
+        """Judge the run time of a step against the time available for it."""
         judge, span, steps = self._judge, now - self._looked, self._steps
         self.predictions += steps
         load = self._busy / span if span > 0.0 else nan
@@ -142,7 +142,7 @@ class ModelWatch:
 
 
 class LoadWatch:
-    """The load at the tip that the model does not know, as it was estimated in the last `LOAD_WINDOW`; it is never a fault.
+    """Judge of the disturbance force at the tip, as estimated in the last `LOAD_WINDOW`; it is never a fault.
 
     Attributes
     ----------
@@ -156,11 +156,11 @@ class LoadWatch:
         self._loads: deque[Array] = deque()
 
     def is_due(self, stamp: int) -> bool:
-        """Whether an estimate at `stamp` (ns) is to be taken: not if the last one was but `LOAD_INTERVAL` before."""
+        """Return True if no estimate was taken within the `LOAD_INTERVAL` before `stamp` (ns)."""
         return not self._stamps or not 0 <= stamp - self._stamps[-1] < LOAD_INTERVAL
 
     def took(self, estimate: Estimate) -> None:
-        """Go on with an estimate that `is_due`."""
+        """Take an estimate that `is_due`."""
         if self._stamps and estimate.stamp < self._stamps[-1]:  # the clock was set back
             self._stamps.clear()
             self._loads.clear()
@@ -171,7 +171,7 @@ class LoadWatch:
             self._loads.popleft()
 
     def status(self, at: Evaluation) -> Status | None:
-        """In words and figures; None as long as nothing but strokes was measured."""
+        """Return the status, in words and figures; None as long as nothing but strokes was measured."""
         finder = TipLoadFinder()
         finder.add(np.array(self._stamps, np.int64), np.array(self._loads).reshape(-1, 2))
         load, self.explanation = finder.load, ""
@@ -189,7 +189,7 @@ class LoadWatch:
 
 
 class _Sums(NamedTuple):
-    """Of the normalised residuals in one look: its time (s), and how many, their sum, squares and largest magnitude."""
+    """Sums over the normalised residuals of one look: time (s), number, sum, sum of squares, largest magnitude."""
 
     time: float
     number: int
@@ -199,7 +199,7 @@ class _Sums(NamedTuple):
 
 
 class ResidualJudge:
-    """Judges one channel by the root mean square of its normalised residual, which is 1 where noise explains all.
+    """Judge of one channel by the root mean square of its normalised residual, which is 1 if noise explains all.
 
     Parameters
     ----------
@@ -214,14 +214,14 @@ class ResidualJudge:
         self._window: deque[_Sums] = deque()
 
     def take(self, normalised: Array, now: float) -> None:
-        """Normalised residuals, shape (k,), that became known since the last look; NaN where not measured."""
+        """Take normalised residuals, shape (k,), that became known since the last look; NaN where not measured."""
         known = normalised[np.isfinite(normalised)]
         if len(known):
             squares = float(known @ known)
             self._window.append(_Sums(now, len(known), float(known.sum()), squares, float(np.abs(known).max())))
 
     def status(self, alarm: tuple[Level, str] | None, at: Evaluation, explained: str = "", is_judged: bool = False) -> Status:
-        """State of the channel, with its alarm if there is one.
+        """Return the status of the channel, with its alarm if there is one.
 
         Parameters
         ----------
@@ -256,7 +256,7 @@ class ResidualJudge:
 
 
 class HealthWatch:
-    """Alarms that last, and those that ended and are not acknowledged.
+    """Health of the rig: active alarms, and ended ones that are not acknowledged.
 
     Attributes
     ----------
@@ -271,7 +271,7 @@ class HealthWatch:
         self.has_news = False
 
     def took(self, health: Health) -> None:
-        """Go on with what the twin tells."""
+        """Take the twin's report on the rig's health."""
         before = len(self._alarms.all)
         self._noise = dict(health.noise)
         self._alarms.take(health)
@@ -279,19 +279,19 @@ class HealthWatch:
         self._before.update(map(repeated, self._alarms.fold_ended()))
 
     def acknowledge(self) -> str:
-        """Let go of alarms that ended; says which."""
+        """Release alarms that have ended; return in words which."""
         ended = [alarm for alarm in self._alarms.all if alarm.until is not None]
         self._alarms.forget_ended()
         self._before.clear()
         return "; ".join(f"{alarm.channel}: {alarm.told}" for alarm in ended) or "no alarm has ended"
 
     def of(self, channel: str) -> Alarm | None:
-        """The alarm that lasts in a channel."""
+        """Return the active alarm of a channel; None without one."""
         return next((alarm for alarm in self._alarms.lasting if alarm.channel == channel), None)
 
     @property
     def is_alarmed(self) -> bool:
-        """Whether an alarm lasts."""
+        """Return True if an alarm is active."""
         return bool(self._alarms.lasting)
 
     @property
@@ -302,7 +302,7 @@ class HealthWatch:
         return f"judged by health: alarm of {', '.join(channels)}" if channels else ""
 
     def status(self, at: Evaluation) -> Status:
-        """State of the rig."""
+        """Return the status of the rig's health."""
         judge, self.has_news = self._judge, False
         judge.begin(at)
         alarms = self._alarms.all
@@ -320,11 +320,11 @@ class HealthWatch:
 
 
 def level_of(alarm: Alarm) -> Level:
-    """An error is what lasts and has a name."""
+    """Return ERROR for an active alarm with a named cause, else WARN."""
     return Level.WARN if alarm.until is not None or alarm.cause is None else Level.ERROR
 
 
 def told_of(alarm: Alarm, times: int = 1) -> str:
-    """In words, of an alarm that has come so many times."""
+    """Return an alarm in words, with the number of `times` that it has occurred."""
     ended = f"ended, {times} times" if times > 1 else "ended"
     return f"{alarm.channel}: {alarm.told}" + ("" if alarm.until is None else f" ({ended}; not acknowledged)")

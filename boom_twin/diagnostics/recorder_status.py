@@ -13,7 +13,7 @@ ENDED = "ended"
 
 @dataclass(frozen=True, slots=True)
 class DiskState:
-    """What is on the disk.
+    """State of a recording's files and of the disk.
 
     Attributes
     ----------
@@ -38,20 +38,20 @@ class DiskState:
 
 @dataclass(frozen=True, slots=True)
 class TopicState:
-    """Messages of one topic: received, and published but never received (None: not known)."""
+    """Message counts of one topic: received, and published but never received (None: not known)."""
 
     received: int
     missed: int | None
 
 
 class RecordingJudge:
-    """Judges one recording."""
+    """Judge of one recording."""
 
     def __init__(self) -> None:
         self._judge = ComponentJudge("recording")
 
     def status(self, topics: Mapping[str, TopicState], disk: DiskState, end: str | None, at: Evaluation) -> Status:
-        """State of the recording.
+        """Return the status of the recording.
 
         Parameters
         ----------

@@ -16,9 +16,9 @@ from .stream_stats import ChannelStats
 
 @dataclass(frozen=True, slots=True)
 class SensorSpec:
-    """What is known of a sensor: name of its status, range, noise and resolution, in its own unit.
+    """Specification of a sensor: name of its status, range, noise and resolution, in its own unit.
 
-    ``unit`` is how a key ends that holds a value of it: ``rad``, ``m``, ``m_s2``.
+    ``unit`` stands at the end of the keys of its values: ``rad``, ``m``, ``m_s2``.
     """
 
     name: str
@@ -31,13 +31,13 @@ class SensorSpec:
 
 
 class SensorJudge:
-    """Judges one sensor by its figures."""
+    """Judge of one sensor by its statistics."""
 
     def __init__(self, sensor: SensorSpec) -> None:
         self._sensor, self._judge = sensor, ComponentJudge(f"sensor {sensor.name}")
 
     def status(self, figures: ChannelStats, age: float, at: Evaluation) -> Status:
-        """State of the sensor.
+        """Return the status of the sensor.
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class SensorJudge:
             self._judge.check("outside_share", figures.outside, share, told)
 
     def _check_frozen(self, figures: ChannelStats, thresholds: Thresholds) -> None:
-        """How long the reading has not changed, against what noise explains."""
+        """Judge for how long the reading has not changed, against what noise explains."""
         known = 0.0 if isnan(figures.rate) else 1.0 / figures.rate
         needed = readings_of_frozen(self._sensor.sigma, self._sensor.resolution, thresholds.frozen_false_alarm)
         limit, unchanged = max(thresholds.frozen_after, needed * known), figures.unchanged * known
@@ -90,7 +90,7 @@ def sensors_of(
     mounts: Sequence[Mount | None],
     absent: Collection[str] = (),
 ) -> dict[Stream, list[SensorSpec]]:
-    """The sensors of every stream, in the order of a sample's values.
+    """Return the sensors of every stream, in the order of a sample's values.
 
     Parameters
     ----------

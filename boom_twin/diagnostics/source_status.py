@@ -15,13 +15,13 @@ FOLLOWED = "Followed is the one whose stamps go on, and which of them that is RO
 
 
 class PublishersJudge:
-    """Judges all input topics together. A second source makes all that is predicted doubtful: it is told before all else."""
+    """Judge of the publishers of all input topics. A second source makes all predictions doubtful, so it is reported first."""
 
     def __init__(self) -> None:
         self._judge = ComponentJudge("publishers")
 
     def status(self, publishers: Mapping[Stream, Peers], followed: Mapping[Stream, str], at: Evaluation) -> Status:
-        """State of the sources.
+        """Return the status of the sources.
 
         Parameters
         ----------
@@ -49,7 +49,7 @@ class PublishersJudge:
 
 @dataclass(frozen=True, slots=True)
 class Reception:
-    """One topic; counts since the node was activated.
+    """Reception of one topic; counts since the node was activated.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Reception:
 
 
 class ReceptionJudge:
-    """Judges all input topics together."""
+    """Judge of the reception of all input topics."""
 
     def __init__(self) -> None:
         self._judge = ComponentJudge("reception")
@@ -85,7 +85,10 @@ class ReceptionJudge:
         self._left_out: dict[str, int] = {}
 
     def status(self, topics: Mapping[str, Reception], left_out: Mapping[str, int], at: Evaluation) -> Status:
-        """State of the reception; `topics` by name, and what was left out for lack of time, in all, by what it is."""
+        """Return the status of the reception.
+
+        `topics` are by name. `left_out` counts, by kind and in all, what was left out for lack of time.
+        """
         judge = self._judge
         judge.begin(at)
         for name, each in topics.items():

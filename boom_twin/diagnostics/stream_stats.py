@@ -19,7 +19,7 @@ LONGEST = 10.0
 
 @dataclass(frozen=True, slots=True)
 class ChannelStats:
-    """One sensor since the last look.
+    """Statistics of one sensor since the last look.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class ChannelStats:
 
 
 class Channel:
-    """Works out the figures of one sensor.
+    """Computation of the statistics of one sensor.
 
     Parameters
     ----------
@@ -63,11 +63,11 @@ class Channel:
         self.forget()
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Forget all readings and counts."""
         self._value, self._stamp, self._unchanged, self._gaps = nan, 0, 0, 0
 
     def look(self, stamps: NDArray[np.int64], values: Array, refused: int, longest: float) -> ChannelStats:
-        """The figures of what came since the last look.
+        """Return the statistics of what came since the last look.
 
         Parameters
         ----------
@@ -98,7 +98,7 @@ class Channel:
         )
 
     def _take(self, stamps: NDArray[np.int64], values: Array) -> Array:
-        """Remember the newest reading; gives the steps between the stamps, s, without those that are no pause."""
+        """Keep the newest reading; return the steps between the stamps, s, without those that are no pause."""
         if not len(values):
             return np.zeros(0)
         steps = np.diff(stamps, prepend=self._stamp or stamps[0]) * NANO
@@ -109,7 +109,7 @@ class Channel:
 
 
 class Rows:
-    """Rows of numbers that come one by one, kept as plain memory: nothing for Python's collector of garbage to search.
+    """Rows of numbers in plain memory, in which Python's garbage collector has nothing to search.
 
     Parameters
     ----------
@@ -121,16 +121,16 @@ class Rows:
         self._width, self._numbers = width, array("d")
 
     def append(self, row: Array) -> None:
-        """One more row, shape (width,)."""
+        """Append a row, shape (width,)."""
         self._numbers.frombytes(row.tobytes())
 
     def table(self) -> Array:
-        """All of them, shape (k, width); no row can be added as long as this is there."""
+        """Return all rows, shape (k, width). No row can be added as long as the result exists."""
         return np.frombuffer(self._numbers).reshape(-1, self._width)
 
 
 class StreamWatch:
-    """Counts messages as they come, and works out figures when asked; times in s, stamps in ns.
+    """Statistics of one stream: messages are counted as they come, statistics computed when asked; times in s, stamps in ns.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class StreamWatch:
         self.begin(monotonic())
 
     def begin(self, now: float) -> None:
-        """Listening begins; everything but the count is forgotten."""
+        """Start listening; everything but the count is forgotten."""
         self.newest: int | None = None
         self._heard, self._told, self._least, self.lag = now, self.count, nan, nan
         self._stamps, self._values = array("q"), Rows(len(self._channels))  # of samples
@@ -165,7 +165,7 @@ class StreamWatch:
             channel.forget()
 
     def seen(self, stamp: int) -> None:
-        """A message came."""
+        """Count a message."""
         self.count += 1
         self.newest = stamp
         self._heard = now = self._monotonic()
@@ -174,22 +174,22 @@ class StreamWatch:
             self._least = lag
 
     def took(self, sample: Sample) -> None:
-        """A message held this; one that is refused never gets here."""
+        """Take the sample of a message. A message that is refused has none."""
         self._stamps.append(sample.stamp)
         self._values.append(sample.values)
 
     def age(self, now: float) -> float:
-        """Time since the last message, or since listening began."""
+        """Return the time since the last message, or since listening began."""
         return now - self._heard
 
     def age_of(self, figures: ChannelStats, now: float) -> float:
-        """Time since the last reading of one channel, or since listening began; by stamps beyond the last message."""
+        """Return the time since the last reading of a channel, or since listening began; by stamps beyond the last message."""
         if self.newest is None or not figures.stamp:
             return self.age(now)
         return self.age(now) + max(0, self.newest - figures.stamp) * NANO
 
     def look(self, longest: float) -> list[ChannelStats]:
-        """The figures of every channel since the last look; `longest` (s) is the step between stamps that is allowed."""
+        """Return the statistics of every channel since the last look; `longest` (s) is the largest permitted step of stamps."""
         taken, values = self._stamps, self._values
         self._stamps, self._values = array("q"), Rows(len(self._channels))
         refused = max(0, self.count - self._told - len(taken))

@@ -14,12 +14,12 @@ MEGA = 1e6
 
 
 def stress_watch(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> StressWatch | None:
-    """Return the watch of a boom whose predictions have strokes that are so read; None if no section bends."""
+    """Return the report of a boom's stresses; `reads`: how strokes of predictions are read. None if no section bends."""
     return StressWatch(BendingStressModel(scene, reads=reads)) if stations(scene) else None
 
 
 class StressWatch:
-    """Tells moments and stresses at the newest stamp; they are never a fault, for no limit is known.
+    """Report of bending moments and stresses at the newest stamp. They are never a fault, because no limit is known.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class StressWatch:
         self._model, self._judge = model, ComponentJudge("bending")
 
     def status(self, prediction: Prediction, estimate: Estimate | None, at: Evaluation) -> Status:
-        """Moment, stress and its deviation at every station, by a prediction and the estimate beside it."""
+        """Return moment, stress and its deviation at every station, from a prediction and the estimate beside it."""
         found, judge, places = self._model.at(prediction, estimate), self._judge, self._model.stations
         judge.begin(at)
         columns = found.moments, found.stresses, found.stress_sigmas

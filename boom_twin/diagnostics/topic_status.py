@@ -19,7 +19,7 @@ OTHER_USER = (
 
 @dataclass(frozen=True, slots=True)
 class Peers:
-    """The publishers of an input, or the subscribers of an output.
+    """Publishers of an input, or subscribers of an output.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Peers:
 
 
 class TopicJudge:
-    """Judges one input topic.
+    """Judge of one input topic.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class TopicJudge:
         at: Evaluation,
         wrong_names: tuple[Level, str] | None = None,
     ) -> Status:
-        """State of the topic.
+        """Return the status of the topic.
 
         Parameters
         ----------
@@ -108,7 +108,7 @@ class TopicJudge:
         return judge.finish("listened to" if stream.newest is not None else "waiting for a message")
 
     def _count(self, stream: StreamWatch, now: float) -> None:
-        """Messages, and how many a second since the last look."""
+        """Report the number of messages, and their rate since the last look."""
         time, count = self._counted
         self._counted = (now, stream.count)
         self._judge.note("messages", stream.count)
@@ -116,18 +116,18 @@ class TopicJudge:
 
 
 def seconds(stamp: int | None) -> str:
-    """A stamp (ns) in seconds, exactly."""
+    """Return a stamp (ns) in seconds, exactly."""
     return "nan" if stamp is None else f"{stamp // SECOND}.{stamp % SECOND:09d}"
 
 
 class OutputsJudge:
-    """Judges all output topics together."""
+    """Judge of all output topics together."""
 
     def __init__(self) -> None:
         self._judge = ComponentJudge("outputs")
 
     def status(self, peers: Iterable[Peers], at: Evaluation) -> Status:
-        """State of the outputs; `peers` are their subscribers."""
+        """Return the status of the outputs; `peers` are their subscribers."""
         judge, shared = self._judge, 0
         judge.begin(at)
         for each in peers:

@@ -19,7 +19,7 @@ from .topic_status import OutputsJudge, Peers, TopicJudge, seconds
 
 
 def all_pieces(look: Generator[None, None, list[Status]]) -> list[Status]:
-    """All of a look at once, see `TwinWatch.look`."""
+    """Do all pieces of a look at once and return the result, see `TwinWatch.look`."""
     while True:
         try:
             next(look)
@@ -28,7 +28,7 @@ def all_pieces(look: Generator[None, None, list[Status]]) -> list[Status]:
 
 
 class TwinWatch:
-    """Takes what the node does, message by message, and judges it when asked; nothing is worked out for a single message.
+    """Judge of the twin and its inputs. It takes every message and judges when asked; a message alone costs no computation.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class TwinWatch:
         self.begin()
 
     def begin(self) -> None:
-        """Listening begins."""
+        """Start listening and reset all that is counted."""
         now = self._monotonic()
         for stream in self._streams.values():
             stream.begin(now)
@@ -79,11 +79,11 @@ class TwinWatch:
     # -- one message --------------------------------------------------------------------------------------------------
 
     def seen(self, stream: Stream, stamp: int) -> None:
-        """A message came."""
+        """Count a message."""
         self._streams[stream].seen(stamp)
 
     def took(self, sample: Sample, report: Report, duration: float) -> None:
-        """The twin made `report` of `sample` in so many seconds."""
+        """Take the `report` that the twin made of `sample` in `duration` seconds."""
         self._streams[sample.stream].took(sample)
         for each in report.all:
             self._model.took(each, duration if each is report else 0.0)
@@ -96,7 +96,7 @@ class TwinWatch:
             self.judged(each.health, 0.0)
 
     def _keep_residuals(self, report: Report) -> None:
-        """Until the next look."""
+        """Keep the residuals of a report until the next look."""
         rows = report.rows
         if rows is not None and len(rows.streams) == 1:  # as nearly always
             names = rows.names(rows.streams[0])
@@ -106,7 +106,7 @@ class TwinWatch:
             self._keep(each.names, each.values, each.sigmas)
 
     def _keep(self, names: tuple[str, ...], values: Array, sigmas: Array) -> None:
-        """A row of these channels."""
+        """Append a row of values and standard deviations of these channels."""
         kept = self._residuals.get(names)
         if kept is None:
             kept = self._residuals[names] = Rows(len(names)), Rows(len(names))
@@ -114,14 +114,14 @@ class TwinWatch:
         kept[1].append(sigmas)
 
     def judged(self, health: Health | None, duration: float) -> None:
-        """The twin judged the rig's health in so many seconds; None if there was nothing to tell."""
+        """Take the result of a look at the rig's health, which took `duration` seconds; None if there is no news."""
         self._model.worked(duration)
         if health is not None:
             self.health = self.health or HealthWatch()
             self.health.took(health)
 
     def broken(self, reason: str) -> None:
-        """A message could not be handled at all."""
+        """Count a message that could not be handled at all."""
         self._model.break_down(reason)
 
     # -- a look -------------------------------------------------------------------------------------------------------
@@ -132,7 +132,10 @@ class TwinWatch:
         return self._streams[Stream.STROKES].newest
 
     def is_urgent(self) -> bool:
-        """Whether the model failed, an alarm began, or a stream fell silent or is heard again: worth a look out of turn."""
+        """Return True if the model failed, an alarm began, or a stream fell silent or is heard again.
+
+        A look should not wait for its turn then.
+        """
         now = self._monotonic()
         before, self._silent = self._silent, {s for s, each in self._streams.items() if self._is_silent(each, now)}
         return self._model.has_failed or before != self._silent or (self.health is not None and self.health.has_news)
@@ -149,7 +152,7 @@ class TwinWatch:
         left_out: Mapping[str, int] | None = None,
         words: Mapping[str, str] | None = None,
     ) -> Generator[None, None, list[Status]]:
-        """The state of model, topics, health, sensors and residuals; of the model alone while the twin does not listen.
+        """Return the states of model, topics, health, sensors and residuals; of the model alone while the twin does not listen.
 
         It is worked out in pieces, for a live node to take samples in between: each takes a millisecond or two of those of a
         second at 1 kHz.
@@ -222,7 +225,7 @@ class TwinWatch:
         return self._topics[stream].status(watch, peers, offset, at, wrong_names)
 
     def _look_at(self, stream: Stream, at: Evaluation) -> list[Status]:
-        """The sensors of one stream."""
+        """Return the statuses of the sensors of one stream."""
         watch = self._streams[stream]
         return [
             judge.status(figures, watch.age_of(figures, at.now), at)
@@ -230,7 +233,7 @@ class TwinWatch:
         ]
 
     def _look_at_residuals(self, now: Callable[[], Evaluation]) -> Generator[None, None, list[Status]]:
-        """Every channel that ever had a residual, one stream after the other."""
+        """Return the statuses of every channel that ever had a residual, one stream after the other."""
         taken, self._residuals = self._residuals, {}
         for names, those in taken.items():
             yield
@@ -247,6 +250,6 @@ class TwinWatch:
         return [judge.status(self._alarm_of(name), at, explained, is_judged) for name, judge in self._judges.items()]
 
     def _alarm_of(self, channel: str) -> tuple[Level, str] | None:
-        """Level and words of the alarm that lasts in a channel."""
+        """Return level and words of the active alarm of a channel."""
         alarm = None if self.health is None else self.health.of(channel)
         return None if alarm is None else (level_of(alarm), alarm.told)

@@ -21,7 +21,7 @@ LOCAL = frozenset({"localhost", "127.0.0.1", "[::1]"})
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only programs of this machine reach `host`."""
+    """Return True if only programs on this machine can reach `host`."""
     try:
         return host == "localhost" or ip_address(host).is_loopback
     except ValueError:
@@ -29,12 +29,12 @@ def is_loopback(host: str) -> bool:
 
 
 def in_address(host: str) -> str:
-    """`host` as it stands in the address of a page."""
+    """Return `host` as written in the address of a page (an IPv6 address in brackets)."""
     return f"[{host}]" if ":" in host else host
 
 
 class AccessControl:
-    """Checks every request.
+    """Access control of the page: checks Host, Origin and token of every request.
 
     On loopback the ``Host`` must be `host` or a usual name of this machine, so that no page of another name that resolves to it
     gets in.

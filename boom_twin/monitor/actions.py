@@ -19,7 +19,7 @@ RECORDER_TIMEOUT = 2 * PATIENCE
 
 
 class RecorderProcess:
-    """Runs one recorder at a time.
+    """Recorder in a child process, at most one at a time.
 
     Parameters
     ----------
@@ -36,11 +36,11 @@ class RecorderProcess:
 
     @property
     def is_running(self) -> bool:
-        """Whether a recorder runs."""
+        """Return True if a recorder is running."""
         return self._process is not None and self._process.poll() is None
 
     def start(self) -> str:
-        """Start one, unless it runs already; gives what was done."""
+        """Start a recorder unless one is running; return what was done, in words."""
         if self.is_running:
             ending = "the recording before this one is still being completed: start again when it has ended"
             return ending if self._is_stopped else "recording already"
@@ -51,7 +51,7 @@ class RecorderProcess:
         return f"recording into {out}"
 
     def stop(self) -> str:
-        """Stop it, without waiting for its end; gives what was done."""
+        """Ask the recorder to stop, without waiting for its end; return what was done, in words."""
         if not self.is_running or self._process is None:
             return "not recording"
         self._process.send_signal(signal.SIGINT)
@@ -59,7 +59,7 @@ class RecorderProcess:
         return "recording stopped"
 
     def close(self) -> None:
-        """Stop it and wait until its files are complete."""
+        """Stop the recorder and wait until its files are complete."""
         if self._process is not None:
             self.stop()
             try:
@@ -78,7 +78,7 @@ AT_NODE = "acknowledge-at-node"
 
 
 class ViewerActions:
-    """Carries out what was permitted at start, and nothing else.
+    """Actions of the page's viewers, limited to those permitted at start.
 
     Parameters
     ----------
@@ -103,16 +103,16 @@ class ViewerActions:
         }
 
     def of(self, feed: Feed) -> ViewerActions:
-        """The same for another feed."""
+        """Return these actions for another feed."""
         return ViewerActions(feed, self.permitted, self._recording)
 
     @property
     def is_recording(self) -> bool:
-        """Whether a recording that was started here runs."""
+        """Return True if a recording started by this monitor is running."""
         return self._recording is not None and self._recording.is_running
 
     def act(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Do it; gives the answer to the page. Raises ValueError if the request is none of `ACTS`."""
+        """Carry out a request and return the answer to the page; raise ValueError if it is none of `ACTS`."""
         name = request.get("do")
         if name not in self._acts:
             raise ValueError("unknown request")

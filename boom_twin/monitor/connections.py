@@ -1,8 +1,8 @@
 """Limit connections to the page's server: how long one may be idle, and how many an address may have.
 
-None is kept for a stranger. One that has sent no whole request has few seconds and few places, in which the newest drives out
-the oldest: a page sends its request at once, so that a thousand silent connections do not keep it out. Those whose request was
-let in have places of their own; a viewer's WebSocket needs neither, see `boom_twin.monitor.server.MOST_VIEWERS`.
+A connection that has sent no whole request has few seconds and few places, in which the newest drives out
+the oldest. A page sends its request at once, so a thousand silent connections do not keep it out. Connections whose request was
+accepted have places of their own. A viewer's WebSocket needs neither, see `boom_twin.monitor.server.MOST_VIEWERS`.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ MOST, MOST_OF_ONE = 256, 64
 
 
 class ConnectionCount:
-    """Connections of one kind in the order in which they were last of use; the oldest makes room for a new one."""
+    """Connections of one kind, ordered by their last use. The oldest makes room for a new one."""
 
     def __init__(self) -> None:
         self._open: dict[Connection, None] = {}
         self._counts: Counter[str] = Counter()
 
     def take(self, connection: Connection) -> Connection | None:
-        """Give it the newest place; the connection that must go for that, if any."""
+        """Make a connection the newest; return the connection that must be closed for it, if any."""
         self.leave(connection)
         address, gone = connection.address, None
         if self._counts[address] >= MOST_OF_ONE:
@@ -50,7 +50,7 @@ class ConnectionCount:
         return gone
 
     def leave(self, connection: Connection) -> None:
-        """Take its place from it, if it has one."""
+        """Remove a connection, if it is there."""
         if connection in self._open:
             del self._open[connection]
             self._counts -= Counter([connection.address])
@@ -70,25 +70,25 @@ class Connections:
         self._silent, self._accepted = ConnectionCount(), ConnectionCount()
 
     def __call__(self) -> Connection:
-        """A new one, as `asyncio.loop.create_server` asks for it."""
+        """Return a new connection, as `asyncio.loop.create_server` requires."""
         return Connection(self._server, self)
 
     def begin(self, connection: Connection) -> None:
-        """It was made, and has sent nothing yet."""
+        """Count a new connection that has sent nothing yet."""
         self._disconnect(self._silent.take(connection), "a newer one")
 
     def accept(self, connection: Connection) -> None:
-        """A request of it was let in."""
+        """Count a connection whose request was accepted."""
         self._silent.leave(connection)
         self._disconnect(self._accepted.take(connection), "a newer one")
 
     def end(self, connection: Connection) -> None:
-        """It needs no place any more: it is closed, or a viewer's."""
+        """Stop counting a connection that is closed or has become a viewer's."""
         self._silent.leave(connection)
         self._accepted.leave(connection)
 
     def expire(self, connection: Connection) -> None:
-        """Its time is over."""
+        """Close a connection that sent no request in time."""
         self._disconnect(connection, f"it sent no request within {REQUEST_TIME:g} s")
 
     def _disconnect(self, connection: Connection | None, reason: str) -> None:
@@ -99,7 +99,7 @@ class Connections:
 
 
 class Connection(web.RequestHandler):
-    """One connection, whose requests aiohttp reads; every answer has the headers of `POLICY`, also to what is no request."""
+    """Connection whose requests aiohttp reads. Every answer has the headers of `POLICY`, also that to an invalid request."""
 
     __slots__ = ("_all", "_deadline", "_link", "address")
 
@@ -112,7 +112,7 @@ class Connection(web.RequestHandler):
         self._deadline: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Begin to wait for a request."""
+        """Start waiting for a request."""
         super().connection_made(transport)
         assert isinstance(transport, asyncio.Transport)
         self._link, self.address = transport, str((transport.get_extra_info("peername") or [""])[0])
@@ -120,22 +120,22 @@ class Connection(web.RequestHandler):
         self._all.begin(self)
 
     def connection_lost(self, exc: BaseException | None) -> None:
-        """Give its place to another."""
+        """Give the place of the closed connection to another."""
         self._cancel_deadline()
         self._all.end(self)
         super().connection_lost(exc)
 
     def accept(self) -> None:
-        """A whole request came, and was let in."""
+        """Note that a whole request arrived and was accepted."""
         self._cancel_deadline()
         self._all.accept(self)
 
     def become_viewer(self) -> None:
-        """It is a WebSocket from now on."""
+        """Give up its place, because it is a WebSocket from now on."""
         self._all.end(self)
 
     def abort(self) -> None:
-        """Close it without a word."""
+        """Close the connection without an answer."""
         self._cancel_deadline()
         if self._link is not None:
             self._link.abort()
@@ -143,7 +143,10 @@ class Connection(web.RequestHandler):
     def handle_error(
         self, request: web.BaseRequest, status: int = 500, exc: BaseException | None = None, message: str | None = None
     ) -> web.StreamResponse:
-        """Answer to what is no request, which is told in one line, or to a fault of a handler; a peer that has gone is none."""
+        """Return the answer to an invalid request, which is logged in one line, or to a failing handler.
+
+        A peer that has disconnected is neither.
+        """
         if isinstance(exc, ConnectionError):
             return web.Response(status=status)
         if status == HTTPStatus.BAD_REQUEST:

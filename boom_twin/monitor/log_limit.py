@@ -13,14 +13,17 @@ MOST = 3
 
 
 class LogRateLimit(logging.Filter):
-    """Lets `MOST` records of each logger through in a `PERIOD`; the first one after it says how many were left out."""
+    """Filter that passes `MOST` records of each logger in a `PERIOD`.
+
+    The first record after the period states how many were left out.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self._periods: dict[str, tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Whether it is written."""
+        """Return True if the record is to be written."""
         now = time.monotonic()
         begin, count = self._periods.get(record.name, (now, 0))
         if now - begin >= PERIOD:

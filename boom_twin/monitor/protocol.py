@@ -42,16 +42,16 @@ HEAD = struct.Struct("<BBHI")
 
 
 def pack(kind: int, table: int, times: NDArray[np.float64], values: NDArray[np.float32]) -> bytes:
-    """One block: `times` (k,), `values` (k, c)."""
+    """Return one block: `times` (k,), `values` (k, c)."""
     rows, columns = values.shape
     body = values.T.astype("<f4").tobytes()
     return HEAD.pack(kind, table, columns, rows) + times.astype("<f8").tobytes() + body + bytes(-len(body) % 8)
 
 
 def state(store: Store, now: float, time: float, dropped: DroppedMessages | None = None) -> dict[str, Any]:
-    """The lamps at `now` (s, the time they count by), while the newest data are of `time` (s), and what was dropped.
+    """Return the message ``state``: lamps at `now` (s, on the lamps' clock), time (s) of the newest data, dropped messages.
 
-    All is not well where messages were dropped, whatever the lamps say: they may have told otherwise.
+    The level is at least WARN if messages were dropped, because they may have changed the lamps.
     """
     groups = store.statuses(now).groups(now)
     groups["residuals"] = _with_alarms(groups["residuals"], list(store.alarms.lamps(time)))
@@ -64,7 +64,7 @@ def state(store: Store, now: float, time: float, dropped: DroppedMessages | None
 
 
 def layout(store: Store) -> dict[str, Any]:
-    """The tables that there are; of those of residuals also what they are of, and the unit that they are shown in."""
+    """Return the message ``layout``: all tables; for tables of residuals also title, unit and factor of display."""
     tables = [{"name": name, "columns": table.columns, **_residuals(name)} for name, table in store.tables.items()]
     return {"kind": "layout", "epoch_ns": str(store.epoch), "tables": tables}
 
@@ -78,17 +78,17 @@ def _residuals(table: str) -> dict[str, Any]:
 
 
 def alarms(found: list[ListedAlarm]) -> dict[str, Any]:
-    """All alarms, oldest first."""
+    """Return the message ``alarms``, oldest first."""
     return {"kind": "alarms", "alarms": [{**asdict(alarm), "level": alarm.level.name} for alarm in found]}
 
 
 def dump(message: Any) -> str:
-    """As JSON."""
+    """Return a message as JSON text."""
     return json.dumps(_plain(message), allow_nan=False, separators=(",", ":"))
 
 
 def _with_alarms(lamps: list[StatusLamp], alarms: list[StatusLamp]) -> list[StatusLamp]:
-    """Lamps with the rig's health as the alarms that last; a lamp that stands for them goes, unless its node is silent."""
+    """Return the lamps with active alarms in place of the lamp of the rig's health, unless that lamp's node is silent."""
     health = next((lamp for lamp in lamps if lamp.name == HEALTH), None)
     if not alarms or (health is not None and health.level == Severity.STALE):
         return lamps

@@ -34,7 +34,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """Serves one feed.
+    """Server of the live page for one feed.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Server:
         self._viewers: set[web.WebSocketResponse] = set()
 
     def application(self) -> web.Application:
-        """The application, for `aiohttp.web`."""
+        """Return the application for `aiohttp.web`."""
         application = web.Application(middlewares=[self._guard], client_max_size=LONGEST)
         routes = {"/": self._index, "/socket": self._connect, "/page/{name}": self._file}
         application.add_routes([web.get(path, handler) for path, handler in routes.items()])
@@ -72,7 +72,7 @@ class Server:
         return web.FileResponse(PAGE / "index.html")
 
     async def _file(self, request: web.Request) -> web.FileResponse:
-        """One of the page's own files: what is asked for is compared with their names, no path is made of it."""
+        """Return one of the page's own files. The name asked for is only compared with theirs; no path is made of it."""
         file = next((file for file in PAGE.iterdir() if file.name == request.match_info["name"]), None)
         if file is None:
             raise web.HTTPNotFound(text="there is no such file of the page")
@@ -94,7 +94,7 @@ class Server:
         return socket
 
     async def _run(self, application: web.Application) -> AsyncIterator[None]:
-        """Let the feed take what comes, as long as the server runs."""
+        """Poll the feed as long as the server runs."""
         self._analyst = Analyst(self._feed, self._compiler)
         tasks = [asyncio.create_task(each()) for each in (self._poll, self._track_peaks)]
         tasks[0].add_done_callback(_stop_on_fault)
@@ -111,13 +111,13 @@ class Server:
             await asyncio.sleep(POLL_PERIOD)
 
     async def _track_peaks(self) -> None:
-        """Know where the peaks of a live session were at first, whether or not a page is open."""
+        """Follow the peaks of a live session from its beginning, also while no page is open."""
         while self._feed.end is None:
             await self._analyst.spectrum_at(self._feed.store.newest)
             await asyncio.sleep(PEAK_PERIOD)
 
     def _choose(self, index: int) -> str:
-        """Begin to open another session, for all viewers; says so."""
+        """Start opening another session for all viewers; return in words what is done."""
         assert self._sessions is not None
         if self._opening is not None and not self._opening.done():
             return "a session is being opened already"
@@ -125,7 +125,7 @@ class Server:
         return f"opening {self._sessions.names[index]} .."
 
     async def _open(self, sessions: SessionList, index: int) -> None:
-        """Show another session: its viewers' sockets are closed, and their pages connect again.
+        """Show another session: close its viewers' sockets, upon which their pages connect again.
 
         It is opened in a thread. The one before is read here, between two turns of this loop, so it is closed here, too.
         """
@@ -150,7 +150,7 @@ async def _add_policy(request: web.Request, response: web.StreamResponse) -> Non
 
 
 def _stop_on_fault(task: asyncio.Task[None]) -> None:
-    """A feed that fails ends the monitor: a page without data that says nothing would be worse."""
+    """End the monitor if the feed has failed. A page without data and without a reason would be worse."""
     if not task.cancelled() and (error := task.exception()) is not None:
         asyncio.get_running_loop().call_exception_handler({"message": "the feed failed", "exception": error})
         raise web.GracefulExit

@@ -40,14 +40,14 @@ MOST_REQUESTS = 40
 
 
 class SessionChoice(NamedTuple):
-    """The sessions of a monitor, and what opens another one by its place among them; that says what is done."""
+    """Sessions of a monitor, and the function that opens one by its index and returns in words what is done."""
 
     sessions: SessionList
     choose: Callable[[int], str]
 
 
 class Viewer:
-    """Serves one WebSocket until it is closed.
+    """Viewer served over one WebSocket until it is closed.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Viewer:
         self._response: TipResponses | None = None
 
     async def serve(self) -> None:
-        """Send and hear, until one of the two ends."""
+        """Send and receive until one of the two ends."""
         tasks = [asyncio.create_task(each()) for each in (self._send, self._send_spectra, self._send_responses, self._receive)]
         _, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in others:
@@ -114,7 +114,7 @@ class Viewer:
             await asyncio.sleep(max(0.0, PERIOD - (time.monotonic() - now)))
 
     def _advance(self, span: float) -> float:
-        """The session's time up to which the page is to know everything."""
+        """Return the session time up to which the page is to have all data."""
         return self._feed.store.newest if self._playback is None else self._playback.advance(span)
 
     async def _restart_if_cleared(self) -> None:
@@ -141,7 +141,10 @@ class Viewer:
             await self._socket.send_str(told)
 
     async def _send_rows(self, position: float) -> None:
-        """All rows that are not sent yet, in messages of bounded size; what comes meanwhile waits for the lamps' next turn."""
+        """Send all rows that are not sent yet, in messages of bounded size.
+
+        Rows that arrive meanwhile wait for the next turn.
+        """
         tables = list(self._feed.store.tables.values())[: self._tables]
         unsent = {number: self._unsent(table, position) for number, table in enumerate(tables)}
         while unsent:
@@ -158,7 +161,7 @@ class Viewer:
                 await self._socket.send_bytes(b"".join(blocks))
 
     def _unsent(self, table: Table, position: float) -> tuple[int, int]:
-        """Numbers of the first row to send and of the one after the last."""
+        """Return the numbers of the first row to send and of the one after the last."""
         end = table.count if self._playback is None else table.until(position)
         first = self._sent.get(table.name)
         if first is None:
@@ -188,7 +191,7 @@ class Viewer:
             await asyncio.sleep(SPECTRUM_PERIOD)
 
     async def _send_spectrogram(self, position: float) -> None:
-        """The columns of the spectrogram that are not sent yet."""
+        """Send the columns of the spectrogram that are not sent yet."""
         generation = self._generation
         found = await self._analyst.spectrogram_between(max(self._spectrogram_until, position - HISTORY), position)
         if found is not None and generation == self._generation == self._feed.store.generation:
@@ -196,7 +199,7 @@ class Viewer:
             await self._socket.send_bytes(block)
 
     async def _send_responses(self) -> None:
-        """The response in the posture shown, where it is another than the page has."""
+        """Send the response in the posture shown whenever it differs from the one that the page has."""
         while not self._socket.closed:
             found = await self._analyst.response_at(self._position)
             if found is not self._response:
@@ -208,7 +211,7 @@ class Viewer:
 
     @property
     def _position(self) -> float:
-        """The session's time that is shown, s."""
+        """Session time that is shown, s."""
         return self._feed.store.newest if self._playback is None else self._playback.position
 
     async def _send_text(self, message: dict[str, Any]) -> None:
@@ -217,7 +220,7 @@ class Viewer:
     # -- in -----------------------------------------------------------------------------------------------------------
 
     async def _receive(self) -> None:
-        """Carry out requests; a page that sends anything else is sent away."""
+        """Carry out requests; close the socket of a page that sends anything else."""
         second, count = 0.0, 0
         async for message in self._socket:
             now = time.monotonic()

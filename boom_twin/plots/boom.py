@@ -23,7 +23,7 @@ STEEL, RIGID, BARREL, ROD = "#C9D6E2", "#8FA3B5", "#E6B98A", "#B9742F"
 
 
 def draw_base(axes: Axes, pivot: Array, size: float) -> None:
-    """Triangle under a pivot (m) on hatched ground; `size` is its height (m)."""
+    """Draw a triangle under a pivot (m) on hatched ground; `size` is its height (m)."""
     x, y = pivot
     ground, half = y - size, 0.6 * size
     axes.fill([x - half, x, x + half], [ground, y, ground], facecolor="white", edgecolor=INK, zorder=1.5)
@@ -35,13 +35,13 @@ def draw_base(axes: Axes, pivot: Array, size: float) -> None:
 
 
 def draw_pin(axes: Axes, place: Array, size: float = 6.0, colour: str = INK) -> None:
-    """A pin: small circle, `size` in points."""
+    """Draw a pin as a small circle, `size` in points."""
     look: dict[str, Any] = {"markerfacecolor": "white", "markeredgecolor": colour, "markeredgewidth": 1.5}
     axes.plot(place[0], place[1], "o", markersize=size, zorder=8, **look)
 
 
 def draw_link(axes: Axes, points: list[Array], colour: str = BLUE, width: float = 5.0) -> None:
-    """A link through two pins, or a plate through three."""
+    """Draw a link through two pins, or a plate through three."""
     x, y = np.array(points).T
     if len(points) > 2:
         axes.fill(x, y, facecolor=colour, alpha=0.35, linewidth=0, zorder=5)
@@ -51,7 +51,7 @@ def draw_link(axes: Axes, points: list[Array], colour: str = BLUE, width: float 
 
 
 def draw_cylinder(axes: Axes, barrel_pin: Array, rod_pin: Array, closed_length: float, width: float) -> None:
-    """Barrel from its pin, nine tenths of `closed_length` long, and the rod out of it; `width` of the barrel in m."""
+    """Draw the barrel from its pin, nine tenths of `closed_length` long, and the rod out of it; `width` of the barrel in m."""
     along = (rod_pin - barrel_pin) / np.hypot(*(rod_pin - barrel_pin))
     end = barrel_pin + 0.9 * closed_length * along
     _box(axes, barrel_pin, end, width, BARREL, 6.0)
@@ -59,14 +59,14 @@ def draw_cylinder(axes: Axes, barrel_pin: Array, rod_pin: Array, closed_length: 
 
 
 def draw_section(axes: Axes, corners: list[tuple[Array, Array, bool]], depth: float, alpha: float = 1.0) -> None:
-    """Parts of a section from point to point (m); flexible ones light, rigid ones dark. `depth` in m."""
+    """Draw parts of a section from point to point (m); flexible ones light, rigid ones dark. `depth` in m."""
     for start, stop, flexible in corners:
         if np.hypot(*(stop - start)) > 1e-9:
             _box(axes, start, stop, depth, STEEL if flexible else RIGID, 2.0, alpha)
 
 
 def _box(axes: Axes, start: Array, stop: Array, width: float, colour: str, order: float, alpha: float = 1.0) -> None:
-    """Rectangle about the line from start to stop."""
+    """Draw a rectangle about the line from start to stop."""
     along = (stop - start) / np.hypot(*(stop - start))
     across = 0.5 * width * np.array([-along[1], along[0]])
     x, y = np.array([start + across, stop + across, stop - across, start - across]).T
@@ -114,12 +114,12 @@ def boom_picture(scene: Scene, equilibrium: Equilibrium, path: Path, title: str 
 
 
 def undeformed_outline(scene: Scene, angles: Array) -> Array:
-    """Points (k, 2) of the centre line with nothing bent, those of `Equilibrium.outline`; joint `angles` in rad."""
+    """Return points (k, 2) of the centre line with nothing bent, those of `Equilibrium.outline`; joint `angles` in rad."""
     return UndeflectedBoom(scene, compile_scene(scene)).at(angles)
 
 
 def draw_boom(axes: Axes, scene: Scene, bones: Skeleton, alpha: float = 0.55) -> None:
-    """Base, sections, cylinders, links and pins of an undeformed boom."""
+    """Draw base, sections, cylinders, links and pins of an undeformed boom."""
     size = 0.035 * float(sum(section.length for section in scene.sections))
     for i in range(len(scene.sections)):
         draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i), alpha)
@@ -135,7 +135,7 @@ def draw_boom(axes: Axes, scene: Scene, bones: Skeleton, alpha: float = 0.55) ->
 
 
 def section_parts(scene: Scene, bones: Skeleton, i: int) -> list[tuple[Array, Array, bool]]:
-    """Root, beam and head of section `i` (0-based) from point to point, and whether they bend."""
+    """Return root, beam and head of section `i` (0-based) from point to point, and whether they bend."""
     section = scene.sections[i]
     if section.beam is None:
         return [(bones.pivots[i], bones.pivots[i + 1], False)]
@@ -155,7 +155,7 @@ def _deflected(axes: Axes, straight: Array, equilibrium: Equilibrium) -> None:
 
 
 def _lengths(axes: Axes, scene: Scene, bones: Skeleton) -> None:
-    """Number and length of every section, beside its middle."""
+    """Draw number and length of every section, beside its middle."""
     for i, section in enumerate(scene.sections):
         lift = section_depth(scene, i) + 0.012 * float(np.ptp(bones.pivots, axis=0).max())
         where = bones.point(i, 0.5 * section.length, lift)
@@ -167,7 +167,7 @@ def _lengths(axes: Axes, scene: Scene, bones: Skeleton) -> None:
 
 
 def _detail(axes: Axes, scene: Scene, bones: Skeleton) -> None:
-    """The joint in the middle of the boom, enlarged."""
+    """Draw the joint in the middle of the boom, enlarged."""
     i = len(bones.joints) // 2
     joint = bones.joints[i]
     draw_boom(axes, scene, bones)
@@ -184,7 +184,7 @@ def _detail(axes: Axes, scene: Scene, bones: Skeleton) -> None:
 
 
 def _numbers(side: Axes, equilibrium: Equilibrium) -> None:
-    """Two small tables: per cylinder, and natural frequencies."""
+    """Draw two small tables: per cylinder, and natural frequencies."""
     side.axis("off")
     sag = 1e3 * (equilibrium.tip - equilibrium.tip_rigid)
     lines = [f"tip deflection   x {sag[0]:+.0f} mm", f"                 y {sag[1]:+.0f} mm", ""]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.text import Annotation
 
 COLOURS = {"kN": ORANGE, "Hz": GREEN, "kN m": PURPLE, "MPa": SKY}
-"""Of bars, by unit."""
+"""Colours of bars, by unit."""
 GAP = 16.0  # pixels between a bar, its words and the edge
 LEAST_SHARE = 0.1  # of the width, that is left for bars however long the words are
 
@@ -81,7 +81,7 @@ def _tips(axes: Axes, scene: Scene, found: Envelope) -> None:
 
 
 def _bars(axes: Axes, found: Envelope, own: list[tuple[str, Array]], unit: str) -> list[Annotation]:
-    """From the least to the greatest value, one bar a quantity; the labels of its ends, value and posture."""
+    """Draw one bar for each quantity from its least to its greatest value; the ends are labelled with value and posture."""
     labels = []
     for place, (_, values) in enumerate(own):
         low, high = int(values.argmin()), int(values.argmax())
@@ -102,7 +102,7 @@ def _bars(axes: Axes, found: Envelope, own: list[tuple[str, Array]], unit: str) 
 
 
 def _make_room(axes: Axes, labels: list[Annotation]) -> None:
-    """Limits of x between which bars and labels, left and right of their ends, fit into the width of drawn axes."""
+    """Set limits of x between which bars and labels, left and right of their ends, fit into the width of drawn axes."""
     width = axes.get_window_extent().width
     ends = np.array([label.xy[0] for label in labels])
     room = np.array([label.get_window_extent().width + GAP for label in labels])

@@ -11,7 +11,7 @@ from ..types import Array
 
 
 class ExtremeRows:
-    """Rows of some arrays side by side: all of them while they are few, of more the extremes in bins of consecutive rows.
+    """Rows of some arrays side by side: all while they are few, of more the extremes in bins of consecutive rows.
 
     Of every bin those rows stay in which a key has its least or its largest value, so that curves drawn through what is
     left span in each bin what all rows spanned. Bins get twice as wide whenever `most` rows are not enough, each of them
@@ -48,30 +48,30 @@ class ExtremeRows:
 
     @property
     def is_thin(self) -> bool:
-        """Whether rows were taken away."""
+        """Return True if rows have been removed."""
         return self._width > 1
 
     @property
     def is_full(self) -> bool:
-        """Whether rows must be taken away."""
+        """Return True if rows must be removed."""
         return len(self._numbers) > self._most
 
     def thin(self, kept: NDArray[np.bool_]) -> None:
-        """Take rows away until at most half as many are left as there may be; but those `kept`, bool (k,), stay anyhow."""
+        """Remove rows until at most half of the permitted number are left, not counting those `kept`, bool (k,), which stay."""
         kept = self._take_away(kept)
         while len(self._numbers) - int(kept.sum()) > self._most // 2 and self._width < self.count:
             self._width *= 2
             kept = self._take_away(kept)
 
     def _take_away(self, kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """With bins as wide as they are; returns which of the rows that are left are kept anyhow."""
+        """Remove rows with the present width of bins; return which of the rows that are left are kept anyhow."""
         stays = kept | extremes(self._numbers // self._width, [self.columns[key] for key in self._keys])
         self._numbers, self.columns = self._numbers[stays], [column[stays] for column in self.columns]
         return kept[stays]
 
 
 def extremes(bins: NDArray[np.int64], keys: Sequence[Array]) -> NDArray[np.bool_]:
-    """Which rows hold the least or the largest value of a key in their bin, the first of equal ones; shape (k,).
+    """Return True for the rows with the least or the largest value of a key in their bin, the first of equal ones; shape (k,).
 
     Parameters
     ----------

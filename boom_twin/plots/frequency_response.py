@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def response_picture(path: Path, title: str, unit: str, response: FrequencyResponse, natural: Array) -> None:
-    """Amplitudes of tip, joint angles and cylinder forces over frequency; `unit` is that of the load.
+    """Draw amplitudes of tip, joint angles and cylinder forces over frequency; `unit` is that of the load.
 
     natural : (modes,) natural frequencies, Hz, drawn as lines.
     """
@@ -60,7 +60,7 @@ def _amplitudes(axes: Axes, frequencies: Array, values: ComplexArray, labels: li
 
 
 def steady_state_picture(path: Path, title: str, found: SteadyState) -> None:
-    """One period: the load, the tip's displacement and acceleration; and the harmonics of the displacement."""
+    """Draw one period of the load and of the tip's displacement and acceleration; and the harmonics of the displacement."""
     with picture(path, title) as figure:
         grid = figure.subplots(2, 2)
         rows = [
@@ -82,7 +82,7 @@ def steady_state_picture(path: Path, title: str, found: SteadyState) -> None:
 
 
 def resonance_picture(path: Path, title: str, found: ResonanceMap) -> None:
-    """Swing of the tip over postures (rows) and rates; rates to avoid are framed."""
+    """Draw the swing of the tip over postures (rows) and rates; rates to avoid are framed."""
     from matplotlib.colors import LogNorm
 
     rows, edges = len(found.postures), _edges(found.rates)
@@ -102,7 +102,7 @@ def resonance_picture(path: Path, title: str, found: ResonanceMap) -> None:
 
 
 def _edges(rates: Array) -> Array:
-    """Borders (r + 1,) between ascending `rates` (r,), and outside of the first and last."""
+    """Return borders (r + 1,) between ascending `rates` (r,), and outside of the first and last."""
     if len(rates) == 1:
         return np.array([0.95, 1.05]) * rates
     middle = 0.5 * (rates[1:] + rates[:-1])

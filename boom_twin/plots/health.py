@@ -42,7 +42,7 @@ def timeline_picture(
 
 
 def _bars(axes: Axes, alarms: list[AlarmSpan], end: float) -> None:
-    """One bar for each, the first on top."""
+    """Draw one bar for each alarm, the first on top."""
     axes.grid(axis="y", visible=False)
     axes.set_ylim(max(len(alarms), 1) - 0.4, -0.6)
     axes.set_yticks(range(len(alarms)), [alarm.channel for alarm in alarms])
@@ -110,7 +110,7 @@ def moment_picture(path: Path, session: str, history: History, rows: list[tuple[
 
 
 def slow_part(history: History, column: int) -> Array:
-    """The static part of a moment (N m), shape (m,): its mean over `SLOW`."""
+    """Return the static part of a moment (N m), shape (m,): its mean over `SLOW`."""
     if history.slow_moments is not None:
         return history.slow_moments[:, column]
     return running_mean(history.stamps_s, history.moments[:, column], SLOW)

@@ -28,7 +28,7 @@ class ImuTrace:
 
 @dataclass(frozen=True)
 class EstimateTrace:
-    """The tip as all sensors see it, at the stamps of the predictions (x forward, y up); NaN before anything was measured.
+    """Tip as all sensors see it, at the stamps of the predictions (x forward, y up); NaN before anything was measured.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class EstimateTrace:
 
 @dataclass(frozen=True)
 class Truth:
-    """What the rig that made a synthetic session really did (model frame: x forward, y up).
+    """True motion of the rig that made a synthetic session (model frame: x forward, y up).
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Orbits:
-    """m instants of k pins with clearance.
+    """Motion of k pins with clearance, at m instants.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Orbits:
 
 @dataclass(frozen=True)
 class AlarmSpan:
-    """An alarm: the channel where it shows, from and to (s; the end of the session while it lasts), and its cause or kind."""
+    """Alarm: the channel where it shows, from and to (s; the end of the session while it lasts), and its cause or kind."""
 
     channel: str
     start: float
@@ -113,7 +113,7 @@ class Density:
 
 @dataclass(frozen=True)
 class ResidualDistribution:
-    """Of the residuals of one channel over their expected deviations.
+    """Distribution of the residuals of one channel over their expected deviations.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ class ResidualDistribution:
 
 @dataclass(frozen=True)
 class SessionTotals:
-    """What is told of all rows of a session, also of those that are not in its `History`.
+    """Statistics of all rows of a session, also of those that are not in its `History`.
 
     Attributes
     ----------

@@ -27,7 +27,7 @@ ENDS = ((BLUE, "lowest"), (ORANGE, "highest"))
 
 
 def joint_ranges_picture(path: Path, scene: Scene, name: str) -> Path:
-    """Write one pair of panels a joint, and one of the boom with every joint at the ends of its range.
+    """Draw one pair of panels for each joint, and one panel of the boom with every joint at the ends of its range.
 
     Parameters
     ----------
@@ -55,12 +55,12 @@ def joint_ranges_picture(path: Path, scene: Scene, name: str) -> Path:
 
 
 def _straight(scene: Scene) -> Array:
-    """Joint angles (rad) of the boom as straight as its ranges allow."""
+    """Return the joint angles (rad) of the boom as straight as its ranges allow."""
     return np.asarray(np.radians(np.clip(0.0, *np.transpose([joint.range_deg for joint in scene.joints]))))
 
 
 def _boom(axes: Axes, scene: Scene) -> None:
-    """The straight boom, where each section gets when only its joint turns, and the fan that it sweeps."""
+    """Draw the straight boom, each section with only its own joint turned to its ends, and the fan that it sweeps."""
     from matplotlib.patheffects import withStroke
 
     axes.set_aspect("equal", adjustable="datalim")
@@ -88,9 +88,9 @@ def _boom(axes: Axes, scene: Scene) -> None:
 
 
 def folded_section(pivot: Array, before: float, angle: float, length: float, aside: float) -> Array:
-    """Line of a section that its joint turns by `angle` (rad) from the heading `before`, shape (3, 2), m.
+    """Return the line of a section that its joint turns by `angle` (rad) from the heading `before`, shape (3, 2), m.
 
-    One that is folded back lies on the section before: it is moved `aside` (m), by the more the farther it is beyond 90
+    A folded section would lie on the section before, so it is moved `aside` (m), by the more the farther it is beyond 90
     degrees, to the side from which it came.
     """
     along = np.array([np.cos(before), np.sin(before)])
@@ -101,14 +101,14 @@ def folded_section(pivot: Array, before: float, angle: float, length: float, asi
 
 
 def _fan(axes: Axes, pivot: Array, ends: Array, radius: float) -> None:
-    """What a section sweeps, as a sector about its pivot."""
+    """Draw the sector that a section sweeps about its pivot."""
     turn = np.linspace(ends[0], ends[1], 60)
     rim = pivot + radius * np.column_stack([np.cos(turn), np.sin(turn)])
     axes.fill(*np.vstack([pivot, rim]).T, facecolor=PURPLE, alpha=0.18, linewidth=0, zorder=3)
 
 
 def _joint(axes: Axes, scene: Scene, i: int) -> None:
-    """Sections before and after, links and cylinder: the ends of the range in full, what lies between as a shadow."""
+    """Draw sections before and after, links and cylinder: the ends of the range in full, positions between as a shadow."""
     axes.set_aspect("equal", adjustable="box")
     straight, pins = _straight(scene), []
     for place, degrees in enumerate(np.linspace(*scene.joints[i].range_deg, POSITIONS)):
@@ -131,7 +131,10 @@ def _joint(axes: Axes, scene: Scene, i: int) -> None:
 
 
 def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | None) -> None:
-    """One position; names of the pins where it has a colour, bright around them, for links and cylinders lie below."""
+    """Draw one position of a joint's mechanism; name its pins if `colour` is given.
+
+    The names have a bright outline, because links and cylinders lie below them.
+    """
     from matplotlib.patheffects import withStroke
 
     joint, alpha = bones.joints[i], 0.12 if colour is None else 0.4
@@ -154,7 +157,7 @@ def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | 
 
 
 def _named(joint: JointPins) -> dict[str, Array]:
-    """Pins by the letters of the scene."""
+    """Return the pins of a joint by the names that the scene gives them."""
     six_bar = {"D": joint.d, "E": joint.e, "Q": joint.q}
     ends = {"base pin": joint.barrel_pin, "rod_pin": joint.rod_pin} if joint.d is None else {"C": joint.barrel_pin}
     if joint.kind in ("B2", "B3"):
@@ -167,7 +170,7 @@ def _pins_of(joint: JointPins) -> list[Array]:
 
 
 def _stroke(axes: Axes, scene: Scene, i: int) -> None:
-    """Stroke by angle in the band that the cylinder has."""
+    """Draw stroke by angle in the band that the cylinder has."""
     joint = scene.joints[i]
     degrees = np.linspace(*joint.range_deg, CURVE)
     axes.axhspan(0.0, joint.cylinder.max_stroke, color=PALE, alpha=0.5, linewidth=0, label="0 to max_stroke")

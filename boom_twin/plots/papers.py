@@ -20,7 +20,7 @@ LOOKS = {  # pins, program: colour, width, dashes
 
 @dataclass(frozen=True)
 class StopTrace:
-    """A stop in one posture, m rows.
+    """Stop of the boom in one posture, m rows.
 
     Times (s), rise of the tip (mm), its vertical acceleration (m/s^2) and the force of cylinder 1 (kN), each (m,).
     """
@@ -56,7 +56,7 @@ def posture_picture(path: Path, title: str, note: str, peer: str, traces: list[S
 
 @dataclass(frozen=True)
 class LetGoTrace:
-    """A boom let go from the undeflected posture.
+    """Motion of a boom let go from the undeflected posture.
 
     Name; times (s) and height over that posture (mm), shape (m,); that height at rest (mm).
     """

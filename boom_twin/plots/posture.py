@@ -48,7 +48,7 @@ def posture_picture(path: Path, session: str, history: History, note: str) -> No
 
 
 def spread(count: int, most: int) -> list[int]:
-    """At most `most` of `count` places, evenly spread, with the first and the last."""
+    """Return at most `most` of `count` places, evenly spread, with the first and the last."""
     return sorted({round(place) for place in np.linspace(0, count - 1, min(count, most))}) if count else []
 
 

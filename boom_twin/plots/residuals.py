@@ -62,7 +62,7 @@ def _channel(axes: Axes, history: History, channel: int, reach: float) -> None:
 
 
 def running_mean(stamps: Array, values: Array, over: float = MEAN_OVER) -> Array:
-    """Mean of all samples within half of `over` (s) of each one; `stamps` ascending, no NaN, both shape (k,)."""
+    """Return the mean of all samples within half of `over` (s) of each one; `stamps` ascending, no NaN, both shape (k,)."""
     total = np.concatenate([[0.0], np.cumsum(values)])
     first = np.searchsorted(stamps, stamps - 0.5 * over)
     last = np.searchsorted(stamps, stamps + 0.5 * over, side="right")
@@ -105,7 +105,7 @@ def spectrum_picture(path: Path, session: str, history: History, note: str) -> N
 
 
 def has_spectrum(history: History) -> bool:
-    """Whether the session is long enough."""
+    """Return True if the session is long enough for a spectrum."""
     return bool(len(history.stamps_s) > 16 and history.stamps_s[-1] - history.stamps_s[0] >= SHORTEST)
 
 

@@ -99,7 +99,7 @@ def compare_picture(path: Path, title: str, names: list[str], apart: list[float]
 
 @dataclass(frozen=True)
 class Interval:
-    """A parameter as it is drawn: name, unit, value before, estimate and its interval, and whether it was taken over."""
+    """Parameter as it is drawn: name, unit, value before, estimate and its interval, and whether it was taken over."""
 
     name: str
     unit: str
@@ -113,7 +113,7 @@ class Interval:
 def held_out_picture(
     path: Path, title: str, note: str, names: Sequence[str], times: tuple[Array, Array], normalised: tuple[Array, Array]
 ) -> None:
-    """Residuals over their expected deviation, before on the left and after on the right.
+    """Draw residuals over their expected deviation, before on the left and after on the right.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def held_out_picture(
 
 
 def parameters_picture(path: Path, title: str, note: str, intervals: Sequence[Interval]) -> None:
-    """One row a parameter: before, estimate, 95 % interval; shares in percent of the value before."""
+    """Draw one row for each parameter: before, estimate, 95 % interval; shares in percent of the value before."""
     groups = list(dict.fromkeys(interval.unit for interval in intervals))
     counts = [sum(interval.unit == unit for interval in intervals) for unit in groups]
     with picture(path, title, note, (12.0, 1.6 + 0.8 * len(groups) + 0.4 * sum(counts))) as figure:

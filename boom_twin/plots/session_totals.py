@@ -13,13 +13,13 @@ from ..types import Array
 from .history import Density, History, ResidualDistribution, SessionTotals
 
 EDGES = np.linspace(-5.0, 5.0, 51)
-"""Of the bins of normalised residuals; what lies outside counts in the outermost ones."""
+"""Edges of the bins of normalised residuals. Residuals outside count in the outermost bins."""
 SEGMENT = 8.0
 """s; lines of a spectrum are 1/SEGMENT apart."""
 
 
 class SessionTotalsBuilder:
-    """Adds up parts of a session."""
+    """Computation of session totals from parts of a session."""
 
     def __init__(self) -> None:
         self._channels: dict[str, _Channel] = {}
@@ -27,7 +27,7 @@ class SessionTotalsBuilder:
         self._predicted: list[Density] = []
 
     def add(self, history: History) -> None:
-        """Take a part in, with all its rows."""
+        """Add a part, with all its rows."""
         for i, name in enumerate(history.residual_names):
             self._channels.setdefault(name, _Channel()).add(history.residual_values[:, i], history.residual_sigmas[:, i])
         imu = history.imu
@@ -41,13 +41,13 @@ class SessionTotalsBuilder:
 
     @property
     def totals(self) -> SessionTotals:
-        """Of all parts so far."""
+        """Totals of all parts so far."""
         residuals = {name: channel.distribution for name, channel in self._channels.items()}
         return SessionTotals(residuals, tuple(self._predicted), tuple(self._measured) or None)
 
 
 class _Channel:
-    """The residuals of one channel."""
+    """Distribution of the residuals of one channel."""
 
     def __init__(self) -> None:
         self._statistics, self._reach = ColumnStatistics(1), 0.0
@@ -70,7 +70,7 @@ class _Channel:
 
 
 def totals_of(history: History) -> SessionTotals:
-    """The totals of a session: its own, or those of its rows if they are all there."""
+    """Return the totals of a session: its own, or those of its rows if they are all there."""
     if history.totals is not None:
         return history.totals
     builder = SessionTotalsBuilder()
@@ -82,7 +82,7 @@ _UNKNOWN = Density(np.array([1.0]), np.array([np.nan]), 0.0, 0)
 
 
 def _averaged(earlier: list[Density], stamps: Array, values: Array) -> list[Density]:
-    """Densities of both columns of `values`, averaged with those of earlier parts as by Welch over all segments."""
+    """Return densities of both columns of `values`, averaged with those of earlier parts as by Welch over all segments."""
     found = earlier or [_UNKNOWN, _UNKNOWN]
     for part in unbroken(stamps):
         found = [_mean(each, density(stamps[part], values[part, i], each.interval)) for i, each in enumerate(found)]
@@ -90,7 +90,7 @@ def _averaged(earlier: list[Density], stamps: Array, values: Array) -> list[Dens
 
 
 def _mean(one: Density, other: Density) -> Density:
-    """Of two densities, weighted by their segments; of different lines, the finer one's."""
+    """Return the mean of two densities, weighted by their segments; if their lines differ, the one with more lines."""
     if len(one.frequencies) != len(other.frequencies):
         return max(one, other, key=lambda each: len(each.frequencies))
     if not (count := one.segments + other.segments):
@@ -99,7 +99,7 @@ def _mean(one: Density, other: Density) -> Density:
 
 
 def density(stamps: Array, values: Array, interval: float = 0.0) -> Density:
-    """One-sided power spectral density of `values` (k,), put on even times first; what is NaN is bridged.
+    """Return the one-sided power spectral density of `values` (k,), interpolated to even times, also across NaN.
 
     Parameters
     ----------

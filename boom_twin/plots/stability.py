@@ -30,7 +30,7 @@ NAMES, METHODS, ASIDE = 4.6, 0.85, 0.8  # widths, inches
 
 @dataclass(frozen=True)
 class MatrixRow:
-    """A row of the matrix: `marks` (keys of MARKS), one a method."""
+    """Row of the matrix: `marks` (keys of MARKS), one a method."""
 
     group: str
     name: str
@@ -135,7 +135,7 @@ LOOKS = {"ideal": (GREY, 2.4), "contact": (ORANGE, 1.3), "spring-damper": (BLUE,
 
 @dataclass(frozen=True)
 class Trace:
-    """The tip in one posture with one kind of pins (a key of `LOOKS`): s, vertical displacement m, acceleration m/s^2."""
+    """Tip in one posture with one kind of pins (a key of `LOOKS`): s, vertical displacement m, acceleration m/s^2."""
 
     posture: str
     model: str

@@ -126,7 +126,7 @@ def _frame(axes: Axes, panel: Panel) -> None:
 
 
 def _notes(axes: Axes, curve: Curve, colour: str, offset: tuple[float, float]) -> None:
-    """Small print beside those points of a curve that have any."""
+    """Draw small print beside those points of a curve that have any."""
     paper = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.6}
     for note, x, y in zip(curve.notes, _ms(curve.seconds), curve.errors, strict=False):
         if note:
@@ -134,7 +134,7 @@ def _notes(axes: Axes, curve: Curve, colour: str, offset: tuple[float, float]) -
 
 
 def _marks(axes: Axes, panel: Panel) -> None:
-    """Front, default, floor."""
+    """Draw front, default and floor."""
     if panel.front:
         x, y = np.array(panel.front).T
         axes.plot(1e3 * x, y, color=INK, linewidth=1.0, linestyle=(0, (2, 2)), markeredgecolor=INK, zorder=4, **RING)

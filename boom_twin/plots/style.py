@@ -62,7 +62,7 @@ SMALL: dict[str, Any] = {"fontsize": 13, "color": GREY, "va": "top", "ha": "righ
 
 @contextmanager
 def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = (16.0, 9.0)) -> Iterator[Figure]:
-    """A figure of `size` (hundreds of pixels), titled, written to `path` as PNG when the block is left.
+    """Provide a titled figure of `size` (hundreds of pixels), written to `path` as PNG when the block is left.
 
     The same arrays give the same bytes: the file holds no time and no version. UsageError if the name is of another kind.
     """
@@ -87,13 +87,13 @@ def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = 
 
 
 def shade_gaps(axes: Axes, gaps: list[tuple[float, float]]) -> None:
-    """Grey bands where strokes were missing; the first one is labelled for a legend."""
+    """Draw grey bands where strokes were missing; the first one is labelled for a legend."""
     for number, (start, stop) in enumerate(gaps):
         axes.axvspan(start, stop, color=PALE, linewidth=0, zorder=0.5, label="" if number else "strokes missing")
 
 
 def shade_alarms(axes: Axes, alarms: list[AlarmSpan]) -> None:
-    """Coloured bands where alarms lasted, each with its cause."""
+    """Draw coloured bands where alarms lasted, each with its cause."""
     for alarm in alarms:
         axes.axvspan(alarm.start, alarm.stop, color=ORANGE, alpha=0.13, linewidth=0, zorder=0.4)
         place = (max(alarm.start, axes.get_xlim()[0]), 0.97)
@@ -104,24 +104,24 @@ def shade_alarms(axes: Axes, alarms: list[AlarmSpan]) -> None:
 
 
 def broken(stamps: Array, values: Array, gaps: list[tuple[float, float]]) -> tuple[Array, Array]:
-    """`stamps` (m,) and `values` (m, c) with a NaN in the middle of every gap, so that no line is drawn across it."""
+    """Return `stamps` (m,) and `values` (m, c) with a NaN in the middle of every gap, so that no line is drawn across it."""
     middles = np.array([0.5 * (start + stop) for start, stop in gaps])
     places = np.searchsorted(stamps, middles)
     return np.insert(stamps, places, middles), np.insert(values, places, np.nan, axis=0)
 
 
 def extent(times: Array) -> tuple[float, float]:
-    """From the first of `times` (k,) to the last, at least a millisecond: the limits of an axis."""
+    """Return the first and last of `times` (k,), at least a millisecond apart, as the limits of an axis."""
     return float(times[0]), float(max(times[-1], times[0] + 1e-3))
 
 
 def legend_above(axes: Axes, columns: int = 1, top: float = 1.0, **look: Any) -> None:
-    """Legend above the right end of an axes; `top` as a share of its height."""
+    """Draw a legend above the right end of an axes; `top` as a share of its height."""
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, top), ncols=columns, borderaxespad=0.1, **look)
 
 
 def limits(*arrays: Array, around: float | None = None) -> tuple[float, float]:
-    """Limits of an axis that show all finite values with a margin; symmetric about `around` if that is given."""
+    """Return limits of an axis that show all finite values with a margin; symmetric about `around` if that is given."""
     values = np.concatenate([np.ravel(array) for array in arrays])
     values = values[np.isfinite(values)]
     if values.size == 0:

@@ -48,7 +48,7 @@ def tip_picture(path: Path, session: str, history: History, truth: Truth | None,
 
 
 def most_active_window(stamps: Array, acceleration: Array) -> tuple[float, float]:
-    """Window of `WINDOW` s about the largest acceleration (m, 2), inside the session; all of it if that is shorter."""
+    """Return the window of `WINDOW` s about the largest acceleration (m, 2), inside the session; all of a shorter session."""
     size = np.hypot(acceleration[:, 0], acceleration[:, 1])
     if not np.isfinite(size).any():
         return 0.0, WINDOW
@@ -59,13 +59,13 @@ def most_active_window(stamps: Array, acceleration: Array) -> tuple[float, float
 
 
 def rms_difference(history: History, values: Array, stamps: Array, other: Array) -> float:
-    """Root mean square of the distance between `values` (m, 2) and `other` (t, 2), taken at the history's stamps."""
+    """Return the root mean square distance between `values` (m, 2) and `other` (t, 2), taken at the history's stamps."""
     gap = values - _at(history.stamps_s, stamps, other)
     return float(np.sqrt(np.nanmean(np.sum(gap**2, axis=1)))) if np.isfinite(gap).any() else float("nan")
 
 
 def _at(stamps: Array, at: Array, values: Array) -> Array:
-    """`values` (t, 2) known at `at`, linearly at `stamps`; NaN outside."""
+    """Return `values` (t, 2) known at `at`, linearly interpolated at `stamps`; NaN outside."""
     return np.stack([np.interp(stamps, at, column, left=np.nan, right=np.nan) for column in values.T], axis=1)
 
 
@@ -114,7 +114,7 @@ def _load(axes: Axes, history: History, estimate: EstimateTrace) -> None:
 
 
 def _errors(history: History, shown: tuple[Array, Array | None], truth: tuple[Array, Array], unit: tuple[float, str]) -> str:
-    """Errors of prediction and estimate (m, 2) against the truth, its stamps and values (t, 2), for a title."""
+    """Return errors of prediction and estimate (m, 2) against the truth, its stamps and values (t, 2), for a title."""
     factor, name = unit
     errors = [None if values is None else factor * rms_difference(history, values, *truth) for values in shown]
     told = [f"{kind} {error:.2g}" for kind, error in zip(("prediction", "estimate"), errors, strict=True) if error is not None]
@@ -122,7 +122,7 @@ def _errors(history: History, shown: tuple[Array, Array | None], truth: tuple[Ar
 
 
 def _estimate_lines(axes: Axes, history: History, values: Array, sigmas: Array) -> list[Array]:
-    """Draw an estimate (m, 2) with its band; returns what is to be seen: the lines, and where the band usually ends."""
+    """Draw an estimate (m, 2) with its band; return the extent to show: the lines, and where the band usually ends."""
     stamps, drawn = broken(history.stamps_s, values, history.gaps)
     _, deviations = broken(history.stamps_s, sigmas, history.gaps)
     for i, (name, colour) in enumerate(zip("xy", ESTIMATED, strict=True)):

@@ -20,7 +20,7 @@ from .quantities import Quantity, read
 
 @dataclass(frozen=True)
 class ComparedSession:
-    """What is known of one session.
+    """Figures and alarms of one session, for a comparison.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class ComparedSession:
 
 
 def side_of(path: Path, replayed: Callable[[Path], Path], window: TimeWindow = WHOLE) -> ComparedSession:
-    """One side from a replay folder, or from a session, of which `replayed` makes a replay folder of the `window`.
+    """Return one side from a replay folder, or from a session that `replayed` makes one of, for the `window`.
 
     Raises
     ------
@@ -100,7 +100,7 @@ class ComparisonRow:
 
 
 def rows_of(one: ComparedSession, other: ComparedSession) -> list[ComparisonRow]:
-    """All figures that either has, in the order of the first."""
+    """Return all figures that either session has, in the order of the first."""
     left, right = ({each.name: each for each in side.quantities} for side in (one, other))
     return [_row(name, left.get(name), right.get(name)) for name in dict.fromkeys([*left, *right])]
 
@@ -118,7 +118,7 @@ def _row(name: str, a: Quantity | None, b: Quantity | None) -> ComparisonRow:
 
 
 def flat(one: ComparedSession, other: ComparedSession, rows: list[ComparisonRow]) -> dict[str, Any]:
-    """As one flat object: every column of the table as a list, and the alarms in words."""
+    """Return a comparison as one flat object: every column of the table as a list, and the alarms in words."""
     columns = ("name", "unit", "a", "b", "difference", "sigma", "is_significant")
     return {
         "session_a": one.name,
@@ -133,7 +133,7 @@ def flat(one: ComparedSession, other: ComparedSession, rows: list[ComparisonRow]
 
 
 def as_text(one: ComparedSession, other: ComparedSession, rows: list[ComparisonRow]) -> list[str]:
-    """A table, then the alarms."""
+    """Return the lines of a table, then of the alarms."""
     lines = [f"{'':32s} {'A':>12s} {'B':>12s} {'B - A':>12s} {'+-':>10s}"]
     for row in rows:
         numbers = "".join(f" {_number(value):>12s}" for value in (row.a, row.b, row.difference))

@@ -19,7 +19,7 @@ from .vibration import HoldFinder, HoldInterval
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What a replay showed.
+    """Result of the evaluation of a replay.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Evaluation:
 
 
 class Evaluator:
-    """Evaluates the stretches of a replay; its `add` is what `boom_twin.offline.replay.replay_into` is to give them to.
+    """Evaluation of a replay block by block. Its `add` is the function to give to `boom_twin.offline.replay.replay_into`.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class Evaluator:
         self._fatigue = None if category is None else FatigueCounter(scene, category, heights)
 
     def add(self, stretch: Stretch) -> None:
-        """Take the next stretch in."""
+        """Add the next block of the replay."""
         own = self._history.add(stretch)
         self._quantities.add(own, stretch.estimates.load, stretch.estimates.load_variance)
         if self._fatigue is not None:
@@ -78,7 +78,7 @@ class Evaluator:
         self._holds.add(own, stretch.estimates.load)
 
     def finish(self, result: Replay, folder: Path) -> Evaluation:
-        """What came out of the replay, whose figures are written into `folder`; to be called once."""
+        """Return the evaluation of the replay and write its figures into `folder`; to be called once."""
         still = self._holds.finish()
         found = self._quantities.quantities(result.recording.totals.tip_sigma, still, self._settings)
         file = write(folder, self._scene, found)

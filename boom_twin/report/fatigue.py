@@ -36,7 +36,10 @@ BIN = 1e4  # Pa, in which ranges are added up
 
 @dataclass(frozen=True)
 class Fatigue:
-    """Of one station in one session: cycles above `SMALL`, their largest range (Pa), damage; 1 is the end of its life."""
+    """Fatigue of one station in one session: cycles above `SMALL`, their largest range (Pa), damage.
+
+    A damage of 1 is the end of the station's life.
+    """
 
     station: Station
     cycles: float
@@ -45,7 +48,10 @@ class Fatigue:
 
 
 def endured(ranges: Array, category: float) -> Array:
-    """Cycles N that a detail of `category` (MPa) endures at stress `ranges` (Pa), shape (k,); infinite below the cut-off."""
+    """Return the cycles N that a detail of `category` (MPa) endures at stress `ranges` (Pa), shape (k,).
+
+    N is infinite below the cut-off.
+    """
     knee = 1e6 * category * (GIVEN / KNEE) ** (1.0 / 3.0)
     limit = knee * (KNEE / CUT_OFF) ** 0.2
     with np.errstate(divide="ignore", over="ignore"):
@@ -54,20 +60,20 @@ def endured(ranges: Array, category: float) -> Array:
 
 
 def damage_of(cycles: Iterable[tuple[float, float]], category: float) -> float:
-    """Damage of cycles: range (Pa) and count of each."""
+    """Return the damage of cycles, given range (Pa) and count of each."""
     table = np.array([*cycles], float).reshape(-1, 2)
     return float(np.sum(table[:, 1] / endured(table[:, 0], category)))
 
 
 class RainflowCounter:
-    """Counts the cycles of a stress that comes in parts; needs the package `rainflow`."""
+    """Rainflow counter of a stress that comes in parts. It needs the package `rainflow`."""
 
     def __init__(self) -> None:
         self._rainflow, self._open = _package(), np.zeros(0)
         self._closed: Counter[int] = Counter()  # by range in `BIN`
 
     def add(self, stress: Array) -> None:
-        """Take the next values, shape (k,), Pa."""
+        """Add the next values, shape (k,), Pa."""
         if not len(stress):
             return
         series = np.concatenate([self._open, stress])
@@ -80,7 +86,10 @@ class RainflowCounter:
         self._open = series[sorted(left)]
 
     def cycles(self) -> list[tuple[float, float]]:
-        """Range (Pa) and count of all so far above `SMALL`: closed cycles, and halves of those that have not closed."""
+        """Return range (Pa) and count of all cycles so far above `SMALL`.
+
+        A cycle that has not closed counts as a half.
+        """
         found = Counter({size: float(count) for size, count in self._closed.items()})
         series = self._open if len(self._open) != 2 else np.insert(self._open, 1, self._open.mean())  # of two it counts none
         for size, _, count, _, _ in self._rainflow.extract_cycles(series):
@@ -89,7 +98,7 @@ class RainflowCounter:
 
 
 class FatigueCounter:
-    """Adds up the stretches of a session.
+    """Fatigue of all stations, added up over the blocks of a session.
 
     Parameters
     ----------
@@ -108,12 +117,12 @@ class FatigueCounter:
         self._counters = [RainflowCounter() for _ in self._stations]
 
     def add(self, history: History) -> None:
-        """Take the next stretch in, with all its rows."""
+        """Add the next block, with all its rows."""
         for counter, stress in zip(self._counters, (history.moments / self._moduli).T, strict=True):
             counter.add(stress)
 
     def found(self) -> list[Fatigue]:
-        """One for every station, base to tip."""
+        """Return the fatigue of every station, base to tip."""
         rows = []
         for station, counter in zip(self._stations, self._counters, strict=True):
             cycles = counter.cycles()

@@ -24,31 +24,31 @@ td.n { text-align: right } img { width: 100%; height: auto; margin: .5em 0 }
 
 
 def page(title: str, parts: Iterable[str]) -> str:
-    """The whole document."""
+    """Return the whole document."""
     head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{escape(title)}</title>'
     body = "\n".join(parts)
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}<style>{STYLE}</style></head>\n<body>\n{body}\n</body></html>\n'
 
 
 def heading(text: str, level: int = 2) -> str:
-    """A headline."""
+    """Return a headline."""
     return f"<h{level}>{escape(text)}</h{level}>"
 
 
 def paragraph(text: str, kind: str = "") -> str:
-    """Text, of a kind that `STYLE` knows."""
+    """Return a paragraph of a kind that `STYLE` knows."""
     return f'<p class="{kind}">{escape(text)}</p>' if kind else f"<p>{escape(text)}</p>"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table, without a head if that is empty; numbers with 4 significant digits, right-aligned; None and NaN as a dash."""
+    """Return a table with 4 significant digits, numbers right-aligned, None and NaN as a dash; an empty head is left out."""
     titles = f"<thead><tr>{''.join(f'<th>{escape(title)}</th>' for title in head)}</tr></thead>" if head else ""
     lines = "".join("<tr>" + "".join(map(_cell, row)) + "</tr>" for row in rows)
     return f"<table>{titles}<tbody>{lines}</tbody></table>"
 
 
 def image(path: Path, told: str) -> str:
-    """A PNG file, within the page; `told` stands for it where it cannot be seen."""
+    """Return a PNG file as an image within the page; `told` is its alternative text."""
     data = b64encode(path.read_bytes()).decode()
     return f'<img alt="{escape(told)}" src="data:image/png;base64,{data}">'
 

@@ -35,7 +35,7 @@ ASSUMED = f"Heights are not in the scene: assumed are {BOX:g} radii of gyration,
 
 @dataclass(frozen=True)
 class Subject:
-    """What a report is about.
+    """Replay, evaluation and scene that a report is about.
 
     Attributes
     ----------
@@ -57,17 +57,17 @@ class Subject:
 
     @property
     def history(self) -> History:
-        """Of the replay."""
+        """History of the replay."""
         return self.evaluation.history
 
     @property
     def name(self) -> str:
-        """Of the session."""
+        """Name of the session."""
         return self.result.session.path.resolve().name
 
     @property
     def origin(self) -> str:
-        """Where the session comes from; empty if it does not say."""
+        """Origin of the session; empty if it states none."""
         return self.result.session.notes.get("origin", "")
 
 
@@ -167,7 +167,7 @@ def _alarms(subject: Subject, folder: Path) -> list[str]:
 
 
 def _alarm(alarm: Alarm, first: int) -> str:
-    """Words, times, and the causes with their estimates."""
+    """Return an alarm as HTML: words, times, and the causes with their estimates."""
     start = max(0.0, (alarm.since - first) * NANO)
     end = "lasts to the end" if alarm.until is None else f"to {(alarm.until - first) * NANO:.2f} s"
     rows = [
@@ -221,7 +221,7 @@ def _vibration(subject: Subject, folder: Path) -> list[str]:
 
 
 def _measured(each: Vibration, model: float) -> tuple[str, str, str]:
-    """Frequency, how far it is from the model's, and damping, with their standard deviations."""
+    """Return frequency, its deviation from the model's, and damping, with their standard deviations."""
     apart, sigma = 100.0 * (each.frequency / model - 1.0), 100.0 * each.frequency_sigma / model
     return (
         f"{each.frequency:.4f} ± {each.frequency_sigma:.1g}",

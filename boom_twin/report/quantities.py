@@ -37,7 +37,7 @@ FREQUENCY_ERROR = 0.01  # share by which natural frequencies of the model may be
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One figure: its standard deviation is None where it is not known; units are SI."""
+    """Figure of a session in SI units. Its standard deviation is None if it is not known."""
 
     name: str
     value: float
@@ -46,7 +46,7 @@ class Quantity:
 
 
 class QuantityBuilder:
-    """Adds up the stretches of a session.
+    """Computation of a session's quantities, block by block.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class QuantityBuilder:
         self._loads = SectionLoads(scene)
 
     def add(self, history: History, load: Array, variance: Array) -> None:
-        """Take the next stretch in, with all its rows; `load`, `variance` as for `SectionLoads.add`."""
+        """Add the next block, with all its rows; `load`, `variance` as for `SectionLoads.add`."""
         for name, column in zip(history.residual_names, history.residual_values.T, strict=True):
             values = column[np.isfinite(column)]
             means, squares = self._channels.setdefault(name, (BatchMeans(), BatchMeans()))
@@ -74,11 +74,11 @@ class QuantityBuilder:
         self._loads.add(history, load, variance)
 
     def loads(self, heights: Array | None) -> list[Load]:
-        """As `SectionLoads.loads`."""
+        """Return the loads, see `SectionLoads.loads`."""
         return self._loads.loads(heights)
 
     def quantities(self, tip_sigma: float | None, still: list[HoldInterval], settings: Settings) -> list[Quantity]:
-        """All figures of the session; `tip_sigma` is the largest deviation of the predicted tip, m, if it is known."""
+        """Return all figures of the session; `tip_sigma` is the largest deviation of the predicted tip, m, if it is known."""
         return [
             *self._residuals(),
             *_frequencies(still),
@@ -115,7 +115,7 @@ class QuantityBuilder:
 
 
 class BatchMeans:
-    """Mean of values that come in parts, and how sure it is by the method of batch means.
+    """Mean of values that come in parts, and its standard deviation by the method of batch means.
 
     Attributes
     ----------
@@ -128,13 +128,13 @@ class BatchMeans:
         self._sums: list[tuple[float, int]] = []  # of each of `BATCHES` pieces of each part: sum and number of values
 
     def add(self, values: Array) -> None:
-        """Take values in, shape (k,)."""
+        """Add values, shape (k,)."""
         self.count += len(values)
         self._sums += [(float(piece.sum()), len(piece)) for piece in np.array_split(values, BATCHES)]
 
     @property
     def mean(self) -> tuple[float, float]:
-        """The mean, and its standard deviation from those of `BATCHES` batches; at least so many values."""
+        """Mean, and its standard deviation from `BATCHES` batches. It needs at least so many values."""
         parts = [part.sum(axis=0) for part in np.array_split(np.array(self._sums), BATCHES)]
         means = np.array([total / count for total, count in parts if count])
         total = sum(total for total, _ in self._sums)
@@ -152,7 +152,10 @@ def _frequencies(still: list[HoldInterval]) -> Iterator[Quantity]:
 
 
 def _weighted(name: str, rows: Array, error: float) -> Quantity:
-    """Weighted mean of values and deviations (k, 2), as unsure as these say or the values scatter, and by `error` besides."""
+    """Return the weighted mean of values and deviations (k, 2).
+
+    Its standard deviation follows from the weights or from the scatter, whichever is larger, and includes `error`.
+    """
     weights = rows[:, 1] ** -2.0
     mean = float(weights @ rows[:, 0] / weights.sum())
     scatter = float(weights @ (rows[:, 0] - mean) ** 2 / max(len(rows) - 1, 1))
@@ -160,7 +163,7 @@ def _weighted(name: str, rows: Array, error: float) -> Quantity:
 
 
 class PathLength:
-    """How far a stroke has gone back and forth, and in how many legs; what does not come back by `LEG` is noise."""
+    """Travel of a stroke back and forth, and its number of legs. A reversal smaller than `LEG` is noise."""
 
     def __init__(self) -> None:
         self._begin: float | None = None
@@ -168,7 +171,7 @@ class PathLength:
         self._travel, self._legs = 0.0, 0
 
     def add(self, stroke: Array) -> None:
-        """Go on with the next values, shape (k,), m; at least one."""
+        """Add the next values, shape (k,), m; at least one."""
         begin = float(stroke[0]) if self._begin is None else self._begin
         extreme, way = begin if self._begin is None else self._extreme, self._way
         for value in stroke.tolist():
@@ -190,7 +193,7 @@ class PathLength:
 
 
 def write(folder: Path, scene: Scene, found: list[Quantity]) -> Path:
-    """Keep them beside ``summary.json``; returns the file."""
+    """Write the quantities beside ``summary.json``; return the file."""
     path = folder / FILE_NAME
     rows = ",\n".join(f"  {json.dumps(asdict(each))}" for each in found)
     write_atomic(path, f'{{\n "scene_sha256": "{digest(scene)}",\n "quantities": [\n{rows}\n ]\n}}\n')
@@ -198,7 +201,7 @@ def write(folder: Path, scene: Scene, found: list[Quantity]) -> Path:
 
 
 def read(folder: Path) -> tuple[str, list[Quantity]]:
-    """Digest of the scene, and the figures, of a replay folder; BagError if they are not there."""
+    """Return digest of the scene, and the figures, of a replay folder; raise BagError if they are not there."""
     path = folder / FILE_NAME
     try:
         with open_received(path) as file:
@@ -209,13 +212,13 @@ def read(folder: Path) -> tuple[str, list[Quantity]]:
 
 
 def digest(scene: Scene) -> str:
-    """Of everything that a scene names."""
+    """Return the SHA-256 of everything that a scene names, in hexadecimal."""
     return sha256(scene.model_dump_json(exclude_none=True).encode()).hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """The most loaded station of a section.
+    """Most loaded station of a section.
 
     Attributes
     ----------
@@ -242,19 +245,19 @@ class Load:
 
     @property
     def stress(self) -> float:
-        """Of the outermost fibre by bending, Pa."""
+        """Bending stress of the outermost fibre, Pa."""
         return abs(self.moment) / self.modulus
 
 
 class SectionLoads:
-    """Looks for the largest bending moment of every flexible section in stretches of a session."""
+    """Largest bending moment of every flexible section over the blocks of a session."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._places = scene, stations(scene)
         self._largest: dict[int, _Largest] = {}  # by section
 
     def add(self, history: History, load: Array, variance: Array) -> None:
-        """Take the next stretch in, with all its rows; estimated load at the tip (N) and its variance (N^2), each (m, 2)."""
+        """Add the next block, with all its rows; estimated load at the tip (N) and its variance (N^2), each (m, 2)."""
         for section in sorted({station.section for station in self._places}):
             columns = [i for i, station in enumerate(self._places) if station.section == section]
             size = np.abs(history.moments[:, columns])
@@ -267,7 +270,10 @@ class SectionLoads:
                 self._largest[section] = _Largest(column, moment, when, static, *about)
 
     def loads(self, heights: Array | None) -> list[Load]:
-        """One for every flexible section; `heights` (n,) of the sections, m, or None for the scene's or thin-walled boxes'."""
+        """Return the load of every flexible section.
+
+        `heights` (n,) of the sections, m; None for the scene's, or those of thin-walled boxes.
+        """
         if not self._largest:
             return []
         model, found = BendingStressModel(self._scene, heights), []
@@ -282,7 +288,7 @@ class SectionLoads:
 
 
 class _Largest(NamedTuple):
-    """Largest moment of a section so far: column, N m, when (s), its static part; and what there was then.
+    """Largest moment of a section so far: column, N m, when (s), its static part; and the state at that time.
 
     Strokes (m), joint angles (rad), estimated load at the tip (N) and its variance (N^2).
     """
@@ -298,7 +304,7 @@ class _Largest(NamedTuple):
 
 
 def section_heights(text: str | None, scene: Scene) -> Array | None:
-    """Heights (m) of all sections from ``h1,h2,..``; UsageError unless there is one above 0 for each."""
+    """Return the heights (m) of all sections from ``h1,h2,..``; raise UsageError unless there is one above 0 for each."""
     if text is None:
         return None
     count = len(scene.sections)

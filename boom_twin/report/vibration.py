@@ -19,14 +19,14 @@ RATE = 40.0  # Hz, to which samples are thinned out
 
 
 def vibrations(times: Array, values: Array) -> list[Vibration]:
-    """Modes by frequency in `values` (k, c) at `times` (k,) in s; none of less than a second or two."""
+    """Return the modes by frequency in `values` (k, c) at `times` (k,) in s; none of less than a second or two."""
     return free_vibrations(*_thinned(times, values))
 
 
 def _thinned(times: Array, values: Array) -> tuple[float, Array]:
-    """Step (s) and values (n, c) at even times, each the mean of those in a step; nothing where there is too little.
+    """Return step (s) and values (n, c) at even times, each the mean of those in a step; no rows if there are too few.
 
-    Means of a decaying vibration are one, with the same frequency and damping; a filter would spoil the ends.
+    Means of a decaying vibration decay with the same frequency and damping. A filter would spoil the ends.
     """
     columns = [column for column in values.T if 2 * np.isfinite(column).sum() > len(column)]
     if len(times) < 2 or not columns:
@@ -60,9 +60,9 @@ POINTS = 60
 
 @dataclass(frozen=True, slots=True)
 class HoldInterval:
-    """A stretch (s since the first sample) of standing still; the model's frequencies (Hz), and by mode what was measured.
+    """Rest period (s since the first sample): the model's frequencies (Hz), and by mode what was measured.
 
-    Nothing is where a load shook the boom: a pump's lines are no natural frequencies.
+    `measured` is empty if a load excited the boom, because the lines of a pump are no natural frequencies.
     """
 
     start: float
@@ -73,7 +73,7 @@ class HoldInterval:
 
 
 class HoldFinder:
-    """Finds all intervals of a session in which the boom stood still for `LEAST`; of a long one, `LONGEST` is looked at.
+    """Search for the rest periods of a session that last `LEAST`; of a long one, `LONGEST` is evaluated.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class HoldFinder:
         self._told_to = -inf  # s; end of an interval of `LONGEST`, which may go on
 
     def add(self, history: History, load: Array) -> None:
-        """Take the next rows in, all of them; an interval that lasts to their end waits for those that follow.
+        """Add the next rows, all of them; a rest period that lasts to their end waits for those that follow.
 
         `load`, shape (rows, 2), is the estimated load at the tip (N), NaN without sensors that tell it.
         """
@@ -100,12 +100,12 @@ class HoldFinder:
         )
 
     def finish(self) -> list[HoldInterval]:
-        """All of them; to be called once, after the last `add`."""
+        """Return all rest periods; to be called once, after the last `add`."""
         self._look(is_last=True)
         return self._found
 
     def _look(self, is_last: bool) -> float:
-        """Take what has ended; returns from where on (s) rows are still needed."""
+        """Evaluate the rest periods that have ended; return from where on (s) rows are still needed."""
         times, strokes = self._strokes
         if not len(times):
             return 0.0
@@ -137,20 +137,20 @@ _NOTHING = np.zeros(0), np.zeros((0, 0))
 
 
 def _appended(held: tuple[Array, Array], more: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Times and values with more behind them; of other channels than before, only those."""
+    """Return times and values with `more` appended; only `more` if its channels are others."""
     if held[1].shape[1] != more[1].shape[1]:
         return more
     return np.concatenate([held[0], more[0]]), np.concatenate([held[1], more[1]])
 
 
 def _from(rows: tuple[Array, Array], start: float) -> tuple[Array, Array]:
-    """Times and values from `start` (s) on."""
+    """Return times and values from `start` (s) on."""
     kept = rows[0] >= start
     return rows[0][kept], rows[1][kept]
 
 
 def course(history: History, scene: Scene) -> tuple[Array, Array]:
-    """Times (k,) in s and natural frequencies (k, modes) of the model in the postures then; NaN without an equilibrium."""
+    """Return times (k,) in s and the model's natural frequencies (k, modes) at these times; NaN without an equilibrium."""
     modes, count = ModeList(scene), len(history.stamps_s)
     places = np.unique(np.linspace(0, count - 1, min(count, POINTS)).astype(int))
     rows = [modes.at(history.strokes[place].tolist()) for place in places]
@@ -161,7 +161,7 @@ def course(history: History, scene: Scene) -> tuple[Array, Array]:
 
 
 def still(times: Array, strokes: Array, least: float = LEAST) -> list[tuple[float, float]]:
-    """From and to (s) where no stroke (k, n) moved faster than `PACE`, for `least` seconds at least."""
+    """Return begin and end (s) of intervals of at least `least` seconds in which no stroke (k, n) moved faster than `PACE`."""
     if len(times) < 2:
         return []
     before, after = (np.clip(np.searchsorted(times, times + half), 0, len(times) - 1) for half in (-OVER / 2, OVER / 2))
@@ -173,7 +173,7 @@ def still(times: Array, strokes: Array, least: float = LEAST) -> list[tuple[floa
 
 
 def measured_motion(history: History) -> tuple[Array, Array]:
-    """Times (k,) and values (k, c): the IMU's specific force (m/s^2), or without one the angles (rad)."""
+    """Return times (k,) and values (k, c): the IMU's specific force (m/s^2), or without one the angles (rad)."""
     if history.imu is not None:
         return history.imu.stamps_s, history.imu.measured
     places = [i for i, name in enumerate(history.residual_names) if stream_of(name) is Stream.ANGLES]
@@ -188,7 +188,7 @@ def _between(times: Array, start: float, stop: float) -> np.ndarray:
 
 
 def _by_mode(found: list[Vibration], model: list[float]) -> dict[int, Vibration]:
-    """The surest vibration near every mode."""
+    """Return the surest vibration near every mode."""
     near: dict[int, Vibration] = {}
     for each in found if model else ():
         mode = int(np.argmin(np.abs(np.array(model) - each.frequency)))

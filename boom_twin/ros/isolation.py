@@ -41,7 +41,7 @@ _REMOVED = ("ROS_DISCOVERY_SERVER", "ROS_STATIC_PEERS")
 
 @dataclass(frozen=True, slots=True)
 class Isolation:
-    """A claimed domain.
+    """Claimed ROS domain.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Isolation:
 
 
 def add_domain(parser: ArgumentParser) -> None:
-    """The option ``--domain`` of what runs isolated."""
+    """Declare the option ``--domain`` of programs that run isolated."""
     text = "ROS domain, 0 to 232, where your own ROS 2 tools can listen (default: any that is free, closed to them)"
     parser.add_argument("--domain", type=int, choices=range(LARGEST + 1), metavar="N", help=text)
 
@@ -120,7 +120,7 @@ def refuse_foreign(topics: Topics) -> None:
 
 
 def _foreign(node: Any, topics: Topics) -> list[str]:
-    """Who publishes one of the topics, or listens to an input, in words."""
+    """Return in words who publishes one of the topics, or listens to an input."""
     from .node.diagnostics import node_name
 
     inputs, outputs = topics.inputs.values(), [*topics.outputs.values(), topics.events]
@@ -130,7 +130,7 @@ def _foreign(node: Any, topics: Topics) -> list[str]:
 
 
 def _preferred() -> list[int]:
-    """Domains above the usual ones; first those whose ports the system does not hand out; else in any order."""
+    """Return the domains above the usual ones, in random order, first those whose ports the system does not hand out."""
     try:
         low, high = map(int, HANDED_OUT.read_text(encoding="ascii").split())
     except (OSError, ValueError):
@@ -144,9 +144,11 @@ def _preferred() -> list[int]:
 
 
 def _claim(domains: list[int]) -> tuple[int, socket.socket]:
-    """The first that nobody has claimed, and what holds it: an unused port of the domain, freed by the system at the end.
+    """Claim the first free domain; return it and the socket that holds it.
 
-    A port, and no file: it is seen by all users, and in all containers that share the network, as DDS itself is.
+    The socket is bound to a port that DDS does not use in that domain. The system frees it at the end.
+
+    A port is used instead of a file because all users see it, and all containers that share the network, as DDS itself.
     """
     for domain in domains:
         lock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

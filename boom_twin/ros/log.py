@@ -8,7 +8,7 @@ from ..system.terminal_text import printable
 
 
 class Log:
-    """Writes lines to the log of `node`.
+    """Log of `node`, with all texts escaped.
 
     Names and texts in them come from files, messages and other nodes: all is escaped here, so that they neither steer a
     terminal nor make lines of their own.

@@ -31,13 +31,13 @@ MOST = 400
 RARE = (Output.HEALTH, Output.TIP_UNCERTAINTY, Output.DIAGNOSTICS)
 """Outputs of which none may be missed."""
 MOST_BYTES = 4_000_000
-"""Of one topic taken in one look: no more are taken once there are so many."""
+"""Bytes of one topic after which no more of its messages are taken in one look."""
 
 
 class TopicFeed(Feed):
-    """Listens to the twin; needs an initialised rclpy.
+    """Feed from the topics of a live twin. It needs an initialised rclpy.
 
-    Its messages are taken when it is looked at, not by an executor: that would wake up for each of a thousand in a second.
+    Messages are taken by `poll`, not by an executor, which would wake up for each of a thousand in a second.
     Rows are heard as best effort, so the node never keeps or repeats one for it; states and events are heard reliably.
 
     Parameters
@@ -65,7 +65,7 @@ class TopicFeed(Feed):
         self._asked = self._node.create_client(Trigger, f"{NODE}/acknowledge")
 
     def poll(self) -> None:
-        """Take what has come."""
+        """Take the messages that have arrived, and the node's answer to `release_alarms`."""
         now = time.monotonic()
         for subscription, name in self._heard:
             with subscription.handle:
@@ -79,7 +79,7 @@ class TopicFeed(Feed):
             self._take_answer(answer)
 
     def now(self) -> float:
-        """Of a clock that only goes forward."""
+        """Return the time (s) of a clock that only goes forward."""
         return time.monotonic()
 
     def publish(self, words: str) -> None:
@@ -91,7 +91,7 @@ class TopicFeed(Feed):
         self._events.publish(message)
 
     def release_alarms(self) -> str:
-        """Ask it; the answer becomes an event."""
+        """Ask the node to release alarms that have ended; its answer becomes an event."""
         if not self._asked.service_is_ready():
             return "the node is not there to let go of it"
         with self._asked.handle:
@@ -104,12 +104,12 @@ class TopicFeed(Feed):
         self.publish(f"{'let go of' if answer.success else 'not let go'} by the node: {answer.message}")
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self._node.destroy_node()
 
 
 def _taken(receive: Callable[[], tuple[bytes, Any] | None]) -> Iterator[bytes]:
-    """What `receive` gives, at most `MOST` messages and little more than `MOST_BYTES`."""
+    """Yield the messages that `receive` returns, at most `MOST` of them and little more than `MOST_BYTES`."""
     count = size = 0
     while count < MOST and size < MOST_BYTES and (found := receive()) is not None:
         count, size = count + 1, size + len(found[0])

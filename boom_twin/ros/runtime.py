@@ -26,7 +26,7 @@ from .log import Log
 from .node.receive_queue import ReceiveQueue
 
 STOPPED = (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException)
-"""What ends a spinning process in order."""
+"""Exceptions that end a spinning process in order."""
 NO_PROFILES = "SKIP_DEFAULT_XML_FILE"
 """Set to 1: Fast DDS does not take ``DEFAULT_FASTRTPS_PROFILES.xml``, which may name log files, from the working directory."""
 
@@ -40,7 +40,7 @@ OTHER_REMEDY = "Check the environment variables ROS_*."
 
 @contextmanager
 def ros(arguments: Sequence[str] | None = None) -> Iterator[None]:
-    """rclpy, started with the process's or the given ROS arguments, and shut down at the end.
+    """Provide rclpy within a context, started with the process's or the given ROS arguments.
 
     rclpy's own signal handlers are left out: they close the context at once, and then a node can no longer say that it
     is going. What a signal does is up to Python, see `boom_twin.ros.startup`. Fast DDS takes its profiles from the file that
@@ -65,7 +65,7 @@ def ros(arguments: Sequence[str] | None = None) -> Iterator[None]:
 
 
 def one_line(error: BaseException) -> str:
-    """The text of an error of rclpy without line breaks and what its C parts append."""
+    """Return the text of an error of rclpy without line breaks and without what its C parts append."""
     return " ".join(re.split(r", at \.?/", str(error))[0].split()).rstrip(".") or type(error).__name__
 
 
@@ -101,9 +101,9 @@ def spin(node: Node, queue: ReceiveQueue, is_over: Callable[[], bool]) -> None:
 
 @contextmanager
 def callback_turns(node: Node, is_due: Callable[[], bool]) -> Iterator[Callable[[], None]]:
-    """Give a function that lets the callbacks of `node` run until `is_due`, which is asked every `WAKE` s, or sooner.
+    """Provide a function that lets the callbacks of `node` run until `is_due`, which is asked every `WAKE` s, or sooner.
 
-    By the events executor, whose turns a timer ends from here, see `spin`; by the single-threaded one where that one is missing
+    The events executor runs them, whose turns a timer ends, see `spin`; the single-threaded one where that one is missing
     or fails.
     """
     turn, executors = Future(), [_events_executor, SingleThreadedExecutor]
@@ -185,7 +185,7 @@ class _EventTurns:
         self._turn, self._end = Future(), 0.0
 
     def serve(self, executor: Any, queue: ReceiveQueue) -> None:
-        """One turn."""
+        """Run one turn."""
         if queue:
             _call_back_once(executor, queue)
             return
@@ -211,7 +211,7 @@ class _EventTurns:
 
 
 def _take_over(executor: Any, queue: ReceiveQueue) -> None:
-    """Let the executor put what has waited in its own row, if any has."""
+    """Let the executor queue the messages that have waited in its own row, if there are any."""
     end, before = time.monotonic() + INTAKE, -1
     while queue.is_behind and queue.received != before and time.monotonic() < end:
         before = queue.received
@@ -220,13 +220,13 @@ def _take_over(executor: Any, queue: ReceiveQueue) -> None:
 
 @cache
 def message_class(type_name: str) -> Any:
-    """The class of ``package/msg/Name``."""
+    """Return the class of ``package/msg/Name``."""
     package, folder, name = type_name.split("/")
     return getattr(import_module(f"{package}.{folder}"), name)
 
 
 def qos_profile(qos: Qos, depth: int | None = None) -> QoSProfile:
-    """`qos` of ``topics.yaml``; with another depth, if one is given."""
+    """Return the QoS profile of `qos` in ``topics.yaml``; with another depth, if one is given."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=depth or qos.depth,

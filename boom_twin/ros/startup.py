@@ -16,16 +16,16 @@ from ..errors import UsageError
 from ..system.child_process import python_command
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""What asks a process to end; SIGHUP comes when its terminal is closed, and is ignored where ``nohup`` has it so."""
+"""Signals that end a process. SIGHUP comes when its terminal is closed, and is ignored under ``nohup``."""
 
 
 def stop_signals() -> tuple[signal.Signals, ...]:
-    """Those of `STOPS` that this process is to hear."""
+    """Return the signals of `STOPS` that this process handles; SIGHUP is left out if it is ignored."""
     return tuple(each for each in STOPS if each is not signal.SIGHUP or signal.getsignal(each) is not signal.SIG_IGN)
 
 
 def on_stop_signal(act: Callable[[], None]) -> None:
-    """From now on the first of `STOPS` calls `act`, and further ones do nothing."""
+    """Call `act` at the first of `STOPS`, and ignore further ones."""
 
     def stop(number: int, frame: FrameType | None) -> None:
         for each in STOPS:
@@ -37,7 +37,7 @@ def on_stop_signal(act: Callable[[], None]) -> None:
 
 
 class InterruptedWorkError(KeyboardInterrupt):
-    """A piece of work took too long to end by itself.
+    """Interruption of a piece of work that took too long to end by itself.
 
     A class of its own: a KeyboardInterrupt proper that passes through ``exec`` of a text, as dataclasses are made by, lets
     Python end the process as killed by SIGINT even where it was caught.
@@ -50,11 +50,11 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _nothing(unraisable: object) -> None:
-    """Tell nothing."""
+    """Report nothing."""
 
 
 class StopSignal:
-    """A stop by one of `STOPS`: seen between two pieces of work, or KeyboardInterrupt where one takes too long.
+    """Stop by one of `STOPS`: seen between two pieces of work, or KeyboardInterrupt if one takes too long.
 
     An exception in the midst of a callback is reported by rclpy as a fault of the callback. Python handles a signal between two
     of its instructions, and compiling has some that take seconds: a thread, which runs meanwhile, ends a process that goes on.
@@ -92,7 +92,7 @@ class StopSignal:
         os._exit(0)
 
     def over(self) -> None:
-        """Interrupt nothing from now on: the process is ending."""
+        """Interrupt nothing from now on, because the process is ending."""
         signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 

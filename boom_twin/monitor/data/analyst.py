@@ -19,7 +19,7 @@ from .topic_rows import ESTIMATE
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """An acceleration of the tip: what it is called, its table, its two columns there, and their directions."""
+    """Acceleration of the tip as a signal: name, table, its two columns there, and their directions."""
 
     name: str
     table: str
@@ -43,7 +43,7 @@ MATCH = 0.2
 
 
 class Analyst:
-    """Looks at one feed; one look of a kind at a time, because the model's workspace is one.
+    """Analysis of one feed, one computation of a kind at a time, because the model's workspace is one.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Analyst:
         self._firsts: dict[int, tuple[float, float]] = {}
 
     async def spectrum_at(self, time: float) -> tuple[dict[str, Any], bytes] | None:
-        """Text message ``lines`` and binary block of the spectrum at `time` (s); None without enough of a signal."""
+        """Return text message ``lines`` and binary block of the spectrum at `time` (s); None without enough of a signal."""
         async with self._turn:
             store = self._feed.store
             signal = self._signal(time)
@@ -87,7 +87,7 @@ class Analyst:
             return self._known[1]
 
     async def response_at(self, time: float) -> TipResponses:
-        """How the tip answers to loads in the posture at `time` (s); the same object while the boom has not moved.
+        """Return the tip's response to loads in the posture at `time` (s); the same object while the boom has not moved.
 
         It has a boom of its own, so that no spectrum waits for it: the first on a computer compiles for half a minute.
         """
@@ -103,7 +103,7 @@ class Analyst:
             return await asyncio.to_thread(self._responses.at, strokes)
 
     async def load_at(self, time: float) -> dict[str, Any] | None:
-        """Text message ``load`` of what the load at the tip was before `time` (s), in words; None without any."""
+        """Return text message ``load`` on the load at the tip before `time` (s), in words; None without a load."""
         table = self._feed.store.tables.get(ESTIMATE)
         if table is None:
             return None
@@ -112,7 +112,7 @@ class Analyst:
         return None if found is None else {"kind": "load", "words": f"load at the tip: {found.text}"}
 
     async def spectrogram_between(self, after: float, until: float) -> tuple[float, bytes] | None:
-        """Time (s) of the newest column of the spectrogram after one time and up to another, and the block of them all."""
+        """Return time (s) of the newest column of the spectrogram between two times, and the block of all its columns."""
         signal = self._signal(until := STEP * floor(until / STEP))
         table = self._feed.store.tables.get(signal.table)
         if table is None:
@@ -126,7 +126,7 @@ class Analyst:
         return float(ends[-1]), pack(SPECTROGRAM, SIGNALS.index(signal), ends, found)
 
     def _signal(self, time: float) -> Signal:
-        """The best acceleration of which the last segment before `time` (s) has values."""
+        """Return the best acceleration that has values in the last segment before `time` (s)."""
         for signal in SIGNALS:
             table = self._feed.store.tables.get(signal.table)
             if table is not None:
@@ -136,7 +136,7 @@ class Analyst:
         return PREDICTION
 
     def _moved(self, time: float) -> float:
-        """By how much a cylinder moved within the window before `time` (s), at most, m."""
+        """Return the largest motion (m) of a cylinder within the window before `time` (s)."""
         strokes = self._feed.strokes_between(time - WINDOW, time)
         return float(np.ptp(strokes, axis=0).max()) if len(strokes) else 0.0
 
@@ -145,9 +145,9 @@ class Analyst:
         return None if found is None else (self._natural(strokes), found)
 
     def _placed(self, peak: dict[str, Any], natural: list[float], time: float, has_moved: bool) -> dict[str, Any]:
-        """A peak with the number of its mode, its deviation from the model, and how that has drifted since the first look.
+        """Return a peak with the number of its mode, its deviation from the model, and its drift since the first look.
 
-        None of these where the boom has moved: its frequencies are of no one posture.
+        None of these is given if the boom has moved, because its frequencies do not belong to one posture.
         """
         mode = None if has_moved else _mode(peak["frequency"], natural)
         if mode is None:
@@ -166,12 +166,12 @@ class Analyst:
 
 
 def response_messages(found: TipResponses) -> tuple[dict[str, Any], bytes]:
-    """Text message ``loads`` and binary block of a response; the block is empty where there is none."""
+    """Return text message ``loads`` and binary block of a response; the block is empty if there is no response."""
     text = {"kind": "loads", "names": found.loads, "trouble": found.trouble}
     return text, pack(RESPONSE, 0, found.frequencies, found.accelerations.astype("f4")) if found.loads else b""
 
 
 def _mode(frequency: float, natural: list[float]) -> int | None:
-    """Number, from 1, of the nearest natural frequency, if it is near."""
+    """Return the number, from 1, of the nearest natural frequency, if it is near."""
     number = min(range(len(natural)), key=lambda i: abs(natural[i] - frequency), default=None)
     return None if number is None or abs(natural[number] - frequency) > MATCH * natural[number] else number + 1

@@ -41,7 +41,7 @@ TURN = 0.04
 
 
 class BagFeed(Feed):
-    """A session that is read further with every `poll`.
+    """Feed of a recorded session, read further at every `poll`.
 
     Parameters
     ----------
@@ -56,16 +56,16 @@ class BagFeed(Feed):
         self._steps: Generator[None] | None = None
 
     def begin(self, steps: Generator[None]) -> None:
-        """Read by going through `steps`."""
+        """Start reading; every step of `steps` reads a part of the session."""
         self._steps = steps
 
     @property
     def is_reading(self) -> bool:
-        """Whether more is to come."""
+        """Return True if a part of the session is still to be read."""
         return self._steps is not None
 
     def poll(self) -> None:
-        """Read for `TURN`; a fault of the session ends that, and is told."""
+        """Read for `TURN` seconds; a fault of the session ends the reading and is kept in `trouble`."""
         if self._steps is None:
             return
         turn = perf_counter() + TURN
@@ -139,7 +139,7 @@ def bag_feed(
 
 
 def _names(topics: Topics) -> dict[str, Topic]:
-    """Every topic that may be shown, by its absolute name."""
+    """Return every topic that may be shown, by its absolute name."""
     shown = [*topics.inputs.values(), *topics.outputs.values(), topics.events]
     return {topic.absolute: topic for topic in shown}
 
@@ -154,7 +154,7 @@ def _title(session: Session, is_published: bool) -> str:
 def _take_published(
     session: Session, feed: Feed, topics: Topics, counts: dict[str, int], window: TimeWindow
 ) -> Generator[None]:
-    """What the node said, beside the measured acceleration; one message a step."""
+    """Store the recorded outputs of the node and the measured acceleration, one message a step."""
     known, topic_rows = _names(topics), feed.topic_rows
     for name, _, message in read(session, {name: known[name].type for name in counts if name in topic_rows.names}, window):
         topic_rows.take(name, message, feed.now())
@@ -164,7 +164,7 @@ def _take_published(
 def _take_predicted(
     session: Session, topics: Topics, counts: dict[str, int], twin: _Twin, window: TimeWindow
 ) -> Generator[None]:
-    """What a twin says now; one sample a step."""
+    """Run a twin on the recorded inputs and store its predictions, one sample a step."""
     wanted = [name for name in topics.heard if "/" + name.lstrip("/") in counts]
     ahead = SampleReader(session.path, topics, wanted, twin.twin.plan.joints, window)
     try:
@@ -181,7 +181,7 @@ def _take_predicted(
 
 
 class _Twin:
-    """A twin beside the session, watched as the node watches its own; its time is that of the stamps."""
+    """Twin that is run on a session and diagnosed as a live node diagnoses its own. Its time is that of the stamps."""
 
     def __init__(self, feed: Feed, topics: Topics, scene: Scene, settings: Settings, usual: Baseline) -> None:
         self._feed, self._time = feed, 0.0
@@ -200,11 +200,11 @@ class _Twin:
 
     @property
     def has_predicted(self) -> bool:
-        """Whether the model has moved at all."""
+        """Return True if the twin has predicted anything yet."""
         return bool(self._feed.store.tables)
 
     def took(self, step: Step) -> None:
-        """Show what a sample caused."""
+        """Show the results of one sample."""
         sample, report, _ = step
         self._time = max(self._time, sample.stamp * NANO)
         if self._looked is None:
@@ -221,7 +221,7 @@ class _Twin:
             self._look()
 
     def finish(self) -> None:
-        """The session has ended."""
+        """Raise BagError if the session, which has ended, turns out to be of another boom."""
         self._refuse(self._other_boom.judge())
 
     def _refuse(self, reason: str) -> None:
@@ -236,6 +236,6 @@ class _Twin:
 
 
 def _as_message(status: Status) -> Any:
-    """As it would stand on ``/diagnostics``."""
+    """Return a status as a message on ``/diagnostics`` holds it."""
     values = [SimpleNamespace(key=key, value=str(value)) for key, value in status.values.items()]
     return SimpleNamespace(name=f"{NODE}: {status.name}", level=status.level, message=status.message, values=values)

@@ -16,12 +16,12 @@ LONGEST = 200
 
 
 class MalformedError(Exception):
-    """A message that cannot be used; the text says why."""
+    """Error of a message that cannot be used; the text states why."""
 
 
 @dataclass(slots=True)
 class TopicLoss:
-    """Messages of one topic that were dropped: how many, and why the last one."""
+    """Count of the dropped messages of one topic, and the reason of the last one."""
 
     topic: str
     count: int
@@ -29,7 +29,7 @@ class TopicLoss:
 
 
 class DroppedMessages:
-    """Counts messages that were dropped, and logs them.
+    """Counter and log of dropped messages.
 
     Every one is handed to the log; how many lines of it are written is bounded there, see `boom_twin.monitor.log_limit`.
 
@@ -52,7 +52,7 @@ class DroppedMessages:
             self._add(topic, f"cannot be read: {type(error).__name__}: {error}")
 
     def told(self) -> list[dict[str, Any]]:
-        """As plain values, the most messages first."""
+        """Return the losses as plain values, the most messages first."""
         return [asdict(loss) for loss in sorted(self.by_topic.values(), key=lambda loss: -loss.count)]
 
     def _add(self, topic: str, reason: str) -> None:

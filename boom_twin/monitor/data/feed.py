@@ -17,7 +17,9 @@ from .topic_rows import TopicRows
 
 
 class Feed:
-    """A store and what fills it; `boom_twin.monitor.data.bag_feed` and `boom_twin.ros.monitor_feed` have the two kinds.
+    """Source of the page's data: a store and the reader that fills it.
+
+    `boom_twin.monitor.data.bag_feed` and `boom_twin.ros.monitor_feed` have the two kinds.
 
     Parameters
     ----------
@@ -45,25 +47,25 @@ class Feed:
         self._plan: Plan | None = None
 
     def poll(self) -> None:
-        """Take what has come; called often."""
+        """Read the data that has arrived; called often."""
 
     def publish(self, words: str) -> None:
-        """Tell an event, so that a recording of the session holds it."""
+        """Publish an event, so that a recording of the session holds it."""
         raise NotImplementedError
 
     def release_alarms(self) -> str:
-        """Ask the node to let go of alarms that ended; says whether that could be asked."""
+        """Ask the node to release alarms that have ended; return in words if it could be asked."""
         raise NotImplementedError
 
     def close(self) -> None:
-        """Let go of what is held."""
+        """Release all resources of the feed."""
 
     def now(self) -> float:
-        """The time that lamps count by, s."""
+        """Return the time (s) by which status lamps count."""
         return self.store.newest
 
     def scene(self) -> Scene | None:
-        """The scene, as soon as it is known."""
+        """Return the scene, or None until it is known."""
         if self._scene is None and self.topic_rows.scene == DEFAULT_NAME:
             self._scene = load_scene()
         return self._scene
@@ -95,7 +97,7 @@ SLOWEST, FASTEST = 0.1, 10.0
 
 
 class Playback:
-    """A position that moves on at a speed, as long as it is not held, up to what has been read of the session.
+    """Position in a recorded session. Unless held, it advances at a speed up to what has been read of the session.
 
     Parameters
     ----------
@@ -116,7 +118,7 @@ class Playback:
         self.position, self.speed, self.is_held = 0.0, 1.0, False
 
     def advance(self, span: float) -> float:
-        """Move on by `span` (s) of real time; gives the position. It holds at the end."""
+        """Advance by `span` (s) of real time and return the position; hold at the end."""
         if not self.is_held:
             self.seek(self.position + self.speed * span)
             self.is_held = self.is_at_end
@@ -124,13 +126,13 @@ class Playback:
 
     @property
     def is_at_end(self) -> bool:
-        """Whether nothing more can come."""
+        """Return True if the position is at the end of the session."""
         return self.position >= (self._feed.end or 0.0)
 
     def pace(self, speed: float) -> None:
-        """Go on at that speed, or the nearest that there is."""
+        """Set the speed, limited to the permitted range."""
         self.speed = min(max(speed, SLOWEST), FASTEST)
 
     def seek(self, position: float) -> None:
-        """Go there, or to the nearest end of what has been read."""
+        """Move to `position` (s), limited to what has been read."""
         self.position = min(max(position, 0.0), self._feed.store.newest, self._feed.end or 0.0)

@@ -20,19 +20,19 @@ LONGEST_TEXT = 500
 
 
 def stamp(msg: Any) -> int:
-    """``header.stamp`` in ns, which must be after 1970 and fit into a message."""
+    """Return ``header.stamp`` in ns; raise MalformedError unless it is after 1970 and fits into a message."""
     return instant(stamp_of(msg))
 
 
 def instant(found: int) -> int:
-    """The same of a stamp alone."""
+    """Return the stamp `found` (ns); raise MalformedError unless it is after 1970 and fits into a message."""
     if not 0 < found < LATEST:
         raise MalformedError("no stamp" if found == 0 else f"impossible stamp {found / 1e9:.9g} s")
     return found
 
 
 def numbers(values: Sequence[float], *, may_lack: bool = False) -> list[float]:
-    """Values of at most `LARGEST`; NaN only where a sensor `may_lack`."""
+    """Return the values as floats; raise MalformedError above `LARGEST`, or for NaN unless a sensor `may_lack`."""
     found = [float(value) for value in values]
     for value in found:
         if not abs(value) <= LARGEST and not (may_lack and isnan(value)):
@@ -41,13 +41,13 @@ def numbers(values: Sequence[float], *, may_lack: bool = False) -> list[float]:
 
 
 def count(what: str, found: int, most: int) -> None:
-    """Not more than `most` of something."""
+    """Raise MalformedError if there are more than `most`."""
     if found > most:
         raise MalformedError(f"{found} {what}, at most {most} are possible")
 
 
 def stream_of_residuals(names: Sequence[str]) -> Stream:
-    """The stream whose channels they are: ``joint_1`` and the like, each once; of an IMU both axes in their order."""
+    """Return the stream of these channels; raise MalformedError unless each is named once, an IMU's axes in their order."""
     stream = stream_of(names[0]) if names else None
     odd = next((name for name in names if stream is None or stream_of(name) is not stream), None)
     if odd is not None or stream is None or len(set(names)) != len(names):
@@ -58,7 +58,10 @@ def stream_of_residuals(names: Sequence[str]) -> Stream:
 
 
 def named(msg: Any, *fields: str) -> None:
-    """The arrays `fields` of a sensor_msgs/JointState have one value for every name, of which there are not too many."""
+    """Raise MalformedError unless every array in `fields` of a sensor_msgs/JointState has one value for every name.
+
+    Too many names are malformed, too.
+    """
     count("names", len(msg.name), LONGEST)
     found = {field: len(getattr(msg, field)) for field in fields}
     if any(length != len(msg.name) for length in found.values()):
@@ -67,5 +70,5 @@ def named(msg: Any, *fields: str) -> None:
 
 
 def text(found: str) -> str:
-    """A text as it may be shown: the beginning of a long one, control characters as escapes."""
+    """Return a text as it may be shown: the beginning of a long one, control characters as escapes."""
     return printable(found[:LONGEST_TEXT], keep="")

@@ -1,6 +1,6 @@
-"""What the model says of the posture that is shown: natural frequencies, and how the tip answers to loads.
+"""Natural frequencies and tip response of the model in the posture that is shown.
 
-Worked out anew only where the boom has moved, in a thread beside the server and never on a sample's way.
+The model is evaluated again only if the boom has moved, in a thread beside the server, so that no sample waits for it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Found = TypeVar("Found")
 
 
 class PresentPosture(Generic[Found]):
-    """Something of one boom at its strokes, worked out anew where it has moved by `MOVED`."""
+    """Result that depends on the strokes of one boom, computed again when it has moved by `MOVED`."""
 
     def __init__(self) -> None:
         self._at: Array | None = None
@@ -44,7 +44,7 @@ class PresentPosture(Generic[Found]):
         self._one_at_a_time = threading.Lock()  # a thread goes on when the viewer that waited for it has gone
 
     def at(self, strokes: Sequence[float]) -> Found:
-        """What there is at `strokes` (m); the same object as before where the boom has not moved."""
+        """Return the result at `strokes` (m), the same object as before if the boom has not moved."""
         now = np.asarray(strokes, dtype=np.float64)
         with self._one_at_a_time:
             if self._found is None or self._at is None or np.max(np.abs(now - self._at)) > MOVED:
@@ -61,7 +61,7 @@ WIDTH = 1e-4
 
 
 class ModeList(PresentPosture[list[float]]):
-    """The lowest `COUNT` frequencies (Hz) about the equilibrium; none where there is no equilibrium."""
+    """Lowest `COUNT` natural frequencies (Hz) about the equilibrium; none where there is no equilibrium."""
 
     def __init__(self, scene: Scene) -> None:
         super().__init__()
@@ -83,7 +83,7 @@ MILLIMETRE = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TipResponses:
-    """How much the tip accelerates under harmonic loads.
+    """Amplitude of the tip's acceleration under harmonic loads.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class TipResponses:
 
 
 class ResponseList(PresentPosture[TipResponses]):
-    """Response of the tip to 1 N at the tip, and to 1 mm of every cylinder's drive."""
+    """Frequency response of the tip to 1 N at the tip, and to 1 mm of every cylinder's drive."""
 
     def __init__(self, scene: Scene) -> None:
         super().__init__()
@@ -123,7 +123,7 @@ class ResponseList(PresentPosture[TipResponses]):
 
 
 class ResponseCompiler:
-    """Has a process of its own compile what responses need, if that was never done on this computer; once, for all viewers.
+    """Compilation in a child process, once for all viewers, of what responses need and this computer has not compiled yet.
 
     It takes half a minute, in which a compiler in a thread of the server would leave it little of the interpreter's lock.
     A viewer that goes away meanwhile does not stop it, or a page that is opened and closed again would never have responses.
@@ -133,14 +133,14 @@ class ResponseCompiler:
         self._task: asyncio.Task[None] | None = None
 
     async def finish(self) -> None:
-        """Return when it is done."""
+        """Wait until the compilation is done, and start it if needed."""
         import asyncio  # which a replay, whose report uses this module, has no need of
 
         self._task = self._task or asyncio.create_task(_compile_beside())
         await asyncio.shield(self._task)
 
     def close(self) -> None:
-        """Stop it, if it runs."""
+        """Stop the compilation, if it runs."""
         if self._task is not None:
             self._task.cancel()
 

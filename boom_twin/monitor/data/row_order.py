@@ -16,7 +16,7 @@ AHEAD = 60_000_000_000
 
 @dataclass(frozen=True, slots=True)
 class TableRow:
-    """Numbers of one stamp (ns), and the names of their columns."""
+    """Row of a table: stamp (ns), names of the columns, values."""
 
     stamp: int
     columns: Sequence[str]
@@ -25,7 +25,7 @@ class TableRow:
 
 @dataclass(frozen=True, slots=True)
 class OrderedRows:
-    """What a row leads to.
+    """Outcome of one received row: the rows to store, and a stray row that is dropped.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class OrderedRows:
 
 
 class RowOrder:
-    """Lets a row of a table through if its stamp is after that of the row before.
+    """Filter that passes a row of a table if its stamp is after that of the row before.
 
     A row whose stamp leaps is held back until the next one of its table. If that goes on from it, time has leapt and both are
     let through; else it was a stray one.
@@ -54,7 +54,7 @@ class RowOrder:
         self._held: dict[str, TableRow] = {}
 
     def put(self, table: str, row: TableRow) -> OrderedRows:
-        """What `row` leads to; raises MalformedError if its stamp is not after that of the row before."""
+        """Return the rows to store after `row`; raise MalformedError if its stamp is not after that of the row before."""
         last, held = self._last.get(table, row.stamp - 1), self._held.get(table)
         if not -BACK <= row.stamp - last <= AHEAD:
             return self._leap(table, row, last, held)

@@ -11,14 +11,14 @@ from .feed import Feed
 
 
 def sessions_in(path: Path) -> list[Path]:
-    """The sessions that lie in a folder, by name; the path itself where it is one, or holds none."""
+    """Return the sessions in a folder, by name; the path itself if it is a session, or holds none."""
     if not path.is_dir() or is_session(path):
         return [path]
     return sorted(each for each in path.iterdir() if is_session(each)) or [path]
 
 
 class SessionList:
-    """Opens one session after the other.
+    """Recorded sessions, of which one is open at a time.
 
     Parameters
     ----------
@@ -56,17 +56,17 @@ class SessionList:
         raise errors[0]
 
     def open(self, index: int) -> Feed:
-        """Return the feed of a session, which is shown from `show` on; nothing else changes, so a thread may wait for it."""
+        """Return the feed of a session, which is shown from `show` on. Nothing else changes, so a thread may wait for it."""
         try:
             return self._open_feed(self._paths[index])
         except OSError as error:
             raise BagError(f"{self._paths[index]}: cannot be read ({error.strerror}). Choose another session.") from None
 
     def show(self, index: int, feed: Feed) -> None:
-        """Take another session's feed for the one before, which is closed."""
+        """Replace the feed by that of another session, and close the one before."""
         before, self.feed, self.index = self.feed, feed, index
         before.close()
 
     def close(self) -> None:
-        """Close the one that is open."""
+        """Close the feed that is open."""
         self.feed.close()

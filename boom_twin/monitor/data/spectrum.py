@@ -33,7 +33,7 @@ MOST_POINTS = 40_000
 
 @dataclass(frozen=True, slots=True)
 class Peak:
-    """A peak of the spectrum: frequency (Hz), damping ratio (NaN if not to be had), density ((m/s^2)^2/Hz)."""
+    """Peak of the spectrum: frequency (Hz), damping ratio (NaN if not known), density ((m/s^2)^2/Hz)."""
 
     frequency: float
     damping: float
@@ -42,7 +42,7 @@ class Peak:
 
 @dataclass(frozen=True, slots=True)
 class Spectrum:
-    """Frequencies (k,) in Hz, one-sided densities (k, c) in (m/s^2)^2/Hz, peaks of their sum by frequency."""
+    """Spectrum: frequencies (k,) in Hz, one-sided densities (k, c) in (m/s^2)^2/Hz, peaks of their sum by frequency."""
 
     frequencies: Array
     densities: Array
@@ -50,7 +50,7 @@ class Spectrum:
 
 
 def spectrum(times: Array, values: Array) -> Spectrum | None:
-    """Of `values` (n, c) in m/s^2 at `times` (n,) in s; None where they last less than one segment."""
+    """Return the spectrum of `values` (n, c) in m/s^2 at `times` (n,) in s; None if they last less than one segment."""
     finite = np.isfinite(values).all(axis=1)
     times, values = times[finite], values[finite]
     if len(times) < 32 or times[-1] - times[0] < SEGMENT:
@@ -65,12 +65,12 @@ def spectrum(times: Array, values: Array) -> Spectrum | None:
 
 
 def spacing(times: Array) -> float:
-    """Usual distance (s) of `times` (n,), at least so much that there are `MOST_POINTS` in all of their span."""
+    """Return the usual step (s) of `times` (n,), at least their whole span divided by `MOST_POINTS`."""
     return max(float(np.median(np.diff(times))), float(times[-1] - times[0]) / MOST_POINTS)
 
 
 def _peaks(frequencies: Array, density: Array, values: Array, rate: float) -> list[Peak]:
-    """The highest peaks that stand out, their frequencies by a parabola through the decibels."""
+    """Return the highest peaks that stand out, their frequencies by a parabola through the decibels."""
     level = 10.0 * np.log10(np.maximum(density, 1e-30))
     found, _ = find_peaks(level, prominence=PROMINENCE)
     found = [i for i in found if LOWEST <= frequencies[i] <= min(HIGHEST, 0.4 * rate)]
@@ -85,9 +85,9 @@ def _peaks(frequencies: Array, density: Array, values: Array, rate: float) -> li
 
 
 def damping(values: Array, rate: float, frequency: float) -> float:
-    """Damping ratio of the mode at `frequency` (Hz) from the decay of the autocorrelation in the band around it.
+    """Return the damping ratio of the mode at `frequency` (Hz), from the autocorrelation's decay in the band around it.
 
-    The autocorrelation of a lightly damped mode that is shaken at random decays as its free vibration does, as
+    The autocorrelation of a lightly damped mode under random excitation decays as its free vibration does, as
     exp(-2 pi zeta f t) (Cole 1973). NaN where it does not decay.
 
     Parameters
@@ -128,7 +128,7 @@ FULL = 0.9
 
 
 def spectrogram(times: Array, values: Array, ends: Array) -> NDArray[np.float32]:
-    """One-sided densities, (m/s^2)^2/Hz, of the segments before `ends`.
+    """Return one-sided densities, (m/s^2)^2/Hz, of the segments before `ends`.
 
     Each is a periodogram with Hann's window, both directions added; Welch's method averages such.
 
@@ -157,7 +157,7 @@ def spectrogram(times: Array, values: Array, ends: Array) -> NDArray[np.float32]
 
 
 def _periodogram(times: Array, values: Array) -> Array:
-    """Density at multiples of 1 / `SEGMENT`, Hz."""
+    """Return the density at multiples of 1 / `SEGMENT`, Hz."""
     count = round(SEGMENT / spacing(times))
     even = times[-1] - SEGMENT + SEGMENT / count * np.arange(1, count + 1)
     window = np.hanning(count + 1)[:-1]

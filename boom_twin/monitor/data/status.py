@@ -23,7 +23,7 @@ _LIMITS = ("_error", "_warn", "_stale")
 
 
 class Severity(IntEnum):
-    """By rising severity, which is not the order of diagnostic_msgs."""
+    """Severity of a status, in rising order. The order of diagnostic_msgs is another."""
 
     OFF = 0
     OK = 1
@@ -33,7 +33,7 @@ class Severity(IntEnum):
 
 
 LEVELS = (Severity.OK, Severity.WARN, Severity.ERROR, Severity.STALE)
-"""By the number in diagnostic_msgs/DiagnosticStatus."""
+"""Severity by the number in diagnostic_msgs/DiagnosticStatus."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +66,12 @@ class StatusLamp:
 
 @dataclass(frozen=True)
 class StatusTable:
-    """All lamps by node, each with the time (s) at which that node last told them."""
+    """Table of all lamps by node, each with the time (s) at which that node last reported them."""
 
     nodes: Mapping[str, tuple[float, tuple[StatusLamp, ...]]] = field(default_factory=dict)
 
     def told(self, now: float, statuses: Iterable[Any], clock: float) -> StatusTable:
-        """The table after one DiagnosticArray of one or more nodes.
+        """Return the table after one DiagnosticArray of one or more nodes.
 
         Parameters
         ----------
@@ -91,7 +91,10 @@ class StatusTable:
         return StatusTable(nodes)
 
     def groups(self, now: float) -> dict[str, list[StatusLamp]]:
-        """Lamps by group; those of a node that is silent, and did not say that it ended, are stale, whatever they were."""
+        """Return the lamps by group.
+
+        Lamps of a node that is silent, and did not report its end, are stale, whatever their level was.
+        """
         found: dict[str, list[StatusLamp]] = {group: [] for group in GROUPS}
         for node, (heard, lamps) in self.nodes.items():
             silence = now - heard
@@ -104,12 +107,12 @@ class StatusTable:
 
 
 def worst(lamps: Iterable[StatusLamp]) -> StatusLamp | None:
-    """The lamp of the highest level, the first of equal ones."""
+    """Return the lamp of the highest level, the first of equal ones."""
     return max(lamps, key=lambda lamp: lamp.level, default=None)
 
 
 def overall(groups: Mapping[str, list[StatusLamp]]) -> tuple[Severity, str]:
-    """Severity and reason of everything; without a word about the model nothing is well."""
+    """Return severity and reason of all groups together; without a status of the model, nothing is well."""
     lamp = worst(lamp for lamps in groups.values() for lamp in lamps)
     if lamp is None or (lamp.level < Severity.ERROR and not groups["model"]):
         return Severity.STALE, "no word from the twin"
@@ -136,7 +139,7 @@ def _group(name: str) -> str:
 
 
 def _judged(values: Mapping[str, float], level: Severity) -> tuple[str, float]:
-    """The quantity that is nearest to, or farthest beyond, a limit of the present level; its name and that limit."""
+    """Return name and limit of the quantity that is nearest to, or farthest beyond, a limit of the present level."""
     best, found = -inf, ("", nan)
     kinds = {Severity.ERROR: ("_error",), Severity.STALE: ("_stale",)}.get(level, _LIMITS)
     for key, limit in values.items():
@@ -162,7 +165,7 @@ MOST = 500
 
 @dataclass(slots=True)
 class ListedAlarm:
-    """A lamp that was not well, or what the judge of the rig's health found.
+    """Alarm in the list: a lamp that was not well, or an alarm of the health monitor.
 
     Attributes
     ----------
@@ -193,7 +196,7 @@ class ListedAlarm:
 
 
 class AlarmList:
-    """Follows the lamps from well to not well and back.
+    """List of alarms, which begin and end as the lamps leave and reach the level OK.
 
     Attributes
     ----------
@@ -208,7 +211,7 @@ class AlarmList:
         self._number = 0
 
     def follow(self, time: float, statuses: StatusTable) -> None:
-        """The lamps at `time` (s), but for that of the rig's health, whose alarms `judge` is told of."""
+        """Update the alarms to the lamps at `time` (s), except the lamp of the rig's health, see `judge`."""
         told = ((f"{node}: {lamp.name}", lamp) for node, (_, lamps) in statuses.nodes.items() for lamp in lamps)
         lamps = {key: lamp for key, lamp in told if lamp.name != HEALTH}
         for key in [key for key in self._open if key not in lamps or lamps[key].level <= Severity.OK]:
@@ -218,10 +221,10 @@ class AlarmList:
                 self._raise(key, lamp.name, lamp.level, lamp.reason, time)
 
     def judge(self, now: float, told: Sequence[Alarm], time: Callable[[int], float]) -> None:
-        """The alarms of the rig's health at `now` (s), those that last and those that have just ended.
+        """Update the alarms of the rig's health to those reported at `now` (s): active ones and those that have just ended.
 
-        `time` gives seconds of a stamp. An alarm that is told of no more has ended. Who has seen it is asked again where its
-        most probable cause is another, and when it ends.
+        `time` converts a stamp to seconds. An alarm that is no longer reported has ended. It must be acknowledged again if its
+        most probable cause changes, and when it ends.
         """
         lasting: dict[tuple[str, int], ListedAlarm] = {}
         for found in told:
@@ -235,7 +238,7 @@ class AlarmList:
         self._judged = lasting
 
     def lamps(self, time: float) -> Iterable[StatusLamp]:
-        """What the judge had found at `time` (s), as lamps."""
+        """Yield the health alarms that were active at `time` (s), as lamps."""
         for alarm in self.all:
             if alarm.causes and alarm.begin <= time and (alarm.end is None or time < alarm.end):
                 yield StatusLamp(alarm.name, "residuals", alarm.level, alarm.reason, age=time - alarm.begin)
@@ -248,14 +251,14 @@ class AlarmList:
         return alarm
 
     def acknowledge(self, number: int) -> ListedAlarm | None:
-        """Note that somebody has seen it; None if there is none of that number."""
+        """Acknowledge an alarm by its number and return it; None if there is no such alarm."""
         alarm = next((each for each in self.all if each.number == number), None)
         if alarm is not None:
             alarm.is_acknowledged = True
         return alarm
 
     def acknowledge_ended(self) -> None:
-        """Note that the node has let go of all judged alarms that ended."""
+        """Acknowledge all ended health alarms, because the node has released them."""
         for alarm in self.all:
             alarm.is_acknowledged |= bool(alarm.causes) and alarm.end is not None
 
@@ -268,7 +271,7 @@ class AlarmList:
 
 
 def _renew(alarm: ListedAlarm, found: Alarm, time: Callable[[int], float]) -> None:
-    """As the judge tells it now."""
+    """Update `alarm` to the present state of `found`, an alarm of the health monitor."""
     causes = tuple((text(each.cause), each.probability) for each in found.ranked) or ((text(found.cause or "not known"), nan),)
     is_same = [each[0] for each in causes[:1]] == [each[0] for each in alarm.causes[:1]]
     alarm.is_acknowledged &= is_same and found.until is None

@@ -67,12 +67,12 @@ class Table:
         self._values = np.pad(self._values, ((0, more), (0, 0)))
 
     def until(self, time: float) -> int:
-        """Number of the first row after `time` (s), the rows being in order."""
+        """Return the number of the first row after `time` (s). The rows are in order."""
         size = len(self._times)
         return bisect_right(range(self.first, self.count), time, key=lambda row: self._times[row % size]) + self.first
 
     def rows(self, first: int, end: int) -> Rows:
-        """Times (k,) and values (k, columns) of the rows from number `first` up to before `end`, as far as they are kept."""
+        """Return times (k,) and values (k, columns) of the kept rows with numbers from `first` up to before `end`."""
         places = np.arange(max(first, self.first), min(end, self.count)) % len(self._times)
         return self._times[places], self._values[places]
 
@@ -82,7 +82,7 @@ MOST_STATUSES = 100_000
 
 
 class Store:
-    """All that a feed has told.
+    """Data of a feed: tables, states of the lamps, and alarms.
 
     Parameters
     ----------
@@ -110,18 +110,18 @@ class Store:
         self._statuses: list[tuple[float, StatusTable]] = []
 
     def clear(self) -> None:
-        """Forget the numbers; the lamps stay as they are."""
+        """Delete all rows and the epoch; keep the lamps."""
         self.generation += 1
         self.epoch = 0
         self.tables = {}
 
     def time(self, stamp: int) -> float:
-        """Seconds from the epoch, which the first stamp (ns) sets."""
+        """Return the seconds since the epoch, which the first stamp (ns) sets."""
         self.epoch = self.epoch or stamp
         return (stamp - self.epoch) * NANO
 
     def append(self, name: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
-        """Add a row to a table, made by its first one."""
+        """Add a row to a table; the first row creates the table."""
         self.check(name, columns)
         table = self.tables.get(name)
         if table is None:
@@ -140,7 +140,7 @@ class Store:
         return max((table.newest for table in self.tables.values()), default=0.0)
 
     def set_statuses(self, time: float, statuses: StatusTable) -> None:
-        """The lamps from `time` (s, as they count it) on."""
+        """Set the lamps from `time` (s, on the lamps' clock) on, and update the alarms."""
         if not self._keeps_statuses:
             self._statuses.clear()
         self._statuses.append((time, statuses))
@@ -149,7 +149,7 @@ class Store:
         self.alarms.follow(self.newest, statuses)
 
     def statuses(self, time: float) -> StatusTable:
-        """The lamps as they were last told at `time` (s)."""
+        """Return the lamps as last reported at `time` (s)."""
         place = bisect_right(self._statuses, time, key=itemgetter(0)) if self._keeps_statuses else len(self._statuses)
         return self._statuses[place - 1][1] if place else StatusTable()
 

@@ -39,7 +39,7 @@ COMPARED = Stream.IMU
 RESIDUALS = {stream: "joints" if stream is Stream.ANGLES else stream.value for stream in Stream if stream is not COMPARED}
 """Names of the tables of residuals."""
 NO_MEASUREMENT = "no measurement"
-"""Of `SampleDecoder`: an Imu that says that it has none is nothing odd."""
+"""Oddity of `SampleDecoder` that is no fault here: an Imu states that it has no measurement."""
 PLANE = ("x_m", "z_m")
 VECTORS: dict[Output, tuple[str, tuple[str, str], Callable[[Any], Any]]] = {
     Output.TIP_DISPLACEMENT: ("displacement", PLANE, attrgetter("vector")),
@@ -52,7 +52,7 @@ ESTIMATE = "estimate"
 ESTIMATE_COLUMNS = (
     "x_m", "z_m", "sigma_x_m", "sigma_z_m", "x_m_s2", "z_m_s2", "sigma_x_m_s2", "sigma_z_m_s2", "load_x_N", "load_z_N",
 )  # fmt: skip
-"""Of the table of estimates: displacement and acceleration of the tip with their deviations, load."""
+"""Columns of the table of estimates: displacement and acceleration of the tip with their deviations, load."""
 JOINED = (
     Output.TIP_DISPLACEMENT, Output.TIP_POSITION, Output.ESTIMATE_POSE, Output.ESTIMATE_ACCELERATION, Output.ESTIMATE_LOAD,
 )  # fmt: skip
@@ -60,7 +60,7 @@ JOINED = (
 
 
 class TopicRows:
-    """Puts messages into a store.
+    """Converter of messages to rows of a store.
 
     =================  ==================================================================================================
     table              columns
@@ -101,7 +101,7 @@ class TopicRows:
 
     @property
     def scene(self) -> str:
-        """What the node calls its scene: a path, or the name of the package's own; empty if not known yet."""
+        """Name of the node's scene: a path, or the name of the package's own; empty until it is known."""
         return self._scene
 
     def _by_role(self) -> dict[Output, Taker]:
@@ -123,7 +123,7 @@ class TopicRows:
             self._takers[topic](message, now)
 
     def take_encoded(self, topic: str, data: bytes, now: float) -> None:
-        """The same of one in CDR."""
+        """Take a CDR-encoded message of a topic, as `take` does."""
         with self.dropped.guard(topic):
             checks.count("bytes", len(data), LONGEST)
             self._takers[topic](decode(data, self._types[topic]), now)
@@ -135,7 +135,7 @@ class TopicRows:
             self._join(sample.stamp)
 
     def _append(self, table: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
-        """Add a row, and the one that waited for its confirmation; begin anew where time was set back."""
+        """Add a row, and the row that waited for its confirmation; start again if time was set back."""
         self._store.check(table, columns)
         step = self._order.put(table, TableRow(stamp, columns, values))
         if step.is_set_back:
@@ -186,7 +186,7 @@ class TopicRows:
         self._join_estimate(Output.ESTIMATE_LOAD, checks.stamp(msg), checks.numbers((force.x, force.z)))
 
     def _join_estimate(self, role: Output, stamp: int, values: list[float]) -> None:
-        """Make the row of an estimate, once all that it is made of is there; forget what has waited long."""
+        """Add the row of an estimate as soon as all its parts are there; drop parts that have waited long."""
         if len(self._estimates) > WAITING:
             self._estimates.popitem(last=False)
         parts = self._estimates.setdefault(stamp, {})
@@ -221,7 +221,7 @@ class TopicRows:
             self._append(RESIDUALS[stream], [f"{name}_{end}" for end in ends for name in msg.name], stamp, values + ratios)
 
     def _join(self, stamp: int) -> None:
-        """Make the row of a measurement and its residual, once both are there; forget what has waited long."""
+        """Add the row of a measurement and its residual as soon as both are there; drop parts that have waited long."""
         for waiting in (self._measured, self._residuals):
             if len(waiting) > WAITING:
                 waiting.popitem(last=False)
@@ -271,7 +271,7 @@ class TopicRows:
 
 
 def _with_deviations(vector: Any, covariance: Any) -> list[float]:
-    """x and z of a vector, and their standard deviations from a covariance by rows (36,)."""
+    """Return x and z of a vector, and their standard deviations from a covariance by rows (36,)."""
     x, z, x2, z2 = checks.numbers((vector.x, vector.z, covariance[0], covariance[14]))
     if min(x2, z2) < 0.0:
         raise MalformedError(f"a variance is {min(x2, z2):g}; at least 0 is possible")

@@ -39,7 +39,7 @@ All at once would be lost on best-effort listeners: in shared memory Fast DDS ho
 
 @dataclass(frozen=True, slots=True)
 class Played:
-    """What was published: messages by topic, seconds that it took, and by how much a message was late at worst."""
+    """Result of playing: messages sent by topic, wall time (s), and largest delay of a message (s)."""
 
     sent: dict[str, int]
     wall: float
@@ -47,7 +47,7 @@ class Played:
 
 
 class Player:
-    """Plays one session; needs an initialised rclpy.
+    """Player of one session. It needs an initialised rclpy.
 
     Parameters
     ----------
@@ -82,17 +82,17 @@ class Player:
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """The names of what is published."""
+        """Names of the topics that are published."""
         return tuple(self._types)
 
     def unmatched(self, listeners: int = 1) -> list[str]:
-        """The topics that fewer than so many subscriptions have matched."""
+        """Return the topics that fewer than `listeners` subscriptions have matched."""
         return [name for name, each in self._publishers.items() if each.get_subscription_count() < listeners]
 
     def wait(self, timeout: float, listeners: int = 1, check: Callable[[], None] = lambda: None) -> list[str]:
-        """Wait until every topic is listened to, calling `check` now and then; gives the topics that are not.
+        """Wait until every topic is listened to, calling `check` now and then; return the topics that are not.
 
-        A little longer still, because a subscription may know of its publisher a moment after the publisher of it.
+        It waits a little longer then, because a subscription may discover its publisher a moment later than the publisher does.
         """
         end = time.monotonic() + timeout
         while (unmatched := self.unmatched(listeners)) and time.monotonic() < end:
@@ -111,7 +111,7 @@ class Player:
                 raise BoomTwinError(f"{name} is published by {names}: of these only one may be. End the other first.")
 
     def length(self, start: float = 0.0, duration: float | None = None) -> float:
-        """Seconds of that part of the session; BagError if it starts after the end."""
+        """Return the length (s) of that part of the session; raise BagError if it starts after the end."""
         whole = (self._session.end - self._session.start) * NANO
         if start >= whole:
             raise BagError(f"{self._session.path}: nothing from {start:g} s on; the session lasts {whole:.1f} s.")
@@ -161,7 +161,7 @@ class Player:
             self._wall += time.monotonic() - entered
 
     def _wait(self, due: float, stamp: int, is_held: Callable[[], bool]) -> float:
-        """Until `due`; gives the seconds for which the play was held."""
+        """Wait until `due`; return the seconds for which the play was held."""
         held = 0.0
         while True:
             if time.monotonic() >= self._ask:
@@ -173,7 +173,7 @@ class Player:
             time.sleep(min(left, LOOK))
 
     def _hold(self, stamp: int, is_held: Callable[[], bool]) -> float:
-        """Wait as long as the play is held; gives the seconds."""
+        """Wait as long as the play is held; return the seconds."""
         began, was_held = time.monotonic(), False
         while is_held():
             was_held = True
@@ -184,11 +184,11 @@ class Player:
 
     @property
     def played(self) -> Played:
-        """What all calls of `play` published."""
+        """Result of all calls of `play` so far."""
         return Played(dict(self._sent), self._wall, self._latest)
 
     def deliver(self, timeout: float = DELIVERY) -> list[str]:
-        """Wait until all reliable listeners have everything; gives the topics of which some have not.
+        """Wait until all reliable listeners have received everything; return the topics of which some have not.
 
         A lost packet is sent again only while its publisher lives: one that is taken away with its last message may take
         seconds of messages with it.
@@ -201,7 +201,7 @@ class Player:
         ]
 
     def close(self) -> None:
-        """Take the publishers away."""
+        """Destroy the player's node and publishers."""
         self._node.destroy_node()
 
     def _publish(self, name: str, data: bytes | Clock) -> None:
@@ -212,7 +212,7 @@ class Player:
         self._sent[name] += 1
 
     def _schedule(self, first: int, end: int, rate: float) -> Iterator[tuple[int, str, bytes | Clock]]:
-        """Log time (ns), topic and message (in CDR, or a Clock) of all that is published in that span, in order."""
+        """Yield log time (ns), topic and message (in CDR, or a Clock) of all that is published in that span, in order."""
         tick, period = first, round(rate / self._clock_rate / NANO) if self._clock_rate else 0
         for name, stamp, data, _ in read_both(self._session, self._types):
             if not first <= stamp < end:
@@ -224,5 +224,5 @@ class Player:
 
 
 def _clock_at(stamp: int) -> Clock:
-    """The message for ``/clock`` at a time, ns."""
+    """Return the message for ``/clock`` at a time, ns."""
     return Clock(clock=Time(sec=stamp // SECOND, nanosec=stamp % SECOND))

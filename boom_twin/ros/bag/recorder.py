@@ -33,7 +33,7 @@ NAMES = ("scene", "mapping", "frame_prefix", *Settings.model_fields)
 
 
 class RemoteValue:
-    """Asks another node once, as soon as it is there, and never waits.
+    """Value that is asked of another node once, as soon as its service is there, without waiting.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class RemoteValue:
         self._is_told = False
 
     def poll(self) -> Any:
-        """The value, once; None at any other time."""
+        """Return the value once, as soon as it is known; None at any other time."""
         if self._answer is None:
             self._answer = self._ask() if self._is_ready() else None
         if self._is_told or self._answer is None or not self._answer.done():
@@ -61,7 +61,7 @@ class RemoteValue:
 
 
 def twin_values(node: Node) -> dict[str, RemoteValue]:
-    """What the node ``boom_twin`` tells the node that asks: its ``parameters``, and by the services' names its `TEXTS`."""
+    """Return the values to ask of the node ``boom_twin``: its ``parameters``, and by the services' names its `TEXTS`."""
 
     def read_parameters(response: Any) -> dict[str, object]:
         pairs = zip(NAMES, response.values, strict=False)
@@ -89,7 +89,7 @@ COMPLETE = "every required topic has a publisher"
 
 @dataclass(slots=True)
 class Count:
-    """Messages of one topic.
+    """Message counts of one topic.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class _Channel:
             self.subscription = node.create_subscription(found.kind, self.wanted.name, take, found.qos, raw=True)
 
     def look(self, node: Any) -> int:
-        """How many publishers there are; with more than one, their numbers tell nothing."""
+        """Return the number of publishers. With more than one, their sequence numbers are not used."""
         if self.subscription is None:
             return 0
         self._tell_other_types(node)
@@ -138,7 +138,7 @@ class _Channel:
         return number
 
     def _tell_other_types(self, node: Any) -> None:
-        """Tell once of each type that is published beside the recorded one: DDS never connects its publishers."""
+        """Warn once of each type that is published beside the recorded one: DDS never connects its publishers."""
         published = {each.topic_type for each in node.get_publishers_info_by_topic(self.subscription.topic_name)}
         new = published - self._other_types - {self._type, ""}
         for other in sorted(new):
@@ -154,7 +154,7 @@ class _Channel:
         return self.count.missed + self._left_out
 
     def finish(self, written: Sequence[int]) -> Count:
-        """The final count."""
+        """Return the final counts."""
         self.count.written = written[self._key] if self.subscription is not None else 0
         self.count.missed = self.missed
         return self.count
@@ -173,7 +173,7 @@ class _Channel:
         self._storage.put(self._key, received, data, max(info["source_timestamp"], 0), (number or self.count.received) % 2**32)
 
     def _leave_out(self, size: int) -> None:
-        """Tell once of what could not be read again, and would end the reading of all else."""
+        """Leave out a message that could not be read again and would end the reading of all others; warn once."""
         if not self._left_out:
             told = f"a message of {size} bytes is left out, as all above {LARGEST_MESSAGE} are: they could not be read again"
             self._tell(f"warning: {self.wanted.name}: {told} (told once)")
@@ -181,7 +181,7 @@ class _Channel:
 
 
 class _Recording:
-    """What is recorded, told on ``/diagnostics``."""
+    """Recording in progress, with its state on ``/diagnostics``."""
 
     def __init__(
         self, node: Any, storage: Storage, wanted: Sequence[RequestedTopic], thresholds: Thresholds, tell: Callable[[str], None]
@@ -192,7 +192,7 @@ class _Recording:
         self._twin_values = twin_values(node)
 
     def look(self) -> bool:
-        """Subscribe to what has come up; whether every required topic has a publisher. BagError if the disk fails."""
+        """Subscribe to new topics; return True if every required topic has a publisher. Raises BagError if the disk fails."""
         self.storage.check()
         for channel in self.channels:
             channel.open(self.node)
@@ -200,11 +200,11 @@ class _Recording:
         return all(number for channel, number in zip(self.channels, numbers, strict=True) if channel.wanted.required)
 
     def twin(self) -> dict[str, object]:
-        """What the twin has said of itself since the last look, by the names of `twin_values`."""
+        """Return the values that the twin has answered since the last look, by the names of `twin_values`."""
         return {name: value for name, each in self._twin_values.items() if (value := each.poll())}
 
     def tell(self, end: str | None = None) -> None:
-        """Publish the state; `end` as for `boom_twin.diagnostics.recorder_status.RecordingJudge`."""
+        """Publish the recording's state; `end` as for `boom_twin.diagnostics.recorder_status.RecordingJudge`."""
         topics = {each.count.topic: TopicState(each.count.received, each.missed) for each in self.channels}
         clock = self.node.get_clock().now().nanoseconds * NANO
         at = Evaluation(self._thresholds, time.monotonic(), clock)
@@ -215,7 +215,7 @@ class _Recording:
 
 @contextmanager
 def recorder_node() -> Iterator[Any]:
-    """The recorder's node, as long as this lasts; needs an initialised rclpy."""
+    """Provide the recorder's node within a context; needs an initialised rclpy."""
     node = rclpy.create_node(NAME)
     try:
         yield node

@@ -26,7 +26,7 @@ _RULE = "=" * 80
 
 
 def installed_class(type_name: str) -> Any:
-    """The class of ``package/msg/Name`` (``package/Name`` will do).
+    """Return the class of ``package/msg/Name`` (``package/Name`` will do).
 
     Raises
     ------
@@ -45,13 +45,13 @@ def installed_class(type_name: str) -> Any:
 
 
 def full_name(kind: Any) -> str:
-    """``package/msg/Name`` of a class."""
+    """Return ``package/msg/Name`` of a class."""
     package, folder = kind.__module__.split(".")[:2]
     return f"{package}/{folder}/{kind.__name__}"
 
 
 def definition_of(kind: Any) -> str:
-    """The text of a class and of all types in it; fields only where ROS 2 Jazzy's own packages do not have it."""
+    """Return the definition of a class and of all types in it; only its fields if ROS 2 Jazzy's own packages do not have it."""
     name = full_name(kind)
     if name in jazzy().types:
         return str(jazzy().generate_msgdef(name, ros_version=2)[0])
@@ -67,7 +67,7 @@ def definition_of(kind: Any) -> str:
 
 
 def _fields(kind: Any) -> tuple[str, list[str]]:
-    """One line for each field, and the types in them."""
+    """Return one line for each field, and the types in them."""
     lines, inner = [], []
     for name, described in kind.get_fields_and_field_types().items():
         text, used = _spelled(described)
@@ -77,7 +77,7 @@ def _fields(kind: Any) -> tuple[str, list[str]]:
 
 
 def _spelled(described: str) -> tuple[str, str]:
-    """A field's type in the words of a .msg file, and its element."""
+    """Return a field's type as a .msg file writes it, and the type of its elements."""
     if match := _ARRAY.match(described):
         element = _element(match["element"])
         return f"{element}[{match['count']}]", element
@@ -104,7 +104,7 @@ DEPTH = 4000
 
 @dataclass(frozen=True, slots=True)
 class RequestedTopic:
-    """One topic.
+    """Topic that is to be recorded.
 
     Attributes
     ----------
@@ -122,13 +122,13 @@ class RequestedTopic:
 
     @property
     def required(self) -> bool:
-        """Whether recording is complete only with a publisher of it."""
+        """Return True if recording is complete only with a publisher of this topic."""
         return self.topic is None or self.topic.required
 
 
 @dataclass(frozen=True, slots=True)
 class TopicSubscription:
-    """How a topic is subscribed to and how it stands in the bag."""
+    """Subscription of a topic: message class, QoS, and its entry in the bag."""
 
     kind: Any
     qos: QoSProfile
@@ -136,7 +136,7 @@ class TopicSubscription:
 
 
 def requested_topics(names: Sequence[str], known: Mapping[str, Topic]) -> list[RequestedTopic]:
-    """Topics from the words of a command line: ``NAME`` or ``NAME:package/msg/Name``.
+    """Return the topics named on a command line: ``NAME`` or ``NAME:package/msg/Name``.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def requested_topics(names: Sequence[str], known: Mapping[str, Topic]) -> list[R
 
 
 def resolved(wanted: RequestedTopic, node: Any) -> RequestedTopic:
-    """The topic by the name that it has in the namespace of `node`, with its remappings.
+    """Return a requested topic by its name in the namespace of `node`, with the node's remappings.
 
     A name private to the twin is taken to be that of the node ``boom_twin`` there.
     """
@@ -175,17 +175,17 @@ def resolved(wanted: RequestedTopic, node: Any) -> RequestedTopic:
 
 
 def resolved_topic(topic: Topic, node: Any) -> Topic:
-    """Likewise of a topic of a mapping."""
+    """Return a topic of a mapping by its name in the namespace of `node`, with the node's remappings."""
     return topic.model_copy(update={"name": node.resolve_topic_name(topic.name.replace("~", NODE, 1))})
 
 
 def resolved_topics(topics: Topics, node: Any) -> Topics:
-    """Likewise of all of them."""
+    """Return all topics of a mapping by their names in the namespace of `node`, with the node's remappings."""
     return topics.renamed(lambda topic: resolved_topic(topic, node).name)
 
 
 def resolved_mapping(text: str, topics: Topics, node: Any) -> str:
-    """Text of a mapping that says what `text` does, with all names of `topics` as `resolved` has them."""
+    """Return the text of a mapping equal to `text`, but with all names of `topics` resolved by `resolved_topic`."""
     places: dict[tuple[str, ...], Topic] = {("inputs", stream.value): topic for stream, topic in topics.inputs.items()}
     places |= {("outputs", key.value): topic for key, topic in topics.outputs.items()} | {("events",): topics.events}
     for place, topic in places.items():
@@ -196,12 +196,12 @@ def resolved_mapping(text: str, topics: Topics, node: Any) -> str:
 
 
 def with_mapped(text: str, place: tuple[str, ...], value: str) -> str:
-    """Text of a mapping with another value at one place."""
+    """Return the text of a mapping with another value at one place."""
     return with_value(text if plain(text) else "{}", place, value)
 
 
 def subscription_of(node: Any, wanted: RequestedTopic) -> TopicSubscription | None:
-    """How to subscribe; None as long as the type is not known.
+    """Return how to subscribe to a topic; None as long as its type is not known.
 
     Raises
     ------
@@ -226,7 +226,7 @@ def subscription_of(node: Any, wanted: RequestedTopic) -> TopicSubscription | No
 
 
 def _qos(offered: list[QoSProfile]) -> Qos:
-    """What every publisher can serve."""
+    """Return the QoS that every publisher can serve."""
     is_reliable = all(each.reliability == ReliabilityPolicy.RELIABLE for each in offered)
     is_kept = all(each.durability == DurabilityPolicy.TRANSIENT_LOCAL for each in offered)
     return Qos(

@@ -55,7 +55,7 @@ TIP_SOURCES: dict[str, tuple[tuple[Output, Callable[[Any], Any]], tuple[Output, 
 
 @dataclass(frozen=True)
 class DemoResult:
-    """A live run.
+    """Result of a live run.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class DemoResult:
     residual_rms: dict[str, float]
 
     def as_text(self, session: str, sent: int, equal: int) -> list[str]:
-        """Lines of a short table; `sent` strokes were played, a replay gave `equal` of the predictions again."""
+        """Return the lines of a short table; `sent` strokes were played, a replay reproduced `equal` of the predictions."""
         arrived, (median, slowest) = len(self.positions), self.latency_ms
         rows = [
             ("session", session),
@@ -99,7 +99,9 @@ class DemoResult:
 
 
 def score(recorded: Path) -> DemoResult:
-    """The numbers of one recorded run; with those against the truth, if the session's truth lies in the same folder.
+    """Return the results of one recorded run.
+
+    Errors against the truth are included if the session's truth lies in the same folder.
 
     Raises
     ------
@@ -124,7 +126,7 @@ def score(recorded: Path) -> DemoResult:
 
 
 def _messages(session: Session, topic: Topic) -> list[tuple[int, Any]]:
-    """Log times and messages of one topic; none if it has none."""
+    """Return log times and messages of one topic; none if it has none."""
     known = session.find(topic.absolute)
     if known is None or known.count == 0:
         return []
@@ -132,7 +134,10 @@ def _messages(session: Session, topic: Topic) -> list[tuple[int, Any]]:
 
 
 def _tip_errors(session: Session, truth: TipTruth, first: int) -> dict[str, tuple[float, float]]:
-    """Of every source whose outputs were recorded; `first` is the stamp (ns) of the truth's first row."""
+    """Return the errors of every source whose outputs were recorded: position (m) and acceleration (m/s^2).
+
+    `first` is the stamp (ns) of the truth's first row.
+    """
     outputs, found = load_topics().outputs, {}
     for source, roles in TIP_SOURCES.items():
         (at, position), (when, acceleration) = (_vectors(session, outputs[role], vector_of) for role, vector_of in roles)
@@ -142,14 +147,14 @@ def _tip_errors(session: Session, truth: TipTruth, first: int) -> dict[str, tupl
 
 
 def _vectors(session: Session, topic: Topic, vector_of: Callable[[Any], Any]) -> tuple[NDArray[np.int64], Array]:
-    """Stamps (k,), ns, and x and z (k, 2) of the vectors of an output."""
+    """Return stamps (k,), ns, and x and z (k, 2) of the vectors of an output."""
     messages = [msg for _, msg in _messages(session, topic)]
     vectors = [vector_of(msg) for msg in messages]
     return np.array([stamp_of(msg) for msg in messages], np.int64), np.array([(v.x, v.z) for v in vectors]).reshape(-1, 2)
 
 
 def _residual_rms(residuals: list[Any]) -> dict[str, float]:
-    """By channel, over the values that are there."""
+    """Return the root mean square of the residuals by channel, over the values that are there."""
     values: dict[str, list[NDArray[np.float64]]] = {}
     for msg in residuals:
         for name, value in zip(msg.name, msg.position, strict=True):
@@ -162,7 +167,7 @@ SETTLE = 1.0
 
 
 def main() -> int:
-    """Run the demonstration; returns the exit code, 1 if no output arrived."""
+    """Run the demonstration; return the exit code, 1 if no output arrived."""
     args = _arguments()
     try:
         require_rclpy()
@@ -203,7 +208,7 @@ def _arguments() -> Namespace:
 
 
 def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str, int]:
-    """Play, once all have found each other; gives the messages sent by topic."""
+    """Play, once all have found each other; return the number of messages sent by topic."""
     from ..bag.player import Player
     from ..runtime import ros
 
@@ -224,7 +229,7 @@ def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str
 
 
 def _equal(live: DemoResult, again: Replay) -> int:
-    """How many live predictions a replay of the recorded inputs gives again, to the last bit."""
+    """Return how many live predictions a replay of the recorded inputs reproduces, to the last bit."""
     rows = again.recording.predictions
     replayed = dict(zip(rows.stamps.tolist(), map(tuple, rows.tip_position.tolist()), strict=True))
     return sum(replayed.get(stamp) == position for stamp, position in live.positions.items())

@@ -21,7 +21,7 @@ from .processes import LOOK, DemoProcesses, demo_processes
 
 
 def main() -> int:
-    """Play until Ctrl-C; returns the exit code."""
+    """Play until Ctrl-C and return the exit code."""
     args = _arguments()
     try:
         require_rclpy()

@@ -29,11 +29,11 @@ END_TIMEOUT = 2 * DISK_PATIENCE
 LOOK = 1.0
 """Seconds between looks at whether all have found each other."""
 LISTENERS = 2
-"""Of every input: node and recorder."""
+"""Subscribers of every input: node and recorder."""
 
 
 class DemoProcess:
-    """A running module of this package whose words go into a log.
+    """Child process that runs a module of this package and writes its output into a log.
 
     Parameters
     ----------
@@ -54,22 +54,22 @@ class DemoProcess:
             self._process = subprocess.Popen(command, stdout=file, stderr=file, pass_fds=(lock,))
 
     def output(self) -> str:
-        """All that it said so far."""
+        """Return all output so far."""
         return self._log.read_text(encoding="utf-8")
 
     def check(self) -> None:
-        """Raise BoomTwinError if it has ended."""
+        """Raise BoomTwinError if the process has ended."""
         if self._process.poll() is not None:
             last = (self.output().strip().splitlines() or ["nothing was said"])[-1]
             raise BoomTwinError(f"{self._name} ended with {self._process.returncode}: {last} (see {self._log})")
 
     def end(self) -> None:
-        """Ask it to end, and wait until it has."""
+        """Ask the process to end, and wait until it has."""
         end_process(self._process, END_TIMEOUT, self._end_signal)
 
 
 class DemoProcesses:
-    """Node, recorder, and whoever joins them.
+    """Processes of a demonstration: node, recorder, and those that are started later.
 
     Parameters
     ----------
@@ -101,12 +101,12 @@ class DemoProcesses:
         self._recorder = self.start("recorder", record, signal.SIGINT)
 
     def start(self, name: str, arguments: list[str], end_signal: signal.Signals) -> DemoProcess:
-        """Start one more."""
+        """Start one more process."""
         self._children.append(DemoProcess(arguments, self._beside(f"{name}.log"), end_signal, self._lock))
         return self._children[-1]
 
     def _beside(self, name: str) -> Path:
-        """Where a file of this run goes."""
+        """Return the path of a file of this run."""
         return self.recorded.with_name(f"{self.recorded.name}.{name}")
 
     def check(self) -> None:
@@ -117,11 +117,11 @@ class DemoProcesses:
             child.check()
 
     def ask_to_end(self) -> None:
-        """End with the next `check`."""
+        """Make the next `check` raise KeyboardInterrupt."""
         self._is_asked_to_end = True
 
     def play(self, player: Player, duration: float | None = None) -> Iterator[int]:
-        """Play as long as all of them run; as `boom_twin.ros.bag.player.Player.play`."""
+        """Play as `boom_twin.ros.bag.player.Player.play` does, as long as all processes run."""
 
         def is_held() -> bool:
             self.check()
@@ -142,7 +142,7 @@ class DemoProcesses:
         player.refuse_other_publishers()
 
     def end(self) -> None:
-        """End all, the last first."""
+        """End all processes, the last first."""
         with ExitStack() as stack:
             for child in self._children:
                 stack.callback(child.end)
@@ -150,7 +150,7 @@ class DemoProcesses:
 
 @contextmanager
 def _new(path: Path) -> Iterator[TextIO]:
-    """A file that is not there yet, to be written."""
+    """Create a file that must not be there yet, and provide it for writing within a context."""
     try:
         with path.open("x", encoding="utf-8") as file:
             yield file
@@ -160,7 +160,7 @@ def _new(path: Path) -> Iterator[TextIO]:
 
 
 def _free(folder: Path) -> Path:
-    """The folder, or with a number behind its name if it, or a file that goes beside it, is there already."""
+    """Return `folder`, with a number behind its name if it, or a file that goes beside it, is there already."""
     taken = {entry.name for entry in folder.parent.iterdir()}
     numbered = (folder.with_name(f"{folder.name}_{number}") for number in count(2))
     return next(
@@ -172,7 +172,7 @@ def _free(folder: Path) -> Path:
 
 @contextmanager
 def demo_processes(out: Path, origin: str, scene: str, domain: int | None = None) -> Iterator[DemoProcesses]:
-    """Node and recorder as long as this lasts, isolated; recordings of earlier runs stay.
+    """Provide node and recorder within a context, isolated; recordings of earlier runs stay.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def demo_processes(out: Path, origin: str, scene: str, domain: int | None = None
 
 
 def _run(running: DemoProcesses, origin: str) -> Iterator[DemoProcesses]:
-    """Start, and end whatever happens."""
+    """Start the processes, and end them whatever happens."""
     before = {number: signal.getsignal(number) for number in STOPS}
     on_stop_signal(running.ask_to_end)
     try:

@@ -38,7 +38,7 @@ MOST_LINES, LINES_SPAN = 4, 600.0
 
 
 class DiagnosticsPublisher:
-    """The states of one node.
+    """Publisher of the states of one node.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class DiagnosticsPublisher:
         self._logged: dict[str, deque[float]] = {}
 
     def show(self, statuses: Sequence[Status]) -> None:
-        """Publish all, and log in one line those whose level is another than was logged; one that is new was well."""
+        """Publish all statuses; log in one line those whose level differs from the logged one, which is OK for a new status."""
         before = {status.name: self._levels.get(status.name, Level.OK) for status in statuses}
         changed = [status for status in statuses if before[status.name] != status.level and self._is_due(status)]
         self._levels = before | {status.name: status.level for status in changed}
@@ -68,11 +68,14 @@ class DiagnosticsPublisher:
         self._publisher.publish(message)
 
     def settle(self) -> None:
-        """Wait until those that listen have got it, at most a second."""
+        """Wait until subscribers have received everything, at most a second."""
         self._publisher.wait_for_all_acked(Duration(seconds=1))
 
     def _is_due(self, status: Status) -> bool:
-        """Whether a change is logged now, or once the component has not come and gone so often; an error is, and its end."""
+        """Return True if a change of level is logged now.
+
+        An error and its end are always logged. Other changes of a component are limited in rate.
+        """
         if max(status.level, self._levels.get(status.name, Level.OK)) > Level.WARN:
             return True
         now, times = time.monotonic(), self._logged.setdefault(status.name, deque(maxlen=MOST_LINES))
@@ -82,7 +85,7 @@ class DiagnosticsPublisher:
         return True
 
     def _log(self, changed: Sequence[Status]) -> None:
-        """Names of the same state together: the sensors of a topic fall silent as one."""
+        """Log the changed statuses, those with one message together: the sensors of a topic fall silent as one."""
         groups: dict[str, list[str]] = {}
         for status in changed:
             groups.setdefault(status.message, []).append(status.name)
@@ -103,14 +106,14 @@ class DiagnosticsPublisher:
 
 
 def _text(value: str | int | float) -> str:
-    """As a program reads it: nine digits of a float; what files and other nodes put into a text is escaped, as in the log."""
+    """Return a value as text for a program: a float with nine digits, a text with control characters escaped, as in the log."""
     return f"{value:.9g}" if isinstance(value, float) else printable(str(value), keep="")
 
 
 class GraphPeers:
-    """The other ends of every topic of `node`, one topic looked up at a time.
+    """Publishers and subscribers at the other ends of every topic of `node`, one topic looked up at a time.
 
-    Discovery is asked, and not only the events of incompatible QoS: those do not tell who it was, nor that it has gone.
+    Discovery is asked besides the events of incompatible QoS, which tell neither which node it was nor that it has gone.
 
     Attributes
     ----------
@@ -143,14 +146,14 @@ class GraphPeers:
 
 
 def _as_discovered(qos: QoSProfile) -> QoSProfile:
-    """Own QoS as the other ends see it: what is left to the default is none."""
+    """Return the own QoS as the other ends see it; settings left at their default count as none."""
     qos.deadline = qos.lifespan = qos.liveliness_lease_duration = Infinite
     qos.liveliness = LivelinessPolicy.AUTOMATIC
     return qos
 
 
 def _peers(address: str, kind: str, ends: list[tuple[Any, QoSProfile, QoSProfile]]) -> Peers:
-    """From the other ends, and the QoS offered and asked for; `kind` is the type of message that is right."""
+    """Return the peers by the other ends, and the QoS offered and asked for; `kind` is the right type of message."""
     strange = tuple(f"{node_name(end)}: {end.topic_type}, not {kind}" for end, _, _ in ends if end.topic_type != kind)
     ends = [each for each in ends if each[0].topic_type == kind]
     faults = [(node_name(end), _reason(offered, asked)) for end, offered, asked in ends]
@@ -160,20 +163,20 @@ def _peers(address: str, kind: str, ends: list[tuple[Any, QoSProfile, QoSProfile
 
 
 def _reason(offered: QoSProfile, asked: QoSProfile) -> str:
-    """Why the two do not fit; empty if they do."""
+    """Return why the two are incompatible; empty if they are compatible."""
     verdict, reason = qos_check_compatible(offered, asked)
     return str(reason).removeprefix("ERROR: ").rstrip(";") if verdict == QoSCompatibility.ERROR else ""
 
 
 def node_name(endpoint: Any) -> str:
-    """Namespace and name of the node of a publisher or subscriber that was discovered."""
+    """Return namespace and name of the node of a discovered publisher or subscriber."""
     if "UNKNOWN" in endpoint.node_name:  # so rmw calls a node that it has not heard of
         return "a node without a known name"
     return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
 
 
 WORDS = {**EVENTS, **ODDITIES, "too large": f"a message of more than {LARGEST >> 10} KiB, which is left out"}
-"""What is told of the first sample of a kind."""
+"""Descriptions that are logged with the first sample of a kind."""
 TICK = 0.1  # s of steady time between looks at whether something is urgent
 PERIOD = 1.0  # s from one message to the next, where nothing is
 PIECE = 0.002  # s from one piece of such a look to the next: samples are taken in between
@@ -181,7 +184,7 @@ SLOWEST = 0.02  # s from one piece to the next, at most, on the average: of a fl
 
 
 class Diagnostics:
-    """Watches one node; nothing is computed or logged for a single message.
+    """Diagnostics of one node. Nothing is computed or logged for a single message.
 
     Parameters
     ----------
@@ -213,7 +216,7 @@ class Diagnostics:
         self._was_apart, self._newest = False, (0, 0.0)  # newest stamp (ns), and when it was first seen
 
     def watch(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
-        """The node is configured with these."""
+        """Watch the twin that the node is configured with."""
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts, twin.absent)
         stress = stress_watch(twin.scene, twin.reads)
         self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds, stress=stress)
@@ -224,43 +227,43 @@ class Diagnostics:
         self._told.clear()
 
     def tune(self, thresholds: Thresholds) -> None:
-        """Judge by these from now on."""
+        """Set the thresholds from now on."""
         self._watch.thresholds = thresholds
 
     def start(self) -> None:
-        """The node is active: from now on an input that is silent is stale."""
+        """Start watching, because the node is active: from now on an input that is silent is stale."""
         self._watch.begin()
         self._drop_work()
         self._active = True
 
     def stop(self) -> None:
-        """The node is active no more."""
+        """Stop watching, because the node is no longer active."""
         self._drop_work()
         self._active = False
 
     def seen(self, stream: Stream, stamp: int) -> None:
-        """A message came."""
+        """Count a message."""
         self._watch.seen(stream, stamp)
 
     def took(self, sample: Sample, report: Report, duration: float) -> None:
-        """The twin made `report` of `sample` in so many seconds."""
+        """Take the `report` that the twin made of `sample` in `duration` seconds."""
         self._watch.took(sample, report, duration)
 
     def judged(self, health: Health | None, duration: float) -> None:
-        """The twin judged the rig's health in so many seconds, or had nothing to tell."""
+        """Take the result of a look at the rig's health, which took `duration` seconds; None if there is no news."""
         self._watch.judged(health, duration)
 
     def acknowledge(self) -> str:
-        """Somebody has seen the alarms of the rig's health; says which of them ended and are let go."""
+        """Acknowledge the alarms of the rig's health; return in words which of them have ended and are released."""
         health = self._watch.health
         return "health is not judged" if health is None else health.acknowledge()
 
     def broken(self, stream: Stream, error: Exception) -> None:
-        """A message could not be handled at all."""
+        """Count a message that could not be handled at all."""
         self._watch.broken(f"a message of {stream.value} could not be handled: {type(error).__name__}: {error}")
 
     def _tick(self) -> None:
-        """Look up one topic's other ends, every second time; look at everything, if it is due."""
+        """Look up one topic's other ends at every second call; begin a look at everything, if it is due."""
         self._is_peers_turn = not self._is_peers_turn
         if self._is_peers_turn:
             self._peers.look()
@@ -271,7 +274,7 @@ class Diagnostics:
             self._pieces.reset()
 
     def _go_on(self) -> None:
-        """Do the next piece of the look that was begun, and as many more as should have been done since the last one."""
+        """Do the next piece of the look that was begun, and as many more as were due since the last one."""
         began, self._newest_piece = self._newest_piece, time.monotonic()
         for _ in range(1 + int((self._newest_piece - began) / SLOWEST)):
             if self._work is None or next(self._work, self) is self:
@@ -299,7 +302,7 @@ class Diagnostics:
         self._tell_clock(clock, max((each.wait for each in received.values() if each.wait > 0.0), default=0.0))
 
     def _wrong_names(self) -> dict[Stream, tuple[Level, str]]:
-        """The inputs that named cylinders or joints that the scene does not have since the last look, in words."""
+        """Return the inputs that named cylinders or joints unknown to the scene since the last look, with level and words."""
         decoder, found = self._decoder, dict[Stream, tuple[Level, str]]()
         if decoder is None:
             return found
@@ -318,13 +321,13 @@ class Diagnostics:
             self._tell(name, f"{name}: {WORDS.get(name, 'seen in a message')} (told once; counted on /diagnostics)")
 
     def _tell_types(self) -> None:
-        """Log what cannot be heard for its type: an input that is silent anyway does not change its level by that."""
+        """Warn of publishers with another type of message, which cannot be heard. The input's level does not show them."""
         for each in self._peers.publishers.values():
             if each.mistyped:
                 self._tell(f"type of {each.address}", f"{each.address}: another type of message: {'; '.join(each.mistyped)}")
 
     def _tell_clock(self, clock: float, wait: float) -> None:
-        """Log that the strokes are stamped by another clock than the node's, in which messages waited so long, s."""
+        """Warn if the stamps of strokes are not of the node's clock; messages waited at most `wait` seconds."""
         newest = self._watch.newest if self._active else None
         if newest is not None and clock == 0.0:
             self._tell(
@@ -347,7 +350,7 @@ class Diagnostics:
         return "the node's clock: set use_sim_time or play with --clock"
 
     def _tell(self, name: str, text: str) -> None:
-        """Log something once."""
+        """Log a warning once."""
         if name not in self._told:
             self._told.add(name)
             self._logger.warning(text)

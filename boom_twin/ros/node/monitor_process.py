@@ -15,13 +15,13 @@ from ..bag.recorder import TEXTS
 LOOK = 1.0
 """Seconds of steady time between looks at whether it still runs."""
 SERVICES = ("acknowledge", "get_parameters", *TEXTS)
-"""Of the node, that the page or the recorder that it starts asks."""
+"""Services of the node that are used by the page, or by the recorder that it starts."""
 END_TIMEOUT = 1.0
 """Seconds that it may take to end."""
 
 
 class MonitorProcess:
-    """Runs the monitor from now until `close`; if it ends before, one line says so and nothing else changes.
+    """Child process of the monitor, from now until `close`. If it ends before, one line reports that and nothing else changes.
 
     It shares no socket, lock or queue with the node: it hears the node's topics as any subscriber does. Its standard input is
     a pipe that the node holds, so it ends with the node however that ends.
@@ -53,7 +53,7 @@ class MonitorProcess:
         self._timer = node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def close(self) -> None:
-        """End it."""
+        """End the process."""
         self._timer.destroy()
         end_process(self._process, END_TIMEOUT)
 

@@ -70,23 +70,23 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     @property
     def autostart(self) -> bool:
-        """Whether the node is to configure and activate itself."""
+        """Return True if the node is to configure and activate itself."""
         return bool(self.get_parameter("autostart").value)
 
     def set_parameters_atomically(self, parameter_list: list[Parameter[Any]]) -> SetParametersResult:
-        """As any node's; but where rclpy names neither fault nor remedy, the reason does."""
+        """Set parameters as any node does; give a reason with fault and remedy where rclpy has none."""
         if reason := refusal(self, parameter_list):
             return SetParametersResult(successful=False, reason=reason)
         return super().set_parameters_atomically(parameter_list)
 
     def start(self) -> bool:
-        """Configure and activate; whether both went well."""
+        """Configure and activate the node; return True if both succeeded."""
         return bool(self.trigger_configure() == SUCCESS and self.trigger_activate() == SUCCESS)
 
     # -- transitions --------------------------------------------------------------------------------------------------
 
     def _change_state(self, change: Callable[..., Any], request: Any, response: Any) -> Any:
-        """A transition by service; one that the present state does not have is refused: rclpy would end the process."""
+        """Carry out a transition asked for by service; refuse one that the present state lacks: rclpy would end the process."""
         try:
             return change(request, response)
         except RuntimeError as error:  # RCLError
@@ -98,7 +98,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             return response
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Load the scene, compile its model, offer the outputs; FAILURE, with the reason logged, if that cannot be."""
+        """Load the scene, compile its model, offer the outputs; on failure, log the reason and return FAILURE."""
         try:
             self._build()
         except BoomTwinError as error:
@@ -118,7 +118,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Start from the next full stroke sample, and listen."""
+        """Start listening; the model starts from the next full stroke sample."""
         assert self._twin is not None
         self._preparation.finish()
         self._twin.renew()
@@ -137,7 +137,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         return outcome
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Listen no more."""
+        """Stop listening."""
         self.queue.catch_up()
         for sample in self._decoder.assembler.rest():
             self._take(sample)
@@ -145,30 +145,30 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Give up the model and the outputs; parameters can be changed again."""
+        """Release the model and the outputs; parameters can be changed again."""
         self._discard()
         return super().on_cleanup(state)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Let go of everything, from whatever state."""
+        """Release everything, from whatever state."""
         self._stop_listening()
         self._discard()
         self.finished = True
         return super().on_shutdown(state)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Let go of everything; the node can be configured anew."""
+        """Release everything; the node can be configured again."""
         self._stop_listening()
         self._discard()
         return super().on_error(state)
 
     def leave(self) -> None:
-        """Shut down from whatever state; a transition that was interrupted is left as it is."""
+        """Shut down from whatever state; leave an interrupted transition as it is."""
         if self._state_machine.current_state[1] in ("unconfigured", "inactive", "active"):
             self.trigger_shutdown()
 
     def _build(self) -> None:
-        """Scene and settings to a compiled twin."""
+        """Compile a twin from scene and settings."""
         found = scene_from(path_of(self, "scene"))
         scene, name = found.scene, found.source
         for oddity in found.oddities:
@@ -191,7 +191,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._log.info("model ready")
 
     def _tune(self, live: dict[str, float]) -> None:
-        """Live parameters were set."""
+        """Apply the live parameters that were set."""
         self._diagnostics.tune(current(self, Thresholds))
         asked = {name: value for name, value in live.items() if name in Settings.live_names()}
         if asked and self._twin is not None:
@@ -221,7 +221,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
     # -- one message --------------------------------------------------------------------------------------------------
 
     def _receive(self, streams: list[Stream], decoder: CdrDecoder, data: bytes) -> None:
-        """Take one message; whatever it holds, the node lives on."""
+        """Take one message; the node survives whatever it holds."""
         try:
             (stamp, msg), refused = decoder.read(data), self._decoder.refused
             samples = self._decoder.samples(streams, stamp, msg)
@@ -247,7 +247,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             self._judge(self._twin, sample.stamp)
 
     def _judge(self, twin: Twin, stamp: int) -> None:
-        """Judge health: a millisecond, for which no prediction waits."""
+        """Judge the rig's health. It takes about a millisecond, for which no prediction waits."""
         began = perf_counter()
         health = twin.judge_health()
         if health is not None:
@@ -255,7 +255,10 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._diagnostics.judged(health, perf_counter() - began)
 
     def _publish(self, report: Report) -> None:
-        """What somebody listens to, or may ask for later; the node is active, which the publishers need not look at again."""
+        """Publish the outputs that somebody listens to, or may ask for later.
+
+        The node is active here, so the publishers' own check of its state is bypassed.
+        """
         for key, encoded in self._encoder.fill(report, self._is_wanted):
             self._handles[key].publish_raw(encoded)
 

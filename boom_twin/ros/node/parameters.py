@@ -27,7 +27,7 @@ _LARGEST = sys.float_info.max
 
 @dataclass(frozen=True, slots=True)
 class ParameterRow:
-    """One parameter; its type is that of the default, its unit stands at the end of the text."""
+    """Row of the table of parameters. Its type is that of the default; its unit stands at the end of the text."""
 
     name: str
     default: str | bool | float
@@ -82,13 +82,13 @@ def declare(node: Node) -> None:
 
 
 def _unknown(node: Node, names: Iterable[str]) -> str:
-    """What is said of those of `names` that are no parameters; empty if all are."""
+    """Return an error text on those of `names` that are no parameters; empty if all are."""
     unknown = sorted(name for name in names if not _is_known(node, name))
     return "; ".join(f"{name}: unknown. The nearest is `{nearest(name, [row.name for row in TABLE])}`" for name in unknown)
 
 
 def refusal(node: Node, parameters: Iterable[Parameter[Any]]) -> str:
-    """Why these cannot be set, for which rclpy has no remedy: no such parameter, or a whole number; else empty."""
+    """Return why these cannot be set, for faults of which rclpy gives no remedy: unknown name, whole number; else empty."""
     given = {parameter.name: parameter for parameter in parameters}
     if told := _unknown(node, given):
         return f"{told}. `ros2 param list` names all."
@@ -99,12 +99,12 @@ def refusal(node: Node, parameters: Iterable[Parameter[Any]]) -> str:
 
 
 def _is_known(node: Node, name: str) -> bool:
-    """Whether the parameter was declared, here or by rclpy; QoS overrides are declared with their topics."""
+    """Return True if the parameter was declared, here or by rclpy. QoS overrides are declared with their topics."""
     return node.has_parameter(name) or name.startswith("qos_overrides.")
 
 
 def guard(node: Node, is_configured: Callable[[], bool], tune: Callable[[dict[str, float]], None]) -> None:
-    """Refuse what cannot be set, with the reason; give live values that were set to `tune`."""
+    """Refuse values that cannot be set, with the reason; pass live values that were set to `tune`."""
     fixed = {row.name for row in TABLE if row.when == FIXED}
 
     def check(parameters: list[Parameter[Any]]) -> SetParametersResult:
@@ -129,13 +129,13 @@ def guard(node: Node, is_configured: Callable[[], bool], tune: Callable[[dict[st
 
 
 def path_of(node: Node, name: str) -> Path | None:
-    """The path in the parameter ``scene``, ``mapping`` or ``baseline``; None = the package's own."""
+    """Return the path in the parameter ``scene``, ``mapping`` or ``baseline``; None = the package's own."""
     text: str = node.get_parameter(name).value
     return Path(text) if text else None
 
 
 def frame_of(node: Node, topics: Topics) -> str:
-    """The frame of all outputs; UsageError if there can be no such frame."""
+    """Return the frame of all outputs; raise UsageError for an invalid prefix."""
     prefix: str = node.get_parameter("frame_prefix").value
     if prefix.startswith("/"):
         told = "names of frames have no leading slash (tf2)"
@@ -144,23 +144,23 @@ def frame_of(node: Node, topics: Topics) -> str:
 
 
 def baseline_of(node: Node) -> Baseline | None:
-    """What the rig's health is judged by; None if it is not to be judged. UsageError if the file cannot be used."""
+    """Return the baseline of the rig's health; None if health is not judged. Raises UsageError for an unusable file."""
     return load_baseline(path_of(node, "baseline")) if node.get_parameter("health").value else None
 
 
 def baseline_text(node: Node) -> dict[str, str]:
-    """The text of that file under ``baseline``; nothing if it is the package's own, or none is used."""
+    """Return the text of the baseline file under ``baseline``; nothing if it is the package's own, or none is used."""
     path = path_of(node, "baseline")
     return {"baseline": path.read_text(encoding="utf-8-sig")} if path and node.get_parameter("health").value else {}
 
 
 def current(node: Node, table: type[Table]) -> Table:
-    """`Settings` or `Thresholds` as the parameters stand; UsageError if a value is out of bounds."""
+    """Return `Settings` or `Thresholds` as the parameters stand; raise UsageError if a value is out of bounds."""
     return checked(table, {name: node.get_parameter(name).value for name in table.model_fields}, SOURCE)
 
 
 def _descriptor(row: ParameterRow) -> ParameterDescriptor:
-    """Type, meaning and bounds; a ROS range includes its ends, so words say where they are out."""
+    """Return type, meaning and bounds of a parameter. A ROS range includes its ends, so words state where they are excluded."""
     kinds = {str: ParameterType.PARAMETER_STRING, bool: ParameterType.PARAMETER_BOOL, float: ParameterType.PARAMETER_DOUBLE}
     descriptor = ParameterDescriptor(
         type=kinds[type(row.default)], description=row.text, read_only=row.when == AT_START, additional_constraints=row.when

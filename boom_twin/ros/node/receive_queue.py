@@ -26,7 +26,7 @@ CATCH_UP = 0.5
 
 
 class _Topic:
-    """Waiting messages of one topic, with their arrival (ns), and what is counted."""
+    """Waiting messages of one topic, with their arrival (ns), and its counts."""
 
     def __init__(self, depth: int, read: Callable[[bytes], None]) -> None:
         self.waiting: deque[tuple[int, bytes]] = deque()
@@ -37,7 +37,7 @@ class _Topic:
         self.number, self._missed, self._is_numbered = -1, 0, True
 
     def count(self, number: int | None) -> None:
-        """Go on with a message of this number; a number that is not above the last one is another publisher's."""
+        """Count a message by its sequence number. A number that is not above the last one is another publisher's."""
         self.received += 1
         if number is None:
             return
@@ -48,7 +48,7 @@ class _Topic:
         self.number = number
 
     def look(self) -> Reception:
-        """What is known; begins a new span of time."""
+        """Return the reception of this topic and start a new interval."""
         self.lost += self._missed if self._is_numbered else 0
         counts = self.received, self.lost, self.dropped, len(self.waiting)
         found = Reception(*counts, self.wait, self.latency, self._is_numbered)
@@ -57,7 +57,7 @@ class _Topic:
 
 
 class ReceiveQueue:
-    """Reads messages of several topics in the order of their arrival.
+    """Queue of messages of several topics, read in the order of their arrival.
 
     Of a topic of which too many wait, the oldest gives way; others do not suffer from it.
 
@@ -89,11 +89,11 @@ class ReceiveQueue:
         self.on_put: Callable[[], None] | None = None
 
     def __bool__(self) -> bool:
-        """Whether a message waits."""
+        """Return True if a message waits."""
         return bool(self._turns) and any(topic.waiting for topic in self._topics.values())
 
     def open(self, name: str, depth: int, read: Callable[[bytes], None]) -> Callable[..., None]:
-        """The callback of a raw subscription.
+        """Return the callback of a raw subscription.
 
         Parameters
         ----------
@@ -129,7 +129,7 @@ class ReceiveQueue:
         return with_information(put)
 
     def close(self) -> None:
-        """Forget all topics, and what waits."""
+        """Delete all topics and waiting messages."""
         self._topics.clear()
         self._turns.clear()
         self.is_behind = False
@@ -157,9 +157,9 @@ class ReceiveQueue:
         return max(0, self._clock() - arrival) * NANO
 
     def catch_up(self) -> None:
-        """Read what arrived before a request that is about to be answered, so far as there is time for it."""
+        """Read what arrived before a request that is about to be answered, as far as there is time for it."""
         self.work(CATCH_UP)
 
     def look(self) -> Mapping[str, Reception]:
-        """What is known of every topic, by name; begins a new span of time."""
+        """Return the reception of every topic, by name, and start a new interval."""
         return {name: topic.look() for name, topic in self._topics.items()}

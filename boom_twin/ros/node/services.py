@@ -25,9 +25,11 @@ INACTIVE = "the node is not active, so nothing is measured. Activate it first."
 
 
 class Services:
-    """``~/reset``, ``~/acknowledge`` and by sensor ``~/rezero/joint_i``, ``cylinder_i``, ``cylinder_force_i``, ``tip_imu``.
+    """Services of the node, all of type std_srvs/Trigger.
 
-    Besides, ``~/scene`` and ``~/baseline`` answer with the texts that the model was built from. All are std_srvs/Trigger.
+    ``~/reset``, ``~/acknowledge`` and by sensor ``~/rezero/joint_i``, ``cylinder_i``, ``cylinder_force_i``, ``tip_imu``.
+
+    ``~/scene`` and ``~/baseline`` answer with the texts that the model was built from.
 
     Parameters
     ----------
@@ -66,7 +68,7 @@ class Services:
         self._services += [node.create_service(Trigger, f"~/{name}", partial(_tell, text)) for name, text in texts.items()]
 
     def close(self) -> None:
-        """Offer them no more."""
+        """Withdraw the services."""
         for service in self._services:
             self._node.destroy_service(service)
 
@@ -82,7 +84,7 @@ class Services:
         return response
 
     def _limit(self, name: str) -> None:
-        """Refuse what would keep the node busy with starts from rest."""
+        """Raise UsageError if a service that restarts the model from static equilibrium is called again too soon."""
         now = time.monotonic()
         if FROM_REST.fullmatch(name):
             if now - self._called.get(name, -PAUSE) < PAUSE:
@@ -110,7 +112,7 @@ LOG_PERIOD = 1.0
 
 
 class StartLog:
-    """Logs from when on the model goes on with other settings, zeros or from rest.
+    """Log of the changes from which on the model runs with other settings or zeros, or restarts from static equilibrium.
 
     Parameters
     ----------
