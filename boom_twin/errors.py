@@ -56,7 +56,7 @@ ABSENT = _Absent()
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that is wrong (or, as a warning, odd) in a scene.
+    """Fault in a scene, or an irregularity that is only a warning.
 
     Parameters
     ----------
@@ -89,12 +89,12 @@ class Fault:
 
     @property
     def kind(self) -> str:
-        """What it is called where it does not stop a scene."""
+        """Name of a fault that does not stop a scene: ``note`` or ``warning``."""
         return "note" if self.is_note else "warning"
 
 
 def _shortened(value: Any, width: int = 60) -> str:
-    """Text of a value, cut in the middle where it is long; in the spelling of the file."""
+    """Return the text of a value in the spelling of the file, cut in the middle where it is long."""
     if isinstance(value, tuple):
         text = "[" + ", ".join(_shortened(item) for item in value) + "]"
     elif value is None or isinstance(value, bool):

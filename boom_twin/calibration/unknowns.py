@@ -61,7 +61,7 @@ class Unknown:
 
     @property
     def channel(self) -> str | None:
-        """The channel whose zero it is; None for a parameter of the scene."""
+        """Channel whose zero it is; None for a parameter of the scene."""
         channel = self.name.removesuffix(".zero")
         return None if channel == self.name else channel
 
@@ -78,7 +78,7 @@ class Unknown:
         return (LEAST_LOAD - self.present) / self.kind.prior if self.name in ("tip.payload", "line_fill") else -math.inf
 
     def value(self, deviation: float) -> float:
-        """The value that is so many prior deviations off the present one."""
+        """Return the value at `deviation` prior deviations from the present one."""
         step = deviation * self.kind.prior
         return self.present * math.exp(step) if self.kind.relative else self.present + step
 
@@ -91,7 +91,7 @@ def usual_names(
     stiffness: bool = False,
     zeros: str = "all",
 ) -> list[str]:
-    """What is estimated if nobody names it: stiffness of every cylinder, zero of every sensor, and what is asked for.
+    """Return the default unknowns: stiffness of every cylinder, zero of every sensor, and those requested.
 
     Parameters
     ----------
@@ -113,13 +113,13 @@ def usual_names(
 
 
 def zero_names(scene: Scene, streams: Sequence[Stream] = tuple(Stream)) -> list[str]:
-    """Zeros of the sensors of some of the streams of `ZEROS`."""
+    """Return the names of the sensors' zeros of some of the streams of `ZEROS`."""
     channels = channels_of(len(scene.joints))
     return [f"{channel}.zero" for stream in ZEROS if stream in streams for channel in channels[stream]]
 
 
 def unknowns_of(scene: Scene, names: Sequence[str]) -> tuple[Unknown, ...]:
-    """The unknowns of these names; zeros are 0 at present, for a mapping has taken what it knows of them.
+    """Return the unknowns of these names; zeros are 0 at present, since the mapping has applied the known ones.
 
     Raises
     ------

@@ -183,7 +183,7 @@ def restore(t, boom, work, p):
 
 @inner
 def note_linkages(t, p):
-    """Joint angles of the rigid boom at the strokes of the drives, and their derivatives by stroke."""
+    """Write the joint angles of the rigid boom at the strokes of the drives, and their derivatives by stroke."""
     for i in range(p.angles.shape[0]):
         row = t.linkages[i]
         angle = angle_of_length(row, p.closed[i] + p.drives[i], p.angles[i], -WIDEST, WIDEST)
@@ -360,7 +360,7 @@ def move_along(t, boom, work, p, j):
 
 @inner
 def weigh(p, one, other):
-    """Modal mass of two motions (h,), kg."""
+    """Return the modal mass of two motions (h,), kg."""
     total = 0.0
     for i in range(one.shape[0]):
         total += p.masses[i] * one[i] * other[i]

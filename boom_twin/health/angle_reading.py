@@ -40,7 +40,7 @@ class _Exchange:
 
 
 class AngleReading:
-    """Judges the angle sensors against one another.
+    """Monitor of the angle sensors by comparison with one another.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class AngleReading:
         self.begin()
 
     def begin(self) -> None:
-        """The boom starts from rest; alarms last until they are refuted."""
+        """Restart with the boom at rest; alarms last until they are refuted."""
         count = len(self._scene.joints)
         self._strokes, self._since = np.zeros(count), np.full(count, -1, dtype=np.int64)
         self._is_off = False
@@ -68,7 +68,7 @@ class AngleReading:
 
     @property
     def masked(self) -> NDArray[np.bool_]:
-        """Angle sensors that are not to be used, shape (n,)."""
+        """Mask of the angle sensors that must not be used, shape (n,)."""
         if not self._found:
             return self._none
         mask = np.full(len(self._scene.joints), self.has_wrong_strokes)
@@ -78,7 +78,7 @@ class AngleReading:
 
     @property
     def has_wrong_strokes(self) -> bool:
-        """True if strokes are swapped, so that nothing is predicted rightly."""
+        """Return True if strokes are swapped, so that every prediction is wrong."""
         return any(found.is_of_strokes for found in self._found)
 
     def explains(self, alarm: Alarm) -> bool:

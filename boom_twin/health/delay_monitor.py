@@ -32,7 +32,7 @@ ROUNDS, ROUND = 6, 0.25  # of Gauss-Newton, and by how much (s) a lag changes in
 
 
 class DelayMonitor:
-    """Judges the joint angles.
+    """Monitor of the joint angles' stamps.
 
     Attributes
     ----------

@@ -34,7 +34,7 @@ class _Deviation:
 
 
 class DeviationMonitor:
-    """Judges the slow means of the residuals of one stream.
+    """Monitor of the slow means of one stream's residuals.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ TAKEN_OUT = "with gravity taken out"
 
 
 class ImuMount:
-    """Judges the IMU at the tip.
+    """Monitor of the IMU at the tip.
 
     Attributes
     ----------

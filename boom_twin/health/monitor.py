@@ -27,7 +27,7 @@ MEASURED_NOISE = (Stream.STROKES, Stream.ANGLES)  # streams whose noise is repor
 
 
 class HealthMonitor:
-    """Follows one rig.
+    """Health monitor of one rig.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ class _Fault:
 
 
 class SensorMonitor:
-    """Turns the findings about one stream into alarms.
+    """Monitor that turns the findings about one stream into alarms.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class SensorMonitor:
         self.masked, self._is_anew = self._none, False
 
     def begin(self) -> None:
-        """The boom starts from rest: what jumped may have come back unseen."""
+        """Note a start from rest: a reading that jumped may have come back unseen."""
         self._is_anew = True
 
     @property

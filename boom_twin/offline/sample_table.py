@@ -32,7 +32,7 @@ NEVER = np.iinfo(np.int64).min
 
 
 def predicted_columns(joints: int) -> list[str]:
-    """Names of the columns of a prediction, those that ``boom_twin simulate`` writes: of a boom with so many joints."""
+    """Return the names of the columns of a prediction, as ``boom_twin simulate`` writes them, for so many joints."""
     numbers = range(1, joints + 1)
     return [
         "t_s",
@@ -44,7 +44,7 @@ def predicted_columns(joints: int) -> list[str]:
 
 
 def columns_of(joints: int) -> list[str]:
-    """Names of all columns: predicted, measured, residuals, modes, estimated, deviations of the estimate."""
+    """Return the names of all columns: predicted, measured, residuals, modes, estimated, deviations of the estimate."""
     return [
         *predicted_columns(joints),
         *chain.from_iterable(_channel_columns(joints, "measured").values()),
@@ -56,7 +56,7 @@ def columns_of(joints: int) -> list[str]:
 
 
 def _channel_columns(joints: int, kind: str) -> dict[Stream, list[str]]:
-    """Names of the columns of every stream's channels."""
+    """Return the names of the columns of every stream's channels."""
     return {
         stream: [f"{kind}_{name}_{SENSORS[stream].unit_suffix}" for name in names]
         for stream, names in channels_of(joints).items()
@@ -64,13 +64,13 @@ def _channel_columns(joints: int, kind: str) -> dict[Stream, list[str]]:
 
 
 class TableFile(Protocol):
-    """Where rows go."""
+    """Interface of a file that table rows are written to."""
 
     def write(self, rows: Array) -> None:
         """Append rows, shape (k, columns)."""
 
     def close(self) -> None:
-        """The table is complete."""
+        """Complete the table."""
 
 
 class CsvFile:
@@ -91,7 +91,7 @@ class CsvFile:
 
 
 class RowsInMemory:
-    """A table that is kept.
+    """Table in memory.
 
     Attributes
     ----------
@@ -138,13 +138,13 @@ def _arrow() -> tuple[Any, Any]:
 
 
 def check_kind(kind: str | None) -> None:
-    """UsageError if tables of that kind cannot be written here; to be called before a long run."""
+    """Raise UsageError if tables of that kind cannot be written here; to be called before a long run."""
     if kind == "parquet":
         _arrow()
 
 
 def table_file(path: Path, joints: int) -> TableFile:
-    """The file of a table of a boom with so many joints, by the end of its name ``.csv`` or ``.parquet``.
+    """Return the file of a table, by the end of its name ``.csv`` or ``.parquet``, of a boom with so many joints.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def table_file(path: Path, joints: int) -> TableFile:
 
 
 class SampleTable:
-    """Makes the table of a replay; its `add` is what `boom_twin.offline.replay.replay_into` gives stretches to.
+    """Builder of a replay's table; `boom_twin.offline.replay.replay_into` gives stretches to its `add`.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ class SampleTable:
         self._file.close()
 
     def _new_rows(self, stretch: Stretch) -> Array:
-        """What was predicted and estimated; the rest is empty."""
+        """Return rows with the predicted and estimated values; the rest is NaN."""
         p, e = stretch.predictions, stretch.estimates
         rows = np.full((len(p.stamps), self._rows.shape[1]), np.nan)
         seconds = (p.stamps - stretch.first) * NANO

@@ -60,9 +60,9 @@ def limits_of(scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mou
 
 @dataclass
 class _UpdateExtras:
-    """What one call of the compiled update gives beside numbers.
+    """Results of one call of the compiled update that are not numbers.
 
-    drawn, of which outlines are made, by row of a prediction; health and events by row of a sample.
+    `drawn` (the source of outlines) is keyed by row of a prediction; `health` and `events` are keyed by row of a sample.
     """
 
     drawn: dict[int, Drawn] = field(default_factory=dict)
@@ -79,7 +79,7 @@ _Held = tuple[_Code, tuple[tuple[Any, ...], tuple[Any, ...], Any]]
 
 
 class BlockUpdate:
-    """Ordinary samples through the compiled update.
+    """Driver of the compiled update, for regular samples.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class BlockUpdate:
 
     @property
     def limits(self) -> Limits:
-        """What samples are judged by."""
+        """Limits that the compiled update checks samples against."""
         return self._limits
 
     @limits.setter
@@ -140,7 +140,7 @@ class BlockUpdate:
         self._limits, self._held = limits, None
 
     def begin_health(self) -> None:
-        """What was found up to now is of no concern to the health monitor any more, which begins anew when it is told more."""
+        """Restart the health monitor with the next data; what was found up to now is not passed to it."""
         self._told, self._due, self._begins_health = tuple(self._found.counts.tolist()), None, True
 
     def advance(self, run: Run | None, block: SampleBlock, trusted: bool = False) -> tuple[int, int]:
@@ -208,7 +208,7 @@ class BlockUpdate:
         return self._held
 
     def make_room(self) -> None:
-        """Before the next call of the compiled update, which adds its rows to those that the health monitor is told later."""
+        """Prepare the next call of the compiled update; pass pending rows to the health monitor when the buffer is full."""
         self._begin, self._news = tuple(self._found.counts.tolist()), NO_EXTRAS
         if max(self._begin) > CAPACITY:
             self._tell_health()
@@ -230,7 +230,7 @@ class BlockUpdate:
             self._take_judgement(row - 1)
 
     def _look_around(self, run: Run, row: int) -> None:
-        """What a prediction that begins a slot or left the model's validity has beside its numbers."""
+        """Add the shape, event and health request of a prediction that begins a slot or is outside the model's validity."""
         clock, at = self._state.clock, int(self._found.counts[0]) - 1 - self._begin[0]
         if self._news is NO_EXTRAS:
             self._news = _UpdateExtras()
@@ -250,7 +250,7 @@ class BlockUpdate:
 
     @property
     def is_due(self) -> bool:
-        """Whether the newest sample was the first of a slot, and the rig's health was not judged yet."""
+        """Return True if the newest sample began a slot and the rig's health has not been judged since."""
         return self._due is not None
 
     def judge(self) -> Health | None:
@@ -334,7 +334,7 @@ class BlockUpdate:
         )
 
     def _outlines(self) -> dict[int, Outline]:
-        """Outlines by row of a prediction."""
+        """Return outlines by row of a prediction."""
         drawn = self._news.drawn
         return dict(zip(drawn, self._boom.outlines(list(drawn.values())), strict=True)) if drawn else {}
 
@@ -343,7 +343,7 @@ class BlockUpdate:
         return EstimateBlock(self._found.stamps[own].copy(), self._found.estimates[own].copy())
 
     def reports(self, stamps: NDArray[np.int64]) -> list[ReportBlock | Report]:
-        """What the compiled update found of samples with these stamps (ns)."""
+        """Return reports of the samples with these stamps (ns) from the results of the compiled update."""
         self._take_judgement(len(stamps) - 1)
         block = ReportBlock(stamps, self._predictions(), self._estimates(), self._residuals(), self._news.health)
         if not self._news.events:
@@ -352,7 +352,7 @@ class BlockUpdate:
         return [replace(each, events=self._news.events.get(row, ())) for row, each in reports]
 
     def report(self, stamp: int, events: Sequence[str], judged: bool = True) -> Report:
-        """What the compiled update found of one sample, of which `events` are to be told too; unless `judged`, see `judge`."""
+        """Return the report of one sample, with `events` added; unless `judged`, health is left out, see `judge`."""
         found, news, (predicted, known) = self._found, self._news, self._found.counts.tolist()
         rows = ReportRows(self._boom, self._channels, stamp)
         if known > self._begin[1]:

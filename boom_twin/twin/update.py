@@ -134,7 +134,7 @@ def take_residuals(limits, state, p, f, first, found):
 
 @inner
 def is_ordinary(estimates, limits, state, stamp, values):
-    """Whether strokes come when they are due, all of them, where their cylinders can be; they are put into `state` then."""
+    """Return True if strokes are on time, complete and within reach of their cylinders; write them to `state` then."""
     span = stamp - state.clock[NEWEST]
     most = STEP * state.usual[STROKES]
     if most == 0.0:
@@ -240,7 +240,10 @@ def keep_strokes(state, stamp):
 
 @inner
 def compare(limits, state, stream, stamp, values, row, trusted, found):
-    """Residuals of a measured sample, now or when the strokes have come; False, and nothing done, if it is not ordinary."""
+    """Write the residuals of a measured sample, or store it until its strokes come.
+
+    Return False, with nothing done, if the sample is irregular.
+    """
     if not trusted and not is_due(limits, state, stream, stamp, values):
         return False
     if stamp > state.clock[NEWEST]:
@@ -257,7 +260,7 @@ def compare(limits, state, stream, stamp, values, row, trusted, found):
 
 @inner
 def is_due(limits, state, stream, stamp, values):
-    """Whether a measured sample comes when it is due, and whole."""
+    """Return True if a measured sample is on time and complete."""
     most = limits.leap
     if state.usual[stream] != 0.0:
         most = max(limits.gap, STEP * state.usual[stream])
@@ -293,7 +296,7 @@ def move_row(ring, old, new):
 
 @inner
 def flush_waiting(limits, state, row, found):
-    """Residuals of all samples that waited for the newest stroke."""
+    """Write the residuals of all samples that waited for the newest stroke."""
     ring, done = state.waiting, 0
     while done < ring.bounds[COUNT] and ring.stamps[done] <= state.clock[NEWEST]:
         if not write_residual(limits, state, ring.streams[done], ring.stamps[done], ring.values[done], row, found):
@@ -313,7 +316,7 @@ def forget_waiting(ring, count):
 
 @kernel
 def write_residual(limits, state, stream, stamp, values, row, found):
-    """Residuals of one sample against what was expected at its stamp; False if nothing was."""
+    """Write the residuals of one sample from the readings expected at its stamp; return False if there are none."""
     after, share = matched(state.past, stamp)
     if after < 0:
         return False
@@ -338,9 +341,9 @@ def write_residual(limits, state, stream, stamp, values, row, found):
 
 @kernel
 def matched(past, stamp):
-    """Row of the first expected readings that are not before `stamp`, and where between them and those before it lies.
+    """Return the first row of expected readings not before `stamp`, and the place of `stamp` between it and the row before.
 
-    The share is 1 at the row itself. A row of -1: there are none around it.
+    The place is a share: 1 at the row itself, 0 at the row before. The row is -1 if no rows surround `stamp`.
     """
     at = -1
     for back in range(past.bounds[COUNT]):
