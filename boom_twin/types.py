@@ -1,4 +1,4 @@
-"""Frozen values that cross folders: what goes into the twin, what comes out."""
+"""Frozen values that cross folders: inputs and results of the twin."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ HELD = frozenset({"leap", "late", "second source"})
 """Events of samples that were left out, unless a later report gives them as `Report.earlier`."""
 
 Mount = Literal["root", "head"]
-"""Where on its section an inclinometer sits; between the two lies the bending of the section."""
+"""Place of an inclinometer on its section; the two places differ by the bending of the section."""
 
 
 class Stream(Enum):
-    """A source of samples."""
+    """Source of samples."""
 
     STROKES = "cylinder_strokes"
     ANGLES = "joint_angles"
@@ -52,12 +52,12 @@ class StrokeReading(StrEnum):
 
 
 G = 9.80665
-"""m/s^2 of one g, by definition."""
+"""Standard gravity, m/s^2."""
 
 
 @dataclass(frozen=True, slots=True)
 class SensorKind:
-    """The sensors of one stream.
+    """Sensors of one stream.
 
     Attributes
     ----------
@@ -179,7 +179,7 @@ SENSORS: dict[Stream, SensorKind] = {
         alarms=("stuck", "dropout"),
     ),
 }
-"""What they should read is in `boom_twin.deviation.step.write_expected_readings`, their topics are in ``topics.yaml``."""
+"""Expected readings are in `boom_twin.deviation.step.write_expected_readings`, topics in ``topics.yaml``."""
 
 
 def channels_of(joints: int) -> dict[Stream, tuple[str, ...]]:
@@ -208,7 +208,7 @@ def sensor_kind(channel: str) -> SensorKind:
 
 
 GIVE = 5.0 * pi / 180.0
-"""What an encoder may read beyond ``range_deg`` (rad), which is of the rigid boom: at its end a joint sags and swings on."""
+"""Angle (rad) that an encoder may read beyond ``range_deg``, which holds for the rigid boom, without sag and vibration."""
 
 
 LIMIT = 1e7
@@ -217,7 +217,7 @@ LIMIT = 1e7
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One message of the rig, mapped to the scene's order and units.
+    """Message of the rig, mapped to the scene's order and units.
 
     Attributes
     ----------
@@ -324,7 +324,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class Residuals:
-    """Measured minus predicted at the stamp of one sample.
+    """Residuals at the stamp of one sample: measured minus predicted.
 
     The prediction is that of the strokes up to this stamp. Residuals of strokes are innovations: the prediction, its mean over
     the filter's models by their probabilities, is that of the strokes before them.
@@ -380,7 +380,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Ranked:
-    """One cause that may explain an alarm.
+    """Cause that may explain an alarm.
 
     Attributes
     ----------

@@ -41,7 +41,7 @@ READINGS: dict[Stream, Callable[[Results, Array], Array]] = {
     Stream.ANGLES: lambda results, gravity: results.joints,
     Stream.IMU: _specific_force,
 }
-"""What the sensors of the streams that a fit can compare should read, shape (.., channels), given gravity (m/s^2)."""
+"""Expected readings of the streams that a fit can compare, shape (.., channels), given gravity (m/s^2)."""
 
 
 class ForwardModel:

@@ -1,4 +1,4 @@
-"""Nonlinear least squares with priors, and which unknowns the sessions can tell apart."""
+"""Nonlinear least squares with priors, and the unknowns that the sessions can tell apart."""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ HELPS = 0.5  # of the deviation left, from which on a posture is worth the way
 
 @dataclass(frozen=True)
 class InseparableUnknowns:
-    """Unknowns that the sessions cannot tell apart, or do not show.
+    """Unknowns that the sessions cannot tell apart or determine.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Kalman filter of residuals under an unknown load at the tip: their innovations, which are white whatever the load was.
+"""Kalman filter of residuals under an unknown load at the tip: its innovations are white for any load.
 
 States, SI: the load's x and y, a Gauss-Markov process of correlation time `LOAD_TIME`; a load that stays but where it jumps, x
 and y; for every stroke the error of its smoothed reading, white noise through the smoother twice; then q and q' of the reduced

@@ -28,7 +28,7 @@ LEAST = 0.5  # of the values of a block that must be there
 
 @dataclass(frozen=True)
 class ResidualBlocks:
-    """Measured means of b blocks in c channels, and how predictions on a grid of m instants are averaged likewise.
+    """Measured means of b blocks in c channels, and the averaging matrices of predictions on a grid of m instants.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ MEMORY = 2.0  # s, in which a boom's slowest swing is told from others near it
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """The filter for c channels: `matrix` (c, c) is the inverse of L, `past` (p, c, c) holds A_1 .. A_p."""
+    """Whitening filter for c channels: `matrix` (c, c) is the inverse of L, `past` (p, c, c) holds A_1 .. A_p."""
 
     matrix: Array
     past: Array

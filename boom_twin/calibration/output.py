@@ -57,7 +57,7 @@ def provenance(found: Calibration, credit: str) -> str:
 
 
 def write_scene(found: Calibration, scene: Scene, text: str, out: Path, credit: str) -> None:
-    """Write the scene, of which the text is given, with the values that changed, and their provenance."""
+    """Write the scene, given its text, with the values that changed and their provenance."""
     note = provenance(found, credit)
     description = f"{scene.description.rstrip()}\n{note}" if scene.description else note
     wanted = found.scene.model_copy(update={"description": description})
@@ -73,7 +73,7 @@ def write_scene(found: Calibration, scene: Scene, text: str, out: Path, credit: 
 
 
 def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path, credit: str, joints: int) -> Path | None:
-    """Write the zeros of the sensors into a mapping beside the scene; None if there is none to be written.
+    """Write the zeros of the sensors into a mapping beside the scene; return None if there are none to write.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter, SI: present value, estimate, 95 % interval, and whether the sessions tell it."""
+    """Estimate of one parameter, SI: present value, estimate, 95 % interval, and whether the sessions determine it."""
 
     unknown: Unknown
     value: float
@@ -61,7 +61,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Result.
+    """Result of a calibration.
 
     Attributes
     ----------

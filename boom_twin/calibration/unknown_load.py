@@ -62,11 +62,11 @@ class _Part(NamedTuple):
 
 
 Run = Callable[[LoadPrior, Array], Innovations]
-"""The filter of one session: of what is known of the load, and columns of residuals (b, j, c)."""
+"""Filter of one session, a function of the load prior and of columns of residuals (b, j, c)."""
 
 
 class Pass(NamedTuple):
-    """One session at a trial: white residuals (b, c), their derivatives (p, b, c), and the load (b, 2), N."""
+    """Results of one session at a trial: white residuals (b, c), their derivatives (p, b, c), and the load (b, 2), N."""
 
     white: Array
     slopes: Array

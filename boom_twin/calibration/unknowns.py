@@ -16,7 +16,7 @@ LEAST_LOAD = 1e-3  # kg, kg/m; a load of nothing is another model
 
 @dataclass(frozen=True, slots=True)
 class UnknownKind:
-    """A kind of parameter.
+    """Kind of a parameter.
 
     Attributes
     ----------
@@ -42,19 +42,19 @@ KINDS = {
     "tip.payload": UnknownKind("kg", 50.0, 5.0),
     "line_fill": UnknownKind("kg/m", 10.0, 1.0),
 }
-"""By the last word of a parameter's name."""
+"""Kinds of parameters, by the last word of a parameter's name."""
 
 ZEROS = {
     Stream.ANGLES: UnknownKind("rad", math.radians(2.0), math.radians(0.05)),
     Stream.STROKES: UnknownKind("m", 0.01, 5e-4),
     Stream.IMU: UnknownKind("m/s^2", 0.3, 0.03),
 }
-"""Of the zeros of sensors, by their stream, in the order in which they are estimated."""
+"""Kinds of the sensors' zeros, by stream, in the order in which they are estimated."""
 
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """One parameter to be estimated, with the value that it has at present (SI)."""
+    """Parameter to be estimated, with its present value (SI)."""
 
     name: str
     present: float
@@ -67,7 +67,7 @@ class Unknown:
 
     @property
     def kind(self) -> UnknownKind:
-        """Unit and likely deviations."""
+        """Unit and likely deviations of the parameter's kind."""
         if self.channel is not None and (stream := stream_of(self.channel)) is not None:
             return ZEROS[stream]
         return KINDS[self.name if self.name in KINDS else self.name.rpartition(".")[2]]

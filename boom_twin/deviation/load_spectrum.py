@@ -34,7 +34,7 @@ PADDED = 8  # times as long with zeros
 
 @dataclass(frozen=True, slots=True)
 class Pulses:
-    """The periodic part of a load.
+    """Periodic part of a load.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Pulses:
 
 @dataclass(frozen=True, slots=True)
 class TipLoad:
-    """A load at the tip that the model does not know: root mean square (N), and its pulses if they stand out."""
+    """Load at the tip that the model does not know: root mean square (N), and its pulses if they stand out."""
 
     rms: float
     pulses: Pulses | None
@@ -155,7 +155,7 @@ class TipLoadFinder:
         self._loads: Array = np.zeros((0, 2))
 
     def add(self, stamps: NDArray[np.int64], loads: Array) -> None:
-        """Take in loads (k, 2) in N at `stamps` (k,) in ns; exactly zero is what is told before anything is measured."""
+        """Add loads (k, 2) in N at `stamps` (k,) in ns. Loads of exactly zero, from before any measurement, are skipped."""
         known = loads.any(axis=1)
         stamps, loads = stamps[known], loads[known]
         self._squares += float(np.square(loads).sum())

@@ -40,7 +40,7 @@ SWING, SPEED = 0.3, 0.05  # how far a boom at work swings, as a share of the tip
 
 
 class Drawn(NamedTuple):
-    """A boom at one instant, as far as its outline needs it.
+    """State of a boom at one instant, as far as its outline needs it.
 
     frames, positions : of `State` and `Work`. angles : (n,) joint angles of the rigid boom, rad. pins : (n, 4) of `State`.
     """
@@ -148,7 +148,7 @@ class BoomPredictor:
         return self._row[self.places.variances]
 
     def start(self, strokes: Array, may_move: bool = False) -> None:
-        """Forget all; at rest in equilibrium where transducers read `strokes` (m), shape (n,).
+        """Reset to rest in equilibrium where transducers read `strokes` (m), shape (n,).
 
         Parameters
         ----------
@@ -223,7 +223,7 @@ class BoomPredictor:
         f.masked[:], f.deaf[:] = masked, strokes
 
     def doubt(self, channels: Collection[str]) -> None:
-        """Let the zeros of these angle sensors and axes of the IMU drift as they may not when all is well."""
+        """Allow a large drift of the zeros of these angle sensors and axes of the IMU."""
         names = channels_of(self.plan.joints)
         places = [*names[Stream.IMU], "", "", *names[Stream.ANGLES]]  # as zeros stand among the states, mount and scale between
         for place, name in enumerate(places):

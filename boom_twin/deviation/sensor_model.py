@@ -34,7 +34,7 @@ def specific_force(x: Any, y: Any, c: Any, s: Any) -> tuple[Any, Any]:
 
 
 class Mounting:
-    """The angle sensors of a boom, one for each joint.
+    """Angle sensors of a boom, one for each joint.
 
     An encoder reads the angle of its joint. An inclinometer reads the angle of the root, or of the head, of its section to
     the horizontal, and is compared with just that: nothing measured by another sensor enters, so a fault of one inclinometer

@@ -1,4 +1,4 @@
-"""Monitor which joint's angle every encoder reads, and with which sign and unit: what is swapped is told as that.
+"""Monitor which joint's angle every encoder reads, and with which sign and unit; a swap is reported as a swap.
 
 Readings of two joints that are exchanged, of the other sign or in degrees, differ from the model by far more than a boom can
 give way, and by an amount that is known. As evidence of a fault they would point at a stroke's scale or an offset.
@@ -31,7 +31,10 @@ RIGHT = 0.3  # of how far an exchange would put it off: a reading that is less o
 
 @dataclass(frozen=True)
 class _Exchange:
-    """Joints (0-based) of which readings are exchanged, one if its sign or unit is; whether strokes are; what was told."""
+    """Exchanged readings of one or more joints, with their alarm.
+
+    `joints` are 0-based, a single one if its sign or unit is wrong. `is_of_strokes` is True if strokes are exchanged.
+    """
 
     joints: tuple[int, ...]
     is_of_strokes: bool
@@ -82,7 +85,7 @@ class AngleReading:
         return any(found.is_of_strokes for found in self._found)
 
     def explains(self, alarm: Alarm) -> bool:
-        """Return True if an alarm of a single sensor is a part of what is told here."""
+        """Return True if an alarm of a single sensor is part of an exchange reported here."""
         joints = {joint for found in self._found if not found.is_of_strokes for joint in found.joints}
         return alarm.kind in {"range", "jump", "noise", "spikes"} and alarm.channel in {f"joint_{i + 1}" for i in joints}
 

@@ -1,4 +1,4 @@
-"""Name what is wrong with a boom by fault twins: twins of a changed scene that take the same samples.
+"""Name a fault of a boom by fault twins: twins of a changed scene that take the same samples.
 
 The filter of a twin tells the logarithm of the likelihood of all that was read (`BoomPredictor.evidence`). A fault hypothesis
 is a twin whose scene has the fault, or a twin that lets a sensor's zero drift. Its gain over the twin of the scene itself, from

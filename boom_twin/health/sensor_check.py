@@ -102,7 +102,7 @@ class SensorFindings:
     outside: Flags
     level: Array
     is_calm: bool = False
-    """Nothing was found in any channel; `level` is not told then."""
+    """True if nothing was found in any channel; `level` is unknown then."""
 
     def by_kind(self) -> dict[str, Flags]:
         """Return the findings by kind, as alarms name them."""

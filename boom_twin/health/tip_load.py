@@ -33,7 +33,7 @@ class TipLoadMonitor:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the past."""
+        """Reset the monitor."""
         self.alarm: Alarm | None = None
         self._since = self._last = 0
         self._largest = 0.0, 0.0

@@ -89,7 +89,7 @@ class TipErrors:
         self._estimates, self._estimated_position, self._estimated_acceleration = 0, 0.0, 0.0
 
     def add(self, predictions: PredictionBlock, rows: slice, estimates: EstimateBlock | None = None) -> None:
-        """Take in some rows of predictions, all by the clock of the first one, and the estimates of the same rows."""
+        """Add some rows of predictions, all by the clock of the first one, and the estimates of the same rows."""
         stamps, truth = predictions.stamps[rows], self._truth
         if not len(stamps):
             return

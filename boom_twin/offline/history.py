@@ -74,7 +74,7 @@ class HistoryBuilder:
         self._peak, self._peak_at = -1.0, 0.0  # largest acceleration of the tip, and when, s
 
     def add(self, stretch: Stretch) -> History:
-        """Take the next stretch in; returns the history of it alone, with all its rows."""
+        """Add the next stretch; return the history of it alone, with all its rows."""
         own = _stretch_history(stretch, self._scene, self._plan)
         self._note_peak(own)
         self._totals.add(own)
@@ -150,7 +150,7 @@ class _Shapes:
         self._newest: list[tuple[float, Array]] = []
 
     def add(self, found: list[tuple[float, Array]]) -> None:
-        """Append some."""
+        """Append shapes."""
         numbered = enumerate(found, self._count)
         self._chosen += [(number, shape) for number, shape in numbered if number % self._step == 0]
         self._count += len(found)
@@ -161,7 +161,7 @@ class _Shapes:
 
     @property
     def kept(self) -> list[tuple[float, Array]]:
-        """Shapes that are left."""
+        """Shapes with their times that are kept."""
         is_last = bool(self._chosen) and self._chosen[-1][0] == self._count - 1
         return [shape for _, shape in self._chosen] + ([] if is_last else self._newest)
 

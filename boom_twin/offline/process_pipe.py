@@ -75,7 +75,7 @@ class Pipe:
             raise
 
     def finish(self) -> None:
-        """Close the pipe, wait for the process to end, and raise what it had to say if that was an error."""
+        """Close the pipe, wait for the process to end, and raise its error if it reported one."""
         told = self._ended()
         if self._process.returncode != 0:
             text = told.decode(errors="replace").strip()
@@ -105,7 +105,7 @@ class Pipe:
 
 
 def _make_roomy(end: IO[bytes]) -> None:
-    """Let a pipe hold `ROOM` bytes, where the system can do that and allows it; else it stays as it is."""
+    """Let a pipe hold `ROOM` bytes, if the system can do that and allows it."""
     if hasattr(fcntl, "F_SETPIPE_SZ"):
         with suppress(OSError):
             fcntl.fcntl(end, fcntl.F_SETPIPE_SZ, ROOM)
@@ -142,7 +142,7 @@ def post(items: list[Any]) -> None:
 
 
 def _write(descriptor: int, item: Any) -> None:
-    """Write all of an object: Python's buffered writer loses what a process that is suspended (Ctrl-Z) had begun to write."""
+    """Write all of an object. Python's buffered writer loses what a suspended process (Ctrl-Z) had begun to write."""
     left = memoryview(pickle.dumps(item, protocol=pickle.HIGHEST_PROTOCOL))
     while left:
         left = left[os.write(descriptor, left) :]

@@ -30,7 +30,7 @@ A looped session repeats stamps; a stray stamp is far from its stream.
 
 
 class Changes:
-    """The changes of a session, each to be repeated before the stroke sample that it began with.
+    """Changes of a session, each to be repeated before the stroke sample at which it took effect.
 
     Parameters
     ----------
@@ -78,13 +78,13 @@ def recorded_changes(session: Session, topics: Topics) -> Changes:
 
 
 Item = SampleBlock | Change | int | Counter[str]
-"""What goes up the pipe, see `items_of`."""
+"""Item that goes up the pipe, see `items_of`."""
 BATCH = 400
 """Messages in one block up the pipe, at least."""
 
 
 class SampleReader:
-    """The samples of a session, many at a time; iterate once.
+    """Samples of a session, many at a time; iterate once.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Recording of a replay: what was predicted, a stretch of the session at a time, and totals of all of it."""
+"""Recording of a replay: predictions, a stretch of the session at a time, and totals of all stretches."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Stretch:
 
     @property
     def estimates(self) -> EstimateBlock:
-        """The estimates beside the predictions."""
+        """Estimates beside the predictions."""
         return self.block.estimates
 
     def of(self, stream: Stream) -> ResidualRows:
@@ -87,7 +87,7 @@ class Stretch:
 
 
 class SessionTotals:
-    """Figures of all predictions and residuals of a session, of which only these are kept.
+    """Totals of all predictions and residuals of a session; the values themselves are not kept.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class SessionTotals:
         self._touching: Array | None = None
 
     def add(self, stretch: Stretch) -> None:
-        """Take a stretch in."""
+        """Add a stretch."""
         angles, predictions = stretch.of(Stream.ANGLES), stretch.predictions
         self.residuals.add(angles.values)
         self.normalised.add(angles.normalised)
@@ -194,7 +194,7 @@ class Recording:
         self.totals = SessionTotals(joints)
 
     def add(self, found: ReportBlock | Report) -> None:
-        """Keep what samples caused."""
+        """Add reports of samples."""
         if isinstance(found, Report):
             self._add_one(found)
         else:
@@ -252,7 +252,7 @@ class Recording:
         self._single.append(report)
 
     def _note_time(self, report: Report) -> None:
-        """Keep where stamps stepped: the one before, and the one after it."""
+        """Store where stamps stepped: the stamp before, and the one after."""
         for found, events in ((self.gaps, ("gap", "restart")), (self.clock_sets, ("clock set", "jump back"))):
             if self._newest is not None and not set(events).isdisjoint(report.events):
                 found.append((self._newest, report.stamp))

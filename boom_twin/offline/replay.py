@@ -424,7 +424,7 @@ def _followed(samples: Iterable[SampleBlock | Change | None], twins: FaultTwins)
 
 @contextmanager
 def _unhurried_collector() -> Iterator[None]:
-    """Keep the garbage collector away: a replay makes many small objects that last."""
+    """Freeze and disable the garbage collector: a replay makes many small objects that last."""
     gc.freeze()
     gc.disable()
     try:

@@ -1,4 +1,4 @@
-"""Table of a replay: a row for every prediction, with what was measured, its residuals and the estimate; CSV or Parquet.
+"""Table of a replay: one row per prediction, with readings, residuals and the estimate; CSV or Parquet.
 
 A row has what was measured up to its stamp and after that of the row before: of every channel the newest value, empty where
 there is none. So a value stands once, and that of a sensor with the stamps of the strokes stands in its own row.
@@ -20,12 +20,12 @@ from ..types import NANO, SENSORS, Array, Stream, channels_of
 from .recording import Stretch
 
 DELAY = 2.0
-"""s for which a row waits for residuals that become known late."""
+"""Time (s) that a row waits for late residuals."""
 ESTIMATED = (
     "tip_x_m", "tip_y_m", "tip_angle_rad", "tip_vx_m_s", "tip_vy_m_s", "tip_angular_velocity_rad_s",
     "tip_ax_m_s2", "tip_ay_m_s2", "tip_angular_acceleration_rad_s2", "load_x_N", "load_y_N",
 )  # fmt: skip
-"""Names of what is estimated, each with ``estimate_`` before it, and with ``estimate_sigma_`` for its standard deviation."""
+"""Names of the estimated quantities, with ``estimate_`` before them, or ``estimate_sigma_`` for their standard deviations."""
 MODAL = [f"estimate_mode_{j}_{end}" for end in ("m", "m_s") for j in range(1, MODES + 1)]
 """Names of the modal coordinates and their rates, at a modal mass of 1 kg."""
 NEVER = np.iinfo(np.int64).min
@@ -74,7 +74,7 @@ class TableFile(Protocol):
 
 
 class CsvFile:
-    """A CSV file with a head; numbers with nine significant digits, times with nine decimals, nothing for NaN."""
+    """CSV file with a head; numbers with nine significant digits, times with nine decimals, nothing for NaN."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         self._file: IO[str] = path.open("w", encoding="ascii", newline="\n")
@@ -110,7 +110,7 @@ class RowsInMemory:
 
 
 class ParquetFile:
-    """A Parquet file; a row group for every stretch, doubles, nothing for NaN."""
+    """Parquet file; a row group for every stretch, doubles, nothing for NaN."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         self._arrow, parquet = _arrow()
@@ -179,7 +179,7 @@ class SampleTable:
         self._ahead: list[SampleBlock] = []  # samples that may be of rows to come
 
     def add(self, stretch: Stretch) -> None:
-        """Take the next stretch in; rows of a clock that was set back over earlier stamps begin anew."""
+        """Add the next stretch; rows restart where a clock was set back over earlier stamps."""
         stamps, rows, residuals = stretch.predictions.stamps, self._new_rows(stretch), stretch.block.residuals
         for part in np.split(np.arange(len(stamps)), np.flatnonzero(np.diff(stamps) <= 0) + 1):
             if len(self._stamps) and stamps[part[0]] <= self._stamps[-1]:
@@ -212,7 +212,7 @@ class SampleTable:
         return rows
 
     def _fill(self, places: dict[int, int], streams: Integers, stamps: Integers, values: Array) -> None:
-        """Put values (k, w) of channels at `stamps` (ns) into the rows that they are of; `places` by stream: first column."""
+        """Write values (k, w) of channels at `stamps` (ns) into their rows; `places` by stream: first column."""
         order = np.argsort(stamps, kind="stable")
         row = np.searchsorted(self._stamps, stamps[order])
         inside = (row < len(self._stamps)) & (stamps[order] > self._before)
@@ -225,7 +225,7 @@ class SampleTable:
                 self._rows[row[own][known], first + channel] = column[known]
 
     def _write(self, count: int) -> None:
-        """Write the first rows of those that wait."""
+        """Write the first of the waiting rows."""
         if count:
             self._file.write(self._rows[:count])
             self._before = int(self._stamps[count - 1])

@@ -70,7 +70,7 @@ WHOLE = {kind.stem: kind.channels(0) for kind in SENSORS.values() if kind.ends}
 
 
 class ResidualBuffer:
-    """Measured minus predicted, without any zero, in the order in which it became known.
+    """Residuals as measured minus predicted, without any zero, in the order in which they became known.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ CAPACITY = 4096  # samples that one call of the compiled update takes at most
 
 
 def limits_of(scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mount | None], absent: Collection[str]) -> Limits:
-    """Return what the compiled update judges samples by, of a scene compiled as `plan` with its load, and of its sensors."""
+    """Return the limits of the compiled update for a scene compiled as `plan` with its load, and for its sensors."""
     channels = list(channels_of(plan.joints).values())
     counts = np.array([len(names) for names in channels])
     mounting, far = Mounting(plan, scene.base.inclination, mounts), FAR * settings.stroke_variance**0.5
@@ -75,7 +75,7 @@ NO_EXTRAS = _UpdateExtras()
 _Code = tuple[Callable[..., tuple[int, int]], Callable[..., bool]]
 """`update` and `measure`, compiled for a scene's types."""
 _Held = tuple[_Code, tuple[tuple[Any, ...], tuple[Any, ...], Any]]
-"""With what `update` and `measure` take of boom, limits and state; output: see `boom_twin.kernels.jit.hold`."""
+"""Compiled code with its arguments (boom, limits, state) and output, see `boom_twin.kernels.jit.hold`."""
 
 
 class BlockUpdate:
@@ -144,7 +144,7 @@ class BlockUpdate:
         self._told, self._due, self._begins_health = tuple(self._found.counts.tolist()), None, True
 
     def advance(self, run: Run | None, block: SampleBlock, trusted: bool = False) -> tuple[int, int]:
-        """Take samples of a block as long as they are ordinary; `reports` or `report` tell what they caused.
+        """Take samples of a block as long as they are regular; `reports` or `report` return the results.
 
         Parameters
         ----------
@@ -167,7 +167,7 @@ class BlockUpdate:
         return reason, row
 
     def measure(self, code: int, stamp: int, values: Array, trusted: bool) -> int:
-        """Take one measured sample, without the boom; `DONE`, or `ODD` and nothing done.
+        """Take one measured sample without the boom; return `DONE`, or `ODD` with nothing done.
 
         Parameters
         ----------
@@ -193,7 +193,7 @@ class BlockUpdate:
             self._state.clock[UNMATCHED] = 0
 
     def _hold(self) -> _Held:
-        """Look up the compiled code, and write once what it takes with every call; another load needs little of that anew."""
+        """Look up the compiled code and prepare the arguments of every call; another load renews few of them."""
         self._kept = state, found = self._kept or (hold(self._state), hold(self._found))
         limits, (one, width) = hold(self._limits), (np.zeros(1, np.int64), int(self._widths.max()))
         block = one, one, np.zeros((1, width))
@@ -254,9 +254,10 @@ class BlockUpdate:
         return self._due is not None
 
     def judge(self) -> Health | None:
-        """Judge the rig's health if the newest sample was the first of a slot and that was not done yet; gives the news.
+        """Judge the rig's health if the newest sample began a slot and was not judged yet; return it or None.
 
-        What that sample caused is complete without it: a live node publishes it first. It comes before the next sample.
+        The report of that sample is complete without it, so a live node publishes the report first. The judgement comes before
+        the next sample.
         """
         run, self._due = self._due, None
         if run is None or self._judge is None:
@@ -267,14 +268,14 @@ class BlockUpdate:
         return health
 
     def _take_judgement(self, row: int) -> None:
-        """Judge, if that is due, and give the news with sample `row`."""
+        """Judge the rig's health, if that is due, and store it with sample `row`."""
         if (health := self.judge()) is not None:
             self._news.health[row] = health
 
     def _tell_health(self, end: float = inf) -> None:
-        """Give the health monitor what has come since it was told last, but for what came last from `end` (ns) on.
+        """Pass the results since the last call to the health monitor, except the last ones from `end` (ns) on.
 
-        The first of a slot so come with the rest of it, in one piece.
+        So the results of a slot are passed together.
         """
         found = self._found
         if self._judge is None:

@@ -16,9 +16,9 @@ from ..types import Array, Estimate, Health, Outline, Prediction, Report, Residu
 Integers = NDArray[np.int64]
 
 STREAMS = tuple(Stream)
-"""A stream stands in a block as its place here."""
+"""Streams by code: a block holds the place of a stream in this tuple."""
 CODES = {stream: code for code, stream in enumerate(STREAMS)}
-"""The place of every stream in `STREAMS`."""
+"""Code of every stream: its place in `STREAMS`."""
 
 
 class SampleBlock(NamedTuple):

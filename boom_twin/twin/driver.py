@@ -58,7 +58,7 @@ def drive(twin: Twin, items: Iterable[Sample | Change | None], judged: bool = Tr
 
 
 def drive_one(twin: Twin, sample: Sample, judged: bool = True) -> Step:
-    """Update `twin` with one sample, of which no change comes before; see `drive`."""
+    """Update `twin` with one sample that no change precedes; see `drive`."""
     began = perf_counter()
     report = twin.update(sample, judged)
     return Step(sample, report, perf_counter() - began)

@@ -1,4 +1,4 @@
-"""The twin's model under one load, and its preparation in a thread while samples go on through the present one.
+"""Model of the twin under one load, and its preparation in a thread while the present model takes the samples.
 
 A model takes some hundredths of a second, and depends on scene and settings alone. A sample would wait for it; prepared beside,
 it is taken in between two samples. The `Change` of the stroke sample that it takes effect with is recorded, as any other, and a
@@ -98,7 +98,7 @@ class ModelPreparation:
             self._thread = None
 
     def _go_on(self) -> None:
-        """Ask if no other model is needed, or the one that is has been made; else make it."""
+        """Request the settings if no other model is needed or the needed one is ready; else make the model."""
         requests, made = self._twin.requests, self._made
         settings = requests.settings.tuned(self._asked)
         if settings.load == requests.settings.load or (made is not None and made[0] == settings):

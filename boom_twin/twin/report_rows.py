@@ -1,4 +1,4 @@
-"""Rows of the compiled update that a report of one sample is made of when it is asked for."""
+"""Rows of the compiled update from which the report of one sample is made on request."""
 
 from __future__ import annotations
 

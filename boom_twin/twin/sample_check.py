@@ -62,7 +62,7 @@ class SampleCheck:
         return found
 
     def look_at(self, stamps: NDArray[np.int64]) -> None:
-        """Look at the stamps (ns) of strokes that are to come in a block: if these are enough to be sure, be so at once."""
+        """Accept the stamps (ns) of strokes as nanoseconds before their block is taken, if they suffice to decide."""
         deciding = stamps[: FIRST - self._count]
         if not self.is_sure and 0 < len(deciding) == FIRST - self._count:
             span = max(self._high, int(deciding.max())) - min(self._low, int(deciding.min()))

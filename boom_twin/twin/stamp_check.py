@@ -99,7 +99,7 @@ class StampCheck:
         return self.newest is not None and 0 < stamp - self.newest <= min(self.longest, FEW * self.usual or self._gap)
 
     def take(self, stamp: int) -> None:
-        """Go on with this stamp; samples that are held were stray."""
+        """Take this stamp as the newest of the line; held samples were stray."""
         if self.newest is not None:
             span, usual = stamp - self.newest, self.usual
             self.usual = usual + SMOOTHING * (min(span, 2.0 * usual) - usual) if usual else float(span)

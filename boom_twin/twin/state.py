@@ -102,7 +102,7 @@ class Limits(NamedTuple):
 
 @by_reference
 class UpdateOutput(NamedTuple):
-    """Room for what a call gives, see `boom_twin.twin.blocks`; `counts` has the rows of predictions, and of residuals.
+    """Buffers for the results of a call, see `boom_twin.twin.blocks`; `counts` has the rows of predictions, and of residuals.
 
     rows : results and estimates, see `boom_twin.kernels.result_row`. estimates : see `boom_twin.deviation.estimate_row`.
     measured : strokes less their zeros, m. raw : as measured.

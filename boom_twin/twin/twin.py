@@ -140,7 +140,7 @@ class Twin:
         return self._boom.evidence
 
     def rezero(self, sensor: str) -> dict[str, float]:
-        """Ask that the mean residual of the last second becomes the zero of a sensor; gives its new zeros by channel.
+        """Request the mean residual of the last second as the zero of a sensor; return its new zeros by channel.
 
         Parameters
         ----------
@@ -190,7 +190,7 @@ class Twin:
         return loaded_model(self.scene, settings, self.mounts, self.baseline, self.reads, self.absent)
 
     def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
-        """Go on with this model, which is of the present load, after that of `before`."""
+        """Use this model, which has the present load, in place of that of `before`."""
         self._boom, self.judge = model.boom, model.judge
         self._boom.doubt(self._doubted)
         self.plan = self._boom.plan
@@ -200,7 +200,7 @@ class Twin:
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, self.plan.joints)))  # of strokes
 
     def _take_over(self, stamp: int) -> list[str]:
-        """Make what was asked for hold; gives the events. Another load, or other zeros of strokes, need a start from rest."""
+        """Apply the requested changes; return the events. Another load, or other zeros of strokes, need a start from rest."""
         asked, before = self.requests, self.settings
         model, is_new = asked.model, asked.is_new and self._run is not None
         from_rest, self.settings = asked.take(), asked.settings
@@ -224,7 +224,7 @@ class Twin:
         return events
 
     def _begin_anew_at(self, stamp: int) -> None:
-        """Start from rest with the strokes of `stamp` (ns), though the boom may be at work; what was measured since waits."""
+        """Start from rest with the strokes of `stamp` (ns), though the boom may be moving; measured samples since then wait."""
         self._begin_anew()
         drop_waiting(self._state, NONE, stamp - 1)
 
@@ -237,7 +237,7 @@ class Twin:
         self._compiled.begin_health()
 
     def warm_up(self) -> None:
-        """Compile every kernel, with a twin of the same boom that is thrown away."""
+        """Compile every kernel, with a temporary twin of the same boom."""
         other = Twin(self.scene, self.settings, reads=self.reads)
         middle = np.radians([sum(joint.range_deg) / 2 for joint in self.scene.joints])
         strokes = np.array([stroke_curve(self.scene, i, middle[i : i + 1])[0] for i in range(len(middle))])
@@ -332,7 +332,7 @@ class Twin:
         return Sample(STREAMS[code], int(block.stamps[row]), block.values[row, : channels[code]].copy())
 
     def _advance_one(self, sample: Sample, trusted: bool = False) -> int:
-        """Take a sample if it is ordinary, or `trusted`; see `BlockUpdate.advance`."""
+        """Take a sample if it is regular, or `trusted`; see `BlockUpdate.advance`."""
         if sample.stream is not Stream.STROKES:
             return self._compiled.measure(CODES[sample.stream], sample.stamp, sample.values, trusted)
         one = self._one
@@ -341,7 +341,7 @@ class Twin:
         return reason
 
     def _look_at(self, sample: Sample) -> Report:
-        """Take a sample that may be out of the ordinary; of a copy, for it may be held, and the caller's may change."""
+        """Take a sample that may be irregular. It is copied, since it may be held and the caller's arrays may change."""
         self._compiled.make_room()
         sample = replace(sample, values=sample.values.copy())
         complete = self._is_complete(sample)
@@ -457,7 +457,7 @@ class Twin:
         return sample.values - self._zeros.of_strokes(sample.stamp)
 
     def _follow(self, sample: Sample, values: Array, complete: bool, events: list[str]) -> Report:
-        """Go on to a stroke sample, whose `values` are without the sensors' zeros; the model starts if it has not."""
+        """Step to a stroke sample, whose `values` are without the sensors' zeros; start the model if it has not started."""
         if not complete:
             events.append("partial")
         asked = complete and self.requests.due
@@ -492,7 +492,7 @@ class Twin:
         return self._step(self._run, sample, events)
 
     def _step(self, run: Run, sample: Sample, events: list[str]) -> Report:
-        """Step the model to strokes that were looked at, their values less the sensors' zeros."""
+        """Step the model to checked strokes, their values less the sensors' zeros."""
         self._lines[Stream.STROKES].take(sample.stamp)
         estimate = self._boom.estimate if run.is_predicted else None
         before, rates, check = self._state.strokes, self._boom.speeds, run.plausible
