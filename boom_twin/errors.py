@@ -1,4 +1,4 @@
-"""The exceptions that boom_twin raises on purpose, as a tree.
+"""Exceptions that boom_twin raises on purpose, as a tree.
 
 ::
 
@@ -29,23 +29,23 @@ class BoomTwinError(Exception):
 
 
 class UsageError(BoomTwinError):
-    """An argument is outside its bounds; the text names it, its value, the bound and the remedy."""
+    """Error of an argument outside its bounds; the text names it, its value, the bound and the remedy."""
 
 
 class SolverError(BoomTwinError):
-    """No equilibrium or no step was found; the text says where and what to try."""
+    """Error of an equilibrium or a step that was not found; the text says where and what to try."""
 
 
 class BagError(BoomTwinError):
-    """A session cannot be read or written; the text names the file, the place and the remedy."""
+    """Error of a session that cannot be read or written; the text names the file, the place and the remedy."""
 
 
 class SceneWarning(UserWarning):
-    """A scene can be used but holds something odd; the text has the form of a `Fault`."""
+    """Warning of an irregularity in a scene that can be used; the text has the form of a `Fault`."""
 
 
 class _Absent:
-    """The value of a fault at a key that is not there."""
+    """Value of a fault at a key that is not there."""
 
     def __repr__(self) -> str:
         return "absent"
@@ -56,7 +56,7 @@ ABSENT = _Absent()
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that is wrong (or, as a warning, odd) in a scene.
+    """Fault in a scene, or an irregularity that is only a warning.
 
     Parameters
     ----------
@@ -89,12 +89,12 @@ class Fault:
 
     @property
     def kind(self) -> str:
-        """What it is called where it does not stop a scene."""
+        """Name of a fault that does not stop a scene: ``note`` or ``warning``."""
         return "note" if self.is_note else "warning"
 
 
 def _shortened(value: Any, width: int = 60) -> str:
-    """Text of a value, cut in the middle where it is long; in the spelling of the file."""
+    """Return the text of a value in the spelling of the file, cut in the middle where it is long."""
     if isinstance(value, tuple):
         text = "[" + ", ".join(_shortened(item) for item in value) + "]"
     elif value is None or isinstance(value, bool):
@@ -105,7 +105,7 @@ def _shortened(value: Any, width: int = 60) -> str:
 
 
 class SceneError(BoomTwinError):
-    """A scene that cannot be used.
+    """Error of a scene that cannot be used.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Frozen values that cross folders: what goes into the twin, what comes out."""
+"""Frozen values that cross folders: inputs and results of the twin."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ HELD = frozenset({"leap", "late", "second source"})
 """Events of samples that were left out, unless a later report gives them as `Report.earlier`."""
 
 Mount = Literal["root", "head"]
-"""Where on its section an inclinometer sits; between the two lies the bending of the section."""
+"""Place of an inclinometer on its section; the two places differ by the bending of the section."""
 
 
 class Stream(Enum):
-    """A source of samples."""
+    """Source of samples."""
 
     STROKES = "cylinder_strokes"
     ANGLES = "joint_angles"
@@ -45,19 +45,19 @@ class Stream(Enum):
 
 
 class StrokeReading(StrEnum):
-    """What the stroke transducers of a session read: the cylinder with its oil compressed, or as if the oil were unloaded."""
+    """Quantity that stroke transducers read: the cylinder's length with its oil compressed, or that with the oil unloaded."""
 
     LENGTH = "length"
     DRIVE = "drive"
 
 
 G = 9.80665
-"""m/s^2 of one g, by definition."""
+"""Standard gravity, m/s^2."""
 
 
 @dataclass(frozen=True, slots=True)
 class SensorKind:
-    """The sensors of one stream.
+    """Sensors of one stream.
 
     Attributes
     ----------
@@ -102,22 +102,22 @@ class SensorKind:
 
     @property
     def is_imu(self) -> bool:
-        """Whether its messages are read by axes."""
+        """Return True if its messages are read by axes."""
         return self.message == "sensor_msgs/msg/Imu"
 
     @property
     def named(self) -> str:
-        """The stem of the names in messages."""
+        """Stem of the names in messages."""
         return self.part or self.stem
 
     @property
     def unit(self) -> str:
-        """The SI unit."""
+        """SI unit."""
         return next(iter(self.units))
 
     @property
     def unit_suffix(self) -> str:
-        """The SI unit as the end of a key or of a column's name: ``rad``, ``m_s2``."""
+        """SI unit as the end of a key or of a column's name: ``rad``, ``m_s2``."""
         return self.unit.replace("/", "_").replace("^", "")
 
     @property
@@ -127,7 +127,7 @@ class SensorKind:
         return 1.0 / self.units[unit], unit.replace("^2", "²")
 
     def channels(self, joints: int) -> tuple[str, ...]:
-        """Names of the channels in the order of a sample, of a boom with so many joints."""
+        """Return the names of the channels in the order of a sample, of a boom with so many joints."""
         return tuple(f"{self.stem}_{end}" for end in self.ends or range(1, joints + 1))
 
 
@@ -179,11 +179,11 @@ SENSORS: dict[Stream, SensorKind] = {
         alarms=("stuck", "dropout"),
     ),
 }
-"""What they should read is in `boom_twin.deviation.step.write_expected_readings`, their topics are in ``topics.yaml``."""
+"""Expected readings are in `boom_twin.deviation.step.write_expected_readings`, topics in ``topics.yaml``."""
 
 
 def channels_of(joints: int) -> dict[Stream, tuple[str, ...]]:
-    """Names of the channels of every stream, in the order of its samples, of a boom with so many joints."""
+    """Return the names of the channels of every stream, in the order of its samples, of a boom with so many joints."""
     return {stream: kind.channels(joints) for stream, kind in SENSORS.items()}
 
 
@@ -191,7 +191,7 @@ NUMBER = re.compile(r"[1-9]\d{0,3}")
 
 
 def stream_of(channel: str) -> Stream | None:
-    """The stream that a channel comes by; None if there can be no such channel."""
+    """Return the stream of a channel; None if there can be no such channel."""
     stem, _, end = channel.rpartition("_")
     for stream, kind in SENSORS.items():
         if stem == kind.stem and (end in kind.ends if kind.ends else NUMBER.fullmatch(end)):
@@ -200,7 +200,7 @@ def stream_of(channel: str) -> Stream | None:
 
 
 def sensor_kind(channel: str) -> SensorKind:
-    """The row of `SENSORS` that a channel belongs to; KeyError if there can be no such channel."""
+    """Return the row of `SENSORS` of a channel; KeyError if there can be no such channel."""
     stream = stream_of(channel)
     if stream is None:
         raise KeyError(channel)
@@ -208,7 +208,7 @@ def sensor_kind(channel: str) -> SensorKind:
 
 
 GIVE = 5.0 * pi / 180.0
-"""What an encoder may read beyond ``range_deg`` (rad), which is of the rigid boom: at its end a joint sags and swings on."""
+"""Angle (rad) that an encoder may read beyond ``range_deg``, which holds for the rigid boom, without sag and vibration."""
 
 
 LIMIT = 1e7
@@ -217,7 +217,7 @@ LIMIT = 1e7
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One message of the rig, mapped to the scene's order and units.
+    """Message of the rig, mapped to the scene's order and units.
 
     Attributes
     ----------
@@ -237,7 +237,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """Of one prediction: ``shape``, ``undeflected`` and ``pins``, see `Prediction`, m."""
+    """Outline of one prediction: ``shape``, ``undeflected`` and ``pins``, see `Prediction`, m."""
 
     shape: Array
     undeflected: Array
@@ -246,7 +246,7 @@ class Outline:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """What the model says at the stamp of one stroke sample (model frame: x forward, y up).
+    """Prediction of the model at the stamp of one stroke sample (model frame: x forward, y up).
 
     Attributes
     ----------
@@ -290,7 +290,7 @@ class Prediction:
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """The tip as all sensors together see it, at the stamp of one stroke sample (model frame: x forward, y up).
+    """Estimate of the tip from all sensors at the stamp of one stroke sample (model frame: x forward, y up).
 
     Attributes
     ----------
@@ -324,7 +324,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class Residuals:
-    """Measured minus predicted at the stamp of one sample.
+    """Residuals at the stamp of one sample: measured minus predicted.
 
     The prediction is that of the strokes up to this stamp. Residuals of strokes are innovations: the prediction, its mean over
     the filter's models by their probabilities, is that of the strokes before them.
@@ -354,7 +354,7 @@ class Residuals:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What holds from one stroke sample on; with it a replay repeats what was done to a running twin.
+    """Change of a running twin that takes effect at one stroke sample; a replay repeats it.
 
     Attributes
     ----------
@@ -380,7 +380,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Ranked:
-    """One cause that may explain an alarm.
+    """Cause that may explain an alarm.
 
     Attributes
     ----------
@@ -399,7 +399,7 @@ class Ranked:
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """Something is wrong with the rig, its sensors, or the model of it.
+    """Alarm about the rig, its sensors, or the model of it.
 
     Attributes
     ----------
@@ -430,7 +430,7 @@ class Alarm:
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """What is known of the rig's health at one stamp (ns).
+    """Health of the rig at one stamp (ns).
 
     Attributes
     ----------
@@ -451,7 +451,7 @@ class Health:
 
 
 class _Rows(Protocol):
-    """What some fields of a report are made of when they are asked for."""
+    """Source of the report's fields that are made on request."""
 
     row: Array | None
     streams: Sequence[int]
@@ -464,7 +464,7 @@ class _Rows(Protocol):
 
 
 class _MadeWhenAsked:
-    """Beside the fields of a report, what those are made of that are not made yet."""
+    """Base of a report with the rows from which its missing fields are made on request."""
 
     __slots__ = ("rows",)
     rows: Any  # _Rows or None; what is encoded from rows knows more of them
@@ -475,7 +475,7 @@ _MADE_OF_ROWS = frozenset({"prediction", "estimate", "residuals"})
 
 @dataclass(frozen=True, slots=True)
 class Report(_MadeWhenAsked):
-    """What one sample caused.
+    """Report on one sample and all that it caused.
 
     Attributes
     ----------
@@ -515,9 +515,9 @@ class Report(_MadeWhenAsked):
 
     @classmethod
     def of_rows(cls, stamp: int, rows: _Rows, events: tuple[str, ...], health: Health | None) -> Report:
-        """A report whose prediction, estimate and residuals are made of `rows` when they are asked for.
+        """Return a report whose prediction, estimate and residuals are made from `rows` on request.
 
-        Few look at them where messages are encoded straight from the rows; it is the same in every other way.
+        Few callers read them where messages are encoded straight from the rows. The report is the same in every other way.
         """
         report, put = object.__new__(cls), object.__setattr__
         put(report, "stamp", stamp)
@@ -531,7 +531,7 @@ class Report(_MadeWhenAsked):
         return report
 
     def __getattr__(self, name: str) -> Any:
-        """A field that is not made yet; ``rows``, of a report that was made at once, is None."""
+        """Make and return a field that is not made yet; ``rows`` is None for a report that was made at once."""
         if name == "rows":
             return None
         if name not in _MADE_OF_ROWS or self.rows is None:
@@ -542,15 +542,15 @@ class Report(_MadeWhenAsked):
 
     @property
     def is_predicted(self) -> bool:
-        """Whether there is a prediction, which is not made by that."""
+        """Return True if there is a prediction; the prediction itself is not made."""
         return self.prediction is not None if self.rows is None else self.rows.row is not None
 
     @property
     def has_residuals(self) -> bool:
-        """Whether there are residuals, likewise."""
+        """Return True if there are residuals; the residuals themselves are not made."""
         return bool(self.residuals if self.rows is None else self.rows.streams)
 
     @property
     def all(self) -> tuple[Report, ...]:
-        """Those of `earlier`, and this one: everything that this sample caused, in order."""
+        """Reports of `earlier`, and this one: everything that this sample caused, in order."""
         return (*self.earlier, self) if self.earlier else (self,)

@@ -28,7 +28,7 @@ Readings = dict[Stream, Array]
 
 
 def boom_of(scene: Scene, trial: Values) -> Scene:
-    """The scene with values (SI) of its parameters by name; zeros of sensors are passed over."""
+    """Return the scene with parameter values (SI) by name; zeros of sensors are ignored."""
     return with_parameters(scene, {name: value for name, value in trial.items() if not name.endswith(".zero")})
 
 
@@ -41,7 +41,7 @@ READINGS: dict[Stream, Callable[[Results, Array], Array]] = {
     Stream.ANGLES: lambda results, gravity: results.joints,
     Stream.IMU: _specific_force,
 }
-"""What the sensors of the streams that a fit can compare should read, shape (.., channels), given gravity (m/s^2)."""
+"""Expected readings of the streams that a fit can compare, shape (.., channels), given gravity (m/s^2)."""
 
 
 class ForwardModel:
@@ -62,7 +62,7 @@ class ForwardModel:
         self._zeros = np.array([[trial.get(f"{name}.zero", 0.0) for name in strokes] for trial in trials])
 
     def move(self, course: SessionCourse, noise: Array | None = None) -> Readings:
-        """Readings along a course.
+        """Return the readings along a course.
 
         Parameters
         ----------
@@ -90,7 +90,7 @@ class ForwardModel:
         return self._readings(np.concatenate([first[:, None], rows], axis=1))
 
     def rest(self, strokes: Array) -> Readings:
-        """Readings at rest with strokes (n,) in m; shape (trials, 1, channels) for each stream."""
+        """Return the readings at rest with strokes (n,) in m; shape (trials, 1, channels) for each stream."""
         return self._readings(self._settled(strokes, strokes - self._zeros)[:, None])
 
     def _settled(self, near: Array, strokes: Array) -> Array:
@@ -110,7 +110,7 @@ Parts = Sequence[tuple[SessionCourse, ResidualBlocks]]
 
 
 class CalibrationProblem:
-    """What is compared.
+    """Comparison of predicted with measured block means of all sessions, as a function of the unknowns.
 
     Parameters
     ----------
@@ -165,11 +165,11 @@ class CalibrationProblem:
         return np.maximum(0.0, self.least + START)
 
     def values(self, deviations: Array) -> dict[str, float]:
-        """Values of the unknowns by name."""
+        """Return the values of the unknowns by name."""
         return {unknown.name: unknown.value(float(d)) for unknown, d in zip(self.unknowns, deviations, strict=True)}
 
     def moving(self, deviations: Array, whitening: NoiseModel) -> tuple[Array, Array]:
-        """White residuals of all sessions, shape (k,), and their derivatives, shape (k, p)."""
+        """Return the white residuals of all sessions, shape (k,), and their derivatives, shape (k, p)."""
         forward = ForwardModel(self.scene, self.trials(deviations))
         residuals, slopes = [], []
         for course, blocks in self.parts:
@@ -182,16 +182,16 @@ class CalibrationProblem:
         return np.concatenate(residuals), np.concatenate(slopes, axis=1).T
 
     def resting(self, deviations: Array, strokes: Array) -> tuple[Array, Array]:
-        """Readings (k, c) at rest with strokes (k, n) in m, and their derivatives (p, k, c)."""
+        """Return the readings (k, c) at rest with strokes (k, n) in m, and their derivatives (p, k, c)."""
         forward = ForwardModel(self.scene, self.trials(deviations))
         streams = self.parts[0][1].means
         rows = [np.concatenate([readings[stream] for stream in streams], axis=2) for readings in map(forward.rest, strokes)]
         return self.with_slopes(np.concatenate(rows, axis=1), deviations)
 
     def noise(self, deviations: Array) -> list[Array]:
-        """Realisations of the noise of block means, one array (k, b, c) for every session.
+        """Return realisations of the noise of block means, one array (k, b, c) for every session.
 
-        The strokes' noise shakes the natural modes, so it depends on the unknowns.
+        The strokes' noise excites the natural modes, so it depends on the unknowns.
         """
         rng = np.random.default_rng(0)
         count = -(-REALISATIONS // len(self.parts))
@@ -207,13 +207,13 @@ class CalibrationProblem:
         return found
 
     def booms(self, deviations: Array, step: float) -> dict[int | None, Scene]:
-        """The boom itself, by None, and those with one of the boom's unknowns moved by `step`, by its number."""
+        """Return the boom itself, by None, and the booms with one of its unknowns moved by `step`, by number."""
         moved: list[int | None] = [i for i, unknown in enumerate(self.unknowns) if unknown.channel is None]
         every = np.arange(len(deviations))
         return {i: boom_of(self.scene, self.values(deviations + step * (every == i))) for i in [None, *moved]}
 
     def trials(self, deviations: Array) -> list[dict[str, float]]:
-        """The values themselves, and with every unknown moved that acts through the boom."""
+        """Return the values, and the values with each unknown moved that acts through the boom."""
         moved = [deviations]
         for i, direct in enumerate(self._direct):
             if direct is None:
@@ -222,24 +222,24 @@ class CalibrationProblem:
         return [self.values(each) for each in moved]
 
     def with_slopes(self, readings: Array, deviations: Array) -> tuple[Array, Array]:
-        """From readings (trials, b, channels) those of the channels used, (b, c), and their derivatives (p, b, c)."""
+        """Return the used channels (b, c) of readings (trials, b, channels), and their derivatives (p, b, c)."""
         readings = readings[..., self.used]
         acting = iter((readings[1:] - readings[0]) / DIFFERENCE)
         slopes = np.array([next(acting) if d is None else np.broadcast_to(d, readings[0].shape) for d in self._direct])
         return readings[0] + self._zeros(deviations), slopes
 
     def left(self, deviations: Array, course: SessionCourse, blocks: ResidualBlocks) -> Array:
-        """Measured less predicted means (b, c) of one session."""
+        """Return measured minus predicted means (b, c) of one session."""
         readings = blocks.averaged(ForwardModel(self.scene, [self.values(deviations)]).move(course))[0]
         return np.asarray((blocks.measured - readings)[:, self.used] - self._zeros(deviations))
 
     def _zeros(self, deviations: Array) -> Array:
-        """What zeros of the sensors that are compared add to each channel (c,)."""
+        """Return the contribution of the compared sensors' zeros to each channel, (c,)."""
         pairs = zip(self._direct, deviations, strict=True)
         return sum((effect * at for effect, at in pairs if effect is not None), np.zeros(len(self.used)))
 
     def _effect(self, unknown: Unknown) -> Array | None:
-        """What a prior deviation adds to each channel (c,), for a zero of a sensor that is compared; else None."""
+        """Return the contribution of a prior deviation to each channel (c,); None if not a zero of a compared sensor."""
         if unknown.channel is None or stream_of(unknown.channel) is Stream.STROKES:
             return None
         return unknown.kind.prior * np.array([channel == unknown.channel for channel in self.channels], dtype=float)

@@ -1,4 +1,4 @@
-"""Nonlinear least squares with priors, and which unknowns the sessions can tell apart."""
+"""Nonlinear least squares with priors, and the unknowns that the sessions can tell apart."""
 
 from __future__ import annotations
 
@@ -55,9 +55,9 @@ class Fit:
     load: TipLoad | None = None
 
     def covariance(self, more: Array | float = 0.0) -> Array:
-        """Of the deviations, with the priors, and with `more` information.
+        """Return the covariance of the deviations, with the priors, and with `more` information.
 
-        None is smaller than white noise would give: few realisations may happen to pull little.
+        Variances are at least those for white noise, because few realisations may underestimate them.
         """
         spread, prior = max(1.0, self.misfit) ** 2, np.eye(len(self.deviations))
         white = np.linalg.inv(self._precision(more))
@@ -66,7 +66,7 @@ class Fit:
         return np.asarray(factors[:, None] * found * factors)
 
     def _precision(self, more: Array | float = 0.0) -> Array:
-        """Inverse of the covariance (p, p) that white noise would give, with the priors."""
+        """Return the inverse of the covariance (p, p) for white noise, with the priors."""
         return np.asarray((self.information + more) / max(1.0, self.misfit) ** 2 + np.eye(len(self.deviations)))
 
     def without(self, left_out: Sequence[int], least: Array) -> Array:
@@ -90,11 +90,12 @@ def bounded_minimum(precision: Array, pull: Array, least: Array) -> Array:
 
 
 def fitted(problem: CalibrationProblem, tell: Tell) -> Fit:
-    """Minimise; `tell` is called before every pass over the sessions.
+    """Return the fit by least squares; `tell` is called before every pass over the sessions.
 
-    A stiffness that is wrong makes the boom swing at a wrong frequency, and after some swings measured and predicted ones are
-    out of step, from where least squares do not find back. So the means over holds are fitted first, as equilibria. The noise
-    rings at the boom's frequencies, too: it is made anew at the first estimate of the swinging boom, and the fit repeated.
+    A wrong stiffness gives a wrong natural frequency. After some periods the predicted vibration is out of phase with the
+    measured one, and least squares do not converge. So the means over rest periods are fitted first, as equilibria. The noise
+    excites the natural frequencies too. Its realisations are therefore made anew at the first estimate, and the fit is
+    repeated.
     """
     deviations, passes = fitted_in_holds(problem), 0
     for _ in range(ROUNDS):
@@ -114,12 +115,15 @@ def fitted(problem: CalibrationProblem, tell: Tell) -> Fit:
 
 
 def fitted_in_holds(problem: CalibrationProblem) -> Array:
-    """Deviations that fit the means over holds."""
+    """Return the deviations that fit the means over rest periods."""
     return _minimised(_in_holds(problem), problem.start, problem.least)[0]
 
 
 def _scatter(noise: list[Array], whitening: NoiseModel, slopes: Array) -> Array:
-    """Covariance of J^T w over realisations that the filter was not made from; sessions are independent, so theirs add up."""
+    """Return the covariance of J^T w over realisations that the filter was not made from.
+
+    Sessions are independent, so their covariances add up.
+    """
     found, first = np.zeros((slopes.shape[1], slopes.shape[1])), 0
     for each in noise:
         white = whitening(each[1::2]).reshape(len(each[1::2]), -1)
@@ -130,7 +134,10 @@ def _scatter(noise: list[Array], whitening: NoiseModel, slopes: Array) -> Array:
 
 
 def _in_holds(problem: CalibrationProblem) -> Evaluate:
-    """Residuals of the means over holds and their derivatives, in deviations of single samples."""
+    """Return the function for the residuals of means over rest periods and their derivatives.
+
+    Both are in standard deviations of single samples.
+    """
     found = [hold for course, blocks in problem.parts for hold in _holds(course, blocks)]
     found = found[:: 1 + len(found) // HOLDS]
     if not found:
@@ -147,7 +154,7 @@ def _in_holds(problem: CalibrationProblem) -> Evaluate:
 
 
 def _holds(course: SessionCourse, blocks: ResidualBlocks) -> list[tuple[Array, Array]]:
-    """Means of strokes and of readings over holds, one after the other."""
+    """Return the means of strokes and of readings over rest periods, in order."""
     length = float(blocks.times[1] - blocks.times[0])
     group = max(1, round(HOLD / length))
     rows = round(group * length / course.step)
@@ -160,7 +167,7 @@ def _holds(course: SessionCourse, blocks: ResidualBlocks) -> list[tuple[Array, A
 
 
 def _minimised(evaluate: Evaluate, start: Array, least: Array) -> tuple[Array, int]:
-    """Deviations of least squares with the priors, and evaluations that they took."""
+    """Return the deviations of least squares with the priors, and the number of evaluations."""
     known: dict[bytes, tuple[Array, Array]] = {}
 
     def both(deviations: Array) -> tuple[Array, Array]:
@@ -184,7 +191,7 @@ HELPS = 0.5  # of the deviation left, from which on a posture is worth the way
 
 @dataclass(frozen=True)
 class InseparableUnknowns:
-    """Unknowns that the sessions cannot tell apart, or do not show.
+    """Unknowns that the sessions cannot tell apart or determine.
 
     Attributes
     ----------
@@ -211,7 +218,7 @@ class InseparableUnknowns:
 
 
 def groups_of(problem: CalibrationProblem, fit: Fit) -> list[InseparableUnknowns]:
-    """Unknowns whose estimates are too uncertain to be of use, together with those that they are confused with."""
+    """Return groups of unknowns with estimates too uncertain to be of use; a group holds those that are confused."""
     covariance = fit.covariance()
     spread = np.sqrt(np.diag(covariance))
     vague = spread > _useful(problem)
@@ -228,12 +235,12 @@ def groups_of(problem: CalibrationProblem, fit: Fit) -> list[InseparableUnknowns
 
 
 def _useful(problem: CalibrationProblem) -> Array:
-    """Deviations from which estimates are of use, in units of the priors'."""
+    """Return the largest standard deviations of useful estimates, in units of the priors'."""
     return np.array([unknown.kind.useful / unknown.kind.prior for unknown in problem.unknowns])
 
 
 def _with_posture(problem: CalibrationProblem, fit: Fit, group: list[int]) -> InseparableUnknowns:
-    """The group with the posture that leaves least of its uncertainty."""
+    """Return the group with the posture that reduces its uncertainty most."""
     names, useful = tuple(problem.unknowns[i].name for i in group), _useful(problem)
 
     def left(more: Array | float) -> float:
@@ -247,7 +254,10 @@ def _with_posture(problem: CalibrationProblem, fit: Fit, group: list[int]) -> In
 
 
 def _in_postures(problem: CalibrationProblem, fit: Fit) -> dict[str, Array]:
-    """Information (p, p) that a hold in each of the scene's postures would add; those out of reach are left out."""
+    """Return the information (p, p) that a rest period in each of the scene's postures would add.
+
+    Postures out of reach are left out.
+    """
     found = {}
     for posture in problem.scene.postures or {}:
         try:

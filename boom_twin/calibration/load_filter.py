@@ -1,4 +1,4 @@
-"""Kalman filter of residuals under an unknown load at the tip: their innovations, which are white whatever the load was.
+"""Kalman filter of residuals under an unknown load at the tip: its innovations are white for any load.
 
 States, SI: the load's x and y, a Gauss-Markov process of correlation time `LOAD_TIME`; a load that stays but where it jumps, x
 and y; for every stroke the error of its smoothed reading, white noise through the smoother twice; then q and q' of the reduced
@@ -33,7 +33,7 @@ STROKES = 4  # first place of the strokes' errors
 
 
 class LoadPrior(NamedTuple):
-    """What is taken to be known of the load.
+    """Prior of the unknown load.
 
     `rates` (2,), N^2/s: variance that its x and y gain in a second; `constant`, N: standard deviation of the part that stays;
     `jumps` (b, 2), N^2: variance that x and y of this part gain in each of b blocks; 0 for none.
@@ -52,7 +52,7 @@ class StrokeError(NamedTuple):
 
 
 def stroke_error(variance: float, course: SessionCourse) -> StrokeError:
-    """Of strokes measured with `variance` (m^2) and smoothed as in `course`."""
+    """Return the noise of strokes measured with `variance` (m^2) and smoothed as in `course`."""
     return StrokeError(variance * course.interval, 2.0 * math.pi * course.corner)
 
 
@@ -72,7 +72,10 @@ class FilterModel(NamedTuple):
 
 
 class Innovations(NamedTuple):
-    """Of b blocks, j columns, c channels: `values` (b, j, c), `variances` (b, c); and the load (b, 2), N, by column 0."""
+    """Innovations of b blocks, j columns, c channels.
+
+    `values` are (b, j, c), `variances` (b, c), and `loads` (b, 2) the load, N, by column 0.
+    """
 
     values: Array
     variances: Array
@@ -80,7 +83,7 @@ class Innovations(NamedTuple):
 
 
 def filter_model(modes: ModesAlong, channels: NDArray[np.int64], corner: float, prior: LoadPrior, step: float) -> FilterModel:
-    """The filter for blocks of `step` (s), which begins in the long run of its processes.
+    """Return the filter for blocks of `step` (s); it begins in the stationary state of its processes.
 
     Parameters
     ----------
@@ -109,7 +112,7 @@ def _carried(turn: Array, density: Array) -> Array:
 
 
 def _rates(modes: ModesAlong, corner: float) -> Array:
-    """The states' derivatives by the states, shape (k, s, s)."""
+    """Return the derivatives of the states by the states, shape (k, s, s)."""
     k, m, n = modes.forces.shape
     size = STROKES + 2 * ORDER * n + 2 * m
     a = np.zeros((k, size, size))
@@ -131,13 +134,13 @@ def _rates(modes: ModesAlong, corner: float) -> Array:
 
 
 def _places(n: int, m: int) -> tuple[NDArray[np.int64], ...]:
-    """Of the strokes' errors, with those of what drives them (2 ORDER, n), and of q and q'."""
+    """Return the places of the strokes' errors with their driving states (2 ORDER, n), of q and of q'."""
     first = STROKES + 2 * ORDER * n
     return np.arange(STROKES, first).reshape(-1, n), np.arange(first, first + m), np.arange(first + m, first + 2 * m)
 
 
 def _readings(modes: ModesAlong, rates: Array) -> Array:
-    """How joint angles and the IMU read the states, shape (k, n + 2, s); but for the turn of the IMU."""
+    """Return the measurement matrix of joint angles and IMU, shape (k, n + 2, s), without the rotation of the IMU."""
     k, m, n = modes.forces.shape
     errors, q, rate = _places(n, m)
     joints = modes.joints.swapaxes(1, 2)
@@ -153,7 +156,10 @@ def _readings(modes: ModesAlong, rates: Array) -> Array:
 
 
 def _passing(modes: ModesAlong, size: int) -> Array:
-    """What the IMU reads of rates while shapes change: the tip's acceleration is Psi q'' + 2 Psi' q' + ..; (k, n + 2, s), s."""
+    """Return the measurement matrix of the IMU for changing mode shapes, per knot passed in a second, (k, n + 2, s), s.
+
+    It is the term 2 Psi' q' of the tip's acceleration Psi q'' + 2 Psi' q' + ...
+    """
     k, m, n = modes.forces.shape
     rate = _places(n, m)[2]
     found, middle = np.zeros((k, n + 2, size)), 0.5 * (modes.heading[1:] + modes.heading[:-1])
@@ -164,9 +170,10 @@ def _passing(modes: ModesAlong, size: int) -> Array:
 
 
 def tilted(measured: Array, joints: int) -> Array:
-    """What joint angles and the IMU (b, n + 2) read per radian that the tip is turned, from what was measured (b, n + 2).
+    """Return the change of joint angle and IMU readings (b, n + 2) per radian of tip rotation.
 
-    A tip that is turned reads what acts there along other axes: gravity, and what it is accelerated by, load and all.
+    The IMU of a rotated tip reads gravity and the tip's acceleration, load included, along other axes. So its change follows
+    from the measured readings (b, n + 2).
     """
     found = np.zeros(measured.shape)
     if measured.shape[1] > joints:
@@ -199,9 +206,10 @@ def innovations(
 
 
 def gained_variance(model: FilterModel, prior: LoadPrior, strokes: StrokeError, moving: Array, step: float) -> Array:
-    """Variance (b, s) that states gain in each of b blocks of `step` (s): the load where it jumps, strokes where they move.
+    """Return the variance (b, s) that states gain in each of b blocks of `step` (s).
 
-    `moving` (b, n) is the share of their noise that is left in the strokes, see `SessionCourse`.
+    The load gains variance where it jumps, strokes gain it where they move. `moving` (b, n) is the share of their noise that is
+    left in the strokes, see `SessionCourse`.
     """
     n, found = moving.shape[1], np.zeros((len(moving), len(model.start)))
     found[:, 2:STROKES] = prior.jumps

@@ -85,7 +85,7 @@ class PosturePath(NamedTuple):
 
 
 def posture_path(scene: Scene, course: SessionCourse) -> PosturePath:
-    """Knots of a course, `TRAVEL` apart at most; two at least."""
+    """Return the knots of a course, `TRAVEL` apart at most; two at least."""
     travelled = _travelled(scene, course)
     moving = course.moving.max(axis=1) > 0.0
     held = travelled[~moving & np.append(moving[1:], True)]  # the last instants of holds: frequencies are to be exact there
@@ -102,7 +102,7 @@ def posture_path(scene: Scene, course: SessionCourse) -> PosturePath:
 
 
 def _travelled(scene: Scene, course: SessionCourse) -> Array:
-    """By how much sections have turned so far at every instant of a course, rad: of each step that of the quickest section."""
+    """Return the angle travelled up to every instant of a course, rad; a step adds the rotation of the quickest section."""
     rows = np.unique(np.append(np.arange(0, len(course.strokes), EVERY), len(course.strokes) - 1))
     turns = np.cumsum([joint_angles_of_strokes(scene, at) for at in course.strokes[rows]], axis=1)
     steps = np.abs(np.diff(turns, axis=0)).max(axis=1)
@@ -110,10 +110,10 @@ def _travelled(scene: Scene, course: SessionCourse) -> Array:
 
 
 class _Knot(NamedTuple):
-    """What is known of a posture.
+    """Natural modes and kinematics of one posture.
 
-    m modes with their turns of the joints (m, n), those by a force at the tip (n, 2), the drives' lengths (n,), slopes (n,) of
-    strokes by angles, angle of the tip.
+    `joints` (m, n) are the joint rotations in the m modes, `still` (n, 2) those by a static force at the tip. `drives` (n,) are
+    the drives' lengths, `slopes` (n,) the derivatives of strokes by angles, `heading` is the angle of the tip.
     """
 
     modes: tuple[Mode, ...]
@@ -125,7 +125,7 @@ class _Knot(NamedTuple):
 
 
 def modes_along(scene: Scene, path: PosturePath) -> ModesAlong:
-    """Models of a boom at the knots of a path, in as many modes as there are at all of them.
+    """Return reduced models of a boom at the knots of a path, in as many modes as there are at all of them.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def _knots(scene: Scene, plan: Plan, path: PosturePath) -> list[_Knot]:
 
 
 def _damping_and_forces(plan: Plan, increments: Array, drives: Array) -> tuple[Array, Array]:
-    """Damping (m, m) and forces of the cylinders (m, n) in shapes with these increments; drives are as long as `drives`, m."""
+    """Return damping (m, m) and cylinder forces (m, n) in shapes with these increments, at drive lengths `drives`, m."""
     damping = np.zeros((len(increments), len(increments)))
     forces = increments[:, plan.tables.cylinders.z].copy()
     for i, (compliance, lag) in enumerate(zip(*plan.compliances_and_lags(drives), strict=True)):

@@ -28,7 +28,7 @@ LEAST = 0.5  # of the values of a block that must be there
 
 @dataclass(frozen=True)
 class ResidualBlocks:
-    """Measured means of b blocks in c channels, and how predictions on a grid of m instants are averaged likewise.
+    """Measured means of b blocks in c channels, and the averaging matrices of predictions on a grid of m instants.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class ResidualBlocks:
     means: dict[Stream, csr_array]
 
     def averaged(self, readings: Mapping[Stream, Array]) -> Array:
-        """Means of predicted readings (k, m, channels) of every stream, shape (k, b, c)."""
+        """Return the means of predicted readings (k, m, channels) of every stream, shape (k, b, c)."""
         count = len(next(iter(readings.values())))
         rows = [[mean @ readings[stream][k] for stream, mean in self.means.items()] for k in range(count)]
         return np.array([np.concatenate(parts, axis=1) for parts in rows])
@@ -56,13 +56,13 @@ class ResidualBlocks:
 def block_length(
     sessions: Sequence[MeasuredSession], streams: Sequence[Stream], shortest: float = SHORTEST, least: float = 2.0
 ) -> float:
-    """Time (s) that holds `least` samples, on average, of every one of the streams of every session; `shortest` or more."""
+    """Return the time (s) in which every stream of every session has `least` samples on average; `shortest` or more."""
     gaps = [np.diff(session.series[stream].stamps) * NANO for session in sessions for stream in streams]
     return max(shortest, least * max(float(each[each < USUAL * np.median(each)].mean()) for each in gaps))
 
 
 def channel_names(joints: int, streams: Sequence[Stream]) -> tuple[str, ...]:
-    """Names of the channels of the streams, in the order of `ResidualBlocks`."""
+    """Return the names of the channels of the streams, in the order of `ResidualBlocks`."""
     known = channels_of(joints)
     return tuple(name for stream in streams for name in known[stream])
 
@@ -95,7 +95,10 @@ def blocks_of(
 
 
 def _averages(series: Series, course: SessionCourse, length: float, count: int, lead: float) -> tuple[Array, Array, csr_array]:
-    """Means (count, channels), numbers of values in them, and the average of linear interpolations on the course's grid."""
+    """Return block means (count, channels), numbers of values in them, and the averaging matrix of predictions.
+
+    The matrix averages linear interpolations on the course's grid.
+    """
     times: Array = np.asarray((series.stamps - course.start) * NANO)
     block = np.minimum(((times + lead) / length).astype(np.int64), count - 1)
     there = np.isfinite(series.values)
@@ -118,13 +121,16 @@ MEMORY = 2.0  # s, in which a boom's slowest swing is told from others near it
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """The filter for c channels: `matrix` (c, c) is the inverse of L, `past` (p, c, c) holds A_1 .. A_p."""
+    """Whitening filter for c channels: `matrix` (c, c) is the inverse of L, `past` (p, c, c) holds A_1 .. A_p."""
 
     matrix: Array
     past: Array
 
     def __call__(self, residuals: Array) -> Array:
-        """White residuals of b blocks in a row, shape (.., b, c) to (.., b - p, c); 0 where a value it needs is missing."""
+        """Return the white residuals of b consecutive blocks, shape (.., b, c) to (.., b - p, c).
+
+        They are 0 where a value they need is missing.
+        """
         order, count = len(self.past), residuals.shape[-2]
         left = residuals[..., order:, :].copy()
         for k, gain in enumerate(self.past, start=1):
@@ -132,7 +138,7 @@ class NoiseModel:
         return np.asarray(np.nan_to_num(left @ self.matrix.T, nan=0.0))
 
     def of_constant(self, values: Array) -> Array:
-        """What white residuals a constant (.., c) has in every block."""
+        """Return the white residuals that a constant (.., c) has in every block."""
         return np.asarray((values - values @ self.past.sum(axis=0).T) @ self.matrix.T)
 
 
@@ -149,7 +155,7 @@ def whitening_of(noise: Sequence[Array], length: float) -> NoiseModel:
 
 
 def _lagged(noise: Array, order: int) -> Array:
-    """The values before every one, newest first, shape (k (b - p), p c)."""
+    """Return the values before every one, newest first, shape (k (b - p), p c)."""
     count = noise.shape[1]
     columns = [noise[:, order - k : count - k] for k in range(1, order + 1)]
     return np.concatenate(columns, axis=2).reshape(-1, order * noise.shape[2])

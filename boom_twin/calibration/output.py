@@ -26,17 +26,17 @@ DIGITS = 1e-5  # relative; values are written with six digits
 
 
 def mapping_path(out: Path) -> Path:
-    """Where the zeros that go with a scene are written: ``boom.mapping.yaml`` beside ``boom.yaml``."""
+    """Return the path of the zeros that go with a scene: ``boom.mapping.yaml`` beside ``boom.yaml``."""
     return out.with_suffix(".mapping.yaml")
 
 
 def picture_paths(out: Path) -> list[Path]:
-    """Where the pictures that go with a scene are drawn: of residuals, and of parameters."""
+    """Return the paths of the pictures that go with a scene: residuals, and parameters."""
     return [out.with_suffix(".residuals.png"), out.with_suffix(".parameters.png")]
 
 
 def refuse_overwriting(out: Path, sources: Sequence[Path], force: bool) -> None:
-    """UsageError if a file of the result is there already, or would replace one of `sources` or a file of a recording."""
+    """Raise UsageError if a file of the result exists, or would replace one of `sources` or a file of a recording."""
     for path in (out, mapping_path(out), *picture_paths(out)):
         check_target(path, sources)
         if path.exists() and not force:
@@ -46,7 +46,7 @@ def refuse_overwriting(out: Path, sources: Sequence[Path], force: bool) -> None:
 
 
 def provenance(found: Calibration, credit: str) -> str:
-    """What was changed, from what, when and by what; a few lines of text."""
+    """Return a few lines on the origin of the values: sessions, part held out, and the parameters' earlier values."""
     sessions = ", ".join(f"{session.name} (sha256 {session.digest}..)" for session in found.sessions)
     told = [estimate for estimate in found.estimates if estimate.told]
     before = [f"{e.unknown.name} {e.unknown.present:.6g} {e.unknown.kind.unit}" for e in told if e.unknown.channel is None]
@@ -57,7 +57,7 @@ def provenance(found: Calibration, credit: str) -> str:
 
 
 def write_scene(found: Calibration, scene: Scene, text: str, out: Path, credit: str) -> None:
-    """Write the scene, of which the text is given, with the values that changed, and their provenance."""
+    """Write the scene, given its text, with the values that changed and their provenance."""
     note = provenance(found, credit)
     description = f"{scene.description.rstrip()}\n{note}" if scene.description else note
     wanted = found.scene.model_copy(update={"description": description})
@@ -73,7 +73,7 @@ def write_scene(found: Calibration, scene: Scene, text: str, out: Path, credit: 
 
 
 def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path, credit: str, joints: int) -> Path | None:
-    """Write the zeros of the sensors into a mapping beside the scene; None if there is none to be written.
+    """Write the zeros of the sensors into a mapping beside the scene; return None if there are none to write.
 
     Parameters
     ----------
@@ -99,13 +99,13 @@ def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path
 
 
 def _in_readings(found: Calibration, joints: int) -> dict[str, float]:
-    """The new zeros by channel, in the units of the readings."""
+    """Return the new zeros by channel, in the units of the readings."""
     sensors = {name: sensor for stream in Stream for name, sensor in found.mapped.topics.sensors_of(stream, joints).items()}
     return {name: sensors[name].zero + shift / factor(name, sensors[name]) for name, shift in found.zeros.items()}
 
 
 def _mapping_text(found: Calibration, bag: Path, mapping: Path | None) -> str:
-    """The text that the sessions' mapping was read from; empty for the package's own."""
+    """Return the text of the sessions' mapping; empty for the package's own."""
     if mapping is not None:
         return mapping.read_text(encoding="utf-8-sig")
     own = kept(bag, "mapping", "--mapping")
@@ -113,7 +113,7 @@ def _mapping_text(found: Calibration, bag: Path, mapping: Path | None) -> str:
 
 
 def _changes(before: Any, after: Any, place: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Any]]:
-    """Places of the single values that differ, with their new ones."""
+    """Yield the places of the single values that differ, with their new ones."""
     if isinstance(after, dict):
         for key, value in after.items():
             yield from _changes(before.get(key) if isinstance(before, dict) else None, value, (*place, key))
@@ -139,7 +139,7 @@ SHOWN = {"rad": (180.0 / math.pi, "deg"), "m": (1e3, "mm")}
 
 
 def as_text(found: Calibration) -> list[str]:
-    """A table, what the sessions do not tell, and how the twin does on what was held out."""
+    """Return the lines of a table, of the unknowns that cannot be told apart, and of the residuals held out."""
     rows = [("", "before", "now", "95 % interval", ""), *(_row(estimate) for estimate in found.estimates)]
     widths = [max(len(row[i]) for row in rows) for i in range(5)]
     lines = ["  ".join(f"{text:{width}}" for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
@@ -151,7 +151,7 @@ def as_text(found: Calibration) -> list[str]:
 
 
 def as_object(found: Calibration) -> dict[str, Any]:
-    """Keys of the flat object; SI."""
+    """Return the result as a flat object; SI."""
     values: dict[str, Any] = {}
     for estimate in found.estimates:
         name = estimate.unknown.name
@@ -171,7 +171,7 @@ def as_object(found: Calibration) -> dict[str, Any]:
 
 
 def shown(estimate: Estimate) -> tuple[float, str]:
-    """Factor from SI, and unit, in which a parameter is shown."""
+    """Return the factor from SI, and the unit, in which a parameter is shown."""
     unit = estimate.unknown.kind.unit
     return SHOWN.get(unit, (1.0, unit)) if estimate.unknown.channel else (1.0, unit)
 

@@ -36,7 +36,7 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class Choice:
-    """What is to be estimated: `names`, or if there are none the usual ones with what else is asked for.
+    """Unknowns to estimate: `names`, or if there are none the usual ones and those requested by the other fields.
 
     See `boom_twin.calibration.unknowns.usual_names`.
     """
@@ -50,7 +50,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter, SI: present value, estimate, 95 % interval, and whether the sessions tell it."""
+    """Estimate of one parameter, SI: present value, estimate, 95 % interval, and whether the sessions determine it."""
 
     unknown: Unknown
     value: float
@@ -61,7 +61,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Result.
+    """Result of a calibration.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ def calibrate(
 def _fitted(
     scene: Scene, unknowns: Sequence[Unknown], parts: FittedParts, settings: Settings, progress: Progress
 ) -> tuple[CalibrationProblem, Fit]:
-    """The problem and its fit; where more than noise is left, with an unknown load at the tip, if that explains it."""
+    """Return the problem and its fit; under an unknown load at the tip, if more than noise is left and the load explains it."""
     passes = iter(range(1, 1000))
 
     def tell() -> None:
@@ -211,7 +211,7 @@ def refuse_lengths(paths: Sequence[Path], mapped: Mapped) -> None:
 
 
 def common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int) -> Mapped:
-    """The mapping that all sessions have, or the one at `mapping`; UsageError if theirs differ."""
+    """Return the mapping of all sessions, or the one at `mapping`; UsageError if the sessions' mappings differ."""
     found = [mapping_of(path, mapping, joints) for path in paths]
     for path, each in zip(paths, found, strict=True):
         if each.topics != found[0].topics:
@@ -224,7 +224,11 @@ def common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int) -> 
 
 @dataclass(frozen=True)
 class FittedParts:
-    """What of the sessions is fitted: blocks (s) with and without a load, streams compared, how their sensors are mounted."""
+    """Parts of the sessions that are fitted.
+
+    `length` and `loaded_length` (s) are those of blocks without and with a load, `streams` are compared, `mounts` tell how
+    their sensors are mounted.
+    """
 
     sessions: tuple[tuple[MeasuredSession, SessionCourse], ...]
     length: float
@@ -234,11 +238,14 @@ class FittedParts:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Those of the streams."""
+        """Names of the streams' channels."""
         return channel_names(self.sessions[0][1].strokes.shape[1], self.streams)
 
     def in_blocks(self, length: float, lead: float = 0.0) -> list[tuple[SessionCourse, ResidualBlocks]]:
-        """Averaged over blocks of `length` (s), which begin by the share `lead` of the time between samples before these."""
+        """Return each course with its averages over blocks of `length` (s).
+
+        The first block begins before the course, by the share `lead` of the time between samples.
+        """
         return [
             (course, blocks_of(session, course, length, self.streams, self.mounts, lead * course.interval))
             for session, course in self.sessions
@@ -246,7 +253,7 @@ class FittedParts:
 
 
 def _parts(scene: Scene, sessions: Sequence[MeasuredSession], mapped: Mapped, settings: Settings) -> tuple[FittedParts, int]:
-    """What is fitted, and the stamp from which on the last session is held out."""
+    """Return the parts to fit, and the stamp from which the last session is held out."""
     joints, streams = len(scene.joints), _compared(sessions)
     courses = [course_of(session, settings) for session in sessions]
     _refuse_other_boom(scene, sessions, courses)
@@ -269,12 +276,12 @@ def _parts(scene: Scene, sessions: Sequence[MeasuredSession], mapped: Mapped, se
 
 
 def _compared(sessions: Sequence[MeasuredSession]) -> tuple[Stream, ...]:
-    """The streams that are compared; what one session lacks is left out of all."""
+    """Return the streams to compare; a stream that one session lacks is left out of all."""
     return tuple(stream for stream in READINGS if all(stream in session.series for session in sessions))
 
 
 def _refuse_other_boom(scene: Scene, sessions: Sequence[MeasuredSession], courses: Sequence[SessionCourse]) -> None:
-    """BagError where strokes are beyond what the scene's cylinders travel."""
+    """Raise BagError where strokes are beyond the travel of the scene's cylinders."""
     for session, course in zip(sessions, courses, strict=True):
         for i, joint in enumerate(scene.joints):
             low, high = float(course.strokes[:, i].min()), float(course.strokes[:, i].max())

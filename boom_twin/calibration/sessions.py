@@ -42,7 +42,7 @@ class Series:
     values: Array
 
     def of(self, start: int, stop: int) -> Series:
-        """Those with stamps from `start` to `stop`."""
+        """Return the samples with stamps from `start` to `stop`."""
         inside = (self.stamps >= start) & (self.stamps <= stop)
         return Series(self.stamps[inside], self.values[inside])
 
@@ -68,7 +68,7 @@ class MeasuredSession:
     changed: bool = False
 
     def samples(self, zeros: Mapping[str, float] | None = None) -> list[Sample]:
-        """All samples in the order of their stamps, strokes first, less what sensors read too much (by channel)."""
+        """Return all samples in the order of their stamps, strokes first, less the `zeros` by channel."""
         joints, streams = self.series[Stream.STROKES].values.shape[1], []
         for order, (stream, names) in enumerate(channels_of(joints).items()):
             if stream not in self.series:
@@ -100,7 +100,7 @@ def read_sessions(paths: Sequence[Path], topics: Topics, joints: int, window: Ti
 
 
 def _wanted(session: Session, topics: Topics) -> list[str]:
-    """Topics of the streams of `NEEDED`, which must be there, and of the others if they are."""
+    """Return the topics of the streams of `NEEDED`, which must be there, and of the others if they are."""
     names = []
     for stream in Stream:
         topic = topics.inputs[stream]
@@ -138,7 +138,7 @@ def _measured(session: Session, samples: SampleReader, joints: int) -> MeasuredS
 
 
 def _series(samples: list[Sample]) -> Series:
-    """Samples by stamp, the first of equal ones."""
+    """Return samples by stamp, the first of equal ones."""
     stamps, first = np.unique(np.array([sample.stamp for sample in samples]), return_index=True)
     return Series(stamps, np.array([samples[i].values for i in first]))
 
@@ -185,7 +185,7 @@ class SessionCourse:
 
     @property
     def times(self) -> Array:
-        """Of the grid, s after `start`."""
+        """Times of the grid, s after `start`."""
         return np.asarray(self.step * np.arange(len(self.strokes)))
 
     @property
@@ -195,11 +195,11 @@ class SessionCourse:
 
     @property
     def duration(self) -> float:
-        """From the first to the last instant, s."""
+        """Time from the first to the last instant, s."""
         return self.step * (len(self.strokes) - 1)
 
     def until(self, time: float) -> SessionCourse:
-        """The part up to `time` (s)."""
+        """Return the part up to `time` (s)."""
         count = 1 + int(time / self.step)
         end = self.start + round(time / NANO)
         return SessionCourse(
@@ -207,19 +207,19 @@ class SessionCourse:
         )
 
     def smoothed(self, values: Array) -> Array:
-        """What became of values at `stamps`, shape (k, ..), on the grid, shape (m, ..)."""
+        """Return values at `stamps`, shape (k, ..), interpolated and smoothed on the grid, shape (m, ..)."""
         at: Array = np.asarray((self.stamps - self.start) * NANO)
         return smoothed(_on_grid(at, values, self.times), self.step, self.corner)
 
     def held(self, variance: float) -> SessionCourse:
-        """The course with strokes, measured with `variance` (m^2), at their means where they hold."""
+        """Return the course with strokes, measured with `variance` (m^2), at their means in rest periods."""
         deviation = math.sqrt(variance * self.interval * BAND * self.corner)
         strokes, moving = held(self.strokes, deviation, self.step)
         return replace(self, strokes=strokes, moving=moving)
 
 
 def course_of(session: MeasuredSession, settings: Settings) -> SessionCourse:
-    """The longest stretch of a session without a gap, from where the boom rests.
+    """Return the longest stretch of a session without a gap, from where the boom rests.
 
     Raises
     ------
@@ -245,7 +245,7 @@ def course_of(session: MeasuredSession, settings: Settings) -> SessionCourse:
 
 
 def refuse_short(name: str, duration: float, where: str) -> None:
-    """BagError for a stretch that is too short."""
+    """Raise BagError for a stretch that is too short."""
     if duration < SHORTEST:
         raise BagError(
             f"{name}: {duration:.1f} s {where}, {SHORTEST:g} s are needed. Record a minute with moves that change loads."
@@ -253,20 +253,20 @@ def refuse_short(name: str, duration: float, where: str) -> None:
 
 
 def _on_grid(times: Array, values: Array, grid: Array) -> Array:
-    """Values (k, ..) at `times`, on the lines between them at the instants of `grid`, shape (m, ..)."""
+    """Return values (k, ..) at `times`, interpolated linearly on `grid`, shape (m, ..)."""
     columns = [np.interp(grid, times, column) for column in values.reshape(len(values), -1).T]
     return np.asarray(np.column_stack(columns).reshape(len(grid), *values.shape[1:]))
 
 
 def smoothed(values: Array, step: float, corner: float) -> Array:
-    """Values (m, ..) on a grid of `step` (s), smoothed forth and back up to `corner` (Hz)."""
+    """Return values (m, ..) on a grid of `step` (s), smoothed forth and back up to `corner` (Hz)."""
     sections = butter(3, corner, fs=1.0 / step, output="sos")
     padding = min(len(values) - 1, round(1.0 / (corner * step)))
     return np.asarray(sosfiltfilt(sections, values, axis=0, padtype="even", padlen=padding))
 
 
 def _longest(series: Series) -> Series:
-    """The longest stretch between gaps."""
+    """Return the longest stretch between gaps."""
     cuts = np.flatnonzero(np.diff(series.stamps) * NANO > LARGEST_GAP) + 1
     bounds = np.concatenate([[0], cuts, [len(series.stamps)]])
     lengths = [series.stamps[b - 1] - series.stamps[a] for a, b in pairwise(bounds)]
@@ -276,7 +276,7 @@ def _longest(series: Series) -> Series:
 
 
 def filled(times: Array, values: Array) -> Array:
-    """Values (m, c) at `times` (m,), missing ones on the line between their neighbours; a column without any stays."""
+    """Return values (m, c) at `times` (m,) with missing ones interpolated linearly; a column without any stays."""
     columns = values.T.copy()
     for column in columns:
         known = np.isfinite(column)
@@ -286,7 +286,7 @@ def filled(times: Array, values: Array) -> Array:
 
 
 def _rest(speeds: Array, count: int) -> int | None:
-    """First place from where on `count` speeds in a row are low."""
+    """Return the first place from which `count` speeds in a row are low."""
     fast = np.concatenate([[0], np.cumsum(speeds > SPEED)])
     quiet = np.flatnonzero(fast[count:] == fast[:-count])
     return int(quiet[0]) if len(quiet) else None

@@ -1,4 +1,4 @@
-"""Where strokes hold, and what is left of their noise there.
+"""Rest periods of strokes, and the share of the strokes' noise that is left in them.
 
 A stroke that holds is known by the mean of all its readings over the hold, some thirty times as well as by a smoother that has
 to follow moves. What noise is left in the strokes shakes the model as no boom is shaken, and what it makes of the predictions
@@ -19,7 +19,7 @@ LIKELY = 2.0  # of the deviation that noise makes of a smoothed stroke, root of 
 
 
 def held(smoothed: Array, deviation: float, step: float) -> tuple[Array, Array]:
-    """Strokes with their means where they hold, and how much of their own noise is left in them.
+    """Return strokes with their means in rest periods, and the share of their own noise that is left in them.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def held(smoothed: Array, deviation: float, step: float) -> tuple[Array, Array]:
 
 
 def _stretches(column: Array, deviation: float, step: float) -> list[tuple[int, int]]:
-    """Holds of one stroke, from and up to which rows."""
+    """Return the rest periods of one stroke: first row, and the row after the last."""
     look, clear, most = round(LOOK / step), round(CLEAR / step), (LIKELY * deviation) ** 2
     if len(column) < look:
         return []

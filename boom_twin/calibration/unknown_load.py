@@ -54,7 +54,7 @@ WIDER = 2.0  # by which intervals are wider than that: the load's spectrum is no
 
 
 class _Part(NamedTuple):
-    """What is used of one session."""
+    """Part of one session that is used."""
 
     course: SessionCourse
     blocks: ResidualBlocks
@@ -62,11 +62,11 @@ class _Part(NamedTuple):
 
 
 Run = Callable[[LoadPrior, Array], Innovations]
-"""The filter of one session: of what is known of the load, and columns of residuals (b, j, c)."""
+"""Filter of one session, a function of the load prior and of columns of residuals (b, j, c)."""
 
 
 class Pass(NamedTuple):
-    """One session at a trial: white residuals (b, c), their derivatives (p, b, c), and the load (b, 2), N."""
+    """Results of one session at a trial: white residuals (b, c), their derivatives (p, b, c), and the load (b, 2), N."""
 
     white: Array
     slopes: Array
@@ -74,7 +74,7 @@ class Pass(NamedTuple):
 
 
 def fitted_under_load(problem: CalibrationProblem, quiet: Fit, tell: Tell) -> Fit:
-    """The fit with an unknown load.
+    """Return the fit with an unknown load.
 
     Parameters
     ----------
@@ -123,14 +123,17 @@ def fitted_under_load(problem: CalibrationProblem, quiet: Fit, tell: Tell) -> Fi
 
 
 def is_plausible(load: TipLoad | None, scene: Scene) -> bool:
-    """Whether a load may be one: pulses, or no larger than wind. A drifting encoder looks like a large load that wanders."""
+    """Return True if the load has pulses or is no larger than wind, or if there is none.
+
+    A drifting encoder looks like a large load that wanders.
+    """
     if load is None or load.pulses is not None:
         return True
     return load.rms <= GUSTS * weight_of(scene)
 
 
 def _after_step(problem: CalibrationProblem, passes: Sequence[Pass], deviations: Array) -> tuple[Array, float]:
-    """Deviations after a step of Gauss and Newton, and how long it would be at its full length, in those of the estimate."""
+    """Return the deviations after a step of Gauss and Newton, and its full length in deviations of the estimate."""
     information = _information(passes) + np.eye(len(deviations))
     pull = -deviations - sum(np.einsum("pbc,bc->p", each.slopes, each.white) for each in passes)
     step = bounded_minimum(information, pull, problem.least - deviations)
@@ -144,7 +147,7 @@ def _information(passes: Sequence[Pass]) -> Array:
 
 
 def _scatter(passes: Sequence[Pass], span: int) -> Array:
-    """Covariance of the sums that are to vanish, from those over spans of so many blocks."""
+    """Return the covariance of the sums that must vanish, from sums over spans of `span` blocks."""
     found = np.zeros((len(passes[0].slopes),) * 2)
     for each in passes:
         pulls = np.einsum("pbc,bc->bp", each.slopes, each.white)
@@ -154,7 +157,10 @@ def _scatter(passes: Sequence[Pass], span: int) -> Array:
 
 
 def _jumps(loads: Array, length: float, free: LoadPrior) -> Array:
-    """Variance that the load gains at every block, shape (b, 2), N^2: far more than if let `free` where it jumps, else 0."""
+    """Return the variance that the load gains at every block, shape (b, 2), N^2.
+
+    It is far more than under `free` where the load jumps, else 0.
+    """
     half = round(0.5 * FLANK / length)
     change = np.zeros(loads.shape)
     change[half:-half] = np.abs(loads[2 * half :] - loads[: -2 * half])
@@ -164,7 +170,10 @@ def _jumps(loads: Array, length: float, free: LoadPrior) -> Array:
 
 
 def _load(problem: CalibrationProblem, passes: Sequence[Pass]) -> TipLoad | None:
-    """Size and frequency of what varies of the load, from the sessions on end; what stays is not told from weight and zeros."""
+    """Return size and frequency of the varying part of the load, from consecutive sessions.
+
+    The constant part cannot be told from weight and zeros.
+    """
     finder = TipLoadFinder()
     for (course, blocks), each in zip(problem.parts, passes, strict=True):
         finder.add(course.start + np.round(blocks.times / NANO).astype(np.int64), each.loads - each.loads.mean(axis=0))
@@ -172,7 +181,7 @@ def _load(problem: CalibrationProblem, passes: Sequence[Pass]) -> TipLoad | None
 
 
 def _run(problem: CalibrationProblem, boom: Scene, part: _Part) -> Run:
-    """The filter of one session of `boom`."""
+    """Return the filter of one session of `boom`."""
     course, blocks, path = part
     modes = modes_along(boom, path)
     rows = np.clip(np.rint(blocks.times / course.step).astype(int), 0, len(path.places) - 1)
@@ -198,9 +207,10 @@ def _likely_priors(
     problem: CalibrationProblem, parts: Sequence[_Part], deviations: Array, runs: Sequence[Run],
     free: LoadPrior, rates: Array, seek: bool,
 ) -> list[LoadPrior]:  # fmt: skip
-    """What is known of the load in every session at a trial: its jumps, and rates of the greatest likelihood between them.
+    """Return the load priors of every session at a trial: jumps, and rates between them.
 
-    Jumps are those of the load that a filter finds which lets it move freely; rates are `rates`, or sought from there on.
+    Jumps are those of the load that the filter estimates under the prior `free`. Rates are `rates`, or if `seek` those of the
+    greatest likelihood, sought from `rates` on.
     """
     sessions = []
     for part, run in zip(parts, runs, strict=True):
@@ -236,7 +246,10 @@ def _passes(
     problem: CalibrationProblem, parts: Sequence[_Part], deviations: Array, runs: Sequence[Run],
     priors: Sequence[LoadPrior], kept: Sequence[Pass] | None,
 ) -> list[Pass]:  # fmt: skip
-    """Every session at a trial, with derivatives made anew, or with those of `kept`: any that hold the past alone will do."""
+    """Return the passes of every session at a trial, with new derivatives or with those of `kept`.
+
+    Any derivatives that depend on the past alone will do.
+    """
     if kept is not None:
         return [
             before._replace(white=_white(found)[:, 0], loads=found.loads)
@@ -253,14 +266,14 @@ def _passes(
 
 
 def _checked(found: Innovations) -> Innovations:
-    """The same; SolverError if they are no numbers."""
+    """Return the innovations; raise SolverError if they are not finite or a variance is not positive."""
     if not (np.isfinite(found.values).all() and (found.variances > 0.0).all()):
         raise SolverError("the filter of the unknown load lost its digits on this boom.")
     return found
 
 
 def _white(found: Innovations) -> Array:
-    """Innovations in their deviations, (b, j, c)."""
+    """Return the innovations in their standard deviations, (b, j, c)."""
     return np.asarray(_checked(found).values / np.sqrt(found.variances)[:, None])
 
 
@@ -272,7 +285,7 @@ def _pass(
     predicted: tuple[Array, Array],
     booms: Mapping[int | None, Scene],
 ) -> Pass:
-    """One session at a trial.
+    """Return the pass of one session at a trial.
 
     Parameters
     ----------

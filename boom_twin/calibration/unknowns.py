@@ -16,7 +16,7 @@ LEAST_LOAD = 1e-3  # kg, kg/m; a load of nothing is another model
 
 @dataclass(frozen=True, slots=True)
 class UnknownKind:
-    """A kind of parameter.
+    """Kind of a parameter.
 
     Attributes
     ----------
@@ -42,32 +42,32 @@ KINDS = {
     "tip.payload": UnknownKind("kg", 50.0, 5.0),
     "line_fill": UnknownKind("kg/m", 10.0, 1.0),
 }
-"""By the last word of a parameter's name."""
+"""Kinds of parameters, by the last word of a parameter's name."""
 
 ZEROS = {
     Stream.ANGLES: UnknownKind("rad", math.radians(2.0), math.radians(0.05)),
     Stream.STROKES: UnknownKind("m", 0.01, 5e-4),
     Stream.IMU: UnknownKind("m/s^2", 0.3, 0.03),
 }
-"""Of the zeros of sensors, by their stream, in the order in which they are estimated."""
+"""Kinds of the sensors' zeros, by stream, in the order in which they are estimated."""
 
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """One parameter to be estimated, with the value that it has at present (SI)."""
+    """Parameter to be estimated, with its present value (SI)."""
 
     name: str
     present: float
 
     @property
     def channel(self) -> str | None:
-        """The channel whose zero it is; None for a parameter of the scene."""
+        """Channel whose zero it is; None for a parameter of the scene."""
         channel = self.name.removesuffix(".zero")
         return None if channel == self.name else channel
 
     @property
     def kind(self) -> UnknownKind:
-        """Unit and likely deviations."""
+        """Unit and likely deviations of the parameter's kind."""
         if self.channel is not None and (stream := stream_of(self.channel)) is not None:
             return ZEROS[stream]
         return KINDS[self.name if self.name in KINDS else self.name.rpartition(".")[2]]
@@ -78,7 +78,7 @@ class Unknown:
         return (LEAST_LOAD - self.present) / self.kind.prior if self.name in ("tip.payload", "line_fill") else -math.inf
 
     def value(self, deviation: float) -> float:
-        """The value that is so many prior deviations off the present one."""
+        """Return the value at `deviation` prior deviations from the present one."""
         step = deviation * self.kind.prior
         return self.present * math.exp(step) if self.kind.relative else self.present + step
 
@@ -91,7 +91,7 @@ def usual_names(
     stiffness: bool = False,
     zeros: str = "all",
 ) -> list[str]:
-    """What is estimated if nobody names it: stiffness of every cylinder, zero of every sensor, and what is asked for.
+    """Return the default unknowns: stiffness of every cylinder, zero of every sensor, and those requested.
 
     Parameters
     ----------
@@ -113,13 +113,13 @@ def usual_names(
 
 
 def zero_names(scene: Scene, streams: Sequence[Stream] = tuple(Stream)) -> list[str]:
-    """Zeros of the sensors of some of the streams of `ZEROS`."""
+    """Return the names of the sensors' zeros of some of the streams of `ZEROS`."""
     channels = channels_of(len(scene.joints))
     return [f"{channel}.zero" for stream in ZEROS if stream in streams for channel in channels[stream]]
 
 
 def unknowns_of(scene: Scene, names: Sequence[str]) -> tuple[Unknown, ...]:
-    """The unknowns of these names; zeros are 0 at present, for a mapping has taken what it knows of them.
+    """Return the unknowns of these names; zeros are 0 at present, since the mapping has applied the known ones.
 
     Raises
     ------

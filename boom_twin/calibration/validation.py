@@ -36,7 +36,7 @@ class HeldOutResult:
 
     @property
     def spread(self) -> Array:
-        """Root mean square of the normalised residuals of every channel, shape (c,); 1 where all is as expected."""
+        """Root mean square of the normalised residuals of every channel, shape (c,); 1 if they are as expected."""
         return np.array([_rms(column) for column in (self.values / self.sigmas).T])
 
 

@@ -1,1 +1,1 @@
-"""How a boom deviates from static equilibrium: linearisation at a posture and the Kalman filters of prediction and estimate."""
+"""Deviation of a boom from static equilibrium: linearisation at a posture, Kalman filters of prediction and estimate."""

@@ -73,7 +73,7 @@ def make_transition(p, f, h):
 
 @inner
 def transit(p, f, k, size, h, load2):
-    """Take model `k` with its first `size` states over the transition; its fast load has the variance `load2` (N^2)."""
+    """Propagate the first `size` states of model `k` over the transition; its fast load has the variance `load2` (N^2)."""
     x, covariance, load = f.x[k], f.p[k], force_place(p)
     for i in range(size):
         total = 0.0
@@ -109,7 +109,7 @@ def multiply(f, right, found, size):
 
 @inner
 def correct(x, covariance, row, gain, innovation, variance, size):
-    """Take a reading into a state and its covariance; returns the variance of the innovation."""
+    """Correct a state and its covariance by a reading; return the variance of the innovation."""
     spread_of(row, covariance, gain, size)
     expected = variance
     for k in range(size):

@@ -21,7 +21,7 @@ UNEVEN = 0.5  # share of the time between two lengths by which the one before ma
 
 @inner
 def watch_valves(p, f, h, size):
-    """Believe valves open or closed by the rates of their drives in the model in which all are open."""
+    """Set valves open or closed by the rates of their drives in the model in which all are open."""
     n, drive, opened = p.drives.shape[0], drive_place(p), False
     for i in range(n):
         at = drive + n + i
@@ -42,7 +42,7 @@ def watch_valves(p, f, h, size):
 
 @inner
 def learn_jerk(p, f, h):
-    """Learn how the accelerations of the drives change: a variance of 2/T (E a^2) is stationary under that density."""
+    """Learn the jerk density of the drives' accelerations: a variance of 2/T (E a^2) is stationary under that density."""
     n = p.drives.shape[0]
     for i in range(n):
         at = drive_place(p) + 2 * n + i
@@ -53,7 +53,7 @@ def learn_jerk(p, f, h):
 
 @inner
 def learn_length_noise(f, h, y):
-    """Learn the noise of lengths from third differences, 20 times its variance; no cylinder moves so unevenly.
+    """Learn the noise of lengths from third differences, whose variance is 20 times that of the noise.
 
     Lengths that came `h` (s) after those before, and not in even steps with them, begin a new series of differences.
     """

@@ -34,7 +34,7 @@ PADDED = 8  # times as long with zeros
 
 @dataclass(frozen=True, slots=True)
 class Pulses:
-    """The periodic part of a load.
+    """Periodic part of a load.
 
     Attributes
     ----------
@@ -52,19 +52,19 @@ class Pulses:
 
 @dataclass(frozen=True, slots=True)
 class TipLoad:
-    """A load at the tip that the model does not know: root mean square (N), and its pulses if they stand out."""
+    """Load at the tip that the model does not know: root mean square (N), and its pulses if they stand out."""
 
     rms: float
     pulses: Pulses | None
 
     @property
     def is_there(self) -> bool:
-        """Whether it is of any size: `LEAST` or more."""
+        """Return True if the load is `LEAST` or more."""
         return self.rms >= LEAST or (self.pulses is not None and self.pulses.height >= LEAST)
 
     @property
     def text(self) -> str:
-        """In words: ``pulses of 128 N at 0.430 Hz (+- 0.001)``, ``45 N rms, no main frequency`` or ``none above 20 N``."""
+        """Load in words: ``pulses of 128 N at 0.430 Hz (+- 0.001)``, ``45 N rms, no main frequency`` or ``none above 20 N``."""
         if self.pulses is not None and self.pulses.height >= LEAST:
             digits = min(max(1, int(np.ceil(-np.log10(self.pulses.frequency_sigma)))), 4)
             sure = f"{self.pulses.frequency:.{digits}f} Hz (+- {self.pulses.frequency_sigma:.{digits}f})"
@@ -73,7 +73,7 @@ class TipLoad:
 
 
 def find_pulses(load: Array, interval: float) -> Pulses | None:
-    """The strongest periodic part that stands out; None where there is none.
+    """Return the strongest periodic part that stands out; None if there is none.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def find_pulses(load: Array, interval: float) -> Pulses | None:
 
 
 def _highest(frequencies: Array, power: Array, span: float) -> int | None:
-    """The highest of the peaks that stand out, as its place."""
+    """Return the place of the highest peak that stands out; None if there is none."""
     inner = np.arange(1, len(power) - 1)
     is_peak = (power[inner] > power[inner - 1]) & (power[inner] >= power[inner + 1]) & (power[inner] > 0.0)
     is_inside = (frequencies[inner] >= LOWEST / span) & (frequencies[inner] <= HIGHEST)
@@ -112,7 +112,7 @@ def _highest(frequencies: Array, power: Array, span: float) -> int | None:
 
 
 def _prominences(frequencies: Array, power: Array, places: NDArray[np.int64], span: float) -> Array:
-    """Power of peaks (k,) over the mean of half the frequency to twice, of the larger of the two sides."""
+    """Return the power of peaks (k,) over the mean power on the higher side, from half the frequency to twice."""
     at, lobe, sums = frequencies[places], LOBE / span, np.concatenate([[0.0], np.cumsum(power)])
     sides = (0.5 * at, at - lobe), (at + lobe, np.maximum(2.0 * at - lobe, at + 3.0 * lobe))
     level = np.zeros(len(places))
@@ -124,13 +124,16 @@ def _prominences(frequencies: Array, power: Array, places: NDArray[np.int64], sp
 
 
 def _direction(lines: NDArray[np.complex128]) -> Array:
-    """Unit vector (2,) along which a complex amplitude (2,) is largest."""
+    """Return the unit vector (2,) along which a complex amplitude (2,) is largest."""
     _, vectors = np.linalg.eigh(np.real(np.outer(lines, lines.conj())))
     return np.asarray(vectors[:, -1])
 
 
 def _vertex(levels: Array) -> tuple[float, float]:
-    """Place, from -0.5 to 0.5 about the middle one of three `levels`, and height of the parabola through them."""
+    """Return place and height of the vertex of the parabola through three `levels`.
+
+    The place is from -0.5 to 0.5 about the middle one.
+    """
     below, top, above = levels
     bend = below - 2.0 * top + above
     offset = 0.5 * (below - above) / bend if bend else 0.0
@@ -138,7 +141,7 @@ def _vertex(levels: Array) -> tuple[float, float]:
 
 
 class TipLoadFinder:
-    """Looks for the load in estimates that come in parts, in memory that does not grow with their number.
+    """Finder of the load in estimates that come in parts; its memory does not grow with their number.
 
     The same estimates give the same load, in whatever parts they come.
     """
@@ -152,7 +155,7 @@ class TipLoadFinder:
         self._loads: Array = np.zeros((0, 2))
 
     def add(self, stamps: NDArray[np.int64], loads: Array) -> None:
-        """Take in loads (k, 2) in N at `stamps` (k,) in ns; exactly zero is what is told before anything is measured."""
+        """Add loads (k, 2) in N at `stamps` (k,) in ns. Loads of exactly zero, from before any measurement, are skipped."""
         known = loads.any(axis=1)
         stamps, loads = stamps[known], loads[known]
         self._squares += float(np.square(loads).sum())
@@ -165,7 +168,7 @@ class TipLoadFinder:
             self._append(stamps[first:last], loads[first:last])
 
     def _append(self, stamps: NDArray[np.int64], loads: Array) -> None:
-        """Loads on end."""
+        """Append consecutive loads."""
         if not len(stamps):
             return
         self._newest = int(stamps[-1])
@@ -179,13 +182,16 @@ class TipLoadFinder:
             self._first += round(WINDOW / NANO)
 
     def _close(self) -> None:
-        """The window ends."""
+        """Close the window."""
         self._strongest = _stronger(self._strongest, _pulses_in_bins(self._places, self._loads))
         self._first, self._places, self._loads = None, self._places[:0], self._loads[:0]
 
     @property
     def load(self) -> TipLoad | None:
-        """Of all estimates so far, pulses from the window where they are highest; None if nothing was ever estimated."""
+        """Load of all estimates so far; None if there are none.
+
+        Its pulses are those of the window where they are highest.
+        """
         if not self._count:
             return None
         newest = _pulses_in_bins(self._places, self._loads)
@@ -197,7 +203,7 @@ def _stronger(one: Pulses | None, other: Pulses | None) -> Pulses | None:
 
 
 def _pulses_in_bins(places: NDArray[np.int64], loads: Array) -> Pulses | None:
-    """Those of loads (k, 2) by the numbers of their bins (k,), ascending; empty bins are bridged."""
+    """Return the pulses in loads (k, 2) with ascending bin numbers (k,); empty bins are bridged."""
     if not len(places):
         return None
     bins, starts, counts = np.unique(places, return_index=True, return_counts=True)
@@ -207,7 +213,7 @@ def _pulses_in_bins(places: NDArray[np.int64], loads: Array) -> Pulses | None:
 
 
 def tip_load(times: Array, loads: Array) -> TipLoad | None:
-    """The load in estimates (k, 2) in N at `times` (k,) in s; None without any."""
+    """Return the load in estimates (k, 2) in N at `times` (k,) in s; None without any."""
     finder = TipLoadFinder()
     finder.add(np.round(np.asarray(times) / NANO).astype(np.int64), np.asarray(loads, float))
     return finder.load

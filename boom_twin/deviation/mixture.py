@@ -70,7 +70,7 @@ def add_mean(f, model, share, mean, size):
 
 @inner
 def add_spread(f, model, share, mean, spread, size):
-    """Add a share of a model's covariance, and of how far its state is from the mean, to a covariance."""
+    """Add a share of a model's covariance, and of its state's spread about the mean, to a covariance."""
     if share < 1e-12:
         return
     for i in range(size):
@@ -95,7 +95,7 @@ def mix(f, mixture, size):
 
 @inner
 def weigh_models(f, mixture):
-    """Bring the chances of a mixture's models up to date by their likelihoods; returns the log likelihood of all together."""
+    """Update the probabilities of a mixture's models by their likelihoods; return the log likelihood of the mixture."""
     first, count = models_of(mixture)
     most, total = f.likely[first], 0.0
     for k in range(1, count):

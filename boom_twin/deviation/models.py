@@ -55,7 +55,7 @@ DEAF_WAY, DEAF_RATE = 0.05, 0.02  # m, m/s: how far a drive is, and how fast, wh
 
 @inner
 def start_models(p, f, speed, swing):
-    """Begin at rest at the drives of the posture; drives may be as fast as `speed` (m/s), the tip may swing by `swing` (m)."""
+    """Start at rest at the drives of the posture. Drives may move at `speed` (m/s), the tip may vibrate by `swing` (m)."""
     n, m, size = p.drives.shape[0], p.modes[0], all_states(p)
     load, drive = force_place(p), drive_place(p)
     noise, x, covariance = f.noise, f.x[VALVES], f.p[VALVES]
@@ -94,7 +94,7 @@ def start_models(p, f, speed, swing):
 
 @kernel
 def step_models(p, f, h, y):
-    """Take all models `h` (s) on to lengths `y` (n, m; NaN = missing)."""
+    """Step all models by `h` (s) to lengths `y` (n, m; NaN = missing)."""
     size, every = zero_place(p), all_states(p)
     learn_length_noise(f, h, y)
     usual2 = f.load2[0]
@@ -138,7 +138,7 @@ def step_models(p, f, h, y):
 
 @inner
 def hold_still(p, f, k, size):
-    """Take the readings of model `k` that drives behind closed valves stand still."""
+    """Correct model `k` by readings of zero rate and acceleration of drives behind closed valves."""
     n, drive = p.drives.shape[0], drive_place(p)
     for i in range(n):
         if f.is_open[i] == 0 and not (k >= ALL_VALVES and f.deaf[i]):
@@ -152,7 +152,7 @@ def hold_still(p, f, k, size):
 
 @inner
 def note_innovations(p, f, y):
-    """Write lengths `y` less the mean of the prediction's mixture before them, and the variances of that."""
+    """Write lengths `y` less their mean predicted by the mixture, and the variances of the difference."""
     n = y.shape[0]
     size = drive_place(p) + n  # a length does not depend on the states behind
     for i in range(n):
@@ -167,7 +167,7 @@ def note_innovations(p, f, y):
 
 @inner
 def take_lengths(p, f, k, size, y):
-    """Take lengths `y` (n, m; NaN = missing) into model `k`; returns the logarithm of their likelihood."""
+    """Correct model `k` by lengths `y` (n, m; NaN = missing); return their log likelihood."""
     total = 0.0
     for i in range(y.shape[0]):
         if math.isfinite(y[i]) and not (k >= ALL_VALVES and f.deaf[i]):
@@ -180,7 +180,7 @@ def take_lengths(p, f, k, size, y):
 
 @inner
 def leave_contradiction(p, f, size):
-    """Begin the estimate anew where its tip is far outside what the lengths allow; channels that surprised count for less.
+    """Restart the estimate if its tip is far outside what the lengths allow; channels with excess noise lose weight.
 
     The difference of an estimate and one with fewer readings has at most the variance of the latter.
     """
@@ -197,7 +197,7 @@ def leave_contradiction(p, f, size):
 
 @inner
 def follow_prediction(p, f):
-    """Make the estimate the prediction; nothing is known of the sensors' zeros."""
+    """Set the estimate to the prediction; the sensors' zeros are unknown then."""
     size, every, n = zero_place(p), all_states(p), p.drives.shape[0]
     largest = 0.0
     for i in range(n):

@@ -122,7 +122,7 @@ def new_posture(
 
 @kernel
 def settle_at(t, boom, work, p, drives):
-    """Bring `boom` (State) to rest at the strokes `drives` (n,) of the drives, from the rest before; returns the status."""
+    """Settle `boom` (State) at the strokes `drives` (n,) of the drives, starting from the rest before; return the status."""
     for i in range(drives.shape[0]):
         p.drives[i], p.target[i] = drives[i], p.closed[i] + drives[i]
     scheme = prepare(REST, 0.0, 0.0, work.weights)
@@ -132,7 +132,7 @@ def settle_at(t, boom, work, p, drives):
 
 @kernel
 def linearise(t, boom, work, p, drives, follow):
-    """Take the changes about rest at the strokes `drives` (n,) of the drives; returns the status.
+    """Linearise about rest at the strokes `drives` (n,) of the drives; return the status.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def restore(t, boom, work, p):
 
 @inner
 def note_linkages(t, p):
-    """Joint angles of the rigid boom at the strokes of the drives, and their derivatives by stroke."""
+    """Write the joint angles of the rigid boom at the strokes of the drives, and their derivatives by stroke."""
     for i in range(p.angles.shape[0]):
         row = t.linkages[i]
         angle = angle_of_length(row, p.closed[i] + p.drives[i], p.angles[i], -WIDEST, WIDEST)
@@ -267,7 +267,7 @@ def read_sensors(boom, p, found):
 
 @inner
 def leave_modes_out(p):
-    """Take from the columns of the force what the modes have of them."""
+    """Subtract the modes' share from the columns of the force."""
     n = p.drives.shape[0]
     for a in range(2):
         for j in range(p.modes[0]):
@@ -286,7 +286,7 @@ def leave_modes_out(p):
 
 @inner
 def iterate_modes(t, boom, work, p):
-    """Bring the modes to the present posture: (K + s^2 M) y_j = s^2 M phi_j, then Rayleigh and Ritz in the span of the y_j."""
+    """Update the modes to the present posture: (K + s^2 M) y_j = s^2 M phi_j, then Rayleigh-Ritz in the span of the y_j."""
     n, m = p.drives.shape[0], p.modes[0]
     if m == 0:
         return
@@ -360,7 +360,7 @@ def move_along(t, boom, work, p, j):
 
 @inner
 def weigh(p, one, other):
-    """Modal mass of two motions (h,), kg."""
+    """Return the modal mass of two motions (h,), kg."""
     total = 0.0
     for i in range(one.shape[0]):
         total += p.masses[i] * one[i] * other[i]

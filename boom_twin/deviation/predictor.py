@@ -40,7 +40,7 @@ SWING, SPEED = 0.3, 0.05  # how far a boom at work swings, as a share of the tip
 
 
 class Drawn(NamedTuple):
-    """A boom at one instant, as far as its outline needs it.
+    """State of a boom at one instant, as far as its outline needs it.
 
     frames, positions : of `State` and `Work`. angles : (n,) joint angles of the rigid boom, rad. pins : (n, 4) of `State`.
     """
@@ -52,7 +52,7 @@ class Drawn(NamedTuple):
 
 
 class CompiledBoom(NamedTuple):
-    """A boom as `boom_twin.twin.update` takes it.
+    """Compiled boom as `boom_twin.twin.update` takes it.
 
     tables : of the scene. anchor : the boom at rest at the posture. live : the boom as predicted. work : scratch.
     bending : (stations, unknowns) bending moments by the unknowns, N m. row : the newest prediction, see
@@ -70,7 +70,7 @@ class CompiledBoom(NamedTuple):
 
 
 class BoomPredictor:
-    """A boom that is followed by what its stroke transducers read.
+    """Predictor of a boom by its stroke transducers, and estimator of its tip by all sensors.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ class BoomPredictor:
 
     @cached_property
     def filters_held(self) -> tuple[Any, ...]:
-        """Posture and filters alone, likewise."""
+        """Posture and filters as compiled code takes them, see `held`."""
         return hold(self.posture), hold(self.filters)
 
     @property
@@ -148,7 +148,7 @@ class BoomPredictor:
         return self._row[self.places.variances]
 
     def start(self, strokes: Array, may_move: bool = False) -> None:
-        """Forget all; at rest in equilibrium where transducers read `strokes` (m), shape (n,).
+        """Reset to rest in equilibrium where transducers read `strokes` (m), shape (n,).
 
         Parameters
         ----------
@@ -216,14 +216,14 @@ class BoomPredictor:
     # -- changes by the twin
 
     def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_]) -> None:
-        """Leave masked channels (c,) and strokes (n,) out of the estimate, and forget what a new one of them has told it."""
+        """Leave masked channels (c,) and strokes (n,) out of the estimate; restart it if they include new ones."""
         f = self.filters
         if (masked & ~f.masked).any() or (strokes != f.deaf).any():
             f.status[FED] = 0
         f.masked[:], f.deaf[:] = masked, strokes
 
     def doubt(self, channels: Collection[str]) -> None:
-        """Let the zeros of these angle sensors and axes of the IMU drift as they may not when all is well."""
+        """Allow a large drift of the zeros of these angle sensors and axes of the IMU."""
         names = channels_of(self.plan.joints)
         places = [*names[Stream.IMU], "", "", *names[Stream.ANGLES]]  # as zeros stand among the states, mount and scale between
         for place, name in enumerate(places):
@@ -231,11 +231,14 @@ class BoomPredictor:
                 self.filters.drift[place] = DOUBTED_DRIFT
 
     def rebase(self, shift: int) -> None:
-        """All stamps are later by `shift` (ns) from now on."""
+        """Shift stamps by `shift` (ns) from now on."""
         self.filters.status[FED_STAMP] += shift
 
     def add_phase(self, prediction: Prediction) -> None:
-        """The time that passed is not known: two phases of the vibration in `prediction` are twice its amplitude apart."""
+        """Add the phase uncertainty of the vibration in `prediction` after a pause of unknown length.
+
+        Two phases differ by up to twice the amplitude.
+        """
         m, n, p = int(self.posture.modes[0]), self.plan.joints, self.posture
         if m == 0:
             return
@@ -248,7 +251,7 @@ class BoomPredictor:
 
     @property
     def evidence(self) -> float:
-        """Logarithm of the likelihood of all that was read since the twin was made, up to a constant of the session."""
+        """Log likelihood of all readings since the twin was made, up to a constant of the session."""
         return float(self.filters.evidence[0])
 
     @property

@@ -1,4 +1,4 @@
-"""Rows of the measurement matrix: what sensors, lengths and the tip read of the states of `boom_twin.deviation.states`."""
+"""Rows of the measurement matrix: sensors, lengths and the tip as functions of the states of `boom_twin.deviation.states`."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def column_row(p, columns, at, scale, row):
 
 @inner
 def length_row(p, i, row):
-    """Write the row of what the stroke transducer of cylinder `i` reads."""
+    """Write the row of the stroke transducer of cylinder `i`."""
     n, m = p.drives.shape[0], p.modes[0]
     column_row(p, p.forces, i, p.oil_read[i], row)
     row[drive_place(p) + i] += 1.0

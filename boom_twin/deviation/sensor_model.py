@@ -21,7 +21,7 @@ TURN = 2.0 * np.pi
 
 @inner
 def specific_force(x: Any, y: Any, c: Any, s: Any) -> tuple[Any, Any]:
-    """What an accelerometer reads along two axes, m/s^2; of numbers or of arrays of one shape.
+    """Return the readings of an accelerometer along two axes, m/s^2; for numbers or for arrays of one shape.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def specific_force(x: Any, y: Any, c: Any, s: Any) -> tuple[Any, Any]:
 
 
 class Mounting:
-    """The angle sensors of a boom, one for each joint.
+    """Angle sensors of a boom, one for each joint.
 
     An encoder reads the angle of its joint. An inclinometer reads the angle of the root, or of the head, of its section to
     the horizontal, and is compared with just that: nothing measured by another sensor enters, so a fault of one inclinometer
@@ -76,14 +76,14 @@ class Mounting:
         self._inclination = inclination
 
     def expected(self, joints: Array, live: State) -> Array:
-        """What the sensors should read, rad, shape (n,), while the joint angles are `joints` and the boom is as `live`."""
+        """Return the expected readings, rad, shape (n,), at joint angles `joints` and boom state `live`."""
         if not self.has_any:
             return joints
         return np.where(self.absolute, live.frames[self.frames, FRAME_ANGLE] + self._inclination, joints)
 
 
 class Reading:
-    """Angles (n) in rad, the IMU's x and z in m/s^2, then the tip's x and y in m: shape (n + 4,).
+    """Sensor model: angles (n) in rad, the IMU's x and z in m/s^2, then the tip's x and y in m, shape (n + 4,).
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Reading:
         self._observe = SameTypes(observe)
 
     def of(self, state: State) -> Array:
-        """Of an equilibrium."""
+        """Return the readings at an equilibrium."""
         self._look(state)
         end = state.frames[-1].tolist()
         x, y, angle = end[FRAME_X], end[FRAME_Y], end[FRAME_ANGLE]
@@ -110,10 +110,10 @@ class Reading:
         return found
 
     def forces(self, state: State) -> Array:
-        """Of the cylinders, N, positive in tension, shape (n,)."""
+        """Return the cylinder forces, N, positive in tension, shape (n,)."""
         self._look(state)
         return self._row[self._at.cylinder_forces].copy()
 
     def _look(self, state: State) -> None:
-        """Bring the row of results up to date."""
+        """Update the row of results."""
         self._observe(self._plan.tables, state, self._row)

@@ -33,7 +33,7 @@ OLDEST = 0.1  # s, most that a reading may be late
 
 @kernel
 def take_sensor(p, f, stream, first, residuals, stamp, newest):
-    """Take residuals of one sample against the prediction into the estimate.
+    """Correct the estimate by the residuals of one sample against the prediction.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
 
 @inner
 def take_reading(p, f, channel, residual, zero, variance, age):
-    """Take a residual of a channel, of the quantity in `f.row` with its zero at place `zero`, `age` s ago.
+    """Correct the estimate by a residual of the quantity in `f.row`, `age` s old, of a channel with its zero at place `zero`.
 
     Its noise is learnt: innovations that are larger than expected raise it until they are as expected. The evidence takes
     innovations by the size that they have lately had, for a model is not better for expecting less of the same innovations.

@@ -1,4 +1,4 @@
-"""Step of the filters on cylinder lengths, and what it gives: prediction, expected readings, estimate of the tip."""
+"""Step of the filters on cylinder lengths, and its results: prediction, expected readings, estimate of the tip."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def is_finite(p, f):
 
 @inner
 def place_live(t, boom, live, work, p, f):
-    """Bring `live` to the mean of the prediction."""
+    """Set `live` to the mean of the prediction."""
     n, m, load, drive = p.drives.shape[0], p.modes[0], force_place(p), drive_place(p)
     for i in range(live.z.shape[0]):
         live.z[i] = p.rest[i]
@@ -210,7 +210,7 @@ def rigid_tip(t, p, lengths):
 
 @inner
 def write_expected_readings(p, f, live, results, inclination, values, sigmas):
-    """Write what all sensors should read of the newest prediction, and the deviations of reading less that.
+    """Write the expected readings of all sensors for the newest prediction, and the residuals' standard deviations.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ class Alarms:
         self._lasting: dict[tuple[str, int], int] = {}
 
     def take(self, health: Health) -> None:
-        """Go on with what is told now; an alarm that is told of no more has ended."""
+        """Take the alarms of a report; an alarm that is not in it any more has ended."""
         told = {(alarm.channel, alarm.since): alarm for alarm in health.alarms}
         for key in [key for key in self._lasting if key not in told]:
             place = self._lasting.pop(key)
@@ -37,11 +37,11 @@ class Alarms:
                 del self._lasting[key]
 
     def forget_ended(self) -> None:
-        """Keep only those that last."""
+        """Discard alarms that have ended."""
         self._keep(self.lasting)
 
     def fold_ended(self) -> list[Alarm]:
-        """Keep of those that ended and are of the same channel, kind and cause the newest; return the others."""
+        """Keep only the newest of ended alarms with the same channel, kind and cause; return the others."""
         newest = {repeated(alarm): alarm for alarm in self.all if alarm.until is not None}
         gone = [alarm for alarm in self.all if alarm.until is not None and newest[repeated(alarm)] is not alarm]
         if gone:

@@ -1,4 +1,4 @@
-"""Monitor which joint's angle every encoder reads, and with which sign and unit: what is swapped is told as that.
+"""Monitor which joint's angle every encoder reads, and with which sign and unit; a swap is reported as a swap.
 
 Readings of two joints that are exchanged, of the other sign or in degrees, differ from the model by far more than a boom can
 give way, and by an amount that is known. As evidence of a fault they would point at a stroke's scale or an offset.
@@ -31,7 +31,10 @@ RIGHT = 0.3  # of how far an exchange would put it off: a reading that is less o
 
 @dataclass(frozen=True)
 class _Exchange:
-    """Joints (0-based) of which readings are exchanged, one if its sign or unit is; whether strokes are; what was told."""
+    """Exchanged readings of one or more joints, with their alarm.
+
+    `joints` are 0-based, a single one if its sign or unit is wrong. `is_of_strokes` is True if strokes are exchanged.
+    """
 
     joints: tuple[int, ...]
     is_of_strokes: bool
@@ -40,7 +43,7 @@ class _Exchange:
 
 
 class AngleReading:
-    """Judges the angle sensors against one another.
+    """Monitor of the angle sensors by comparison with one another.
 
     Parameters
     ----------
@@ -56,7 +59,7 @@ class AngleReading:
         self.begin()
 
     def begin(self) -> None:
-        """The boom starts from rest; alarms last until they are refuted."""
+        """Restart with the boom at rest; alarms last until they are refuted."""
         count = len(self._scene.joints)
         self._strokes, self._since = np.zeros(count), np.full(count, -1, dtype=np.int64)
         self._is_off = False
@@ -68,7 +71,7 @@ class AngleReading:
 
     @property
     def masked(self) -> NDArray[np.bool_]:
-        """Angle sensors that are not to be used, shape (n,)."""
+        """Mask of the angle sensors that must not be used, shape (n,)."""
         if not self._found:
             return self._none
         mask = np.full(len(self._scene.joints), self.has_wrong_strokes)
@@ -78,11 +81,11 @@ class AngleReading:
 
     @property
     def has_wrong_strokes(self) -> bool:
-        """True if strokes are swapped, so that nothing is predicted rightly."""
+        """Return True if strokes are swapped, so that every prediction is wrong."""
         return any(found.is_of_strokes for found in self._found)
 
     def explains(self, alarm: Alarm) -> bool:
-        """Return True if an alarm of a single sensor is a part of what is told here."""
+        """Return True if an alarm of a single sensor is part of an exchange reported here."""
         joints = {joint for found in self._found if not found.is_of_strokes for joint in found.joints}
         return alarm.kind in {"range", "jump", "noise", "spikes"} and alarm.channel in {f"joint_{i + 1}" for i in joints}
 

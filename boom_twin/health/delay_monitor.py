@@ -1,4 +1,4 @@
-"""Monitor a constant lag of the angles' stamps: their readings are those of an earlier time, by as much whatever moves.
+"""Monitor a constant lag of the angles' stamps: readings match the motion of an earlier time by a constant amount.
 
 Readings that are d late differ from the prediction by its change in the d before. Both are averaged over two seconds (a
 triangle of blocks), which takes vibration out: a natural frequency that is 1 % wrong puts it out of phase as a lag does.
@@ -32,7 +32,7 @@ ROUNDS, ROUND = 6, 0.25  # of Gauss-Newton, and by how much (s) a lag changes in
 
 
 class DelayMonitor:
-    """Judges the joint angles.
+    """Monitor of the joint angles' stamps.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class DelayMonitor:
         self.begin()
 
     def begin(self) -> None:
-        """Forget all readings, for the boom starts from rest; an alarm lasts until it is refuted."""
+        """Discard all readings, for the boom starts from rest; an alarm lasts until it is refuted."""
         self._number = 0
         self._blocks: deque[tuple[StreamReadings, NDArray[np.bool_]]] = deque()
         self._spans: deque[tuple[Array, Array]] = deque(maxlen=NEWEST[0])

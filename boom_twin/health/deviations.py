@@ -1,4 +1,4 @@
-"""Monitor lasting deviations of a stream from the prediction, each told in its own unit; no cause is inferred from them."""
+"""Monitor lasting deviations of a stream from the prediction, each in its own unit; no cause is inferred from them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class _Deviation:
 
 
 class DeviationMonitor:
-    """Judges the slow means of the residuals of one stream.
+    """Monitor of the slow means of one stream's residuals.
 
     Parameters
     ----------

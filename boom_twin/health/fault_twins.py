@@ -1,4 +1,4 @@
-"""Name what is wrong with a boom by fault twins: twins of a changed scene that take the same samples.
+"""Name a fault of a boom by fault twins: twins of a changed scene that take the same samples.
 
 The filter of a twin tells the logarithm of the likelihood of all that was read (`BoomPredictor.evidence`). A fault hypothesis
 is a twin whose scene has the fault, or a twin that lets a sensor's zero drift. Its gain over the twin of the scene itself, from
@@ -32,22 +32,22 @@ SETTLING = 2.0  # s from a start in which the filters find vibration and zeros
 
 
 class Follower(Protocol):
-    """A twin as far as it is needed here; see `boom_twin.Twin`."""
+    """Interface of a twin as far as fault twins need it; see `boom_twin.Twin`."""
 
     @property
     def evidence(self) -> float:
-        """Logarithm of the likelihood of all that was read."""
+        """Log likelihood of all readings."""
 
     @property
     def requests(self) -> Any:
-        """Changes that wait for the next stroke sample."""
+        """Requested changes that wait for the next stroke sample."""
 
     def update_block(self, block: Any, /) -> object:
         """Take the samples of a block."""
 
 
 class Hypothesis(NamedTuple):
-    """One thing that may be wrong.
+    """Fault hypothesis of a boom.
 
     cause : parameter of the scene, or a sensor; empty if nothing is wrong. kind : the fault in a word. scene : with the fault.
     payload, line_fill : how much more the boom carries, kg and kg/m. doubted : channels whose zeros may drift by any amount.
@@ -93,7 +93,7 @@ def hypotheses(scene: Scene) -> list[Hypothesis]:
 
 
 class FaultTwins:
-    """Twins of all hypotheses, which take the same samples.
+    """Twins of all fault hypotheses, which take the same samples.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class FaultTwins:
             self._evidence.append([twin.evidence for twin in self.twins])
 
     def change(self, change: Change) -> None:
-        """Repeat a change that was made while the session was recorded, with the load that each twin has more."""
+        """Repeat a change from the recorded session; each twin adds the load of its hypothesis."""
         load = change.settings["payload"], change.settings["line_fill"]
         for each, twin in zip(self.hypotheses, self.twins, strict=True):
             twin.requests.repeat(replace(change, settings=change.settings | each.load(*load)))

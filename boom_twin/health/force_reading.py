@@ -33,7 +33,7 @@ REASONS = {"positive in compression": -1.0} | _reasons()
 
 
 class ForceReading:
-    """Judges the forces of the cylinders.
+    """Monitor of the cylinder forces.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class ForceReading:
         self.begin()
 
     def begin(self) -> None:
-        """The boom starts from rest; alarms last until they are refuted."""
+        """Restart with the boom at rest; alarms last until they are refuted."""
         self._is_large = np.zeros(len(self._names), dtype=bool)
         self._reasons: dict[int, tuple[str, int]] = {}  # of a channel, and since when it explains what is read, ns
 
@@ -57,7 +57,10 @@ class ForceReading:
 
     @property
     def masked(self) -> NDArray[np.bool_]:
-        """Channels that are not to be used, shape (channels,): if all large forces are wrong, the small ones as well."""
+        """Mask of the channels that must not be used, shape (channels,).
+
+        If all large forces are wrong, the small ones are masked as well.
+        """
         found = np.isin(np.arange(len(self._names)), list(self._alarms))
         return found | bool(self._alarms) & (found | ~self._is_large).all()
 

@@ -29,12 +29,12 @@ REASONS = {
     "turned by 90 deg anticlockwise": lambda x, z: (-z, x),
     "turned by 90 deg clockwise": lambda x, z: (z, -x),
 }
-"""Reasons for a wrong mean, and what readings (x, z) in m/s^2 then mean."""
+"""Reasons for a wrong mean, each with the function from readings (x, z) in m/s^2 to true values."""
 TAKEN_OUT = "with gravity taken out"
 
 
 class ImuMount:
-    """Judges the IMU at the tip.
+    """Monitor of the IMU at the tip.
 
     Attributes
     ----------

@@ -27,7 +27,7 @@ MEASURED_NOISE = (Stream.STROKES, Stream.ANGLES)  # streams whose noise is repor
 
 
 class HealthMonitor:
-    """Follows one rig.
+    """Health monitor of one rig.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class HealthMonitor:
         self.begin()
 
     def begin(self) -> None:
-        """Begin anew, for the boom starts from rest; alarms of sensors last."""
+        """Restart with the boom at rest; alarms of sensors last."""
         settings = self._settings
         self._blocks = BlockBuilder()
         fastest = {Stream.STROKES: settings.stroke_rate}
@@ -111,7 +111,7 @@ class HealthMonitor:
         return masked | (stream is Stream.IMU and self._mount.alarm is not None)
 
     def judge(self, stamp: int, load: tuple[Array, Array], tip_sigmas: Callable[[], Array]) -> Health | None:
-        """Judge the blocks that are complete now that strokes came with `stamp` (ns); None if there is nothing to tell.
+        """Judge the blocks that strokes with `stamp` (ns) complete; return None if there is nothing to report.
 
         Parameters
         ----------
@@ -171,7 +171,7 @@ class HealthMonitor:
         return news
 
     def _check(self, stream: Stream, block: Block, stamps: NDArray[np.int64], raw: Array, expected: Array) -> list[Alarm]:
-        """Check the sensors of a stream by themselves: stamps (k,) in ns, raw and expected readings (k, channels)."""
+        """Check the sensors of a stream one by one: stamps (k,) in ns, raw and expected readings (k, channels)."""
         monitor = self._sensors[stream]
         findings = self._checks[stream].look(np.asarray(stamps * NANO), raw, expected, block.end * NANO)
         if findings.is_calm and not monitor.alarms:

@@ -89,7 +89,10 @@ def sensor_ranges(scene: Scene, mounts: Sequence[Mount | None]) -> dict[Stream, 
 
 @dataclass(frozen=True)
 class SensorFindings:
-    """By channel, in one block; shape (channels,) each: findings, steps of jumps, and how far the newest readings are off."""
+    """Findings in one block by channel, shape (channels,) each.
+
+    They include the steps of jumps, and the distance of the newest readings from the expected ones.
+    """
 
     stuck: Flags
     noisy: Flags
@@ -99,10 +102,10 @@ class SensorFindings:
     outside: Flags
     level: Array
     is_calm: bool = False
-    """Nothing was found in any channel; `level` is not told then."""
+    """True if nothing was found in any channel; `level` is unknown then."""
 
     def by_kind(self) -> dict[str, Flags]:
-        """In the words of alarms."""
+        """Return the findings by kind, as alarms name them."""
         return {
             "stuck": self.stuck, "noise": self.noisy, "spikes": self.spikes, "jump": self.jumped != 0.0,
             "dropout": self.silent, "range": self.outside,
@@ -110,7 +113,7 @@ class SensorFindings:
 
 
 class SensorCheck:
-    """Looks at the readings of one stream, block by block.
+    """Check of the readings of one stream, block by block.
 
     Parameters
     ----------
@@ -154,7 +157,7 @@ class SensorCheck:
 
     @property
     def noise(self) -> float:
-        """Times the noise that is stated, as it is with most channels, lately."""
+        """Present noise of most channels, in multiples of the stated noise."""
         return math.sqrt(self._known.lately[LASTING]) / self._sigma
 
     def look(self, stamps: Array, raw: Array, expected: Array, now: float) -> SensorFindings:
@@ -177,7 +180,7 @@ class SensorCheck:
         return self._calm if is_calm else self._findings(largest, rows, now)
 
     def _make_room(self, rows: int) -> None:
-        """Room for so many readings, the newest three before the block among them."""
+        """Make room for `rows` readings, including the newest three before the block."""
         known = self._known
         if rows > len(known.times):
             times, raw, left = (np.resize(each, (2 * rows, *each.shape[1:])) for each in (known.times, known.raw, known.left))

@@ -84,7 +84,7 @@ def noise_of(sensors, count, i, column):
 
 @inner
 def sorted_in(column, size, value):
-    """Sort a value into the first `size` of a column, which are in order, if it is finite; return how many they are then."""
+    """Sort a value, if finite, into the first `size` entries of a column, which are in order; return their new number."""
     if not math.isfinite(value):
         return size
     at = size

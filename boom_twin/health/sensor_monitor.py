@@ -1,4 +1,4 @@
-"""Monitor single sensors: what is found in their readings becomes alarms, which end when it is found no more."""
+"""Monitor single sensors: findings in their readings become alarms, and an alarm ends when its finding is gone."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class _Fault:
 
 
 class SensorMonitor:
-    """Turns the findings about one stream into alarms.
+    """Monitor that turns the findings about one stream into alarms.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class SensorMonitor:
         self.masked, self._is_anew = self._none, False
 
     def begin(self) -> None:
-        """The boom starts from rest: what jumped may have come back unseen."""
+        """Note a start from rest: a reading that jumped may have come back unseen."""
         self._is_anew = True
 
     @property
@@ -96,7 +96,7 @@ class SensorMonitor:
         end: int,
         newest: Array | None = None,
     ) -> list[Alarm]:
-        """Take what was found in a block from `start` to `end` (ns); return alarms that began or ended.
+        """Take the findings of a block from `start` to `end` (ns); return alarms that began or ended.
 
         `newest`: by how much the block's last readings are off (strokes: the readings), shape (channels,), if it has any.
         """
@@ -108,7 +108,7 @@ class SensorMonitor:
         return news
 
     def _found(self, findings: SensorFindings, start: int, end: int, newest: Array | None) -> list[Alarm]:
-        """Begin, keep and end faults by what was found; return alarms that began or ended. See `take`."""
+        """Begin, keep and end faults by the findings; return alarms that began or ended. See `take`."""
         news: list[Alarm] = []
         for kind, flags in findings.by_kind().items():
             if kind not in self._sensors.alarms or not flags.any():

@@ -104,7 +104,7 @@ def noise2_at(times, values, t, i):
 
 @kernel
 def survey(sensors, stamps, raw, expected, now):
-    """Take a block of readings, and go on with what is known of every channel.
+    """Take a block of readings, and update the statistics of every channel.
 
     Parameters
     ----------

@@ -79,7 +79,7 @@ class StreamReadings(NamedTuple):
 
 
 class StreamSurvey:
-    """Goes through the readings of one stream, block by block.
+    """Survey of the readings of one stream, block by block.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ AFTER, OVER = 2_000_000_000, 6_000_000_000  # ns from the first passing to a lat
 
 
 class TipLoadMonitor:
-    """Compares the estimated force at the tip with its limit.
+    """Monitor that compares the estimated force at the tip with its limit.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class TipLoadMonitor:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the past."""
+        """Reset the monitor."""
         self.alarm: Alarm | None = None
         self._since = self._last = 0
         self._largest = 0.0, 0.0

@@ -1,1 +1,1 @@
-"""A bag through the twin."""
+"""Replay of recorded sessions through the twin."""

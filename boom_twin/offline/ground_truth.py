@@ -43,17 +43,23 @@ class TipTruth:
     load: Array
 
     def errors(self, predictions: PredictionBlock, rows: slice) -> dict[str, float]:
-        """Root mean square of predicted minus true position (m) and acceleration (m/s^2), as vectors; rows of one clock."""
+        """Return the root mean square errors of predicted position (m) and acceleration (m/s^2), as vectors.
+
+        The rows must be of one clock.
+        """
         found = TipErrors(self)
         found.add(predictions, rows)
         return found.rms
 
     def position_error(self, stamps: NDArray[np.int64], first: int, position: Array) -> float:
-        """Root mean square of the distance to `position` (k, 2), m, told at `stamps` (ns); the truth begins at `first` (ns)."""
+        """Return the root mean square distance to `position` (k, 2), m, told at `stamps` (ns).
+
+        The truth begins at `first` (ns).
+        """
         return self._rms_off(stamps, first, position, self.position)
 
     def acceleration_error(self, stamps: NDArray[np.int64], first: int, acceleration: Array) -> float:
-        """As `position_error`, of an acceleration (k, 2), m/s^2."""
+        """Return the root mean square error of `acceleration` (k, 2), m/s^2; see `position_error`."""
         return self._rms_off(stamps, first, acceleration, self.acceleration)
 
     def _rms_off(self, stamps: NDArray[np.int64], first: int, told: Array, true: Array) -> float:
@@ -61,17 +67,17 @@ class TipTruth:
         return float(np.sqrt(np.mean(np.sum((told - self.at(times, true)) ** 2, axis=1))))
 
     def since(self, offset: float) -> TipTruth:
-        """What is from `offset` (s) after its beginning on."""
+        """Return the truth from `offset` (s) after its beginning on."""
         kept = self.times >= self.times[0] + offset - 0.5 * NANO
         return TipTruth(self.times[kept], self.position[kept], self.acceleration[kept], self.load[kept])
 
     def at(self, times: Array, values: Array) -> Array:
-        """One of the truth's arrays at other times, shape (k, 2)."""
+        """Return one of the truth's arrays at other times, shape (k, 2)."""
         return np.column_stack([np.interp(times, self.times, values[:, i]) for i in range(2)])
 
 
 class TipErrors:
-    """Root mean square errors of what comes in parts: predictions, and the estimates beside them.
+    """Root mean square errors of predictions, and of the estimates beside them, that come in parts.
 
     The first prediction of all is at the truth's first time.
     """
@@ -83,7 +89,7 @@ class TipErrors:
         self._estimates, self._estimated_position, self._estimated_acceleration = 0, 0.0, 0.0
 
     def add(self, predictions: PredictionBlock, rows: slice, estimates: EstimateBlock | None = None) -> None:
-        """Take in some rows of predictions, all by the clock of the first one, and the estimates of the same rows."""
+        """Add some rows of predictions, all by the clock of the first one, and the estimates of the same rows."""
         stamps, truth = predictions.stamps[rows], self._truth
         if not len(stamps):
             return
@@ -102,7 +108,10 @@ class TipErrors:
 
     @property
     def rms(self) -> dict[str, float]:
-        """Of the position, m, and of the acceleration, m/s^2, by their names in ``summary.json``; of estimates if there are."""
+        """Root mean square errors of position (m) and acceleration (m/s^2), by their names in ``summary.json``.
+
+        Those of estimates are included if there are any.
+        """
         found = {
             "tip_error_rms_m": sqrt(self._position / self._count),
             "tip_acceleration_error_rms_m_s2": sqrt(self._acceleration / self._count),
@@ -114,7 +123,7 @@ class TipErrors:
 
 
 def load_truth(folder: Path) -> TipTruth | None:
-    """The truth beside a session, or None if there is none; `folder` is the session's own."""
+    """Return the truth beside a session, or None if there is none; `folder` is the session's own."""
     path = folder / FILE_NAME
     if not holds_file(path):
         return None

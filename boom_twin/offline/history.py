@@ -38,7 +38,10 @@ def draw(result: Replay, history: History, out: Path) -> list[Path]:
 
 
 def history_of(recording: Recording, scene: Scene) -> History:
-    """Everything a replay predicted, as arrays, times from the first prediction; of a recording that keeps its session."""
+    """Return everything a replay predicted, as arrays; times are since the first prediction.
+
+    The recording must keep its session.
+    """
     builder = HistoryBuilder(scene)
     builder.add(recording.whole)
     return builder.history(recording)
@@ -54,7 +57,7 @@ PREDICTED = (
 
 
 class HistoryBuilder:
-    """Makes the history of a session from its stretches, in memory that does not grow with their number.
+    """Builder of a session's history from its stretches; its memory does not grow with their number.
 
     Parameters
     ----------
@@ -71,7 +74,7 @@ class HistoryBuilder:
         self._peak, self._peak_at = -1.0, 0.0  # largest acceleration of the tip, and when, s
 
     def add(self, stretch: Stretch) -> History:
-        """Take the next stretch in; returns the history of it alone, with all its rows."""
+        """Add the next stretch; return the history of it alone, with all its rows."""
         own = _stretch_history(stretch, self._scene, self._plan)
         self._note_peak(own)
         self._totals.add(own)
@@ -100,14 +103,14 @@ class HistoryBuilder:
             table.thin(self._enlarged(table))
 
     def _enlarged(self, table: ExtremeRows) -> NDArray[np.bool_]:
-        """Rows that are shown enlarged, or may be: about the peak, and the newest."""
+        """Return True for rows that are, or may be, shown enlarged: about the peak, and the newest."""
         stamps = table.columns[0]
         if table is not self._predicted and table is not self._imu:
             return np.zeros(len(stamps), bool)
         return np.asarray((np.abs(stamps - self._peak_at) <= WINDOW) | (stamps >= stamps[-1] - WINDOW))
 
     def history(self, recording: Recording) -> History:
-        """The history of all stretches so far; at least one."""
+        """Return the history of all stretches so far; at least one."""
         for table in (self._predicted, self._imu, *self._residuals.values()):
             if table.is_thin:
                 table.thin(self._enlarged(table))  # the newest ones as those before
@@ -147,7 +150,7 @@ class _Shapes:
         self._newest: list[tuple[float, Array]] = []
 
     def add(self, found: list[tuple[float, Array]]) -> None:
-        """Append some."""
+        """Append shapes."""
         numbered = enumerate(found, self._count)
         self._chosen += [(number, shape) for number, shape in numbered if number % self._step == 0]
         self._count += len(found)
@@ -158,13 +161,13 @@ class _Shapes:
 
     @property
     def kept(self) -> list[tuple[float, Array]]:
-        """Those that are left."""
+        """Shapes with their times that are kept."""
         is_last = bool(self._chosen) and self._chosen[-1][0] == self._count - 1
         return [shape for _, shape in self._chosen] + ([] if is_last else self._newest)
 
 
 def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan) -> History:
-    """Everything predicted in a stretch, with all its rows; gaps, alarms and orbits are not in it."""
+    """Return everything predicted in a stretch, with all its rows, but without gaps, alarms and orbits."""
     predictions = stretch.predictions
     found = [rows for stream in Stream if len((rows := stretch.of(stream)).stamps)]
     groups = [_ChannelGroup(rows.names, _seconds(rows.stamps, stretch.first), (rows.values, rows.sigmas)) for rows in found]
@@ -191,7 +194,7 @@ def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan) -> History:
 
 
 def _estimate_trace(stretch: Stretch) -> EstimateTrace:
-    """The estimates beside the predictions."""
+    """Return the estimates beside the predictions."""
     estimates, predictions = stretch.estimates, stretch.predictions
     fed = estimates.is_fed[:, None]
     rigid = predictions.tip_position - predictions.tip_displacement
@@ -202,7 +205,7 @@ def _estimate_trace(stretch: Stretch) -> EstimateTrace:
 
 
 def _running_means(stamps: Array, values: Array) -> Array:
-    """Means of residuals over a second, shape (k, channels); NaN where not measured."""
+    """Return the means of residuals over a second, shape (k, channels); NaN where not measured."""
     means = np.full_like(values, np.nan)
     for column, mean in zip(values.T, means.T, strict=True):
         known = np.isfinite(column)
@@ -211,7 +214,7 @@ def _running_means(stamps: Array, values: Array) -> Array:
 
 
 def _alarms(recording: Recording, end: float) -> list[AlarmSpan]:
-    """Those of the rig's health; one that lasts does so to the `end`, s."""
+    """Return the alarms of the rig's health; an alarm that lasts ends at `end`, s."""
     first = recording.first
     return [
         AlarmSpan(
@@ -242,7 +245,7 @@ class _ChannelGroup(NamedTuple):
 
 
 def _channels(groups: Sequence[_ChannelGroup], tables: int) -> list[Array]:
-    """Stamps and so many tables of all streams as one, a row per stamp and stream; NaN where a stream has no say."""
+    """Return stamps and so many tables of all streams, one row per stamp and stream; NaN in other streams' columns."""
     stamps = np.concatenate([np.zeros(0), *(group.stamps for group in groups)])
     width = sum(len(group.names) for group in groups)
     found = [np.full((len(stamps), width), np.nan) for _ in range(tables)]
@@ -264,7 +267,7 @@ def _imu(force: ResidualRows, stamps: Array, felt: Array, first: int) -> ImuTrac
 
 
 def _truth(truth: TipTruth | None, history: History) -> Truth | None:
-    """The truth on the time of the history: both begin with the first stroke sample."""
+    """Return the truth on the time of the history; both begin with the first stroke sample."""
     if truth is None:
         return None
     return Truth(truth.times - truth.times[0] + history.stamps_s[0], truth.position, truth.acceleration)

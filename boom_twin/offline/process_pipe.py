@@ -28,7 +28,7 @@ END = "end"
 
 
 class Pipe:
-    """The replay's end: start a module with its arguments, send to it, receive from it.
+    """Pipe to a child process: start a module with its arguments, send to it, receive from it.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ class Pipe:
             _make_roomy(end)
 
     def wait_ready(self) -> None:
-        """Until the process has its imports done."""
+        """Wait until the process has its imports done."""
         next(self.receive())
 
     def send(self, item: Any) -> None:
-        """One object down the pipe."""
+        """Send one object down the pipe."""
         assert self._stdin is not None
         try:
             _write(self._stdin.fileno(), item)
@@ -66,7 +66,7 @@ class Pipe:
             raise
 
     def receive(self) -> Iterator[Any]:
-        """Everything that comes up the pipe until its end is sent."""
+        """Yield everything that comes up the pipe until its end is sent."""
         assert self._stdout is not None
         try:
             yield from received(self._stdout)
@@ -75,7 +75,7 @@ class Pipe:
             raise
 
     def finish(self) -> None:
-        """Close the pipe, wait for the process to end, and raise what it had to say if that was an error."""
+        """Close the pipe, wait for the process to end, and raise its error if it reported one."""
         told = self._ended()
         if self._process.returncode != 0:
             text = told.decode(errors="replace").strip()
@@ -89,9 +89,9 @@ class Pipe:
         self._ended()
 
     def _ended(self) -> bytes:
-        """What the process says as it ends, which is waited for.
+        """Close the pipe, wait for the process to end, and return its stderr.
 
-        Nobody takes what it would still send: after a failure that may be gigabytes, and the closed pipe ends it.
+        Output that it would still send is dropped. After a failure that may be gigabytes; the closed pipe ends the process.
         """
         for end in (self._stdin, self._stdout):
             assert end is not None
@@ -105,14 +105,14 @@ class Pipe:
 
 
 def _make_roomy(end: IO[bytes]) -> None:
-    """Let a pipe hold `ROOM` bytes, where the system can do that and allows it; else it stays as it is."""
+    """Let a pipe hold `ROOM` bytes, if the system can do that and allows it."""
     if hasattr(fcntl, "F_SETPIPE_SZ"):
         with suppress(OSError):
             fcntl.fcntl(end, fcntl.F_SETPIPE_SZ, ROOM)
 
 
 def received(stream: IO[bytes]) -> Iterator[Any]:
-    """The objects that come through a pipe, up to its end.
+    """Yield the objects that come through a pipe, up to its end.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def received(stream: IO[bytes]) -> Iterator[Any]:
 
 
 def say_ready() -> None:
-    """Called by the process, once it has all that lasts to its end: the garbage collector passes that by, also at the exit."""
+    """Send the ready message from the process; the garbage collector skips its present objects, also at the exit."""
     gc.freeze()
     post([READY])
 
@@ -142,7 +142,7 @@ def post(items: list[Any]) -> None:
 
 
 def _write(descriptor: int, item: Any) -> None:
-    """Write all of an object: Python's buffered writer loses what a process that is suspended (Ctrl-Z) had begun to write."""
+    """Write all of an object. Python's buffered writer loses what a suspended process (Ctrl-Z) had begun to write."""
     left = memoryview(pickle.dumps(item, protocol=pickle.HIGHEST_PROTOCOL))
     while left:
         left = left[os.write(descriptor, left) :]

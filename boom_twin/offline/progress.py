@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 class TenthLines:
-    """A line for every tenth.
+    """Progress as a line for every tenth.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class TenthLines:
         return min(10, int(10 * self._done / self._total)) if self._total else 0
 
     def update(self, n: float, /) -> None:
-        """So much more was done."""
+        """Add `n` to what was done."""
         self._done += n
         if self._tenths > self._told:
             self._told = self._tenths
@@ -39,11 +39,11 @@ class TenthLines:
             print(f"{self._name}: {10 * self._told} %, {done} of {self._total} {self._unit}", file=sys.stderr, flush=True)
 
     def close(self) -> None:
-        """All was done."""
+        """Do nothing: the last line was printed before."""
 
 
 def progress_of(total: int, unit: str, name: str, done: int = 0) -> ProgressBar:
-    """A bar if stderr is a terminal, else lines."""
+    """Return a bar if stderr is a terminal, else lines."""
     if not sys.stderr.isatty():
         return TenthLines(total, unit, name, done)
     from tqdm import tqdm

@@ -30,7 +30,7 @@ A looped session repeats stamps; a stray stamp is far from its stream.
 
 
 class Changes:
-    """The changes of a session, each to be repeated before the stroke sample that it began with.
+    """Changes of a session, each to be repeated before the stroke sample at which it took effect.
 
     Parameters
     ----------
@@ -43,9 +43,9 @@ class Changes:
         self._before = -1
 
     def due(self, log: int, stamp: int) -> Iterable[Change]:
-        """Those that begin with a stroke sample of that log time and stamp (ns).
+        """Yield the changes that take effect at the stroke sample of that log time and stamp (ns).
 
-        A change whose own sample was not recorded begins with the next one.
+        A change whose own sample was not recorded takes effect at the next one.
         """
         while self._waiting and self._begins(*self._waiting[0], log, stamp):
             yield self._waiting.popleft()[1]
@@ -53,7 +53,7 @@ class Changes:
 
     @property
     def are_left(self) -> bool:
-        """Whether any has not begun yet."""
+        """Return True if any change has not taken effect yet."""
         return bool(self._waiting)
 
     def _begins(self, logged: int, change: Change, log: int, stamp: int) -> bool:
@@ -63,7 +63,7 @@ class Changes:
 
 
 def recorded_changes(session: Session, topics: Topics) -> Changes:
-    """What was changed while the session was recorded, its topics named by `topics`.
+    """Return the changes that were made while the session was recorded; `topics` names its topics.
 
     Raises
     ------
@@ -78,13 +78,13 @@ def recorded_changes(session: Session, topics: Topics) -> Changes:
 
 
 Item = SampleBlock | Change | int | Counter[str]
-"""What goes up the pipe, see `items_of`."""
+"""Item that goes up the pipe, see `items_of`."""
 BATCH = 400
 """Messages in one block up the pipe, at least."""
 
 
 class SampleReader:
-    """The samples of a session, many at a time; iterate once.
+    """Samples of a session, many at a time; iterate once.
 
     Parameters
     ----------
@@ -123,17 +123,17 @@ class SampleReader:
 
     @staticmethod
     def started() -> Pipe:
-        """The process, which begins its imports."""
+        """Return the pipe of the process, which begins its imports."""
         return Pipe(__name__)
 
     def wait_ready(self) -> None:
-        """Until the process can begin."""
+        """Wait until the process can begin."""
         self._pipe.wait_ready()
 
     def __iter__(self) -> Iterator[SampleBlock | Change | None]:
-        """Samples in the order of log times, changes before theirs.
+        """Yield samples in the order of log times, each change before its sample.
 
-        After a block comes a None for every message among its own of which nothing could be used.
+        After a block comes one None for each of its messages that could not be used.
         """
         for item in self._pipe.receive():
             if isinstance(item, Counter):
@@ -145,7 +145,7 @@ class SampleReader:
         self._pipe.finish()
 
     def samples(self) -> Iterator[Sample | Change | None]:
-        """The same, one sample at a time."""
+        """Yield samples, changes and None as in an iteration of the reader, but one sample at a time."""
         for item in self:
             if isinstance(item, SampleBlock):
                 yield from samples_in(item, self._joints)
@@ -158,7 +158,9 @@ class SampleReader:
 
 
 def items_of(path: Path, topics: Topics, wanted: list[str], joints: int, window: TimeWindow = WHOLE) -> Iterator[Item]:
-    """What goes up the pipe, as `SampleReader` is to give it; a whole number is that of the None, the last are the oddities.
+    """Yield the items that go up the pipe, for `SampleReader` to unpack.
+
+    A whole number stands for as many None. The last item is the count of oddities.
 
     Raises
     ------
@@ -204,7 +206,7 @@ def items_of(path: Path, topics: Topics, wanted: list[str], joints: int, window:
 
 
 def _ready_items(task: tuple[Path, Topics, list[str], int, TimeWindow]) -> Iterator[Item]:
-    """What goes up the pipe, all that needs time at first done."""
+    """Return the items that go up the pipe; compile the decoders first."""
     for kind in SENSORS.values():
         jazzy().get_msgdef(kind.message)  # compiles its decoder
     return items_of(*task)

@@ -1,4 +1,4 @@
-"""Recording of a replay: what was predicted, a stretch of the session at a time, and totals of all of it."""
+"""Recording of a replay: predictions, a stretch of the session at a time, and totals of all stretches."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class ResidualRows(NamedTuple):
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of a session on end: everything that was predicted in it.
+    """Part of a session: everything that was predicted in it.
 
     Attributes
     ----------
@@ -76,18 +76,18 @@ class Stretch:
 
     @property
     def estimates(self) -> EstimateBlock:
-        """The estimates beside the predictions."""
+        """Estimates beside the predictions."""
         return self.block.estimates
 
     def of(self, stream: Stream) -> ResidualRows:
-        """Residuals of one stream."""
+        """Return the residuals of one stream."""
         rows, names = self.block.residuals, channels_of(self.joints)[stream]
         own = rows.streams == CODES[stream]
         return ResidualRows(names, rows.stamps[own], rows.values[own, : len(names)], rows.sigmas[own, : len(names)])
 
 
 class SessionTotals:
-    """Figures of all predictions and residuals of a session, of which only these are kept.
+    """Totals of all predictions and residuals of a session; the values themselves are not kept.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class SessionTotals:
         self._touching: Array | None = None
 
     def add(self, stretch: Stretch) -> None:
-        """Take a stretch in."""
+        """Add a stretch."""
         angles, predictions = stretch.of(Stream.ANGLES), stretch.predictions
         self.residuals.add(angles.values)
         self.normalised.add(angles.normalised)
@@ -141,7 +141,7 @@ class SessionTotals:
 
 
 class Recording:
-    """What a replay predicted, in the order of the session.
+    """Recording of a replay's results, in the order of the session.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ class Recording:
         self.totals = SessionTotals(joints)
 
     def add(self, found: ReportBlock | Report) -> None:
-        """Keep what samples caused."""
+        """Add reports of samples."""
         if isinstance(found, Report):
             self._add_one(found)
         else:
@@ -218,7 +218,7 @@ class Recording:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing was predicted yet."""
+        """Return True if nothing was predicted yet."""
         return self._newest is None
 
     @property
@@ -252,7 +252,7 @@ class Recording:
         self._single.append(report)
 
     def _note_time(self, report: Report) -> None:
-        """Keep where stamps stepped: the one before, and the one after it."""
+        """Store where stamps stepped: the stamp before, and the one after."""
         for found, events in ((self.gaps, ("gap", "restart")), (self.clock_sets, ("clock set", "jump back"))):
             if self._newest is not None and not set(events).isdisjoint(report.events):
                 found.append((self._newest, report.stamp))
@@ -287,7 +287,7 @@ class Recording:
 
     @property
     def whole(self) -> Stretch:
-        """The whole session as one stretch, up to now; only of a recording that keeps it."""
+        """Session so far as one stretch; only for a recording that keeps it."""
         found = self._whole or self._stretch()
         if self._take is not None or found is None:
             raise ValueError("the stretches of this recording were given away")
@@ -300,31 +300,37 @@ class Recording:
 
     @property
     def estimates(self) -> EstimateBlock:
-        """The estimates beside them."""
+        """Estimates beside the predictions, see `whole`."""
         return self.whole.estimates
 
     @property
     def health(self) -> list[Health]:
-        """All that was told of the rig's health, see `whole`."""
+        """Reports of the rig's health, see `whole`."""
         return self.whole.health
 
     def of(self, stream: Stream) -> ResidualRows:
-        """Residuals of one stream, see `whole`."""
+        """Return the residuals of one stream, see `whole`."""
         return self.whole.of(stream)
 
     @property
     def duration(self) -> float:
-        """From the first prediction to the last, s, by the model's own time: without what clocks were set by."""
+        """Time from the first prediction to the last, s, in the model's own time.
+
+        Steps of a clock that was set are not part of it.
+        """
         span = (self._newest or 0) - self._first
         return (span - sum(after - before for before, after in self.clock_sets)) * NANO
 
     @property
     def by_first_clock(self) -> slice:
-        """Rows of the predictions before a clock was set: their stamps tell the time since the first one."""
+        """Rows of the predictions before a clock was set.
+
+        Their stamps tell the time since the first one.
+        """
         return self._by_first_clock(0)
 
     def _by_first_clock(self, before: int) -> slice:
-        """The same of a stretch with so many predictions before it."""
+        """Return the rows before a clock was set, in a stretch with so many predictions before it."""
         return slice(None if self._rows_by_first_clock is None else max(0, self._rows_by_first_clock - before))
 
     def add_alarm(self, alarm: Alarm) -> None:
@@ -332,5 +338,5 @@ class Recording:
         self._alarms.all.append(alarm)
 
     def alarms(self) -> list[Alarm]:
-        """All alarms, each once, as it was told last; in the order of their beginning."""
+        """Return all alarms, each once with its latest values, in the order of their beginning."""
         return sorted(self._alarms.all, key=lambda alarm: alarm.since)

@@ -1,4 +1,4 @@
-"""Tell which stroke of a session could not be used first, and which unit it is likely in."""
+"""Report the first stroke of a session that could not be used, and its likely unit."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NEAR = 5.0  # times the travel: within that a stroke is rather one of another bo
 
 
 class RefusedStrokes:
-    """Looks for the first sample of strokes with a value outside the travel of its cylinder.
+    """Finder of the first stroke sample with a value outside the travel of its cylinder.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class RefusedStrokes:
 
     @property
     def told(self) -> str:
-        """A sentence with the value, its bound and the likely unit; empty if there was none."""
+        """Sentence with the value, its bound and the likely unit; empty if there was none."""
         if self._first is None:
             return ""
         i = int(np.flatnonzero((self._first < 0.0) | (self._first > self._travel))[0])
@@ -59,7 +59,7 @@ class RefusedStrokes:
         return said
 
     def _remedy(self, factor: float, unit: str, closed: Array | float) -> str:
-        """Return what the values fit as, and the mapping by which they do."""
+        """Return the quantity that the values fit as, and the mapping by which they do."""
         if np.ndim(closed):
             zeros = zip(self._names, np.asarray(closed) / factor, strict=True)
             sensors = ", ".join(f"{name}: {{unit: {unit}, zero: {zero:g}}}" for name, zero in zeros)
@@ -67,7 +67,7 @@ class RefusedStrokes:
         return f"With the unit `{unit}` it would fit: give by --mapping `sensors: {{{self._names[0]}: {{unit: {unit}}}}}`, .."
 
     def _fits_in_other_order(self) -> bool:
-        """Whether every stroke is within the travel of a cylinder of its own, if not of the one that it is named after."""
+        """Return True if the strokes fit the cylinders' travels in some other order."""
         assert self._first is not None
         known = np.isfinite(self._first)
         return bool(known.all() and self._first.min() >= 0.0 and (np.sort(self._first) <= np.sort(self._travel)).all())

@@ -57,13 +57,13 @@ if TYPE_CHECKING:
 
 
 class ProgressBar(Protocol):
-    """What is told how far a replay is; ``tqdm`` is one."""
+    """Receiver of a replay's progress; ``tqdm`` is one."""
 
     def update(self, n: float, /) -> object:
-        """So many more messages were taken."""
+        """Add `n` messages to those taken."""
 
     def close(self) -> object:
-        """All were."""
+        """Close the display after the last message."""
 
 
 Progress = Callable[[int], ProgressBar]
@@ -73,7 +73,7 @@ GIVEN = "given as a Scene"
 
 @dataclass(frozen=True, repr=False)
 class Replay(SummaryDisplay):
-    """Result of a replay: the numbers of ``summary.json``, and all that was predicted.
+    """Result of a replay: the numbers of ``summary.json``, and all predictions.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Replay(SummaryDisplay):
     truth: TipTruth | None
 
     def columns(self) -> dict[str, Array]:
-        """A row for every stroke stamp: predicted, measured, residuals, estimate.
+        """Return a row for every stroke stamp: predicted, measured, residuals, estimate.
 
         Returns
         -------
@@ -112,7 +112,7 @@ class Replay(SummaryDisplay):
         return dict(zip(columns_of(stretch.joints), np.concatenate(rows.parts).T, strict=True))
 
     def to_frame(self) -> Any:
-        """`columns` as a ``pandas.DataFrame``; UsageError if pandas is not installed."""
+        """Return `columns` as a ``pandas.DataFrame``; UsageError if pandas is not installed."""
         return data_frame(self.columns())
 
     def summary_rows(self) -> dict[str, str]:
@@ -211,7 +211,7 @@ def replay_into(
     with_bag: bool = True,
     causes: bool = False,
 ) -> Replay:
-    """As `replay`, into a folder that is being built, for more to be added to it.
+    """Replay as `replay` does, into a folder under construction to which more will be added.
 
     With `take`, memory stays the same however long the session is: it is given one `Stretch` after the other, and none is kept.
     """
@@ -304,7 +304,7 @@ def replay_into(
 
 
 class _Timed:
-    """Calls `take` and adds up how long that takes, s: it is no part of the replay."""
+    """Wrapper of `take` that adds up its time, s, which is no part of the replay."""
 
     def __init__(self, take: Callable[[Stretch], None]) -> None:
         self._take = take
@@ -318,7 +318,7 @@ class _Timed:
 
 
 def scene_for(session: Path, scene: SceneSource | SessionScene) -> SessionScene:
-    """The scene that a session is read with: as given, or if it is None as `boom_twin.bag.session_model.scene_of` finds it."""
+    """Return the scene to read a session with: `scene`, or if None that of `boom_twin.bag.session_model.scene_of`."""
     if scene is None or isinstance(scene, str | Path):
         return scene_of(session, scene)
     if isinstance(scene, SessionScene):
@@ -328,7 +328,7 @@ def scene_for(session: Path, scene: SceneSource | SessionScene) -> SessionScene:
 
 
 def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) -> tuple[Array, list[Array]]:
-    """Angles of a block of samples, and the residuals of angles that it made known, rows of (joints,) in rad."""
+    """Return the angles of a block of samples, and the residuals of angles that became known, rows (joints,) in rad."""
     code, residuals = CODES[Stream.ANGLES], []
     for each in found:
         if isinstance(each, Report):
@@ -340,7 +340,7 @@ def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) 
 
 
 def _refuse(session: Session, scene: SessionScene, reason: str) -> None:
-    """BagError if there is a `reason` for which the session is of another boom than the scene."""
+    """Raise BagError if there is a `reason` for which the session is of another boom than the scene."""
     if reason:
         raise BagError(
             f"{session.path}: {reason}. The scene ({scene.source}) is of another boom, or the sensors' zeros and units are "
@@ -349,19 +349,19 @@ def _refuse(session: Session, scene: SessionScene, reason: str) -> None:
 
 
 def _wanted(session: Session, topics: Topics) -> list[str]:
-    """The topics to be read: that of the strokes, and what else of the inputs has messages."""
+    """Return the topics to read: that of the strokes, and those of other inputs with messages."""
     found = {name: session.find(name) for name in topics.heard}
     return [name for name, topic in found.items() if Stream.STROKES in topics.heard[name] or (topic and topic.count)]
 
 
 def _expected(session: Session, wanted: list[str], window: TimeWindow) -> int:
-    """About how many messages are read."""
+    """Return the approximate number of messages to read."""
     count = sum(topic.count for name in wanted if (topic := session.find(name)) is not None)
     return round(count * window.share((session.end - session.start) * NANO))
 
 
 def _truth_in(window: TimeWindow, session: Session, topics: Topics, wanted: list[str]) -> TipTruth | None:
-    """The truth of a session from the first strokes in the window on."""
+    """Return the truth of a session from the first strokes in the window on."""
     truth = load_truth(session.path)
     if truth is None or window == WHOLE:
         return truth
@@ -371,7 +371,7 @@ def _truth_in(window: TimeWindow, session: Session, topics: Topics, wanted: list
 
 
 def _first_stroke_stamp(session: Session, topics: Topics, wanted: list[str], window: TimeWindow) -> int:
-    """Stamp of the first message of strokes in a window, ns; 0 if there is none."""
+    """Return the stamp of the first message of strokes in a window, ns; 0 if there is none."""
     types = {name: topics.inputs[topics.heard[name][0]].type for name in wanted}
     messages = read(session, types, window)
     return next((stamp_of(message) for name, _, message in messages if Stream.STROKES in topics.heard[name]), 0)
@@ -379,7 +379,10 @@ def _first_stroke_stamp(session: Session, topics: Topics, wanted: list[str], win
 
 @contextmanager
 def _processes(building: UnfinishedResult, with_bag: bool) -> Iterator[tuple[Pipe, Pipe | None]]:
-    """The processes that read and write, none for the latter without a bag: their imports go on while the session is read."""
+    """Yield the pipes of the reader process and, with a bag, of the writer process.
+
+    Both processes do their imports while the session is read.
+    """
     with ExitStack() as ended:
         reader, writer = SampleReader.started(), None
         ended.callback(reader.stop)
@@ -390,7 +393,7 @@ def _processes(building: UnfinishedResult, with_bag: bool) -> Iterator[tuple[Pip
 
 
 def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Baseline | None, reads: StrokeReading) -> Twin:
-    """A twin with its compiled model; its modules are imported here, while the other processes start."""
+    """Return a twin with its compiled model; its modules are imported here, while the other processes start."""
     from ..twin.twin import Twin
 
     twin = Twin(scene, settings, topics.mounts(len(scene.joints)), baseline, reads=reads, absent=topics.absent)
@@ -421,7 +424,7 @@ def _followed(samples: Iterable[SampleBlock | Change | None], twins: FaultTwins)
 
 @contextmanager
 def _unhurried_collector() -> Iterator[None]:
-    """Keep the garbage collector away: a replay makes many small objects that last."""
+    """Freeze and disable the garbage collector: a replay makes many small objects that last."""
     gc.freeze()
     gc.disable()
     try:
@@ -432,7 +435,7 @@ def _unhurried_collector() -> Iterator[None]:
 
 
 def _never_read(read: NDArray[np.bool_]) -> str:
-    """Which cylinders never had a value, if others had."""
+    """Return a clause on the cylinders that never had a value, if others had; else empty text."""
     silent = [name for name, came in zip(channels_of(len(read))[Stream.STROKES], read, strict=True) if not came]
     return f", because {', '.join(silent)} never had a value" if silent and read.any() else ""
 
@@ -447,7 +450,7 @@ def _told(twin: Twin) -> str:
 
 
 def _summary(recording: Recording, twin: Twin, wall: float, file: Path | None) -> dict[str, Any]:
-    """The contract's numbers of a replay; `file` is that of the result bag, if there is one."""
+    """Return the numbers of a replay for ``summary.json``; `file` is that of the result bag, if there is one."""
     totals, duration = recording.totals, recording.duration
     return {
         "samples": totals.samples,
@@ -470,7 +473,7 @@ def _summary(recording: Recording, twin: Twin, wall: float, file: Path | None) -
 
 
 def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
-    """Gaps, clocks set, and alarms of the rig's health, in the order of their beginning; seconds since the stamp `first`."""
+    """Return gaps, clock steps and health alarms in the order of their beginning; seconds since the stamp `first`."""
     gaps = [
         Alarm(Stream.STROKES.value, "gap", start, end, None, f"no strokes for {(end - start) * NANO:.2f} s")
         for start, end in recording.gaps
@@ -494,13 +497,13 @@ def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
 
 
 def alarm_as_text(alarm: dict[str, Any]) -> str:
-    """An alarm of ``summary.json`` in words."""
+    """Return an alarm of ``summary.json`` in words."""
     end = "the end" if alarm["to_s"] is None else f"{alarm['to_s']:.2f} s"
     return f"{alarm['channel']}, {max(0.0, alarm['from_s']):.2f} s to {end}: {alarm['told']}"
 
 
 def _load(load: TipLoad | None) -> dict[str, Any]:
-    """The load at the tip that the model does not know; nothing where nothing but strokes was measured."""
+    """Return the numbers of the unknown load at the tip; empty where only strokes were measured."""
     if load is None:
         return {}
     pulses = load.pulses
@@ -515,7 +518,7 @@ def _load(load: TipLoad | None) -> dict[str, Any]:
 
 
 def _pins(recording: Recording, twin: Twin) -> dict[str, dict[str, int]]:
-    """How often each pin with clearance lost contact from one sample to the next; nothing without such pins."""
+    """Return how often each pin with clearance lost contact from one sample to the next; empty without such pins."""
     if not twin.plan.pins:
         return {}
     return {"lost_contacts": dict(zip(twin.plan.pins, recording.totals.lost_contacts.tolist(), strict=True))}

@@ -1,4 +1,4 @@
-"""Table of a replay: a row for every prediction, with what was measured, its residuals and the estimate; CSV or Parquet.
+"""Table of a replay: one row per prediction, with readings, residuals and the estimate; CSV or Parquet.
 
 A row has what was measured up to its stamp and after that of the row before: of every channel the newest value, empty where
 there is none. So a value stands once, and that of a sensor with the stamps of the strokes stands in its own row.
@@ -20,19 +20,19 @@ from ..types import NANO, SENSORS, Array, Stream, channels_of
 from .recording import Stretch
 
 DELAY = 2.0
-"""s for which a row waits for residuals that become known late."""
+"""Time (s) that a row waits for late residuals."""
 ESTIMATED = (
     "tip_x_m", "tip_y_m", "tip_angle_rad", "tip_vx_m_s", "tip_vy_m_s", "tip_angular_velocity_rad_s",
     "tip_ax_m_s2", "tip_ay_m_s2", "tip_angular_acceleration_rad_s2", "load_x_N", "load_y_N",
 )  # fmt: skip
-"""Names of what is estimated, each with ``estimate_`` before it, and with ``estimate_sigma_`` for its standard deviation."""
+"""Names of the estimated quantities, with ``estimate_`` before them, or ``estimate_sigma_`` for their standard deviations."""
 MODAL = [f"estimate_mode_{j}_{end}" for end in ("m", "m_s") for j in range(1, MODES + 1)]
 """Names of the modal coordinates and their rates, at a modal mass of 1 kg."""
 NEVER = np.iinfo(np.int64).min
 
 
 def predicted_columns(joints: int) -> list[str]:
-    """Names of the columns of a prediction, those that ``boom_twin simulate`` writes: of a boom with so many joints."""
+    """Return the names of the columns of a prediction, as ``boom_twin simulate`` writes them, for so many joints."""
     numbers = range(1, joints + 1)
     return [
         "t_s",
@@ -44,7 +44,7 @@ def predicted_columns(joints: int) -> list[str]:
 
 
 def columns_of(joints: int) -> list[str]:
-    """Names of all columns: predicted, measured, residuals, modes, estimated, deviations of the estimate."""
+    """Return the names of all columns: predicted, measured, residuals, modes, estimated, deviations of the estimate."""
     return [
         *predicted_columns(joints),
         *chain.from_iterable(_channel_columns(joints, "measured").values()),
@@ -56,7 +56,7 @@ def columns_of(joints: int) -> list[str]:
 
 
 def _channel_columns(joints: int, kind: str) -> dict[Stream, list[str]]:
-    """Names of the columns of every stream's channels."""
+    """Return the names of the columns of every stream's channels."""
     return {
         stream: [f"{kind}_{name}_{SENSORS[stream].unit_suffix}" for name in names]
         for stream, names in channels_of(joints).items()
@@ -64,17 +64,17 @@ def _channel_columns(joints: int, kind: str) -> dict[Stream, list[str]]:
 
 
 class TableFile(Protocol):
-    """Where rows go."""
+    """Interface of a file that table rows are written to."""
 
     def write(self, rows: Array) -> None:
         """Append rows, shape (k, columns)."""
 
     def close(self) -> None:
-        """The table is complete."""
+        """Complete the table."""
 
 
 class CsvFile:
-    """A CSV file with a head; numbers with nine significant digits, times with nine decimals, nothing for NaN."""
+    """CSV file with a head; numbers with nine significant digits, times with nine decimals, nothing for NaN."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         self._file: IO[str] = path.open("w", encoding="ascii", newline="\n")
@@ -91,7 +91,7 @@ class CsvFile:
 
 
 class RowsInMemory:
-    """A table that is kept.
+    """Table in memory.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class RowsInMemory:
 
 
 class ParquetFile:
-    """A Parquet file; a row group for every stretch, doubles, nothing for NaN."""
+    """Parquet file; a row group for every stretch, doubles, nothing for NaN."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
         self._arrow, parquet = _arrow()
@@ -138,13 +138,13 @@ def _arrow() -> tuple[Any, Any]:
 
 
 def check_kind(kind: str | None) -> None:
-    """UsageError if tables of that kind cannot be written here; to be called before a long run."""
+    """Raise UsageError if tables of that kind cannot be written here; to be called before a long run."""
     if kind == "parquet":
         _arrow()
 
 
 def table_file(path: Path, joints: int) -> TableFile:
-    """The file of a table of a boom with so many joints, by the end of its name ``.csv`` or ``.parquet``.
+    """Return the file of a table, by the end of its name ``.csv`` or ``.parquet``, of a boom with so many joints.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def table_file(path: Path, joints: int) -> TableFile:
 
 
 class SampleTable:
-    """Makes the table of a replay; its `add` is what `boom_twin.offline.replay.replay_into` gives stretches to.
+    """Builder of a replay's table; `boom_twin.offline.replay.replay_into` gives stretches to its `add`.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ class SampleTable:
         self._ahead: list[SampleBlock] = []  # samples that may be of rows to come
 
     def add(self, stretch: Stretch) -> None:
-        """Take the next stretch in; rows of a clock that was set back over earlier stamps begin anew."""
+        """Add the next stretch; rows restart where a clock was set back over earlier stamps."""
         stamps, rows, residuals = stretch.predictions.stamps, self._new_rows(stretch), stretch.block.residuals
         for part in np.split(np.arange(len(stamps)), np.flatnonzero(np.diff(stamps) <= 0) + 1):
             if len(self._stamps) and stamps[part[0]] <= self._stamps[-1]:
@@ -199,7 +199,7 @@ class SampleTable:
         self._file.close()
 
     def _new_rows(self, stretch: Stretch) -> Array:
-        """What was predicted and estimated; the rest is empty."""
+        """Return rows with the predicted and estimated values; the rest is NaN."""
         p, e = stretch.predictions, stretch.estimates
         rows = np.full((len(p.stamps), self._rows.shape[1]), np.nan)
         seconds = (p.stamps - stretch.first) * NANO
@@ -212,7 +212,7 @@ class SampleTable:
         return rows
 
     def _fill(self, places: dict[int, int], streams: Integers, stamps: Integers, values: Array) -> None:
-        """Put values (k, w) of channels at `stamps` (ns) into the rows that they are of; `places` by stream: first column."""
+        """Write values (k, w) of channels at `stamps` (ns) into their rows; `places` by stream: first column."""
         order = np.argsort(stamps, kind="stable")
         row = np.searchsorted(self._stamps, stamps[order])
         inside = (row < len(self._stamps)) & (stamps[order] > self._before)
@@ -225,7 +225,7 @@ class SampleTable:
                 self._rows[row[own][known], first + channel] = column[known]
 
     def _write(self, count: int) -> None:
-        """Write the first rows of those that wait."""
+        """Write the first of the waiting rows."""
         if count:
             self._file.write(self._rows[:count])
             self._before = int(self._stamps[count - 1])

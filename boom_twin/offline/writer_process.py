@@ -23,7 +23,10 @@ Packed = ReportBlock | Report
 
 
 def pack(reports: Iterable[Report], joints: int) -> list[Packed]:
-    """Reports as blocks, less what is not written to a bag: events, status. One with a change stays by itself."""
+    """Return reports as blocks, without what a bag does not hold: events, status.
+
+    A report with a change stays by itself.
+    """
     packed: list[Packed] = []
     for has_change, run in groupby(reports, lambda report: report.change is not None):
         found = list(run)
@@ -32,7 +35,7 @@ def pack(reports: Iterable[Report], joints: int) -> list[Packed]:
 
 
 class ReportWriter:
-    """The replay's end of the pipe.
+    """Replay's end of the pipe to the writer process.
 
     Parameters
     ----------
@@ -61,7 +64,7 @@ class ReportWriter:
 
     @staticmethod
     def started(directory: Path, lock: int) -> Pipe:
-        """The process, which begins its imports.
+        """Return the pipe of the process, which begins its imports.
 
         Parameters
         ----------
@@ -73,7 +76,7 @@ class ReportWriter:
         return Pipe(__name__, str(directory), inherited=[lock])
 
     def wait_ready(self) -> None:
-        """Until the process can begin."""
+        """Wait until the process can begin."""
         self._pipe.wait_ready()
 
     def put(self, item: ReportBlock | Report) -> None:

@@ -16,7 +16,7 @@ from .state import COUNT, FIRST, NONE, RECENT, STROKES, ZEROS, Ring, TwinState, 
 
 
 class SensorZeros:
-    """The zeros of all sensors.
+    """Zeros of all sensors, each set with the stamp from which it holds.
 
     Parameters
     ----------
@@ -36,7 +36,10 @@ class SensorZeros:
         self.values: dict[str, float] = {}
 
     def put(self, stamp: int, values: Mapping[str, float]) -> bool:
-        """Others from `stamp` (ns) on; samples of earlier stamps keep what they had. Tells whether those of strokes differ."""
+        """Set the zeros that hold from `stamp` (ns) on; return True if zeros of strokes change.
+
+        Samples with earlier stamps keep the zeros that held then.
+        """
         before, self.values, state = self.values, dict(values), self._state
         if state.zero_sets[0] == ZEROS:
             state.zeros[:-1], state.zeros_since[:-1] = state.zeros[1:].copy(), state.zeros_since[1:].copy()
@@ -50,13 +53,13 @@ class SensorZeros:
         return any(before.get(name) != values.get(name) for name in self._channels[Stream.STROKES])
 
     def forget_past(self) -> None:
-        """The newest zeros hold for every stamp."""
+        """Apply the newest zeros to every stamp."""
         state = self._state
         state.zeros[0], state.zeros_since[0] = state.zeros[state.zero_sets[0] - 1], NONE
         state.zero_sets[0] = 1
 
     def of_strokes(self, stamp: int) -> Array:
-        """What is to be taken from strokes, m, shape (n,)."""
+        """Return the zeros to subtract from the strokes at `stamp` (ns), m, shape (n,)."""
         return self._state.zeros[zeros_at(self._state, stamp), STROKES, : len(self._channels[Stream.STROKES])]
 
 
@@ -67,7 +70,7 @@ WHOLE = {kind.stem: kind.channels(0) for kind in SENSORS.values() if kind.ends}
 
 
 class ResidualBuffer:
-    """Measured minus predicted, without any zero, in the order in which it became known.
+    """Residuals as measured minus predicted, without any zero, in the order in which they became known.
 
     Parameters
     ----------
@@ -82,11 +85,11 @@ class ResidualBuffer:
         self._places = {name: (CODES[stream], i) for stream, names in channels.items() for i, name in enumerate(names)}
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Discard all residuals."""
         self._recent.bounds[:] = 0
 
     def zeros_of(self, sensor: str, now: int, zeros: Mapping[str, float], slope: Callable[[int], float]) -> dict[str, float]:
-        """The zeros of a sensor, by channel, that the second before `now` (ns) tells.
+        """Return the zeros of a sensor, by channel, estimated from the second before `now` (ns).
 
         Parameters
         ----------
@@ -126,7 +129,7 @@ class ResidualBuffer:
 
 
 class Requests:
-    """Collects what is asked for between two stroke samples.
+    """Collector of the changes requested between two stroke samples.
 
     Attributes
     ----------
@@ -150,7 +153,7 @@ class Requests:
         self.model: LoadedModel | None = None
 
     def tune(self, live: Mapping[str, float], model: LoadedModel | None = None) -> None:
-        """Other live settings, whose `model` may have been made beforehand, see `ModelPreparation`.
+        """Request new live settings; their `model` may have been made in advance, see `ModelPreparation`.
 
         Raises
         ------
@@ -160,19 +163,19 @@ class Requests:
         self.settings, self.model, self.due = self.settings.tuned(live), model, True
 
     def zero(self, values: Mapping[str, float]) -> None:
-        """Other zeros of some sensors."""
+        """Request new zeros of some sensors."""
         self.zeros, self.due = {**self.zeros, **values}, True
 
     def rest(self) -> None:
-        """A start of the model from rest."""
+        """Request a restart from static equilibrium."""
         self.from_rest = self.due = True
 
     def repeat(self, change: Change) -> None:
-        """All that was done to another twin with the sample of that stamp; UsageError as for `tune`."""
+        """Request every change that another twin made with the sample of that stamp; UsageError as for `tune`."""
         self.tune(change.settings)
         self.zeros, self.from_rest, self.is_new, self.due = change.zeros, change.from_rest, change.is_new, True
 
     def take(self) -> bool:
-        """Nothing waits any more; tells whether a start from rest was asked for."""
+        """Clear all requests; return True if a restart from static equilibrium was requested."""
         from_rest, self.from_rest, self.is_new, self.due, self.model = self.from_rest, False, False, False, None
         return from_rest

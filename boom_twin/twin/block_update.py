@@ -35,7 +35,7 @@ CAPACITY = 4096  # samples that one call of the compiled update takes at most
 
 
 def limits_of(scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mount | None], absent: Collection[str]) -> Limits:
-    """Return what the compiled update judges samples by, of a scene compiled as `plan` with its load, and of its sensors."""
+    """Return the limits of the compiled update for a scene compiled as `plan` with its load, and for its sensors."""
     channels = list(channels_of(plan.joints).values())
     counts = np.array([len(names) for names in channels])
     mounting, far = Mounting(plan, scene.base.inclination, mounts), FAR * settings.stroke_variance**0.5
@@ -60,9 +60,9 @@ def limits_of(scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mou
 
 @dataclass
 class _UpdateExtras:
-    """What one call of the compiled update gives beside numbers.
+    """Results of one call of the compiled update that are not numbers.
 
-    drawn, of which outlines are made, by row of a prediction; health and events by row of a sample.
+    `drawn` (the source of outlines) is keyed by row of a prediction; `health` and `events` are keyed by row of a sample.
     """
 
     drawn: dict[int, Drawn] = field(default_factory=dict)
@@ -75,11 +75,11 @@ NO_EXTRAS = _UpdateExtras()
 _Code = tuple[Callable[..., tuple[int, int]], Callable[..., bool]]
 """`update` and `measure`, compiled for a scene's types."""
 _Held = tuple[_Code, tuple[tuple[Any, ...], tuple[Any, ...], Any]]
-"""With what `update` and `measure` take of boom, limits and state; output: see `boom_twin.kernels.jit.hold`."""
+"""Compiled code with its arguments (boom, limits, state) and output, see `boom_twin.kernels.jit.hold`."""
 
 
 class BlockUpdate:
-    """Ordinary samples through the compiled update.
+    """Driver of the compiled update, for regular samples.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class BlockUpdate:
 
     @property
     def limits(self) -> Limits:
-        """What samples are judged by."""
+        """Limits that the compiled update checks samples against."""
         return self._limits
 
     @limits.setter
@@ -140,11 +140,11 @@ class BlockUpdate:
         self._limits, self._held = limits, None
 
     def begin_health(self) -> None:
-        """What was found up to now is of no concern to the health monitor any more, which begins anew when it is told more."""
+        """Restart the health monitor with the next data; what was found up to now is not passed to it."""
         self._told, self._due, self._begins_health = tuple(self._found.counts.tolist()), None, True
 
     def advance(self, run: Run | None, block: SampleBlock, trusted: bool = False) -> tuple[int, int]:
-        """Take samples of a block as long as they are ordinary; `reports` or `report` tell what they caused.
+        """Take samples of a block as long as they are regular; `reports` or `report` return the results.
 
         Parameters
         ----------
@@ -167,7 +167,7 @@ class BlockUpdate:
         return reason, row
 
     def measure(self, code: int, stamp: int, values: Array, trusted: bool) -> int:
-        """Take one measured sample, without the boom; `DONE`, or `ODD` and nothing done.
+        """Take one measured sample without the boom; return `DONE`, or `ODD` with nothing done.
 
         Parameters
         ----------
@@ -193,7 +193,7 @@ class BlockUpdate:
             self._state.clock[UNMATCHED] = 0
 
     def _hold(self) -> _Held:
-        """Look up the compiled code, and write once what it takes with every call; another load needs little of that anew."""
+        """Look up the compiled code and prepare the arguments of every call; another load renews few of them."""
         self._kept = state, found = self._kept or (hold(self._state), hold(self._found))
         limits, (one, width) = hold(self._limits), (np.zeros(1, np.int64), int(self._widths.max()))
         block = one, one, np.zeros((1, width))
@@ -208,7 +208,7 @@ class BlockUpdate:
         return self._held
 
     def make_room(self) -> None:
-        """Before the next call of the compiled update, which adds its rows to those that the health monitor is told later."""
+        """Prepare the next call of the compiled update; pass pending rows to the health monitor when the buffer is full."""
         self._begin, self._news = tuple(self._found.counts.tolist()), NO_EXTRAS
         if max(self._begin) > CAPACITY:
             self._tell_health()
@@ -230,7 +230,7 @@ class BlockUpdate:
             self._take_judgement(row - 1)
 
     def _look_around(self, run: Run, row: int) -> None:
-        """What a prediction that begins a slot or left the model's validity has beside its numbers."""
+        """Add the shape, event and health request of a prediction that begins a slot or is outside the model's validity."""
         clock, at = self._state.clock, int(self._found.counts[0]) - 1 - self._begin[0]
         if self._news is NO_EXTRAS:
             self._news = _UpdateExtras()
@@ -250,13 +250,14 @@ class BlockUpdate:
 
     @property
     def is_due(self) -> bool:
-        """Whether the newest sample was the first of a slot, and the rig's health was not judged yet."""
+        """Return True if the newest sample began a slot and the rig's health has not been judged since."""
         return self._due is not None
 
     def judge(self) -> Health | None:
-        """Judge the rig's health if the newest sample was the first of a slot and that was not done yet; gives the news.
+        """Judge the rig's health if the newest sample began a slot and was not judged yet; return it or None.
 
-        What that sample caused is complete without it: a live node publishes it first. It comes before the next sample.
+        The report of that sample is complete without it, so a live node publishes the report first. The judgement comes before
+        the next sample.
         """
         run, self._due = self._due, None
         if run is None or self._judge is None:
@@ -267,14 +268,14 @@ class BlockUpdate:
         return health
 
     def _take_judgement(self, row: int) -> None:
-        """Judge, if that is due, and give the news with sample `row`."""
+        """Judge the rig's health, if that is due, and store it with sample `row`."""
         if (health := self.judge()) is not None:
             self._news.health[row] = health
 
     def _tell_health(self, end: float = inf) -> None:
-        """Give the health monitor what has come since it was told last, but for what came last from `end` (ns) on.
+        """Pass the results since the last call to the health monitor, except the last ones from `end` (ns) on.
 
-        The first of a slot so come with the rest of it, in one piece.
+        So the results of a slot are passed together.
         """
         found = self._found
         if self._judge is None:
@@ -334,7 +335,7 @@ class BlockUpdate:
         )
 
     def _outlines(self) -> dict[int, Outline]:
-        """Outlines by row of a prediction."""
+        """Return outlines by row of a prediction."""
         drawn = self._news.drawn
         return dict(zip(drawn, self._boom.outlines(list(drawn.values())), strict=True)) if drawn else {}
 
@@ -343,7 +344,7 @@ class BlockUpdate:
         return EstimateBlock(self._found.stamps[own].copy(), self._found.estimates[own].copy())
 
     def reports(self, stamps: NDArray[np.int64]) -> list[ReportBlock | Report]:
-        """What the compiled update found of samples with these stamps (ns)."""
+        """Return reports of the samples with these stamps (ns) from the results of the compiled update."""
         self._take_judgement(len(stamps) - 1)
         block = ReportBlock(stamps, self._predictions(), self._estimates(), self._residuals(), self._news.health)
         if not self._news.events:
@@ -352,7 +353,7 @@ class BlockUpdate:
         return [replace(each, events=self._news.events.get(row, ())) for row, each in reports]
 
     def report(self, stamp: int, events: Sequence[str], judged: bool = True) -> Report:
-        """What the compiled update found of one sample, of which `events` are to be told too; unless `judged`, see `judge`."""
+        """Return the report of one sample, with `events` added; unless `judged`, health is left out, see `judge`."""
         found, news, (predicted, known) = self._found, self._news, self._found.counts.tolist()
         rows = ReportRows(self._boom, self._channels, stamp)
         if known > self._begin[1]:

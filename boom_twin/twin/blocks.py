@@ -1,4 +1,4 @@
-"""Blocks of samples, and of what they caused: many of them at once, as arrays.
+"""Arrays for many samples at once: the samples, and the predictions, estimates and residuals that they caused.
 
 A block says the same as so many `Sample` or `Report`: the order of its rows is the order in which the samples were taken.
 """
@@ -16,9 +16,9 @@ from ..types import Array, Estimate, Health, Outline, Prediction, Report, Residu
 Integers = NDArray[np.int64]
 
 STREAMS = tuple(Stream)
-"""A stream stands in a block as its place here."""
+"""Streams by code: a block holds the place of a stream in this tuple."""
 CODES = {stream: code for code, stream in enumerate(STREAMS)}
-"""The place of every stream in `STREAMS`."""
+"""Code of every stream: its place in `STREAMS`."""
 
 
 class SampleBlock(NamedTuple):
@@ -75,7 +75,7 @@ class PredictionBlock(NamedTuple):
     outlines: dict[int, Outline]
 
     def one(self, row: int) -> Prediction:
-        """The prediction of a row; its arrays are views."""
+        """Return the prediction of a row; its arrays are views."""
         outline = self.outlines.get(row)
         return Prediction(
             stamp=int(self.stamps[row]),
@@ -129,7 +129,10 @@ class EstimateBlock:
 
     @property
     def is_fed(self) -> NDArray[np.bool_]:
-        """Whether anything was measured before, shape (p,); until then the load is exactly zero, the rest the prediction."""
+        """Return True for the rows after the first sensor reading, shape (p,).
+
+        Until then the load is exactly zero and the estimate equals the prediction.
+        """
         return np.asarray(self.load.any(axis=1))
 
     def one(self, row: int) -> Estimate:
@@ -142,12 +145,12 @@ ESTIMATED = {name: columns.place for name, columns in vars(EstimateBlock).items(
 
 
 def estimate_of(stamp: int, row: Array) -> Estimate:
-    """The estimate at `stamp` (ns) in a row, see `boom_twin.deviation.estimate_row.WIDTH`; its arrays are views."""
+    """Return the estimate at `stamp` (ns) in a row, see `boom_twin.deviation.estimate_row.WIDTH`; its arrays are views."""
     return Estimate(stamp, *(row[place] for place in ESTIMATED.values()))
 
 
 def row_of(estimate: Estimate) -> Array:
-    """Inverse of `estimate_of`."""
+    """Return the row of an estimate (inverse of `estimate_of`)."""
     return np.concatenate([getattr(estimate, name) for name in ESTIMATED])
 
 
@@ -172,10 +175,10 @@ class ResidualBlock(NamedTuple):
 
 
 class ReportBlock(NamedTuple):
-    """What samples caused of which nothing else is to be told: no event, no change, all accepted.
+    """Reports of accepted samples without events and changes, as arrays.
 
-    In a bag stand, for each of its samples in turn, what `Report` of that sample has, in that order: with the stamp of the
-    sample as log time its prediction, the residuals that became known, its health, the outline of its prediction.
+    A bag holds, for each sample in turn, what its `Report` holds, in this order: the prediction (log time: the sample's stamp),
+    the residuals that became known, the health, the outline of the prediction.
 
     Attributes
     ----------
@@ -196,7 +199,7 @@ class ReportBlock(NamedTuple):
     health: dict[int, Health]
 
     def reports(self, joints: int) -> list[Report]:
-        """The same, a report for every sample, of a boom with so many joints."""
+        """Return one report for every sample, of a boom with so many joints."""
         channels = channels_of(joints)
         found: list[list[Residuals]] = [[] for _ in self.stamps]
         rows = zip(*(field.tolist() for field in self.residuals[:3]), self.residuals.values, self.residuals.sigmas, strict=True)
@@ -214,7 +217,7 @@ class ReportBlock(NamedTuple):
 
 
 def block_of(samples: list[Sample], joints: int) -> SampleBlock:
-    """Samples as a block, of a boom with so many joints."""
+    """Return samples as a block, of a boom with so many joints."""
     width = max(len(names) for names in channels_of(joints).values())
     values = np.full((len(samples), width), np.nan)
     for row, sample in zip(values, samples, strict=True):
@@ -224,14 +227,14 @@ def block_of(samples: list[Sample], joints: int) -> SampleBlock:
 
 
 def samples_in(block: SampleBlock, joints: int) -> list[Sample]:
-    """The samples of a block, of a boom with so many joints; their values are views."""
+    """Return the samples of a block, of a boom with so many joints; their values are views."""
     counts = [len(names) for names in channels_of(joints).values()]
     rows = zip(block.streams.tolist(), block.stamps.tolist(), block.values, strict=True)
     return [Sample(STREAMS[code], stamp, values[: counts[code]]) for code, stamp, values in rows]
 
 
 def report_block(reports: list[Report], joints: int) -> ReportBlock:
-    """Reports as a block, of a boom with so many joints; events, changes and status are not kept."""
+    """Return reports as a block, of a boom with so many joints; events, changes and status are dropped."""
     found = [(at, each.prediction) for at, each in enumerate(reports) if each.prediction is not None]
     known = [(at, each) for at, report in enumerate(reports) for each in report.residuals]
     channels = channels_of(joints)
@@ -269,7 +272,7 @@ def report_block(reports: list[Report], joints: int) -> ReportBlock:
 
 
 def table_of(estimates: list[Estimate | None]) -> Array:
-    """Rows of estimates, shape (k, WIDTH); NaN where there is none."""
+    """Return rows of estimates, shape (k, WIDTH); NaN where there is none."""
     return np.array([np.full(row_at.WIDTH, np.nan) if each is None else row_of(each) for each in estimates]).reshape(
         -1, row_at.WIDTH
     )
@@ -282,7 +285,7 @@ def _outline_of(prediction: Prediction) -> Outline | None:
 
 
 def joined(parts: list[ReportBlock]) -> ReportBlock:
-    """Blocks one after the other as one; there is at least one."""
+    """Return one block that joins one or more blocks in order."""
     samples = np.cumsum([0, *(len(part.stamps) for part in parts)])[:-1].tolist()
     residuals_at = [part.residuals.at + first for part, first in zip(parts, samples, strict=True)]
     others = zip(*(part.residuals[1:] for part in parts), strict=True)
@@ -296,7 +299,10 @@ def joined(parts: list[ReportBlock]) -> ReportBlock:
 
 
 def _joined_predictions(parts: list[tuple[PredictionBlock, int]]) -> PredictionBlock:
-    """Predictions one after the other, each block with the row of its first sample; one without any has no widths."""
+    """Return joined predictions; each block comes with the row of its first sample.
+
+    Blocks without predictions have no column widths and are skipped.
+    """
     parts = [part for part in parts if len(part[0].stamps)] or parts[:1]
     rows = np.cumsum([0, *(len(part.stamps) for part, _ in parts)])[:-1].tolist()
     fields = zip(*(part[1:-1] for part, _ in parts), strict=True)

@@ -58,7 +58,7 @@ def drive(twin: Twin, items: Iterable[Sample | Change | None], judged: bool = Tr
 
 
 def drive_one(twin: Twin, sample: Sample, judged: bool = True) -> Step:
-    """Update `twin` with one sample, of which no change comes before; see `drive`."""
+    """Update `twin` with one sample that no change precedes; see `drive`."""
     began = perf_counter()
     report = twin.update(sample, judged)
     return Step(sample, report, perf_counter() - began)
@@ -67,13 +67,13 @@ def drive_one(twin: Twin, sample: Sample, judged: bool = True) -> Step:
 def drive_blocks(
     twin: Twin, items: Iterable[SampleBlock | Change | None]
 ) -> Iterator[tuple[SampleBlock, list[ReportBlock | Report]] | None]:
-    """As `drive`, block by block: the samples of a block and what they caused, see `Twin.update_block`."""
+    """Update `twin` block by block and yield each block with its reports, see `drive` and `Twin.update_block`."""
     for item in _repeating_changes(twin, items):
         yield None if item is None else (item, twin.update_block(item))
 
 
 def _repeating_changes(twin: Twin, items: Iterable[Item | Change | None]) -> Iterator[Item | None]:
-    """All but the changes, which are asked of the twin in their turn."""
+    """Yield all items but the changes; request each change of the twin in its turn."""
     for item in items:
         if isinstance(item, Change):
             twin.requests.repeat(item)

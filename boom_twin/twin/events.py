@@ -1,4 +1,4 @@
-"""Events of the twin: what may be out of the ordinary about a sample, by the names in `Report.events`."""
+"""Events of the twin: names of irregularities of a sample, as in `Report.events`."""
 
 EVENTS = {
     "late": "stamp not after the newest one of its stream; sample left out",

@@ -1,4 +1,4 @@
-"""What the compiled update found, as the health monitor takes it, compiled: predictions, residuals of each stream."""
+"""Compiled copies of predictions and of each stream's residuals from the compiled update for the health monitor."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What a twin leaves out while samples come faster than they are taken: shapes first, then the judgement of health.
+"""Load shedding of a twin whose samples queue up: it skips shapes first, then the judgement of health.
 
-Predictions, estimates and residuals are never left out, and do not depend on what is; but a sensor that fails meanwhile is
-noticed, and no longer believed by the estimate, only afterwards.
+Predictions, estimates and residuals are never skipped, and do not depend on what is. A sensor that fails meanwhile is detected
+late: until then the estimate still uses it.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ SHAPES_ABOVE, HEALTH_ABOVE = 0.5, 0.75
 
 
 class LoadShedding:
-    """Decides by how full the queue is that samples are taken from. A replay has none, and leaves out nothing.
+    """Decision, by the fill level of the sample queue, what to skip. A replay has no queue and skips nothing.
 
     Attributes
     ----------
@@ -24,17 +24,17 @@ class LoadShedding:
         self._share = 0.0
 
     def filled(self, share: float) -> None:
-        """The queue is so full, 0 to 1, when the next sample is taken."""
+        """Set the fill level of the queue, 0 to 1, when the next sample is taken."""
         self._share = share
 
     def leaves_out_shape(self) -> bool:
-        """Whether the shape that is due is left out; counts it."""
+        """Return True if the shape that is due must be skipped; count it."""
         is_due = self._share > SHAPES_ABOVE
         self.shapes += is_due
         return is_due
 
     def leaves_out_health(self) -> bool:
-        """Whether the look at the rig's health that is due is left out; counts it."""
+        """Return True if the judgement of the rig's health that is due must be skipped; count it."""
         is_due = self._share > HEALTH_ABOVE
         self.health += is_due
         return is_due

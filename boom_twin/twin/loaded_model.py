@@ -1,4 +1,4 @@
-"""The twin's model under one load, and its preparation in a thread while samples go on through the present one.
+"""Model of the twin under one load, and its preparation in a thread while the present model takes the samples.
 
 A model takes some hundredths of a second, and depends on scene and settings alone. A sample would wait for it; prepared beside,
 it is taken in between two samples. The `Change` of the stroke sample that it takes effect with is recorded, as any other, and a
@@ -34,7 +34,7 @@ SWITCH = 5e-4
 
 @dataclass(frozen=True)
 class LoadedModel:
-    """All that depends on the load; `scene` has it."""
+    """Parts of the twin's model that depend on the load, and `scene` with that load."""
 
     scene: Scene
     limits: Limits
@@ -59,7 +59,7 @@ def loaded_model(
 
 
 class ModelPreparation:
-    """Asks a twin for live settings as soon as the model that they need is there.
+    """Preparation of the models that new live settings need, in a thread; requests the settings once the model is ready.
 
     Parameters
     ----------
@@ -73,32 +73,32 @@ class ModelPreparation:
         self._made: tuple[Settings, LoadedModel | None] | None = None
 
     def tune(self, live: Mapping[str, float]) -> None:
-        """Other live settings; UsageError, and nothing asked, if a value is out of bounds."""
+        """Request other live settings; UsageError, and nothing requested, if a value is out of bounds."""
         self._twin.requests.settings.tuned({**self._asked, **live})
         self._asked.update(live)
         if self._thread is None:
             self._go_on()
 
     def take_in(self) -> None:
-        """Ask for what is ready; to be called between two samples, in the thread that updates the twin."""
+        """Request what is ready; call it between two samples, in the thread that updates the twin."""
         if self._thread is not None and not self._thread.is_alive():
             self._thread = None
             self._go_on()
 
     def finish(self) -> None:
-        """Wait until all that was asked for is ready, and ask for it: where no sample waits."""
+        """Wait until all requested models are ready, and request them; for use where no sample waits."""
         while self._thread is not None:
             self._thread.join()
             self.take_in()
 
     def close(self) -> None:
-        """Ask for nothing any more; returns when the other thread has ended."""
+        """Stop requesting; return when the other thread has ended."""
         if self._thread is not None:
             self._thread.join()
             self._thread = None
 
     def _go_on(self) -> None:
-        """Ask if no other model is needed, or the one that is has been made; else make it."""
+        """Request the settings if no other model is needed or the needed one is ready; else make the model."""
         requests, made = self._twin.requests, self._made
         settings = requests.settings.tuned(self._asked)
         if settings.load == requests.settings.load or (made is not None and made[0] == settings):

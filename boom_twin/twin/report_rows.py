@@ -1,4 +1,4 @@
-"""Rows of the compiled update that a report of one sample is made of when it is asked for."""
+"""Rows of the compiled update from which the report of one sample is made on request."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NOTHING = np.zeros((0, 0))
 
 
 class ReportRows:
-    """What prediction, estimate and residuals of a report are made of, see `boom_twin.types.Report.of_rows`.
+    """Rows from which prediction, estimate and residuals of a report are made, see `boom_twin.types.Report.of_rows`.
 
     Parameters
     ----------
@@ -55,15 +55,15 @@ class ReportRows:
         self.values = self.sigmas = NOTHING
 
     def prediction(self) -> Prediction | None:
-        """The prediction, if there is one."""
+        """Return the prediction, or None if there is none."""
         return None if self.row is None else self._boom.prediction_in(self.row, self.stamp, self.outline, self.moments)
 
     def estimate(self) -> Estimate | None:
-        """The estimate beside it."""
+        """Return the estimate, or None if there is none."""
         return None if self.estimated is None else estimate_of(self.stamp, self.estimated)
 
     def residuals(self) -> tuple[Residuals, ...]:
-        """All that became known."""
+        """Return all residuals that became known by the sample."""
         found = []
         for row, code in enumerate(self.streams):
             names = self.names(code)
@@ -72,5 +72,5 @@ class ReportRows:
         return tuple(found)
 
     def names(self, code: int) -> tuple[str, ...]:
-        """Of the channels of a stream."""
+        """Return the names of a stream's channels."""
         return self._channels[STREAMS[code]]

@@ -11,7 +11,7 @@ from .update import matched
 
 
 class Run:
-    """What the twin knows since the boom was last taken to be at rest, beside `TwinState`."""
+    """State of the twin since the boom last started from rest, in addition to `TwinState`."""
 
     def __init__(self, state: TwinState, stamp: int, is_again: bool) -> None:
         self.is_again, self._state = is_again, state
@@ -39,11 +39,11 @@ class Run:
 
     @property
     def strokes(self) -> Array:
-        """The newest ones less their zeros, m, shape (n,); NaN where missing."""
+        """Newest strokes less their zeros, m, shape (n,); NaN where missing."""
         return self._state.strokes
 
     def strokes_at(self, stamp: int) -> Array | None:
-        """As measured at `stamp` (ns), linear between samples, m, shape (n,); None where that is not remembered."""
+        """Return the measured strokes at `stamp` (ns), linear between samples, m, shape (n,); None if not in memory."""
         past = self._state.past
         row, share = matched(past, stamp)
         if row < 0:
@@ -52,7 +52,7 @@ class Run:
         return np.asarray(past.strokes[row] if share == 1.0 else old + share * (past.strokes[row] - old))
 
     def rebase(self, shift: int) -> None:
-        """All stamps are later by `shift` (ns); what is remembered by stamps is forgotten."""
+        """Shift all stamps by `shift` (ns); discard what is stored by stamp."""
         self._state.clock[EPOCH] += shift
         self._state.clock[NEWEST] += shift
         self._state.past.bounds[:] = 0

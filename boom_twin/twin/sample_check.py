@@ -19,7 +19,7 @@ LIMIT = 2**63  # ns
 
 
 class SampleCheck:
-    """Looks at samples before anything is done with them.
+    """Check of samples before the twin takes them.
 
     Parameters
     ----------
@@ -34,7 +34,9 @@ class SampleCheck:
         self.is_sure = False
 
     def checked(self, sample: Sample) -> Sample:
-        """The sample, its stamp an int and its values float64 without gaps, shape (channels,); not copied if it is so already.
+        """Return the sample with an int stamp and contiguous float64 values, shape (channels,).
+
+        The sample is not copied if it has these types already.
 
         Raises
         ------
@@ -60,14 +62,17 @@ class SampleCheck:
         return found
 
     def look_at(self, stamps: NDArray[np.int64]) -> None:
-        """Look at the stamps (ns) of strokes that are to come in a block: if these are enough to be sure, be so at once."""
+        """Accept the stamps (ns) of strokes as nanoseconds before their block is taken, if they suffice to decide."""
         deciding = stamps[: FIRST - self._count]
         if not self.is_sure and 0 < len(deciding) == FIRST - self._count:
             span = max(self._high, int(deciding.max())) - min(self._low, int(deciding.min()))
             self.is_sure = span >= FIRST * SHORTEST
 
     def _look(self, stamp: int) -> None:
-        """Whether stamps are nanoseconds; those that once were are never doubted, and one alone again and again is no sign."""
+        """Raise UsageError if the stamps are too close together to be nanoseconds.
+
+        Stamps that have passed once are not checked again; a single repeated stamp decides nothing.
+        """
         self._count += 1
         self._low, self._high = min(self._low, stamp), max(self._high, stamp)
         if self._count < FIRST or self._low == self._high:

@@ -1,4 +1,4 @@
-"""Check the stamps of a stream: what goes on, and what is a stray, a pause, a clock that was set, or a second source."""
+"""Check the stamps of a stream: tell regular samples from stray ones, pauses, a clock that was set, and a second source."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ LASTING = 1_000_000_000  # ns that a second line of stamps has to go on alone be
 
 
 class StampCheck:
-    """The line of stamps that is followed, and another one that may take its place.
+    """Line of stamps that is followed, and another line that may replace it.
 
-    A sample whose stamp steps, ahead or back, is held, and does nothing. If the next ones go on where the line was, it was
-    stray. If they follow the one that is held, time has stepped: it and they are released together. Where stamps were stray
-    within the last second there may be two sources, and the other line has to go on alone for longer.
+    A sample whose stamp steps ahead or back is held and has no effect. If the next samples continue the old line, it was stray.
+    If they follow the held sample, time has stepped: it and they are released together. After a stray stamp within the last
+    second there may be two sources. Then the other line must continue alone for longer.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class StampCheck:
 
     @property
     def usual(self) -> float:
-        """Time (ns) from one sample to the next; 0 while unknown."""
+        """Usual time (ns) from one sample to the next; 0 while unknown."""
         return float(self._state.usual[self._stream])
 
     @usual.setter
@@ -70,7 +70,7 @@ class StampCheck:
 
     @property
     def held(self) -> list[tuple[Sample, str]]:
-        """The newest samples of the other line, and what each was told to be."""
+        """Newest samples of the other line, each with the event reported for it."""
         return self._held
 
     @held.setter
@@ -82,24 +82,24 @@ class StampCheck:
         self._state.held[self._stream] = len(self._held)
 
     def tune(self, settings: Settings) -> None:
-        """Judge by these limits from now on."""
+        """Set the limits to those of `settings`."""
         self._gap = round(settings.gap * SECOND)
 
     @property
     def longest(self) -> float:
-        """A longer step (ns) is confirmed by the next sample."""
+        """Longest step of a stamp (ns) that needs no confirmation by the next sample."""
         return max(self._gap, STEP * self.usual)
 
     def is_next(self, stamp: int) -> bool:
-        """Whether a sample comes as it usually does."""
+        """Return True if a sample comes at its usual time."""
         return self.newest is None or 0 < stamp - self.newest <= (STEP * self.usual or self._gap)
 
     def is_soon(self, stamp: int) -> bool:
-        """Whether a sample comes early, or after few that were lost."""
+        """Return True if a sample comes early, or after few lost ones."""
         return self.newest is not None and 0 < stamp - self.newest <= min(self.longest, FEW * self.usual or self._gap)
 
     def take(self, stamp: int) -> None:
-        """Go on with this stamp; samples that are held were stray."""
+        """Take this stamp as the newest of the line; held samples were stray."""
         if self.newest is not None:
             span, usual = stamp - self.newest, self.usual
             self.usual = usual + SMOOTHING * (min(span, 2.0 * usual) - usual) if usual else float(span)
@@ -108,9 +108,9 @@ class StampCheck:
             self._other, self.held, self._strayed = self.held[-1][0].stamp, [], stamp
 
     def hold(self, sample: Sample, event: str, is_apart: bool = False) -> str:
-        """Hold a sample, beside those that it follows, or in their place; gives what it is told to be.
+        """Hold a sample, after the held ones that it follows or else in their place; return its event.
 
-        One that `is_apart` has values that those that are held do not lead to: it does not follow them.
+        A sample that `is_apart` does not follow the held ones: no cylinder could have moved from their values to its own.
         """
         last = self.held[-1][0].stamp if self.held else self._other
         follows = last is not None and 0 < sample.stamp - last <= self.longest and not is_apart
@@ -125,14 +125,14 @@ class StampCheck:
         return event
 
     def is_confirmed(self, least: float = 0.0) -> bool:
-        """Whether what is held goes on by itself, for `least` ns and for so long that the line that is followed is late."""
+        """Return True if the held samples continue for `least` ns, and until the line that is followed is late."""
         if self._strayed is not None and self.newest is not None and self.newest - self._strayed < LASTING:
             least = max(least, self._gap)
         span = self.held[-1][0].stamp - self._since
         return span > 0 and span >= max(self.usual / STEP, least)
 
     def release(self) -> list[tuple[Sample, str]]:
-        """What is held; it is followed from now on."""
+        """Return the held samples; their line is followed from now on."""
         held, self.held, self._other = self.held, [], self.newest
         self.usual = self.usual or float(held[-1][0].stamp - held[0][0].stamp) / (len(held) - 1)
         return held
@@ -145,7 +145,7 @@ LONGEST = 1.0  # s for which a speed is taken to last
 
 
 class TimeStep(Enum):
-    """Why stamps stepped."""
+    """Reason for a step in the stamps."""
 
     PAUSE = "pause"
     CLOCK = "clock"
@@ -154,27 +154,33 @@ class TimeStep(Enum):
 
 
 def largest_difference(strokes: Array, expected: Array) -> float:
-    """Largest difference of strokes, m; those that are missing do not count, and none at all is 0."""
+    """Return the largest difference of strokes, m; missing strokes do not count, and 0 if all are missing."""
     return float(np.fmax.reduce(np.abs(strokes - expected), initial=0.0))
 
 
 def closeness(usual: float, settings: Settings) -> float:
-    """How far strokes may be from where they are expected, m: noise, and some of what a usual interval (s) lets them move."""
+    """Return the allowed difference of strokes from their expected values, m.
+
+    It is the noise plus a share of the largest motion in a usual interval (s).
+    """
     return float(FAR * settings.stroke_variance**0.5 + SHARE * settings.stroke_rate * usual)
 
 
 def is_close(strokes: Array, expected: Array, usual: float, settings: Settings) -> bool:
-    """Whether strokes (m) are where they are expected."""
+    """Return True if strokes (m) are at their expected values."""
     return largest_difference(strokes, expected) <= closeness(usual, settings)
 
 
 def is_continuous(boom: BoomPredictor, before: Array, strokes: Array, span: float, usual: float, settings: Settings) -> bool:
-    """Whether strokes (m) are where those of the newest sample, `before`, would be `span` s later."""
+    """Return True if strokes (m) continue the newest sample `before`, extrapolated by `span` (s)."""
     return largest_difference(strokes, nearest(boom, before, strokes, span)) <= closeness(usual, settings)
 
 
 def nearest(boom: BoomPredictor, before: Array, strokes: Array, span: float) -> Array:
-    """Where strokes would be `span` s later, from their estimates or from what was measured, whichever fits better; (n,) m."""
+    """Return the strokes extrapolated by `span` (s), shape (n,), m.
+
+    Each starts from its estimate or from its newest measurement, whichever fits `strokes` better.
+    """
     now, later = boom.extrapolated(0.0), boom.extrapolated(span)
     other = later + np.where(np.isfinite(before), before - now, 0.0)
     return np.where(np.abs(strokes - other) < np.abs(strokes - later), other, later)
@@ -189,7 +195,7 @@ def explain(
     usual: float,
     settings: Settings,
 ) -> TimeStep:
-    """Tell why stamps stepped by `span` (s).
+    """Return the reason for a step of the stamps by `span` (s).
 
     A clock was set if both samples are where they would have been after the usual interval. If the stamps went ahead by no more
     than can be bridged, that is also what a pause at rest looks like: then a cylinder has to move, which would have gone on;

@@ -29,7 +29,7 @@ FIRST, COUNT = range(2)  # of a ring
 
 @by_reference
 class Ring(NamedTuple):
-    """The newest rows of a table: `bounds` has the place of the oldest one, and how many there are."""
+    """Ring buffer of the newest rows of a table: `bounds` has the place of the oldest row, and the number of rows."""
 
     bounds: Integers
     stamps: Integers
@@ -41,7 +41,7 @@ class Ring(NamedTuple):
 
 @by_reference
 class TwinState(NamedTuple):
-    """What the twin remembers from sample to sample, beside the boom; s streams of up to w channels, c measured ones in all.
+    """State of the twin between samples, beside the boom; s streams of up to w channels, c measured channels in all.
 
     clock : (10,) whole numbers by the names above; stamps in ns, CHECKED and TRUSTED since EPOCH.
     interval : (1,) running mean of the time between strokes, s; 0 while unknown.
@@ -72,7 +72,7 @@ class TwinState(NamedTuple):
 
 @by_reference
 class Limits(NamedTuple):
-    """What `update` judges samples by.
+    """Limits that `update` checks samples against.
 
     gap, leap : ns. far : m, by which a stroke may be off its estimate at once. rate : m/s, of the fastest stroke.
     shortest, longest : (n,) strokes that its cylinder can have, m.
@@ -102,7 +102,7 @@ class Limits(NamedTuple):
 
 @by_reference
 class UpdateOutput(NamedTuple):
-    """Room for what a call gives, see `boom_twin.twin.blocks`; `counts` has the rows of predictions, and of residuals.
+    """Buffers for the results of a call, see `boom_twin.twin.blocks`; `counts` has the rows of predictions, and of residuals.
 
     rows : results and estimates, see `boom_twin.kernels.result_row`. estimates : see `boom_twin.deviation.estimate_row`.
     measured : strokes less their zeros, m. raw : as measured.
@@ -136,7 +136,7 @@ def drop_waiting(state: TwinState, first: int, last: int, stream: int | None = N
 
 
 def new_ring(size: int, values: int, sigmas: int = 0, strokes: int = 0) -> Ring:
-    """An empty ring of `size` rows with so many columns."""
+    """Return an empty ring of `size` rows with so many columns."""
     return Ring(
         np.zeros(2, np.int64), np.zeros(size, np.int64), np.zeros(size, np.int64),
         np.zeros((size, values)), np.zeros((size, sigmas)), np.zeros((size, strokes)),
@@ -144,7 +144,7 @@ def new_ring(size: int, values: int, sigmas: int = 0, strokes: int = 0) -> Ring:
 
 
 def new_state(joints: int, channels: Integers) -> TwinState:
-    """Of a boom with so many joints, and so many channels in every stream."""
+    """Return the state of a new twin for so many joints, and so many channels in every stream."""
     streams, width, measured = len(channels), int(channels.max()), int(channels[1:].sum())
     return TwinState(
         clock=np.zeros(10, np.int64), interval=np.zeros(1),
@@ -156,7 +156,7 @@ def new_state(joints: int, channels: Integers) -> TwinState:
 
 
 def new_output(samples: int, joints: int, row: int, moments: int, channels: Integers) -> UpdateOutput:
-    """Room for what so many samples can cause."""
+    """Return empty buffers for the results of so many samples."""
     width, residuals = int(channels.max()), samples + WAITING
     return UpdateOutput(
         counts=np.zeros(2, np.int64), at=np.zeros(samples, np.int64), stamps=np.zeros(samples, np.int64),
@@ -171,7 +171,7 @@ def new_output(samples: int, joints: int, row: int, moments: int, channels: Inte
 
 @inner
 def new_row(ring):
-    """Place for one more row of a ring; the oldest one goes if there is no room."""
+    """Return the place of a new row of a ring; a full ring overwrites its oldest row."""
     size, first, count = ring.stamps.shape[0], ring.bounds[FIRST], ring.bounds[COUNT]
     if count == size:
         ring.bounds[FIRST] = (first + 1) % size
@@ -182,7 +182,7 @@ def new_row(ring):
 
 @inner
 def zeros_at(state, stamp):
-    """Which of the zeros hold at `stamp`."""
+    """Return the number of the zeros that hold at `stamp`."""
     at = state.zero_sets[0] - 1
     while at > 0 and state.zeros_since[at] > stamp:
         at -= 1

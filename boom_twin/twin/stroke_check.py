@@ -19,7 +19,7 @@ Flags = NDArray[np.bool_]
 
 
 class StrokeCheck:
-    """Looks at the strokes of one run, sample by sample; each beside what was estimated (m, shape (n,)) at the one before.
+    """Check of the strokes of one run, sample by sample, against the estimates (m, shape (n,)) at the sample before.
 
     Parameters
     ----------
@@ -33,7 +33,10 @@ class StrokeCheck:
         self._jumped = np.zeros(0, np.int64)  # stamp (ns) since when a stroke is where it jumped; NEVER
 
     def is_of_others(self, stamp: int, values: Array, estimate: Array, settings: Settings) -> bool:
-        """Whether two strokes or more are where no cylinder can be: those of another boom, unless more than `MOST` agree."""
+        """Return True if two or more strokes are out of reach of their cylinders, as of another boom.
+
+        After `MOST` such samples in a row the strokes are believed, and the result is False.
+        """
         limit = self._limit(stamp, settings)
         if np.count_nonzero(_are_far(values, estimate, limit)) < 2:
             self._clock[OTHERS] = 0
@@ -42,14 +45,14 @@ class StrokeCheck:
         return bool(self._clock[OTHERS] <= MOST)
 
     def _limit(self, stamp: int, settings: Settings) -> float:
-        """How far strokes may be from their estimates, m."""
+        """Return the allowed difference of strokes from their estimates, m."""
         span = (stamp - int(self._clock[CHECKED])) * NANO
         return float(FAR * settings.stroke_variance**0.5 + settings.stroke_rate * span)
 
     def of(
         self, stamp: int, values: Array, before: Array, estimate: Array | None, rates: Array, settings: Settings
     ) -> tuple[Array, list[str]]:
-        """Strokes as the model is to take them, and events; `must_restart` tells whether it can.
+        """Return the strokes for the model to take, and events; `must_restart` tells if the model can take them.
 
         Parameters
         ----------
@@ -91,19 +94,22 @@ class StrokeCheck:
 
     @property
     def must_restart(self) -> bool:
-        """Whether a stroke has been elsewhere for so long that it is believed: no motion leads there."""
+        """Return True if a stroke has stayed where it jumped for so long that it is believed.
+
+        The model must restart: no motion leads there.
+        """
         jumped = self._jumped != NEVER
         return bool(jumped.any() and (self._before - self._jumped[jumped]).max() >= LASTING)
 
     def _gone(self, stamp: int, rates: Array) -> Array:
-        """How far (m) strokes may have gone since they jumped elsewhere, shape (n,)."""
+        """Return how far (m) each cylinder may have moved since its stroke jumped, shape (n,)."""
         elapsed = np.where(self._jumped == NEVER, 0, stamp - self._jumped) * NANO
         return np.asarray((USUAL_RATE + 2.0 * np.abs(rates)) * elapsed)
 
     def _note_jumps(self, stamp: int, far: Flags, jumps: Flags, is_onward: Flags, returned: Flags) -> Flags:
-        """Note which readings jumped elsewhere, and which are there no more; gives those that jumped back.
+        """Update the record of strokes that jumped; return those that jumped back.
 
-        One that jumps on, the same way, is a sensor that tells seldom of a cylinder that moves.
+        A stroke that jumps on in the same direction belongs to a cylinder that moves and a sensor that reports seldom.
         """
         is_away = self._jumped != NEVER
         is_back: Flags = is_away & returned
@@ -125,5 +131,5 @@ class StrokeCheck:
 
 
 def _are_far(values: Array, estimate: Array, limit: float) -> Flags:
-    """Which strokes are further than `limit` (m) from their estimates; shape (n,)."""
+    """Return True for strokes further than `limit` (m) from their estimates; shape (n,)."""
     return np.asarray(np.abs(values - estimate) > limit)

@@ -37,7 +37,7 @@ from .update import DONE, FAILED
 
 
 class Twin:
-    """Follows a boom's strokes sample by sample.
+    """Digital twin of a boom, updated by its samples one at a time.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class Twin:
         self._begin()
 
     def _begin(self) -> None:
-        """Know nothing of any sample: state, model, estimate, health, zeros."""
+        """Reset state, model, estimate, health and zeros to those before the first sample."""
         self._state = new_state(len(self.scene.joints), np.array(self._widths))
         self._state.clock[NEWEST] = NONE
         self._adopt(self.model(self.settings))
@@ -127,7 +127,7 @@ class Twin:
         self._state.waiting.bounds[:] = 0
 
     def renew(self) -> None:
-        """Know nothing of any sample, as a new twin does; load, limits and zeros stay."""
+        """Reset the twin to that before the first sample; load, limits and zeros stay."""
         if self._is_new:
             self.reset()
             return
@@ -136,11 +136,11 @@ class Twin:
 
     @property
     def evidence(self) -> float:
-        """Logarithm of the likelihood of all that was read, up to a constant that the samples alone decide."""
+        """Log likelihood of all readings, up to a constant that depends on the samples alone."""
         return self._boom.evidence
 
     def rezero(self, sensor: str) -> dict[str, float]:
-        """Ask that the mean residual of the last second becomes the zero of a sensor; gives its new zeros by channel.
+        """Request the mean residual of the last second as the zero of a sensor; return its new zeros by channel.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class Twin:
         return found
 
     def model(self, settings: Settings) -> LoadedModel:
-        """The model under the load of `settings`; nothing of the twin changes, so that a thread of its own can make it.
+        """Return the model under the load of `settings`; another thread may call this, since the twin keeps its own model.
 
         Parameters
         ----------
@@ -190,7 +190,7 @@ class Twin:
         return loaded_model(self.scene, settings, self.mounts, self.baseline, self.reads, self.absent)
 
     def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
-        """Go on with this model, which is of the present load, after that of `before`."""
+        """Use this model, which has the present load, in place of that of `before`."""
         self._boom, self.judge = model.boom, model.judge
         self._boom.doubt(self._doubted)
         self.plan = self._boom.plan
@@ -200,7 +200,7 @@ class Twin:
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, self.plan.joints)))  # of strokes
 
     def _take_over(self, stamp: int) -> list[str]:
-        """Make what was asked for hold; gives the events. Another load, or other zeros of strokes, need a start from rest."""
+        """Apply the requested changes; return the events. Another load, or other zeros of strokes, need a start from rest."""
         asked, before = self.requests, self.settings
         model, is_new = asked.model, asked.is_new and self._run is not None
         from_rest, self.settings = asked.take(), asked.settings
@@ -224,7 +224,7 @@ class Twin:
         return events
 
     def _begin_anew_at(self, stamp: int) -> None:
-        """Start from rest with the strokes of `stamp` (ns), though the boom may be at work; what was measured since waits."""
+        """Start from rest with the strokes of `stamp` (ns), though the boom may be moving; measured samples since then wait."""
         self._begin_anew()
         drop_waiting(self._state, NONE, stamp - 1)
 
@@ -237,7 +237,7 @@ class Twin:
         self._compiled.begin_health()
 
     def warm_up(self) -> None:
-        """Compile every kernel, with a twin of the same boom that is thrown away."""
+        """Compile every kernel, with a temporary twin of the same boom."""
         other = Twin(self.scene, self.settings, reads=self.reads)
         middle = np.radians([sum(joint.range_deg) / 2 for joint in self.scene.joints])
         strokes = np.array([stroke_curve(self.scene, i, middle[i : i + 1])[0] for i in range(len(middle))])
@@ -280,7 +280,7 @@ class Twin:
 
     @property
     def is_health_due(self) -> bool:
-        """Whether `update` left the judgement of health out for its last sample."""
+        """Return True if `update` left out the judgement of health for its last sample."""
         return self._compiled.is_due
 
     def judge_health(self) -> Health | None:
@@ -332,7 +332,7 @@ class Twin:
         return Sample(STREAMS[code], int(block.stamps[row]), block.values[row, : channels[code]].copy())
 
     def _advance_one(self, sample: Sample, trusted: bool = False) -> int:
-        """Take a sample if it is ordinary, or `trusted`; see `BlockUpdate.advance`."""
+        """Take a sample if it is regular, or `trusted`; see `BlockUpdate.advance`."""
         if sample.stream is not Stream.STROKES:
             return self._compiled.measure(CODES[sample.stream], sample.stamp, sample.values, trusted)
         one = self._one
@@ -341,7 +341,7 @@ class Twin:
         return reason
 
     def _look_at(self, sample: Sample) -> Report:
-        """Take a sample that may be out of the ordinary; of a copy, for it may be held, and the caller's may change."""
+        """Take a sample that may be irregular. It is copied, since it may be held and the caller's arrays may change."""
         self._compiled.make_room()
         sample = replace(sample, values=sample.values.copy())
         complete = self._is_complete(sample)
@@ -390,7 +390,7 @@ class Twin:
         return self._step_in_time(run, line, why)
 
     def _is_apart(self, line: StampCheck, sample: Sample) -> bool:
-        """Whether no cylinder is so fast as to come here from the strokes that are held."""
+        """Return True if some cylinder could not have reached these strokes from the held ones at its maximum speed."""
         if not line.held:
             return False
         last = line.held[-1][0]
@@ -398,14 +398,14 @@ class Twin:
         return bool(largest_difference(sample.values, last.values) > way)
 
     def _is_late(self, run: Run, stamp: int, values: Array) -> bool:
-        """Whether it is back by little, and its strokes are those of its stamp."""
+        """Return True if the stamp is back by at most `jump_back` and the strokes agree with those of that time."""
         if not -self.settings.jump_back <= (stamp - run.newest) * NANO < 0.0:
             return False
         then = run.strokes_at(stamp)
         return then is None or is_close(values, then, run.interval, self.settings)
 
     def _explain(self, run: Run, line: StampCheck) -> TimeStep:
-        """Why the stamps of what is held are not those that were to come."""
+        """Return the reason why the stamps of the held samples step."""
         (first, _), (later, _) = line.held[:2]
         values = self._zeroed(first), self._zeroed(later)
         span, apart = (first.stamp - run.newest) * NANO, (later.stamp - first.stamp) * NANO
@@ -432,7 +432,7 @@ class Twin:
         return replace(reports[-1], earlier=tuple(reports[:-1]))
 
     def _released(self, line: StampCheck) -> list[Sample]:
-        """Samples that were held; what those before the newest were told to be counts no more."""
+        """Return the held samples; events counted for those before the newest are uncounted."""
         held = line.release()
         self.counts.subtract(event for _, event in held[:-1])
         for event in {event for _, event in held if not self.counts[event]}:
@@ -440,7 +440,7 @@ class Twin:
         return [sample for sample, _ in held]
 
     def _rebase(self, run: Run, shift: int) -> None:
-        """Stamps are later by `shift` (ns) from now on, and the model goes on."""
+        """Shift stamps by `shift` (ns) from now on; the model continues."""
         before = run.newest
         run.rebase(shift)
         self._boom.rebase(shift)
@@ -453,11 +453,11 @@ class Twin:
         self._compiled.begin_health()
 
     def _zeroed(self, sample: Sample) -> Array:
-        """Strokes without what their sensors read too much."""
+        """Return strokes less their zeros."""
         return sample.values - self._zeros.of_strokes(sample.stamp)
 
     def _follow(self, sample: Sample, values: Array, complete: bool, events: list[str]) -> Report:
-        """Go on to a stroke sample, whose `values` are without the sensors' zeros; the model starts if it has not."""
+        """Step to a stroke sample, whose `values` are without the sensors' zeros; start the model if it has not started."""
         if not complete:
             events.append("partial")
         asked = complete and self.requests.due
@@ -492,7 +492,7 @@ class Twin:
         return self._step(self._run, sample, events)
 
     def _step(self, run: Run, sample: Sample, events: list[str]) -> Report:
-        """Step the model to strokes that were looked at, their values less the sensors' zeros."""
+        """Step the model to checked strokes, their values less the sensors' zeros."""
         self._lines[Stream.STROKES].take(sample.stamp)
         estimate = self._boom.estimate if run.is_predicted else None
         before, rates, check = self._state.strokes, self._boom.speeds, run.plausible
@@ -509,7 +509,7 @@ class Twin:
         return self._compiled.report(sample.stamp, events, self._judged)
 
     def _fail(self, sample: Sample, events: list[str]) -> Report:
-        """The model failed at a stroke sample."""
+        """Return the report of a stroke sample at which the model failed; reset the model."""
         self.reset()
         self._failed = sample.stamp
         return self._refuse(sample, "model", *events, status=SENTENCES[int(self._state.clock[STATUS])])
@@ -534,7 +534,7 @@ class Twin:
         return replace(reports[-1], earlier=tuple(reports[:-1]))
 
     def _compare(self, sample: Sample, complete: bool) -> Report:
-        """Residuals of a measured sample, now or when the strokes have come."""
+        """Take a measured sample and return its report; its residuals come now or once its strokes have come."""
         self._lines[sample.stream].take(sample.stamp)
         events: tuple[str, ...] = ()
         if not complete:
@@ -545,7 +545,7 @@ class Twin:
         return self._compiled.report(sample.stamp, events)
 
     def _hold(self, sample: Sample, event: str) -> Report:
-        """Taken as a witness of time alone, at first."""
+        """Count an event and return the report of a held sample; its values are not used for now."""
         self.counts[event] += 1
         return Report(sample.stamp, True, events=(event,))
 

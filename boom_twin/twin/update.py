@@ -1,4 +1,4 @@
-"""Compiled update of the twin: ordinary samples of all streams, as many as there are, in one call.
+"""Compiled update of the twin: regular samples of all streams, many in one call.
 
 What a sample of strokes, angles or accelerations does to the twin while nothing is out of the ordinary is written here, once,
 for the live node (a sample a call) and the replay (many). A sample that is not ordinary ends the call, and
@@ -46,13 +46,13 @@ SPAN = 2_000_000_000  # ns for which expected readings are kept
 ALONE = np.int64(0)  # row of a sample that comes alone; typed, because numba compiles once more for every literal
 
 DONE, ODD, LOOK, FAILED = range(4)
-"""Why `update` returned: all samples taken; the sample is not ordinary; the sample is complete and begins a slot, or left the
-model's validity; the model failed (see `STATUS`)."""
+"""Reason why `update` returned: all samples taken; the sample is irregular; the sample is complete and begins a slot, or is
+outside the model's validity; the model failed (see `STATUS`)."""
 
 
 @kernel
 def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stamps, values, first, trusted, found):
-    """Take the samples of a block from row `first` on, as long as they are ordinary.
+    """Take the samples of a block from row `first` on, as long as they are regular.
 
     Parameters
     ----------
@@ -110,9 +110,9 @@ def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stam
 
 @kernel
 def measure(p, f, limits, state, stream, stamp, values, trusted, found):
-    """Take one measured sample, as `update`, which needs the boom too; False, and nothing done, if it is not ordinary.
+    """Take one measured sample as `update` does, but without the boom; return False, with nothing done, if irregular.
 
-    One that is `trusted` is refused only if nothing was expected at its stamp.
+    A `trusted` sample is refused only if no readings were expected at its stamp.
     """
     before = found.counts[1]
     if not compare(limits, state, stream, stamp, values, ALONE, trusted, found):
@@ -123,7 +123,7 @@ def measure(p, f, limits, state, stream, stamp, values, trusted, found):
 
 @inner
 def take_residuals(limits, state, p, f, first, found):
-    """Let the estimate know of the residuals from row `first` on."""
+    """Correct the estimate by the residuals from row `first` on."""
     for k in range(first, found.counts[1]):
         stream = found.residual_streams[k]
         take_sensor(p, f, stream, limits.first[stream], found.values[k], found.residual_stamps[k], state.clock[NEWEST])
@@ -134,7 +134,7 @@ def take_residuals(limits, state, p, f, first, found):
 
 @inner
 def is_ordinary(estimates, limits, state, stamp, values):
-    """Whether strokes come when they are due, all of them, where their cylinders can be; they are put into `state` then."""
+    """Return True if strokes are on time, complete and within reach of their cylinders; write them to `state` then."""
     span = stamp - state.clock[NEWEST]
     most = STEP * state.usual[STROKES]
     if most == 0.0:
@@ -160,7 +160,7 @@ def is_ordinary(estimates, limits, state, stamp, values):
 
 @inner
 def note_stamp(state, stream, stamp):
-    """Go on with a stream's stamp, as `boom_twin.twin.stamp_check.StampCheck.take` does."""
+    """Take a stream's stamp as its newest, as `boom_twin.twin.stamp_check.StampCheck.take` does."""
     if state.newest[stream] != NONE:
         span, usual = stamp - state.newest[stream], state.usual[stream]
         if usual != 0.0:
@@ -183,7 +183,7 @@ def end_step(state, stamp):
 
 @inner
 def give_prediction(pins, live, bending, out, limits, state, stamp, row, found):
-    """Give the row of the newest prediction with its bending moments, and note whether the boom is deflected too far."""
+    """Write the row of the newest prediction with its bending moments, and note if the boom is deflected too far."""
     n, k = state.strokes.shape[0], found.counts[0]
     results, estimates = results_in(out, n, pins), estimates_in(out, n, pins)
     found.at[k], found.stamps[k] = row, stamp
@@ -203,7 +203,7 @@ def give_prediction(pins, live, bending, out, limits, state, stamp, row, found):
 
 @inner
 def give_innovations(f, state, stamp, row, found):
-    """Give the residuals of strokes against what was predicted of them before they were taken."""
+    """Write the residuals of strokes against the prediction made before they were taken."""
     k = new_residual(found, row, STROKES, stamp)
     for i in range(state.taken.shape[0]):
         found.values[k, i], found.sigmas[k, i] = f.innovations[i, 0], math.sqrt(f.innovations[i, 1])
@@ -223,7 +223,7 @@ def new_residual(found, row, stream, stamp):
 
 @inner
 def keep_strokes(state, stamp):
-    """Keep the newest strokes with those of the last `SPAN`; gives their row, where the expected readings go."""
+    """Store the newest strokes with those of the last `SPAN`; return their row, where the expected readings go."""
     past = state.past
     while past.bounds[COUNT] > 0 and past.stamps[past.bounds[FIRST]] < stamp - SPAN:
         past.bounds[FIRST] = (past.bounds[FIRST] + 1) % KEPT
@@ -240,7 +240,10 @@ def keep_strokes(state, stamp):
 
 @inner
 def compare(limits, state, stream, stamp, values, row, trusted, found):
-    """Residuals of a measured sample, now or when the strokes have come; False, and nothing done, if it is not ordinary."""
+    """Write the residuals of a measured sample, or store it until its strokes come.
+
+    Return False, with nothing done, if the sample is irregular.
+    """
     if not trusted and not is_due(limits, state, stream, stamp, values):
         return False
     if stamp > state.clock[NEWEST]:
@@ -257,7 +260,7 @@ def compare(limits, state, stream, stamp, values, row, trusted, found):
 
 @inner
 def is_due(limits, state, stream, stamp, values):
-    """Whether a measured sample comes when it is due, and whole."""
+    """Return True if a measured sample is on time and complete."""
     most = limits.leap
     if state.usual[stream] != 0.0:
         most = max(limits.gap, STEP * state.usual[stream])
@@ -293,7 +296,7 @@ def move_row(ring, old, new):
 
 @inner
 def flush_waiting(limits, state, row, found):
-    """Residuals of all samples that waited for the newest stroke."""
+    """Write the residuals of all samples that waited for the newest stroke."""
     ring, done = state.waiting, 0
     while done < ring.bounds[COUNT] and ring.stamps[done] <= state.clock[NEWEST]:
         if not write_residual(limits, state, ring.streams[done], ring.stamps[done], ring.values[done], row, found):
@@ -313,7 +316,7 @@ def forget_waiting(ring, count):
 
 @kernel
 def write_residual(limits, state, stream, stamp, values, row, found):
-    """Residuals of one sample against what was expected at its stamp; False if nothing was."""
+    """Write the residuals of one sample from the readings expected at its stamp; return False if there are none."""
     after, share = matched(state.past, stamp)
     if after < 0:
         return False
@@ -338,9 +341,9 @@ def write_residual(limits, state, stream, stamp, values, row, found):
 
 @kernel
 def matched(past, stamp):
-    """Row of the first expected readings that are not before `stamp`, and where between them and those before it lies.
+    """Return the first row of expected readings not before `stamp`, and the place of `stamp` between it and the row before.
 
-    The share is 1 at the row itself. A row of -1: there are none around it.
+    The place is a share: 1 at the row itself, 0 at the row before. The row is -1 if no rows surround `stamp`.
     """
     at = -1
     for back in range(past.bounds[COUNT]):
