@@ -164,8 +164,7 @@ def replay(
     health : bool
         Judge the rig's health, see `Report.health`.
     baseline : path, optional
-        What is known of this rig while all is well, a file written by ``boom_twin calibrate --baseline``; by default the
-        one that the session was recorded with, else the package's own.
+        Baseline of this rig; by default the one that the session was recorded with, else the package's own.
     window : TimeWindow, optional
         The part of the session that is replayed. The model starts at rest where that begins, whatever the boom did then; the
         times of the result count from there.
