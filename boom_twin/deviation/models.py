@@ -158,11 +158,12 @@ def note_innovations(p, f, y):
     for i in range(n):
         mean = square = 0.0
         length_row(p, i, f.row)
+        first = length_of(p, i, f.row, f.x[VALVES], size)
         for k in range(BURST + 1):
-            innovation = y[i] - length_of(p, i, f.row, f.x[k], size)
-            mean += f.chances[k] * innovation
-            square += f.chances[k] * (innovation * innovation + variance_of(f.row, f.p[k], f.gain, size))
-        f.innovations[i, 0], f.innovations[i, 1] = mean, square - mean * mean + f.length2[i]
+            apart = length_of(p, i, f.row, f.x[k], size) - first
+            mean += f.chances[k] * apart
+            square += f.chances[k] * (apart * apart + variance_of(f.row, f.p[k], f.gain, size))
+        f.innovations[i, 0], f.innovations[i, 1] = y[i] - first - mean, square - mean * mean + f.length2[i]
 
 
 @inner
