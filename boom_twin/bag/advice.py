@@ -1,4 +1,4 @@
-"""Advice on a session: what it lacks for a replay, and what of it can be published."""
+"""Advice on a session: the data that a replay lacks, and the topics that can be published."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .session_file import CDR
 from .session_model import mapping_of
 
 SKEW = 0.05
-"""Difference (s) of two streams' clocks that is worth a word: a boom moves by centimetres in it."""
+"""Clock difference of two streams that is reported, s. A boom moves by centimetres in that time."""
 
 JOINT_STATES = tuple(stream for stream, kind in SENSORS.items() if not kind.is_imu)
 

@@ -40,7 +40,7 @@ class Syncer:
 
     @property
     def waits(self) -> float:
-        """Time since the disk last answered, s; 0 without an open request."""
+        """Waiting time of the request that the disk works on, s; 0 without an open request."""
         return time.monotonic() - self._began if self._answered < self._sent else 0.0
 
     def ask(self, file: int, mark: int) -> None:
@@ -76,16 +76,16 @@ class Syncer:
 
 
 FLUSH = 0.25
-"""Seconds after which what was recorded is out of this process, and asked onto the disk: a kill costs at most this."""
+"""Time between two flushes, s. A killed process loses at most the messages of that time."""
 STALL = 5.0
-"""Seconds without an answer from the disk after which that is told."""
+"""Time without an answer of the disk before it is reported, s."""
 PATIENCE = 30.0
-"""Seconds that the disk has at the end."""
+"""Time for the disk to complete the bag at the end, s."""
 MOST = 256 * 2**20
 """Bytes of messages that may wait in memory."""
 
 MOST_FILES = 2000
-"""Files of one recording: ``metadata.yaml`` lists them all, and of half as many more its readers would refuse it."""
+"""Limit for the number of files of one recording: readers refuse a ``metadata.yaml`` of about 3000 files."""
 
 _Message = tuple[int, int, bytes, int, int]
 

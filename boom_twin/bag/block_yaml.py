@@ -1,7 +1,7 @@
-"""YAML in block style as ROS tools write it.
+"""Writer of YAML in block style, as ROS tools write it.
 
-ruamel.yaml takes 17 ms for the ``metadata.yaml`` of a result bag, which a replay waits for. Its text of whole numbers and plain
-words is written here, the same to the byte; a collection that holds anything else is left to it.
+ruamel.yaml takes 17 ms for the ``metadata.yaml`` of a result bag, which a replay waits for. Whole numbers and plain words are
+written here with equal bytes. A collection with any other value is left to ruamel.yaml.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 
 _WORD = re.compile(r"[A-Za-z_/][A-Za-z0-9_/.-]{0,99}")
 _OTHER = {"true", "false", "null", "yes", "no", "on", "off", "y", "n"}
-"""Words that stand for something else in YAML, in one version of it or the other."""
+"""Words that are no text in some version of YAML."""
 
 
 def dump(document: Any) -> str:

@@ -28,12 +28,12 @@ from .mcap_records import (
 )
 
 MOST_TOGETHER = 2**22
-"""Messages of pieces that overlap in time and are held together, at most: an empty one takes ten times its bytes."""
+"""Limit for the number of messages held from pieces that overlap in time: an empty one takes ten times its bytes."""
 ENOUGH = 256
-"""Messages in a block, at least, where the next ones come after them."""
+"""Lower limit for the number of messages in a block, except the last."""
 
 _LENGTH = 8
-"""Bytes of a record's length, right before its body."""
+"""Size of the length field right before the body of a record, bytes."""
 _HEAD = np.dtype([("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
 """`MESSAGE_HEAD` behind the length of its record."""
 _ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
@@ -41,14 +41,15 @@ _ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 _INDEX_HEAD = 6
 """Bytes of the channel and the length of its entries, at the start of an index."""
 _PIECE = 2**31
-"""Places of messages of two pieces are so far apart: more than a piece has bytes."""
+"""Offset between the places of messages of two pieces: more than the bytes of a piece."""
 _MESSAGE = int(Opcode.MESSAGE)
 
 
 def message_blocks(path: Path, chunks: Sequence[ChunkPlace], passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
-    """All messages but of the `passed` channels by log time, at equal times in the order of the file; sources are channels.
+    """Yield blocks of all messages, except of the `passed` channels, by log time. Sources of a block are channels.
 
-    Only pieces that overlap in time are held together. Where the recorder's clock was set back, the order is that of the file.
+    Messages of equal time keep the order of the file. Only pieces that overlap in time are held together. If the recorder's
+    clock was set back, the order is that of the file.
     """
     waiting: list[MessageBlock] = []
     try:
@@ -66,7 +67,7 @@ def message_blocks(path: Path, chunks: Sequence[ChunkPlace], passed: Set[int], c
 
 
 def _in_order(path: Path, chunks: Sequence[ChunkPlace], passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
-    """The messages of one piece after the other, of those that overlap in time as soon as all earlier ones are read."""
+    """Yield the messages of one piece after the other. Messages of overlapping pieces wait until all earlier ones are read."""
     budget, held = UnpackBudget(), dict[int, MessageBlock]()
     places = list(enumerate(by_place(chunks)))
     if not clock.is_set_back:
@@ -93,7 +94,7 @@ def _in_order(path: Path, chunks: Sequence[ChunkPlace], passed: Set[int], clock:
 
 
 def _messages(content: bytes) -> MessageBlock:
-    """The messages among the records of a piece, in its order."""
+    """Return the messages among the records of a piece, in its order."""
     starts = np.array(_bodies(content), np.int64)
     heads = gather(content, starts - _LENGTH, _HEAD.itemsize).view(_HEAD)[:, 0]
     channels, ends = heads["channel"].astype(np.int64), starts + heads["length"].astype(np.int64)
@@ -101,16 +102,16 @@ def _messages(content: bytes) -> MessageBlock:
 
 
 def log_clock(path: Path, chunks: Sequence[ChunkPlace]) -> LogClock:
-    """Return the clock of a file's recorder by the indexes behind its chunks; if it was set back there, by the chunks alone.
+    """Return the clock of a file's recorder from the indexes of its chunks.
 
-    No checksum is over an index.
+    If it was set back there, the clock is read from the chunks instead, because an index has no checksum.
     """
     by_index = LogClock.of(lambda: _log_times(path, chunks, True))
     return LogClock.of(lambda: _log_times(path, chunks, False)) if by_index.is_set_back else by_index
 
 
 def _log_times(path: Path, chunks: Sequence[ChunkPlace], by_index: bool) -> Iterator[Piece]:
-    """Places, channels and log times of all messages in the order of the file."""
+    """Yield places, channels and log times of all messages in the order of the file."""
     budget = UnpackBudget()
     with open_received(path) as file:
         for number, place in enumerate(by_place(chunks)):
@@ -121,7 +122,7 @@ def _log_times(path: Path, chunks: Sequence[ChunkPlace], by_index: bool) -> Iter
 
 
 def _indexed(file: BinaryIO, place: ChunkPlace) -> Piece | None:
-    """The messages of a chunk by the index behind it; None if that is none."""
+    """Return places, channels and log times of a chunk from the index after it; None if the index is invalid."""
     file.seek(place.chunk_start_offset + place.chunk_length)
     content = file.read(place.message_index_length)
     found, channels = list[np.ndarray](), list[np.ndarray]()
@@ -145,7 +146,7 @@ def _places(block: MessageBlock) -> Integers:
 
 
 def _bodies(content: bytes) -> list[int]:
-    """Where the records of messages begin, behind their lengths, in the content of a chunk whose records are all whole."""
+    """Return the offsets of the bodies of all message records in the content of a chunk. All records must be whole."""
     found = []
     for opcode, start, end in bounds(content):
         if opcode == _MESSAGE and end - start >= MESSAGE_HEAD.size:

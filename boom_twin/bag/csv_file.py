@@ -1,7 +1,8 @@
 """Read a session from a CSV file: a row for every stamp, a column for every sensor, in SI units.
 
 ``t_s,stroke_1_m,..[,joint_1_rad,..][,imu_x_m_s2,imu_z_m_s2][,cylinder_force_1_N,..]``, an empty cell where there is no value.
-The file is read some thousand rows at a time, once to check and count, and once more for its messages: it may be of any size.
+The file may be of any size: it is read some thousand rows at a time. It is read once to check and count, and once more for its
+messages.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ IMU = ("imu_x_m_s2", "imu_z_m_s2")
 FEWEST, SLOWEST, FASTEST = 20, 1.0, 1e-4  # rows; s from row to row, by which the unit of the times is known
 UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # of which a second has so many
 NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}
-"""Channel of every stream."""
+"""Channel number of every stream."""
 
 
 @dataclass(frozen=True, slots=True)

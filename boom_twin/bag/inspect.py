@@ -18,7 +18,7 @@ from .session_file import CDR, SessionFile, schema_of
 from .time_window import WHOLE, TimeWindow
 
 VARIANTS = 100
-"""Different lists of names that are told apart in one topic."""
+"""Limit for the number of different lists of names that are counted in one topic."""
 
 
 @dataclass(slots=True)

@@ -1,4 +1,4 @@
-"""Integrity of .mcap files: whether both ends are whole, and one kind of error for whatever is damaged."""
+"""Checks of .mcap files for whole ends, and one kind of error for any damage."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ REMEDY = "The file is damaged or was cut off: `boom_twin recover BAG --out DIR` 
 _LZ4 = (RuntimeError,)
 _PARSING = (struct.error, ValueError, KeyError, IndexError, OverflowError, MemoryError)
 PARSE_ERRORS = (McapError, SerdeError, ZstdError, *_LZ4, *_PARSING)
-"""What the parsers raise on bytes that are not what they should be."""
+"""Errors that the parsers raise on invalid bytes."""
 
 
 @contextmanager
@@ -45,14 +45,14 @@ def compare_counts(place: Path, source: str, counts: Mapping[str, int], other: s
 
 
 BLOCK = 2**20
-"""Bytes that are read at a time where a file may be of any size."""
+"""Number of bytes read at a time from a file of any size."""
 
 FOOTER = struct.Struct("<BQQQI8s")
 """The last record of a file, with the magic behind it."""
 
 
 def check_ends(path: Path, file: BinaryIO) -> None:
-    """Magic at both ends, footer, checksum of the summary."""
+    """Raise BagError unless magic at both ends, footer and checksum of the summary are valid."""
     size = path.stat().st_size
     if (start := file.read(len(MCAP0_MAGIC))) != MCAP0_MAGIC:
         if MCAP0_MAGIC.startswith(start):
@@ -70,14 +70,14 @@ def check_ends(path: Path, file: BinaryIO) -> None:
 
 
 def summary_start(path: Path) -> int | None:
-    """Where the summary of a file begins, if it has a whole one that no checksum denies."""
+    """Return the offset of the summary of a file; None if it is not whole or fails its checksum."""
     with open_received(path) as file:
         ends = _footer(file, path.stat().st_size)
     return ends[0] if ends and ends[1] else None
 
 
 def _footer(file: BinaryIO, size: int) -> tuple[int, bool] | None:
-    """Start of the summary, and whether it is in the file and its checksum fits or is absent; None without a whole footer."""
+    """Return the offset of the summary, and True if it is in the file and passes any checksum. None without a whole footer."""
     file.seek(max(0, size - FOOTER.size))
     tail = file.read()
     if len(tail) < FOOTER.size or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:
@@ -90,7 +90,7 @@ def _footer(file: BinaryIO, size: int) -> tuple[int, bool] | None:
 
 
 def checksum_of(file: BinaryIO, start: int, end: int) -> int:
-    """CRC-32 of the bytes from `start` up to `end`, a block at a time."""
+    """Return the CRC-32 of the bytes from `start` up to `end`, read in blocks."""
     total = 0
     file.seek(start)
     while (left := end - file.tell()) > 0 and (block := file.read(min(left, BLOCK))):

@@ -11,35 +11,35 @@ from ..types import SENSORS, Stream
 from .reader import Session, read
 
 WINDOW = 5_000_000_000
-"""Log time (ns) from the first message of strokes or angles on, in which all names are looked at."""
+"""Time from the first message of strokes or angles in which all names are checked, ns of log time."""
 
 KINDS = {stream: kind.named for stream, kind in SENSORS.items() if not kind.ends}
 MOST = 12
-"""Names that a sentence lists."""
+"""Limit for the number of names in a sentence."""
 
 
 def refuse_other_names(session: Session, topics: Topics, joints: int, scene: str = "") -> None:
-    """BagError if a session names other cylinders or joints than a scene has.
+    """Raise BagError if a session names other cylinders or joints than a scene has.
 
     Parameters
     ----------
     session : Session
     topics : Topics
-        How its topics and sensors are named.
+        Names of its topics and sensors.
     joints : int
-        Of the scene.
+        Number of joints of the scene.
     scene : str
-        Where that was taken from, if it is known.
+        Source of the scene; empty if unknown.
     """
     for sentence in other_names(topics, _names(session, topics, joints), joints, scene):
         raise BagError(f"{session.path}: {sentence}")
 
 
 def other_names(topics: Topics, names: Mapping[Stream, Collection[str]], joints: int, scene: str) -> Iterator[str]:
-    """How the names in a session's messages, by stream, are not those of a scene with so many joints; a sentence for each.
+    """Yield a sentence for each conflict of a session's names, by stream, with a scene of `joints` joints.
 
-    No cylinder or joint beyond them may be named, and every cylinder must be named sometime: a boom may lack an encoder, but
-    without a stroke nothing is predicted. Other names do not matter.
+    No cylinder or joint beyond them may be named. Every cylinder must be named at some time: a boom may lack an encoder, but
+    without a stroke there is no prediction. Other names are ignored.
     """
     for stream, found in names.items():
         if beyond := topics.beyond(stream, joints, found):
@@ -54,7 +54,7 @@ def other_names(topics: Topics, names: Mapping[Stream, Collection[str]], joints:
 
 
 def extra_names_message(topic: str, names: Collection[str], stream: Stream, joints: int, scene: str) -> str:
-    """That a topic names cylinders or joints beyond those of the scene, and what to do about it."""
+    """Return the message, with remedy, for a topic that names cylinders or joints beyond those of the scene."""
     kind = KINDS[stream]
     return (
         f"{topic} names {_listed(names)}; {_scene(scene)} has {_counted(joints, kind)}, so this is another boom. "
@@ -63,7 +63,7 @@ def extra_names_message(topic: str, names: Collection[str], stream: Stream, join
 
 
 def strange_names_message(topic: str, lacking: Collection[str], strange: Collection[str]) -> str:
-    """That a topic does not name what the scene has, but something else, and what to do about it."""
+    """Return the message, with remedy, for a topic that lacks names of the scene and has unknown ones."""
     return (
         f"{topic} names {_listed(strange)}, but not {_listed(lacking)}, which the scene has: if they are the same, correct "
         "them at their source, or give the mapping these names"
@@ -84,7 +84,7 @@ def _counted(number: int, kind: str) -> str:
 
 
 def _names(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[str, None]]:
-    """The names in the messages of strokes and angles, in order: within the window, and on until every cylinder was named."""
+    """Return the names in messages of strokes and angles, read for `WINDOW` and on until every cylinder was named."""
     heard = {name: [stream for stream in streams if stream in KINDS] for name, streams in topics.heard.items()}
     present = {name: streams for name, streams in heard.items() if streams and (t := session.find(name)) and t.count}
     if not present:

@@ -1,4 +1,4 @@
-"""Clock of a recorder: whether it was set back within a file, which then tells the order of messages better than it."""
+"""Detect that a recorder's clock was set back within a file. The order of the file is then the order of messages."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ from ..messages.message_block import Integers, MessageBlock
 Piece = tuple[Integers, Integers, NDArray[np.uint64]]
 """Places, channels and log times (ns) of many messages in the order of the file."""
 OUT_OF_ORDER = 0.25
-"""Share of steps back among a file's messages, from which on they were not written as they came: half are at random."""
+"""Share of steps back among a file's messages at which its order is not that of recording; a random order has half."""
 MOST = 0.5
-"""Share of messages that are of topics that step back, from which on it is the clock: it is that of all topics."""
+"""Share of messages in topics that step back at which the clock is the cause, because all topics share the clock."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LogClock:
-    """Steps back of the clock that log times are from, in the order of a file.
+    """Steps back of the clock of log times, in the order of a file.
 
-    A recorder writes a topic's messages as they come. Where the log times of one step back and go on from there, its clock was
-    set back; where they step back all the time, or for one message, the file was not written in order, and log times are sound.
+    A recorder writes a topic's messages as they come. If the log times of a topic step back and continue from there, the
+    clock was set back. If they step back often, or for one message, the file was not written in order, and its log times
+    are sound.
 
     Attributes
     ----------
     places : ndarray of int64, shape (k,)
-        Of the first message after every step.
+        Place of the first message after every step.
     shifts : ndarray of int64, shape (k,)
-        Nanoseconds that log times are behind those before all steps.
+        Total shift of the clock after every step, ns.
     """
 
     places: Integers
@@ -39,12 +40,12 @@ class LogClock:
 
     @property
     def is_set_back(self) -> bool:
-        """Return True if the order of the file counts, not that of its log times."""
+        """Return True if the clock was set back, so that the order of the file is used instead of that of log times."""
         return len(self.places) > 0
 
     @classmethod
     def of(cls, pieces: Callable[[], Iterable[Piece]]) -> LogClock:
-        """Look at a file, whose `pieces` can be gone through twice."""
+        """Return the clock of a file, whose `pieces` are read twice."""
         counts, steps, lasting = Counter[int](), Counter[int](), Counter[int]()
         newest: defaultdict[int, NDArray[np.int64]] = defaultdict(lambda: np.zeros(0, np.int64))
         for _, channels, times in pieces():
@@ -61,11 +62,11 @@ class LogClock:
 
     @property
     def total(self) -> int:
-        """Nanoseconds that the clock was set back in all."""
+        """Total time by which the clock was set back, ns."""
         return int(self.shifts[-1]) if self.is_set_back else 0
 
     def corrected(self, block: MessageBlock, places: Integers) -> MessageBlock:
-        """Return the block with log times of a clock that was not set back: they rise in the order of the file."""
+        """Return the block with log times of a clock that was not set back, rising in the order of the file."""
         return replace(block, log_times=np.maximum.accumulate(self.times(block.log_times, places)))
 
     def times(self, log_times: NDArray[np.uint64], places: Integers) -> NDArray[np.uint64]:
@@ -78,7 +79,7 @@ NEVER_SET_BACK = LogClock(np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 
 def _steps(pieces: Iterable[Piece], known: set[int]) -> tuple[Integers, Integers]:
-    """Places and shifts of all steps back: at the first message of a known channel that is earlier than its last one."""
+    """Return places and shifts of all steps back. A step is at a message of a known channel before its previous one."""
     places, shifts, newest, shift = list[int](), list[int](), 0, 0
     last: dict[int, int] = {}
     for at, channels, times in pieces:

@@ -26,9 +26,9 @@ from ..system.received_files import open_received
 from .integrity import PARSE_ERRORS
 
 LARGEST = 64 * 2**20
-"""Bytes of one record of a summary, and of all definitions, that are read at most."""
+"""Size limit of one record of a summary, and of all definitions together, bytes."""
 MOST_HELD = 2**30
-"""Bytes of one message, and of one chunk unpacked, that are held in memory at most."""
+"""Size limit of one message, and of one unpacked chunk, in memory, bytes."""
 RECORDS_PER_BYTE = 0.5
 """Records that a packed byte may hold; a message has two times and a number, which pack to 5 bytes and more."""
 
@@ -97,10 +97,10 @@ class UnpackError(McapError):
 
 
 class UnpackBudget:
-    """Limit of what the chunks of one file unpack to: bytes by memory, records by the time that they take.
+    """Limit of the unpacked chunks of one file: bytes limit the memory, records the time.
 
-    64 kB can hold chunks of millions of records that take seconds to go through. The reserve of records is for small chunks
-    that pack well; a chunk that stays within its own share is read whatever stands before it.
+    64 kB can hold chunks of millions of records that take seconds to read. The reserve of records is for small chunks that
+    pack well. A chunk within its own share of records is always read.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ def unpack(chunk: Chunk, budget: UnpackBudget) -> bytes:
     Raises
     ------
     McapError
-        If the compression is unknown, more would come out than `budget` allows, or size or checksum do not fit.
+        The compression is unknown, the content exceeds `budget`, or size or checksum do not fit.
     """
     content = unpack_start(chunk, budget)
     if len(content) != chunk.uncompressed_size:

@@ -91,7 +91,7 @@ def summarise(path: Path) -> McapFile:
     Raises
     ------
     BagError
-        If it is not there, not MCAP, cut off, damaged, or of another profile than ros2.
+        The file is missing, not MCAP, cut off, damaged, or of another profile than ros2.
     """
     with as_bag_error(path), open_received(path) as file:
         check_ends(path, file)
@@ -136,7 +136,7 @@ def _has_checksum(file: BinaryIO, place: ChunkIndex) -> bool:
 
 
 _RUN = 2**20
-"""Bytes of messages outside chunks, from which on they are a piece."""
+"""Size of a piece of messages outside chunks, bytes."""
 
 
 class _Pieces:

@@ -19,10 +19,10 @@ from .block_yaml import dump
 
 FILE_NAME = "metadata.yaml"
 VERSION = 9
-"""Of the format, as Jazzy writes it."""
+"""Version of the format that Jazzy writes."""
 
 STORAGES = {".mcap": "mcap", ".db3": "sqlite3"}
-"""Storages of rosbag2 that are read, by the ends of their files' names."""
+"""Storages of rosbag2 that are read, by the suffix of their files."""
 _ROOT = "rosbag2_bagfile_information"
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
@@ -104,7 +104,7 @@ _UNPACKERS = {
     ".zstd": "zstd -d", ".zst": "zstd -d", ".gz": "gzip -dk", ".bz2": "bzip2 -dk", ".xz": "xz -dk", ".lz4": "lz4 -d",
     ".zip": "unzip", ".tar": "tar -xf", ".tgz": "tar -xf",
 }  # fmt: skip
-"""Programs that unpack a file, by the end of its name."""
+"""Commands that unpack a file, by its suffix."""
 
 
 def refuse_packed(path: Path) -> None:
@@ -174,7 +174,7 @@ def offered_qos(qos: Qos) -> list[dict[str, Any]]:
 
 
 DEEPEST = 10_000
-"""Largest depth that is taken over."""
+"""Limit for the depth of a QoS profile that is read."""
 
 _RELIABILITY = {1: "reliable", 2: "best_effort", "reliable": "reliable", "best_effort": "best_effort"}
 _DURABILITY = {1: "transient_local", 2: "volatile", "transient_local": "transient_local", "volatile": "volatile"}

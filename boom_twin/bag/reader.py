@@ -1,4 +1,4 @@
-"""Read a recorded session: its files, what it holds, and its messages decoded in the order of their log times.
+"""Read a recorded session: its files, its content, and its decoded messages in the order of log times.
 
 A session is a rosbag2 directory, a directory of its files without ``metadata.yaml``, or a file of `boom_twin.bag.storages`.
 """
@@ -106,7 +106,7 @@ _PARSERS: dict[str, Callable[[str, str], Typesdict]] = {
     "ros2idl": lambda text, _: get_types_from_idl(text),
 }
 _SEPARATOR = re.compile(r"^={3,}[ \t]*$", re.MULTILINE)
-"""Line between definitions, which rosbags wants to have 80 characters."""
+"""Line between definitions, for which rosbags requires 80 characters."""
 
 
 def _parsed(place: str, schema: Schema, kind: str) -> Typesdict:
@@ -124,7 +124,7 @@ def _parsed(place: str, schema: Schema, kind: str) -> Typesdict:
 
 
 RECOVERED = "recovered from"
-"""The note of a session that was saved from a damaged one, which may have been ended by force."""
+"""Key of the note on a session that was recovered from a damaged one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,7 +289,7 @@ def read_blocks(session: Session, wanted: Mapping[str, str], window: TimeWindow 
 
 
 _AND = " and "
-"""Between the types of one topic, where its messages have several."""
+"""Separator between the types of a topic that has several."""
 
 
 def _topics(files: tuple[SessionFile, ...]) -> tuple[TopicInfo, ...]:

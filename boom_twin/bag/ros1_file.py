@@ -23,7 +23,7 @@ from .mcap_records import MOST_HELD
 from .session_file import CDR, SessionFile, channel_of, schema_of
 
 ENCODING = "ros1"
-"""Encoding of a message whose type is not the same in Jazzy; such a one is not converted."""
+"""Encoding of a message that is not converted, because its type differs in Jazzy."""
 _OWN = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 """Types that differ in ROS 2, and that `Typestore.ros1_to_cdr` converts."""
 _ERRORS = (ReaderError, AssertionError, EOFError, RecursionError, *PARSE_ERRORS)
@@ -66,7 +66,7 @@ def summarise(path: Path) -> Ros1File:
     Raises
     ------
     BagError
-        It is not there, no ``.bag`` of version 2.0, damaged, or has no index.
+        The file is missing, no ``.bag`` of version 2.0, damaged, or has no index.
     """
     with _reader(path) as reader:
         connections = reader.connections

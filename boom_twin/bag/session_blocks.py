@@ -20,7 +20,7 @@ from .time_window import WHOLE, TimeWindow
 
 
 class Source(NamedTuple):
-    """Where messages are from: a file and a topic of it, what that was asked for as, and its type."""
+    """Source of messages: a file, a topic in it, the `name` by which the topic was requested, and its type."""
 
     file: Path
     topic: str
@@ -29,21 +29,21 @@ class Source(NamedTuple):
 
 
 class SessionBlocks:
-    """The messages of some topics by log time, those of equal times in the order of the files; iterate for blocks.
+    """Iterable over blocks of the messages of some topics, sorted by log time, then by file.
 
     Parameters
     ----------
     files : sequence of (SessionFile, set of int)
-        With the channels that are read.
+        Files, each with the channels to read.
     asked : mapping of str to str
-        As what each topic is asked for, by its name in the files.
+        Name by which each topic is requested, by its name in the files.
     window : TimeWindow
-        Only the messages in it.
+        Time window; messages outside it are left out.
 
     Attributes
     ----------
     sources : list of Source
-        What the sources of the blocks stand for.
+        Source for each source number of the blocks.
 
     Raises
     ------
@@ -58,7 +58,7 @@ class SessionBlocks:
         self._files = [(file, self._numbers(file, channels, asked)) for file, channels in files]
 
     def _numbers(self, file: SessionFile, channels: set[int], asked: Mapping[str, str]) -> dict[int, int]:
-        """Places in `sources` by channel; -1 for what was not asked for."""
+        """Return the index in `sources` by channel; -1 for a channel that was not requested."""
         numbers = dict.fromkeys(file.channels, -1)
         for channel in file.channels.values():
             if channel.id in channels:
@@ -77,7 +77,7 @@ class SessionBlocks:
         return blocks if self._window == WHOLE else self._window.cut(blocks, self._files[0][0].path)
 
     def decoded(self, block: MessageBlock, row: int) -> Any:
-        """One message of rosbags, None for a type that Jazzy does not have; BagError if it cannot be decoded."""
+        """Return one decoded message; None for a type unknown to Jazzy. Raise BagError if it cannot be decoded."""
         source = self.sources[block.sources[row]]
         try:
             return decode(block.data(row), source.type) if source.type in jazzy().types else None
@@ -87,7 +87,7 @@ class SessionBlocks:
 
 
 def _wanted(file: SessionFile, numbers: Mapping[int, int], clock: LogClock, ahead: int) -> Iterator[MessageBlock]:
-    """The messages of one file whose channels have a number of 0 or more, their source; log times are later by `ahead` (ns)."""
+    """Yield blocks of the requested channels of one file (number 0 or more), with log times shifted by `ahead` (ns)."""
     seen: Counter[int] = Counter()
     passed = {channel for channel, number in numbers.items() if number < 0}
     with as_bag_error(file.path):
@@ -106,7 +106,7 @@ def _wanted(file: SessionFile, numbers: Mapping[int, int], clock: LogClock, ahea
 
 
 def _merged(files: Sequence[Iterator[MessageBlock]]) -> Iterator[MessageBlock]:
-    """The blocks of all files by log time; at equal times in the order of the files."""
+    """Yield blocks of the messages of all files, sorted by log time, then by file."""
     filling = [(block for block in file if len(block)) for file in files]
     waiting = [next(file, None) for file in filling]
     while filled := [(number, block) for number, block in enumerate(waiting) if block is not None]:

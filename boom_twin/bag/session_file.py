@@ -1,4 +1,4 @@
-"""One file of a session, however it is stored: what it holds, and its messages as CDR."""
+"""One file of a session in any storage: its content, and its messages as CDR."""
 
 from __future__ import annotations
 

@@ -83,9 +83,9 @@ def samples_of(
     angle_stamps_ns: NDArray[np.int64] | None = None,
     forces: Array | None = None,
 ) -> list[Sample]:
-    """The samples of a session in the order of their stamps, of one stamp strokes first; arrays as in `write_session`.
+    """Return the samples of a session by stamp, strokes first at equal stamps, from arrays as in `write_session`.
 
-    Where a row has no value at all, there is no sample.
+    A row without any value gives no sample.
     """
     angle_stamps = stamps_ns if angle_stamps_ns is None else angle_stamps_ns
     streams: list[tuple[Stream, NDArray[np.int64], Array | None]] = [
@@ -105,7 +105,7 @@ def samples_of(
 
 
 def sensor_message(sample: Sample) -> Any:
-    """The message as a sensor of a rig would send it; of an Imu only the acceleration is there, and of it only the plane."""
+    """Return the message as a sensor of a rig sends it. An Imu has only the acceleration in the plane."""
     kind = SENSORS[sample.stream]
     msg = new_message(kind.message)
     if kind.is_imu:

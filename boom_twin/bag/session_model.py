@@ -1,4 +1,4 @@
-"""Choose the scene and the baseline of a session: those given, else those that the session keeps, else the package's own."""
+"""Choose the scene and the baseline of a session: those given, else those of the session, else those of the package."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def scene_from(source: str | Path | None) -> SessionScene:
     Raises
     ------
     SceneError
-        As `boom_twin.load_scene`.
+        The file cannot be used, see `boom_twin.load_scene`.
     """
     name = DEFAULT_NAME if source is None else str(source)
     text = default_text() if source is None else read_text(Path(source))
@@ -151,8 +151,8 @@ class SessionSettings:
 def settings_of(session: Path, given: Path | None = None, namespace: str = "") -> SessionSettings:
     """Return the settings of a session's twin.
 
-    The source is the parameter file `given` for the node in `namespace`, else the node that ran beside the recording, else
-    the defaults of the package.
+    The source is the parameter file `given` for the node in `namespace`. Without it, the source is the node that ran beside
+    the recording, else the defaults of the package.
 
     Raises
     ------
@@ -191,7 +191,7 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
     Raises
     ------
     UsageError
-        As `boom_twin.messages.mapping.load_mapping`.
+        The mapping has faults, see `boom_twin.messages.mapping.load_mapping`.
     BagError
         ``session.yaml`` cannot be read.
     """

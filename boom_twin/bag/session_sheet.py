@@ -1,4 +1,4 @@
-"""``session.yaml`` of a session: its notes, the scene it was recorded with, and whether the folder is whole."""
+"""Session metadata in ``session.yaml``: notes, the scene at recording, and the state of the folder."""
 
 from __future__ import annotations
 
@@ -208,7 +208,7 @@ def _time(moment: datetime) -> str:
 
 
 _BEGUN, _ENDED = (re.compile(rb"^%b:" % key, re.MULTILINE) for key in (b"started", b"ended"))
-"""Lines that the recorder writes at the beginning, and at the end; the texts inside ``session.yaml`` are indented."""
+"""Patterns of the lines that the recorder writes at its start and at its end. Texts in ``session.yaml`` are indented."""
 
 
 def incompleteness(path: Path) -> str:

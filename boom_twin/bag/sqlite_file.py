@@ -20,7 +20,7 @@ from .session_file import SessionFile, channel_of, schema_of
 
 MAGIC = b"SQLite format 3\0"
 BESIDE = ("-wal", "-journal")
-"""Ends of the names of files in which sqlite3 keeps what is not in the database yet."""
+"""Suffixes of the files in which sqlite3 keeps data that are not in the database yet."""
 _MESSAGES = "SELECT topic_id, timestamp, data, id FROM messages ORDER BY"
 _ARE_NUMBERS = "typeof(topic_id) = 'integer' AND typeof(timestamp) = 'integer'"
 _LOG_TIMES = f"SELECT id, topic_id, timestamp FROM messages WHERE {_ARE_NUMBERS} ORDER BY id"

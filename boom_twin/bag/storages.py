@@ -1,4 +1,4 @@
-"""The kinds of files that a session may be stored in, by the ends of their names."""
+"""Kinds of files in which a session may be stored, by their suffixes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SUMMARISE: dict[str, Callable[[Path], SessionFile]] = {
     ".bag": ros1_file.summarise,
     ".csv": csv_file.summarise,
 }
-"""Those of rosbag2 may lie in a folder, see `STORAGES`; the others are sessions by themselves."""
+"""Function for each suffix. Files of rosbag2 may lie in a folder, see `STORAGES`; any other file is a session by itself."""
 
 
 def summarise(path: Path) -> SessionFile:

@@ -13,7 +13,7 @@ from ..messages.message_block import MessageBlock
 from ..types import NANO
 
 NEVER = 2**64 - 1
-"""Log time, ns, after all others."""
+"""Log time after all others, ns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,26 +23,26 @@ class TimeWindow:
     Attributes
     ----------
     start : float
-        s after the first message of the topics that are read.
+        Time after the first message of the topics that are read, s.
     duration : float or None
-        s; None: to the end.
+        Length, s; None is to the end of the session.
     """
 
     start: float = 0.0
     duration: float | None = None
 
     def share(self, length: float) -> float:
-        """Which share of a session of `length` (s) it is, 0 to 1."""
+        """Return the share of a session of `length` (s) that lies in the window, 0 to 1."""
         left = max(0.0, length - self.start)
         return min(left, left if self.duration is None else self.duration) / length if length > 0.0 else 1.0
 
     def cut(self, blocks: Iterable[MessageBlock], path: Path) -> Iterator[MessageBlock]:
-        """The messages inside; blocks after its end are not read.
+        """Yield the messages inside the window. Blocks after its end are not read.
 
         Raises
         ------
         BagError
-            There is none.
+            No message is in the window.
         """
         first: int | None = None
         is_empty, newest = True, 0.0
@@ -62,10 +62,10 @@ class TimeWindow:
             )
 
     def bounds(self, first: int) -> tuple[int, int]:
-        """Log times, ns, of a session that begins at `first`: where the window begins, and the first one after it."""
+        """Return the first log time (ns) in the window and the first one after it, for a session that begins at `first`."""
         begin = min(NEVER, first + round(self.start / NANO))
         return begin, NEVER if self.duration is None else min(NEVER, begin + round(self.duration / NANO))
 
 
 WHOLE = TimeWindow()
-"""All of a session."""
+"""Window of the whole session."""

@@ -48,14 +48,14 @@ def claim_directory(directory: Path) -> None:
 CHUNK_SIZE = 64 * 1024
 """Bytes of messages that wait in memory: about one second of a 200 Hz session."""
 RESULT_CHUNK_SIZE = 512 * 1024
-"""The same of results, which nobody waits for: about a second of all outputs at 200 Hz. Fewer chunks make less of an index."""
+"""Bytes of messages in a chunk of a result bag: about a second of all outputs at 200 Hz. Fewer chunks need less index."""
 LIBRARY = "boom_twin"
 LARGEST_MESSAGE = MOST_HELD - 2**20
-"""Bytes of a message that can be read again: a chunk holds its topic and type too."""
+"""Size limit of a message, bytes. Its chunk holds topic and type, too, and must be readable."""
 
 
 METADATA_PAUSE = 10.0
-"""Time from one writing of ``metadata.yaml`` at a split to the next, over what it takes: it grows with every file."""
+"""Pause between two writings of ``metadata.yaml`` at splits, as a multiple of the writing time, which grows with every file."""
 
 
 class BagWriter:
@@ -70,7 +70,7 @@ class BagWriter:
     notes : dict of str to str, optional
         Kept in every file and in ``custom_data``.
     compression : CompressionType, optional
-        Of the chunks.
+        Compression of the chunks.
     distro : str, optional
         ROS distribution named in the metadata.
     chunk_size : int, optional
@@ -273,7 +273,7 @@ class SessionWriter:
     notes : dict of str to str, optional
         Kept in the file and in ``custom_data``; for instance that the session is synthetic, and its origin.
     compression : CompressionType, optional
-        Of the chunks.
+        Compression of the chunks.
     chunk_size : int, optional
         Bytes of a chunk, before it is compressed.
 

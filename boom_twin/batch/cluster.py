@@ -1,4 +1,4 @@
-"""Sessions side by side: threads of this process, each of which waits for a session's process, here or by way of Dask."""
+"""Sessions in parallel: threads of this process, each of which waits for a session's process, here or on a Dask worker."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def on_dask(client: Client, work: Callable[[SessionTask], Row]) -> Workers:
 def rows_of(workers: Workers, tasks: Sequence[SessionTask]) -> Iterator[Row]:
     """Yield the rows of all tasks as they finish. A failed task does not affect other rows.
 
-    A scheduler gets no more tasks than its workers have threads: when a worker ends, Dask counts that against every task
+    A scheduler gets no more tasks than its workers have threads. When a worker ends, Dask counts that against every task
     that waits there, not only against the running one. Workers that join later are used, too.
     """
     waiting, rows, threads = deque(tasks), SimpleQueue[Row](), list[Thread]()

@@ -1,4 +1,4 @@
-"""Folder of a batch: a file for every finished row, so that a second call goes on; the table and the page at its end."""
+"""Folder of a batch: a file for every finished row, with which a second call continues, and the final table and page."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MARK, TABLE, PAGE = "batch.json", "sessions.parquet", "batch.html"
 ROWS, SESSIONS = "rows", "sessions"
 """Folders of the rows, and of the replays."""
 DIGEST = "row_sha256"
-"""Key of a row's file that shows that the others are whole."""
+"""Key of a row's digest in its file, by which a change is detected."""
 _OWN = frozenset({MARK, TABLE, PAGE, ROWS, SESSIONS})
 
 

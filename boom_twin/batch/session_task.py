@@ -1,4 +1,4 @@
-"""One session of a batch: what is to be done with it, the process that does it, and the row of the table that comes out."""
+"""One session of a batch: its task, the process that does it, and the resulting row of the table."""
 
 from __future__ import annotations
 

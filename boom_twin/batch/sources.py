@@ -1,4 +1,4 @@
-"""Which sessions a batch is of: paths, globs, and files that list them."""
+"""Sessions of a batch from paths, globs, and files that list them."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from ..bag.storages import is_session
 from ..errors import UsageError
 
 LIST = ".txt"
-"""How the name of a file ends that lists sessions."""
+"""Suffix of a file that lists sessions."""
 
 
 def sessions_of(sources: Iterable[str]) -> list[Path]:
-    """All sessions that are named, each once, in the order of their names there.
+    """Return all sessions of the sources, each once, in the order of the sources.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def _listed(file: Path) -> Iterator[Path]:
 
 
 def _matching(pattern: str) -> Iterator[Path]:
-    """The path, or the sessions that a glob fits: folders that hold one, and single files."""
+    """Yield a path, or the sessions (folders and single files) that a glob fits."""
     if not glob.has_magic(pattern) or Path(pattern).exists():
         yield Path(pattern)
         return
@@ -61,7 +61,7 @@ def _matching(pattern: str) -> Iterator[Path]:
 
 
 def _expanded(pattern: str) -> Iterator[str]:
-    """Yield the paths that a glob fits; ``**`` does not go on through links, which may lead in a circle."""
+    """Yield the paths that a glob fits. ``**`` does not follow links, which may lead in a circle."""
     before, *after = re.split(r"(?<![^/])\*\*(?![^/])", pattern, maxsplit=1)
     if not after:
         yield from glob.glob(pattern)
@@ -75,14 +75,14 @@ def _expanded(pattern: str) -> Iterator[str]:
 
 
 def key_of(session: Path) -> str:
-    """Name of a session's files among the results: its own, and a digest of its path."""
+    """Return the key of a session among the results: its name and a digest of its path."""
     path = Path(os.path.realpath(session))
     name = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in path.stem)
     return f"{name[:40]}-{sha256(str(path).encode(errors='surrogateescape')).hexdigest()[:10]}"
 
 
 def fingerprint(session: Path, options: str) -> str:
-    """Changes with the files of a session, by their sizes and times of change, and with the options of the batch."""
+    """Return a digest of the names, sizes and times of change of a session's files and of the options of the batch."""
     files = sorted(session.iterdir()) if session.is_dir() else [session, sheet_path(session)]
     told = [options]
     for file in files:

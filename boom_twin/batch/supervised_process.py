@@ -1,4 +1,4 @@
-"""Run a command with limits of time and memory, apart from its caller: whatever becomes of it, the caller goes on."""
+"""Run a command as a separate process with limits of time and memory. The caller survives any end of it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from threading import Thread
 LOOK = 0.1
 """Seconds between looks at the memory."""
 MOST_TOLD = 2000
-"""Last bytes of what a process said on stderr that are told."""
+"""Number of last bytes of a process's stderr that are reported."""
 
 
 @dataclass(frozen=True, slots=True)

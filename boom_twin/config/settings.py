@@ -21,11 +21,11 @@ _GONE = ("jerk_density", "lag", "stroke_agility", "step", "look_step", "step_tip
 RETIRED = dict.fromkeys(
     (*_GONE, "section_deviation"), "without effect since 0.2.0, whose filter adapts by itself: leave it out"
 ) | {"false_alarms": "without effect since 0.2.0: leave it out"}
-"""Parameters of earlier versions, and what takes their place."""
+"""Parameters of earlier versions, and the remedy for each."""
 
 
 ROS_OWN = ("use_sim_time", "start_type_description_service", "qos_overrides.")
-"""How the names of parameters begin that rclpy declares for every node."""
+"""First part of the names of parameters that rclpy declares for every node."""
 
 
 def read_parameters(path: Path, namespace: str = "") -> dict[str, Any]:
@@ -146,9 +146,9 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 NODE_ONLY = ("scene", "mapping", "health", "baseline", "frame_prefix", "hardware_id", "autostart", "monitor")
 STROKE_RATE = 0.5
-"""No cylinder is faster, m/s."""
+"""Upper bound of a cylinder's speed, m/s."""
 LIVE = "live"
-"""Marks what can change while the twin runs."""
+"""Mark of a setting that can change while the twin runs."""
 Load = Annotated[float, Field(ge=-1, le=1e5, allow_inf_nan=False), LIVE]
 Limit = Annotated[float, Field(ge=1e-6, le=1e9, allow_inf_nan=False), LIVE]
 

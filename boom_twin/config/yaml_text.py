@@ -17,20 +17,20 @@ from ..errors import BoomTwinError
 from ..system.received_files import open_received
 
 LARGEST = 4 * 2**20
-"""Bytes of a file that is read."""
+"""Size limit of a file that is read, bytes."""
 MOST = 50_000
-"""Values that it may hold, aliases written out."""
+"""Limit for the number of values in a file, with aliases expanded."""
 DEEPEST = 30
 
 TAG = "tag:yaml.org,2002:"
 TYPED = {"int": "whole number", "float": "number", "bool": "true or false", "null": "empty value"}
-"""Kinds of scalars that are more than text, in words."""
+"""Kinds of scalars other than text, with their names for messages."""
 
 
 def read_plain(path: Path, failure: type[BoomTwinError], remedy: str, received: bool = False) -> Any:
-    """The values of a YAML file; `failure` with the path, the reason and the remedy if it cannot be read.
+    """Return the values of a YAML file. Raise `failure` with path, reason and remedy if it cannot be read.
 
-    `received` says that it lies in a folder from somebody else, see `boom_twin.system.received_files.open_received`.
+    `received` is True for a file in a received folder, see `boom_twin.system.received_files.open_received`.
     """
     try:
         with open_received(path) if received else path.open("rb") as stream:
@@ -45,7 +45,7 @@ def read_plain(path: Path, failure: type[BoomTwinError], remedy: str, received: 
 
 
 def plain(text: str) -> Any:
-    """The values of a YAML text: dict, list, str, int, float, bool or None; None for an empty text.
+    """Return the values of a YAML text: dict, list, str, int, float, bool or None; None for an empty text.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def plain(text: str) -> Any:
 
 
 def bounded_nodes(text: str) -> tuple[Node | None, Any]:
-    """The root node of an untrusted YAML text, None if it is empty, and what constructs scalars of it.
+    """Return the root node of an untrusted YAML text (None if empty) and the constructor of its scalars.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def bounded_nodes(text: str) -> tuple[Node | None, Any]:
 
 
 class BoundedComposer(Composer):
-    """Stops at too many nodes, each of which takes a hundred times the memory of its text, and at another YAML than 1.2."""
+    """Composer that refuses YAML other than 1.2 and too many nodes, because a node takes 100 times the memory of its text."""
 
     nodes = 0
 
@@ -85,7 +85,7 @@ class BoundedComposer(Composer):
         self.warn_double_anchors = False  # YAML allows them; the warning is one of Python
 
     def compose_document(self) -> Any:
-        """The root; in YAML 1.1, `010` is 8 and `on` is true, which nobody means who writes a scene or a mapping."""
+        """Return the root of a YAML 1.2 document. YAML 1.1 is refused, because there `010` is 8 and `on` is true."""
         event = self.parser.peek_event()
         if event.version not in (None, (1, 2)):
             version = ".".join(map(str, event.version))
@@ -94,7 +94,7 @@ class BoundedComposer(Composer):
         return super().compose_document()
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        """The next node."""
+        """Return the next node. Raise YAMLError after `MOST` nodes."""
         self.nodes += 1
         if self.nodes > MOST:
             raise YAMLError(f"more than {MOST} values")
@@ -102,7 +102,7 @@ class BoundedComposer(Composer):
 
 
 class _Values:
-    """Turns nodes into values."""
+    """Converter of nodes to values."""
 
     def __init__(self, constructor: Any) -> None:
         self._constructor, self._count = constructor, 0
@@ -139,7 +139,7 @@ class _Values:
 
 
 def typed_value(constructor: Any, node: ScalarNode) -> Any:
-    """The value of a scalar of one of the kinds `TYPED`; ValueError if its text is none, as in ``!!bool maybe``."""
+    """Return the value of a scalar of a kind in `TYPED`. Raise ValueError if its text does not fit, as in ``!!bool maybe``."""
     try:
         return constructor.construct_object(node)
     except (ArithmeticError, LookupError, TypeError, ValueError, YAMLError):
@@ -152,12 +152,12 @@ Pair = tuple[Node, Node]
 
 
 def with_value(text: str, place: Place, value: Any) -> str:
-    """The text with another value at `place`; blocks on the way to it that are not there are made.
+    """Return the text with another value at `place`. Missing blocks on the way to it are added.
 
     Parameters
     ----------
     value : bool, int, float, str or dict of these
-        None takes the key out.
+        New value; None removes the key.
     """
     root = YAML(typ="safe", pure=True).compose(text)
     block, depth = _deepest(root, place)
@@ -179,7 +179,7 @@ def with_value(text: str, place: Place, value: Any) -> str:
 
 
 def whole_text(values: Any) -> str:
-    """Plain values as a YAML file, keys in their order, innermost blocks in braces."""
+    """Return plain values as the text of a YAML file, with keys in their order and innermost blocks in braces."""
     stream = StringIO()
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
@@ -189,7 +189,7 @@ def whole_text(values: Any) -> str:
 
 
 def yaml_text(value: Any) -> str:
-    """A value in the spelling of YAML, six digits; a text of several lines as a block for the outermost mapping."""
+    """Return a value as YAML with six digits. A text of several lines becomes a block for the outermost mapping."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key}: {yaml_text(item)}" for key, item in value.items()) + "}"
     if isinstance(value, str) and "\n" in value:
@@ -200,7 +200,7 @@ def yaml_text(value: Any) -> str:
 
 
 def _deepest(node: Node, place: Place) -> tuple[MappingNode, int]:
-    """The last mapping on the way to a place, and how many steps lead to it."""
+    """Return the last existing mapping on the way to a place, and the number of steps to it."""
     found, depth, inner = cast(MappingNode, node), 0, cast(Node | None, node)
     for taken, step in enumerate(place[:-1], start=1):
         if isinstance(inner, MappingNode):
@@ -213,7 +213,7 @@ def _deepest(node: Node, place: Place) -> tuple[MappingNode, int]:
 
 
 def _inserted(text: str, block: MappingNode, line: str) -> str:
-    """A key added: at the end of a block in braces, else above its first key."""
+    """Return the text with a key added at the end of a block in braces, else above its first key."""
     if block.flow_style and not block.value:
         return f"{text[: block.start_mark.index]}{{{line}}}{text[block.end_mark.index :]}"
     if block.flow_style:
@@ -224,7 +224,7 @@ def _inserted(text: str, block: MappingNode, line: str) -> str:
 
 
 def _removed(text: str, block: MappingNode, number: int) -> str:
-    """A key taken out with its value; in a block without braces, with the rest of its line."""
+    """Return the text without a key and its value. In a block without braces, the rest of the line is removed, too."""
     pairs: list[Pair] = block.value
     start, end = pairs[number][0].start_mark.index, _end(text, pairs[number][1])
     if number == 0:
@@ -236,7 +236,7 @@ def _removed(text: str, block: MappingNode, number: int) -> str:
 
 
 def _end(text: str, node: Node) -> int:
-    """Where the text of a node ends; the mark of a block without braces lies behind the comments that follow it."""
+    """Return the end of the text of a node. The end mark of a block without braces lies after the comments that follow it."""
     if not isinstance(node, CollectionNode):
         start = int(node.start_mark.index)
         return start + len(text[start : node.end_mark.index].rstrip())

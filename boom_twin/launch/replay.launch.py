@@ -52,11 +52,11 @@ ARGUMENTS = [
 PASSED_ON = (
     "scene", "params_file", "mapping", "namespace", "frame_prefix", "state_publisher", "monitor", "rviz", "record",
 )  # fmt: skip
-"""To ``twin.launch.py``."""
+"""Arguments that are passed to ``twin.launch.py``."""
 LAST = 3.0
-"""Seconds from the end of the session, in which node and recorder take what is on its way."""
+"""Time after the end of the session for node and recorder to take the last messages, s."""
 KEPT = {"scene": "scene:=FILE", "mapping": "mapping:=FILE"}
-"""What the session keeps, and how something else is given."""
+"""Files that the session keeps, and the argument that replaces each."""
 
 
 def generate_launch_description() -> LaunchDescription:

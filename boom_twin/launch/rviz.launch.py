@@ -29,12 +29,12 @@ ARGUMENTS = [
 
 
 def generate_launch_description() -> LaunchDescription:
-    """The arguments above, and RViz."""
+    """Return the arguments above and RViz."""
     return LaunchDescription([*ARGUMENTS, OpaqueFunction(function=rviz)])
 
 
 def rviz(context: LaunchContext) -> list[LaunchDescriptionEntity]:
-    """RViz in the twin's namespace, to which its topics are relative; a copy of its file has the frames."""
+    """Return RViz in the twin's namespace, to which its topics are relative. A copy of its file has the frame prefix."""
     given = {each.name: LaunchConfiguration(each.name).perform(context) for each in ARGUMENTS}
     folder = TemporaryDirectory(prefix="boom_twin_")
     atexit.register(folder.cleanup)

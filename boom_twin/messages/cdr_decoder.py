@@ -122,7 +122,7 @@ class Layout(NamedTuple):
 
 
 MOST_LAYOUTS = 8
-"""Layouts of one topic that are remembered: a bus may send every joint in a message of its own."""
+"""Number of layouts kept for one topic: a bus may send every joint in a message of its own."""
 
 
 class CdrDecoder:

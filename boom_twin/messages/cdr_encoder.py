@@ -25,43 +25,43 @@ _DOUBLE, _SINGLE = 0x7E37_E43C_8800_0000, 0x7E96_7600
 
 
 class NumberFields:
-    """Placeholders of the numbers that are filled in, each of them once."""
+    """Source of placeholders for the numbers of a template, each unique."""
 
     def __init__(self) -> None:
         self.doubles = self.singles = 0
 
     def double(self) -> float:
-        """The next placeholder of a ``float64``."""
+        """Return the next placeholder of a ``float64``."""
         self.doubles += 1
         return float(np.uint64(_DOUBLE + self.doubles - 1).view(np.float64))
 
     def single(self) -> float:
-        """The next placeholder of a ``float32``."""
+        """Return the next placeholder of a ``float32``."""
         self.singles += 1
         return float(np.uint32(_SINGLE + self.singles - 1).view(np.float32))
 
     def row(self, count: int) -> list[float]:
-        """The next `count` placeholders of ``float64``."""
+        """Return the next `count` placeholders of ``float64``."""
         return [self.double() for _ in range(count)]
 
 
 class Template:
-    """One encoded message.
+    """Encoded message with places for stamps and numbers.
 
     Parameters
     ----------
     type_name : str
     msg : message of rosbags
-        Its numbers are constants, or of `fields`; its stamps are `STAMP` s.
+        Message whose numbers are constants or from `fields`, and whose stamps are `STAMP` s.
     fields : NumberFields
-        Those of `msg`.
+        Placeholders in `msg`.
 
     Attributes
     ----------
     size : int
-        Bytes of a message.
+        Size of a message, bytes.
     double_places, stamp_places : ndarray of int64
-        Of every field among the doubles, and of every stamp among the words of four bytes, that begin after the encapsulation.
+        Index of every field among the doubles, and of every stamp among the words of four bytes, after the encapsulation.
     """
 
     def __init__(self, type_name: str, msg: Any, fields: NumberFields) -> None:
@@ -76,7 +76,7 @@ class Template:
         self.double_places = _places(self._doubles.view("<i8"), _DOUBLE, fields.doubles)
 
     def byte_of(self, double: int) -> int:
-        """Where in the message the field of that number begins; -1 is the last one."""
+        """Return the offset of a field in the message, by its index among the doubles; -1 is the last field."""
         return ORIGIN + 8 * int(self.double_places[double])
 
     def put_into(self, data: Bytes) -> None:
@@ -84,7 +84,7 @@ class Template:
         data[: self.size] = np.frombuffer(self._data, np.uint8)
 
     def fill(self, stamp: int, doubles: Array | Sequence[float], singles: Sequence[float] = ()) -> bytes:
-        """The message with a stamp (ns) in all its headers, and with numbers in the order in which the fields were made."""
+        """Return the message with a stamp (ns) in all its headers, and with numbers in the order of the placeholders."""
         time = divmod(stamp, SECOND)
         for place in self._stamps:
             _TIME.pack_into(self._data, place, *time)
@@ -94,7 +94,7 @@ class Template:
         return bytes(self._data)
 
     def fill_rows(self, stamps: Integers, doubles: Array | Sequence[Array]) -> Bytes:
-        """Many messages, a row of bytes each, with stamps, shape (k,), and numbers, shape (d, k); see `fill`."""
+        """Return many messages, a row of bytes each, with stamps, shape (k,), and numbers, shape (d, k); see `fill`."""
         rows = np.empty((len(stamps), len(self._data)), np.uint8)
         rows[:] = np.frombuffer(self._data, np.uint8)
         rows[:, ORIGIN : ORIGIN + self._doubles.nbytes].view("<f8")[:, self.double_places] = np.transpose(doubles)
@@ -110,7 +110,7 @@ def stamped(header: Any, frame: str = FRAME) -> None:
 
 
 def _places(bits: Any, first: int, count: int) -> Any:
-    """Where the placeholders are, in the order in which they were made; each must be there once."""
+    """Return the indices of the placeholders in their order. Raise ValueError unless each is there once."""
     found = np.flatnonzero((bits >= first) & (bits < first + count))
     places = found[np.argsort(bits[found])]
     if bits[places].tolist() != list(range(first, first + count)):

@@ -18,11 +18,11 @@ class EncodedRows(NamedTuple):
     Attributes
     ----------
     key : str
-        Of the topic.
+        Key of the topic.
     places : ndarray of int64, shape (k,)
-        Where in the block each of them stands.
+        Index of each message in the block.
     data : ndarray of uint8, shape (k, length)
-        Contiguous, not empty.
+        Bytes of each message; contiguous, not empty.
     """
 
     key: str
@@ -31,43 +31,43 @@ class EncodedRows(NamedTuple):
 
 
 class EncodedBlock(NamedTuple):
-    """Messages in the order in which they are to be written.
+    """Encoded messages in the order of writing.
 
     Attributes
     ----------
     log_times : ndarray of int64, shape (n,)
-        Nanoseconds.
+        Log time of each message, ns.
     rows : list of EncodedRows
-        Every place from 0 to n - 1 stands in one of them.
+        Groups that hold every index from 0 to n - 1 once.
     """
 
     log_times: Integers
     rows: list[EncodedRows]
 
     def data(self) -> list[bytes]:
-        """The data of each message; there must be one."""
+        """Return the bytes of each message, in order, of a block that is not empty."""
         places = np.concatenate([rows.places for rows in self.rows])
         found = [data.tobytes() for rows in self.rows for data in rows.data]
         return [found[row] for row in np.argsort(places)]
 
 
 class EncodedBlockBuilder:
-    """Brings groups of encoded messages into the order of the samples that caused them."""
+    """Builder of a block from groups of encoded messages, sorted by the samples that caused them."""
 
     def __init__(self) -> None:
         self._groups: list[tuple[str, Integers, Integers, Bytes]] = []
 
     def add(self, key: str, at: Integers, turns: Integers | int, data: Bytes) -> None:
-        """Messages of one topic and one length, of the samples in the rows `at`; `turns` is their order within a sample."""
+        """Add messages of one topic and one length for the samples in rows `at`. `turns` is their order within a sample."""
         if len(at):
             self._groups.append((key, at, np.full(len(at), turns), data))
 
     def add_one(self, key: str, at: int, turn: int, data: bytes) -> None:
-        """A single message."""
+        """Add a single message."""
         self.add(key, np.array([at]), turn, np.frombuffer(data, np.uint8)[np.newaxis])
 
     def block(self, stamps: Integers) -> EncodedBlock:
-        """All of them; the log times are the stamps (ns) of the samples."""
+        """Return the block of all messages. Log times are the stamps (ns) of the samples."""
         if not self._groups:
             return EncodedBlock(stamps[:0], [])
         at, turns = (np.concatenate([group[column] for group in self._groups]) for column in (1, 2))

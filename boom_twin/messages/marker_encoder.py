@@ -17,11 +17,11 @@ from .type_store import new_message
 POINT = struct.Struct("<3d")
 LINE_STRIP, TEXT, ADD = 4, 9, 0
 LIFETIME = 1
-"""Seconds that a marker stays when no other comes."""
+"""Lifetime of a marker, s."""
 TRACE = 5_000_000_000
-"""Nanoseconds of the tip's trace."""
+"""Duration of the tip's trace, ns."""
 TEXT_HEIGHT = 0.35
-"""m."""
+"""Height of the text, m."""
 
 Colour = tuple[float, float, float, float]
 BOOM: Colour = (0.90, 0.45, 0.10, 1.0)
@@ -32,7 +32,7 @@ NO_FORCE, TENSION, COMPRESSION = (np.array(rgb) for rgb in ((0.75, 0.75, 0.75), 
 
 
 class ShapeMarkers:
-    """Fills one MarkerArray; namespaces and ids are the same in every message.
+    """Encoder of a MarkerArray whose namespaces and ids are equal in every message.
 
     ============================  =========================  ========================================================
     namespace, id                 type                       content
@@ -52,7 +52,7 @@ class ShapeMarkers:
     force_scale : float
         Force that has the full colour, N.
     frame : str
-        Of all markers.
+        Frame of all markers.
     """
 
     def __init__(self, exaggeration: float, force_scale: float, frame: str = FRAME) -> None:
@@ -61,7 +61,7 @@ class ShapeMarkers:
         self._past: deque[tuple[int, bytes]] = deque()
 
     def fill(self, prediction: Prediction) -> bytes:
-        """The encoded message of a prediction that has a shape."""
+        """Return the encoded message of a prediction that has a shape."""
         line, straight, pins = prediction.shape, prediction.undeflected, prediction.pins
         assert line is not None and straight is not None and pins is not None
         large = straight + self._factor * (line - straight)
@@ -74,7 +74,7 @@ class ShapeMarkers:
         return self._with_trace(self._template.fill(prediction.stamp, numbers, colours))
 
     def _new_template(self, points: int, cylinders: int) -> Template:
-        """The message with a trace of one point; its lines have so many points."""
+        """Return the template of a message whose lines have `points` points and whose trace has one point."""
         msg, fields = new_message(TYPES[Output.SHAPE]), NumberFields()
         msg.markers = [
             self._line("boom", 0, 0.12, BOOM, fields, points),
@@ -87,7 +87,7 @@ class ShapeMarkers:
         return Template(TYPES[Output.SHAPE], msg, fields)
 
     def _with_trace(self, data: bytes) -> bytes:
-        """All points of the trace instead of the single one; 24 bytes each, so nothing behind them is aligned anew."""
+        """Return the message with all points of the trace. A point has 24 bytes, so the alignment after them is unchanged."""
         assert self._template is not None
         point = self._template.byte_of(-2)
         count = point - 4 if data[point - 4] else point - 8  # before the padding, if there is any
@@ -95,7 +95,7 @@ class ShapeMarkers:
         return b"".join([head, len(self._past).to_bytes(4, "little"), padding, *(place for _, place in self._past), tail])
 
     def _extend_trace(self, stamp: int, tip: Array) -> None:
-        """Forget what is too old, and what is to come where time was set back; add the newest."""
+        """Add the newest point to the trace. Remove points older than `TRACE`, and points after `stamp` (time set back)."""
         while self._past and self._past[-1][0] >= stamp:
             self._past.pop()
         while self._past and self._past[0][0] < stamp - TRACE:
@@ -103,7 +103,7 @@ class ShapeMarkers:
         self._past.append((stamp, POINT.pack(tip[0], 0.0, tip[1])))
 
     def _line(self, namespace: str, number: int, width: float, colour: Colour | None, fields: NumberFields, points: int) -> Any:
-        """A line of so many points; without a colour, that is one of four fields."""
+        """Return a line of `points` points. Without a colour, the colour is four number fields."""
         marker = self._marker(namespace, number, LINE_STRIP, colour or tuple(fields.single() for _ in range(4)))
         marker.scale.x = width
         marker.points = [new_message("geometry_msgs/msg/Point") for _ in range(points)]
@@ -127,7 +127,7 @@ class ShapeMarkers:
 
 
 def force_colour(share: float) -> Colour:
-    """Grey without force, red at a tension of `share` 1, blue at a compression of -1; grey and pale for NaN."""
+    """Return the colour of a cylinder: grey at `share` 0, red at 1 (tension), blue at -1 (compression), pale grey for NaN."""
     if share != share:
         return GHOST
     end = TENSION if share > 0.0 else COMPRESSION

@@ -17,5 +17,5 @@ def fill_header(header: Any, stamp: int, frame: str = FRAME) -> None:
 
 
 def fill_xz(target: Any, values: Array | Sequence[float]) -> None:
-    """Model x to x, model y to z; y is 0."""
+    """Write model x to x and model y to z; y stays 0."""
     target.x, target.y, target.z = float(values[0]), 0.0, float(values[1])

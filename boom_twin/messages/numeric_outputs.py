@@ -1,4 +1,4 @@
-"""Outputs that tell numbers of a prediction and of the estimate beside it: which number stands where in which message.
+"""Outputs with numbers of a prediction and of its estimate, and the places of the numbers in the messages.
 
 The model's plane (x forward, y up) is the x-z plane of ``base_link``, so a positive turn is one about its -y (REP-103).
 """
@@ -47,7 +47,7 @@ PREDICTED = (
     NumericOutput(Output.TIP_POSITION, lambda msg, fields: fill_xz(msg.point, fields.row(2)), ("tip_x", "tip_y")),
     NumericOutput(Output.TIP_ACCELERATION, lambda msg, fields: _put_motion(msg.accel, fields), _ACCELERATION),
 )
-"""In the order in which a bag has them: m; m; m/s^2 and rad/s^2. ``joint_states`` follows."""
+"""Outputs of a prediction (m; m; m/s^2 and rad/s^2) in the order of a bag, before ``joint_states``."""
 
 
 def _put_pose(msg: Any, fields: NumberFields) -> None:
@@ -105,7 +105,7 @@ ESTIMATED = (
     NumericOutput(Output.ESTIMATE_LOAD, lambda msg, fields: fill_xz(msg.wrench.force, fields.row(2)), ("load_x", "load_y")),
     NumericOutput(Output.ESTIMATE_MODES, _put_modes, _MODES),
 )
-"""In the order in which a bag has them, behind ``joint_states``."""
+"""Outputs of an estimate in the order of a bag, after ``joint_states``."""
 
 
 class Selection(NamedTuple):

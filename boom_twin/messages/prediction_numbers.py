@@ -1,4 +1,4 @@
-"""Numbers that messages tell of a prediction and of the estimate beside it: their names, and the kernels that write them.
+"""Numbers of a prediction and of its estimate in messages: their names, and the kernels that write them.
 
 Every one of them stands once in a row of numbers, by the names of `number_names`, in the axes of the model. A message takes
 some of them, with a sign: see `boom_twin.messages.numeric_outputs`.
@@ -25,8 +25,7 @@ TIP_NUMBERS = (
     "displacement_x", "displacement_y",
 )  # fmt: skip
 TIP_JOINTS = ("tip_dx", "tip_dz", "tip_pitch")
-"""Of the joints that lead from the tip of rigid sections to that of the deflected boom: along and across the last section, m;
-its turn, rad."""
+"""Displacement of the tip from that of rigid sections: along and across the last section, m, and its rotation, rad."""
 COVARIANCE = "variance_xx", "covariance_xy", "covariance_xa", "variance_yy", "covariance_ya", "variance_aa"
 """Upper triangle of a covariance by rows, of x, y and angle."""
 ESTIMATED_NUMBERS = (
@@ -37,9 +36,9 @@ ESTIMATED_NUMBERS = (
     *(f"{kind}_{j}" for kind in ("mode", "mode_rate") for j in range(1, MODES + 1)),
     *(f"{kind}{entry}" for kind in ("", "velocity_", "acceleration_") for entry in COVARIANCE),
 )  # fmt: skip
-"""As in a row of an estimate, see `boom_twin.deviation.estimate_row.WIDTH`, up to its variances of the load."""
+"""Numbers of an estimate's row, see `boom_twin.deviation.estimate_row.WIDTH`, up to its variances of the load."""
 TURN = ("sine_of_half", "cosine_of_half")
-"""Of half the angle of the estimate, for a quaternion."""
+"""Sine and cosine of half the angle of the estimate, for a quaternion."""
 
 DISPLACEMENT = TIP_NUMBERS.index("displacement_x")
 JOINTS = len(TIP_NUMBERS)  # behind the joints' angles: strokes, cylinders' forces, the tip's joints, the estimate

@@ -28,7 +28,7 @@ from .topic_table import TYPES, Output
 from .type_store import jazzy, new_message
 
 OK, WARN, ERROR = range(3)
-"""Of diagnostic_msgs/DiagnosticStatus: the alarm has ended; its cause cannot be told; its cause is named."""
+"""Levels of diagnostic_msgs/DiagnosticStatus: the alarm has ended; its cause is unknown; its cause is named."""
 
 
 def encode_health(health: Health, frame: str = FRAME) -> bytes:

@@ -1,4 +1,4 @@
-"""Encode what the compiled update wrote of one sample: all its messages in one call of compiled code."""
+"""Encode all messages of one sample from the rows of the compiled update, in one call of compiled code."""
 
 from __future__ import annotations
 

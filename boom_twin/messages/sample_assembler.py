@@ -17,7 +17,7 @@ APART = 10.0  # difference of two sources at one stamp, over the change of each 
 
 
 class Reading(NamedTuple):
-    """The sample in one message, whether all names are in the message, and the frame of an Imu (empty of a JointState)."""
+    """Sample of one message; `is_whole` if all names are in it; frame of an Imu (empty for a JointState)."""
 
     sample: Sample
     is_whole: bool
@@ -37,22 +37,22 @@ class _Line:
 
 
 class SampleAssembler:
-    """Samples of all streams from what single messages hold, for the live node and the replay alike.
+    """Assembler of samples of all streams from single messages, for the live node and the replay.
 
-    A sample has the stamp of the first message of its cycle. A cycle ends when it has all names, or when a name comes again
-    that it has, or the one that began the cycle before.
+    A sample has the stamp of the first message of its cycle. A cycle ends when it has all names. It also ends before a name
+    that it has already, or before the name that began the previous cycle.
 
     Parameters
     ----------
     wanted : dict of Stream to ndarray of bool, shape (channels,)
-        Channels that have a sensor.
+        True for channels with a sensor.
     oddities : Counter
-        Where ``names apart``, ``missing names`` and ``two sources`` are counted.
+        Counter of ``names apart``, ``missing names`` and ``two sources``.
 
     Attributes
     ----------
     refused : int
-        Samples left out because of two sources.
+        Number of samples left out because of two sources.
     """
 
     def __init__(self, wanted: Mapping[Stream, NDArray[np.bool_]], oddities: Counter[str]) -> None:
@@ -68,7 +68,7 @@ class SampleAssembler:
                 yield each
 
     def rest(self) -> Iterator[Sample]:
-        """Yield what is left of every stream's newest cycle: no more messages come."""
+        """Yield the incomplete cycle of every stream after the last message."""
         for line in self._lines.values():
             yield from self._ended(line)
 
@@ -88,7 +88,7 @@ class SampleAssembler:
 
     @staticmethod
     def _is_of_cycle(line: _Line, group: Sample, sample: Sample, has: NDArray[np.bool_]) -> bool:
-        """Return True if a message with the channels `has` goes on with a cycle."""
+        """Return True if a message with the channels `has` continues a cycle."""
         if (has & np.isfinite(group.values)).any() or abs(sample.stamp - group.stamp) > LONGEST_CYCLE:
             return False
         return sample.stamp == group.stamp or not (len(line.first) and (has & line.first).any())
@@ -100,7 +100,7 @@ class SampleAssembler:
             yield group
 
     def _is_contested(self, line: _Line, sample: Sample, frame: str) -> bool:
-        """Return True if two sources publish a stream: which of them is right cannot be told, so neither is used."""
+        """Return True if two sources publish a stream. Neither is used, because the right one is unknown."""
         if line.newest and line.newest[-1].stamp == sample.stamp:
             line.newest = [line.newest[0], sample]
         else:

@@ -18,27 +18,27 @@ from .sample_assembler import Reading, SampleAssembler
 from .topic_table import Topics, factor, load_topics
 
 LATEST = 2**31 * SECOND
-"""Stamps (ns) from here on have no place in a message."""
+"""First stamp beyond the range of a message, ns."""
 
 LONGEST = 1000
-"""Most names that are looked through; a machine has some tens of them."""
+"""Limit for the number of names in a message; a machine has some tens of them."""
 
 NO_MEASUREMENT = -1.0
 """First element of a covariance where the quantity is not measured (REP-145)."""
 
 _ABSENT = float("nan")
-"""Known by identity: stands for a channel that the message does not have, unlike one that reads NaN."""
+"""Value of a channel that a message does not have, distinguished by identity from a reading of NaN."""
 
 
 def stamp_of(msg: Any) -> int:
-    """``header.stamp`` of a message in nanoseconds."""
+    """Return ``header.stamp`` of a message, ns."""
     return int(msg.header.stamp.sec) * SECOND + int(msg.header.stamp.nanosec)
 
 
 def in_range(values: Array, middle: Array, half: Array) -> Array:
-    """Return readings less the turn by which they are farther than `half` from `middle`, if that brings them there.
+    """Return readings (rad), with one turn removed where that brings them within `half` of `middle`.
 
-    More than one turn is none of an encoder's: an angle in degrees looks like it.
+    A reading off by more than one turn is unchanged: it is not from an encoder but, for example, in degrees.
     """
     outside = np.abs(values - middle) > half
     if not outside.any():
@@ -48,7 +48,7 @@ def in_range(values: Array, middle: Array, half: Array) -> Array:
 
 
 class _Channels:
-    """The channels of one stream: where they stand in a message, and what a reading of them means."""
+    """Channels of one stream: their places in a message, and the conversion of their readings."""
 
     def __init__(self, topics: Topics, stream: Stream, joints: int) -> None:
         sensors = topics.sensors_of(stream, joints)
@@ -68,7 +68,7 @@ class _Channels:
         self.twice: set[str] = set()  # names that it has more than once
 
     def places(self, names: Sequence[str]) -> list[int]:
-        """Return where the channels stand among `names`; -1 for those that are not there, or more than once."""
+        """Return the indices of the channels among `names`; -1 for a missing or repeated name."""
         if list(names) != self._seen:
             self._seen, counts = list(names), Counter(names)
             self.twice = {name for name in self.names if name and counts[name] > 1}
@@ -77,7 +77,7 @@ class _Channels:
         return self._places
 
     def quantities(self, readings: list[float]) -> list[float]:
-        """Readings in SI units; what is absent stays so."""
+        """Return readings in SI units. Absent channels stay absent."""
         pairs = zip(readings, self.scales, strict=True)
         return [value if value is _ABSENT else (value - zero) * scale for value, (zero, scale) in pairs]
 
@@ -98,33 +98,33 @@ ODDITIES = {
     "no stamp": "header.stamp is 0; the message is left out: let its driver set header.stamp to the time of the reading",
     "impossible stamp": "before 1970, or more seconds than a message can hold; the message is left out",
 }
-"""What may be odd about a message. That a message of a topic that strokes and angles share has only one kind of them is not."""
+"""Irregularities of a message. On a topic shared by strokes and angles, a message with only one of them is regular."""
 
 
 class SampleDecoder:
-    """Maps messages to samples and counts what is odd about them.
+    """Decoder of messages to samples, with counts of irregular messages.
 
     Parameters
     ----------
     joints : int
         Number of joints of the scene, n.
     topics : Topics, optional
-        How the rig's sensors read; as usual by default.
+        Topics and sensors of the rig; those of the package by default.
 
     Attributes
     ----------
     oddities : Counter
-        How often each of `ODDITIES` was met.
+        Count of each of the irregularities `ODDITIES`.
     other_boom_names : dict of Stream to list of str
-        The names that the newest of these messages had, of another boom.
+        Names in the newest message that has names of another boom.
     strange_names : dict of Stream to tuple of list of str
-        Names that the newest messages lacked, and those that they had and the scene does not, where there are both.
+        Names missing in the first message that also had names unknown to the scene, and those unknown names.
     delays : dict of Stream to int
-        By how much stamps of messages are later than those of their samples, ns.
+        Time from the stamp of a sample to that of its message, ns.
     refused : int
-        Messages of which nothing could be used; one without any names and values is not counted.
+        Number of messages without a usable value; one without any names and values is not counted.
     assembler : SampleAssembler
-        Makes samples of what the messages hold.
+        Assembler of samples from messages.
     """
 
     def __init__(self, joints: int, topics: Topics | None = None) -> None:
@@ -155,16 +155,16 @@ class SampleDecoder:
         Parameters
         ----------
         stream : Stream
-            The role of the topic that it came by.
+            Role of the topic of the message.
         stamp_ns : int
-            Nanoseconds, see `stamp_of`.
+            Stamp of the message, ns, see `stamp_of`.
         msg : sensor_msgs/JointState or sensor_msgs/Imu
-            Of rclpy or of rosbags.
+            Message of rclpy or of rosbags.
 
         Returns
         -------
         Sample or None
-            None when no value of it can be used.
+            The sample; None if no value of the message can be used.
         """
         reading = self._reading(stream, stamp_ns, msg)
         return None if reading is None else reading.sample
@@ -211,7 +211,7 @@ class SampleDecoder:
         return places, odd, channels.twice.issuperset(lacking)
 
     def _note_strange(self, stream: Stream, names: Sequence[str], lacking: list[str]) -> None:
-        """Note names that the scene does not have, beside those that are not there: they may be meant."""
+        """Keep names unknown to the scene beside the missing ones, which they may stand for."""
         known = {
             name for each in (stream, self._sharing.get(stream)) if each is not None for name in self._channels[each].names
         }
@@ -233,7 +233,7 @@ class SampleDecoder:
         return None if places is None else [float(found[place]) if place >= 0 else _ABSENT for place in places], is_whole
 
     def _force(self, msg: Any, stream: Stream) -> list[float] | None:
-        """Specific force along the axes that are taken for the tip's x and z."""
+        """Return the specific force (m/s^2) along the axes that the mapping takes for the tip's x and z."""
         if msg.linear_acceleration_covariance[0] == NO_MEASUREMENT:
             self.oddities["no measurement"] += 1
             return None
@@ -241,7 +241,7 @@ class SampleDecoder:
         return [float(getattr(force, axis)) if axis else _ABSENT for axis in self._channels[stream].names]
 
     def _reject(self, value: float) -> float:
-        """NaN, and a count of why; a channel that is absent has been counted before."""
+        """Return NaN and count the reason. An absent channel is counted elsewhere."""
         if value is not _ABSENT:
             self.oddities["absurd magnitude" if abs(value) < inf else "not finite"] += 1
         return nan

@@ -189,7 +189,7 @@ class Topics(_Entry):
     events: EventTopic
     sensors: dict[str, Sensor] = {}
     absent: frozenset[str] = frozenset()
-    """Channels without a sensor, which the mapping says by ``none``."""
+    """Channels without a sensor, marked by ``none`` in the mapping."""
     ranges: tuple[tuple[float, float], ...] = ()
     """Lowest and highest angle of every joint, rad; empty where the scene is not known."""
 

@@ -27,7 +27,7 @@ _ORDERS = (b"\x00\x00", b"\x00\x01")
 
 @cache
 def jazzy() -> Typestore:
-    """The store that encodes, decodes and describes every message here; nothing is ever registered in it."""
+    """Return the type store that encodes, decodes and describes every message. No type is ever registered in it."""
     return get_typestore(Stores.ROS2_JAZZY)
 
 
@@ -44,7 +44,7 @@ def text_in(data: bytes) -> str:
 
 
 def decode(data: bytes, type_name: str) -> Any:
-    """The message in `data`, which may have as much behind its end as Fast DDS leaves there, see `PADDING`.
+    """Return the message in `data`, which may have up to `PADDING` bytes after its end, as Fast DDS leaves there.
 
     The `Typestore`'s own decoder takes 3 bytes.
 
@@ -53,7 +53,7 @@ def decode(data: bytes, type_name: str) -> Any:
     data : bytes
         CDR (``PLAIN_CDR``), of either byte order.
     type_name : str
-        One that Jazzy has.
+        Type that Jazzy has.
 
     Raises
     ------
@@ -85,13 +85,13 @@ Maker = Callable[[], Any]
 
 
 def new_message(type_name: str) -> Any:
-    """A new message of ``package/msg/Name``, a dataclass of rosbags, with every field zero or empty (a quaternion's w too)."""
+    """Return a new message of ``package/msg/Name`` (rosbags dataclass). Every field is zero or empty, also a quaternion's w."""
     return _maker(type_name)()
 
 
 @cache
 def _maker(type_name: str) -> Maker:
-    """The function that makes `type_name`, built from its definition."""
+    """Return a function that makes a message of `type_name`, built from its definition."""
     store = jazzy()
     kind: Any = store.types[type_name]
     fields = [_field_maker(description) for _, description in store.fielddefs[type_name][1]]
@@ -99,7 +99,7 @@ def _maker(type_name: str) -> Maker:
 
 
 def _field_maker(description: Any) -> Maker:
-    """The function that makes one field of the given description."""
+    """Return a function that makes one field of the given description."""
     node, detail = description
     if node is Nodetype.NAME:
         return _maker(detail)

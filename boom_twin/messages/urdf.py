@@ -18,9 +18,9 @@ TIP, TIP_RIGID, TIP_ALONG, TIP_ACROSS, IMU = "tip", "tip_rigid", "tip_along", "t
 UP_IS_POSITIVE = "0 -1 0"
 """Axis of every revolute joint (REP-103: x forward, z up): a positive angle raises what it turns."""
 EYE = 0.1
-"""Of a closed cylinder, the length that the rod's eye stands out of the barrel."""
+"""Length of the rod's eye outside the barrel over the length of the closed cylinder."""
 BARREL_RADIUS, ROD_RADIUS, BAR = 0.045, 0.025, 0.06
-"""Of a closed cylinder's length; of the same; of a link's length: for drawing only, a scene does not tell them."""
+"""Dimensions for drawing: radii over the length of the closed cylinder, side of a link's bar over the link's length."""
 COLOURS = {"section": "0.55 0.62 0.70 1", "link": "0.35 0.40 0.46 1", "barrel": "0.90 0.45 0.10 1", "rod": "0.80 0.82 0.85 1"}
 
 ABOUT = """
@@ -54,9 +54,9 @@ stand for that. No inertia: see `boom_twin check`.
 
 
 def urdf(scene: Scene) -> str:
-    """The URDF document of `scene`, with its links and joints explained in a comment at the top.
+    """Return the URDF document of `scene`, with its links and joints explained in a comment at the top.
 
-    The positions of its joints come in ``~/joint_states``, those of the passive ones from
+    ``~/joint_states`` has the positions of its joints. Those of the passive joints are from
     `boom_twin.scene.kinematics.PassiveJoints`.
     """
     robot = Element("robot", name=NAME)
@@ -75,7 +75,7 @@ def urdf(scene: Scene) -> str:
 
 
 def _section(robot: Element, scene: Scene, i: int) -> None:
-    """Section `i` (0-based) and the joint that turns it."""
+    """Add section `i` (0-based) and the joint that turns it."""
     name, depth = f"section_{i + 1}", section_depth(scene, i)
     link = SubElement(robot, "link", name=name)
     _bar(link, (0.0, 0.0), (scene.sections[i].length, 0.0), depth, "section")
@@ -85,7 +85,7 @@ def _section(robot: Element, scene: Scene, i: int) -> None:
 
 
 def _cylinder(robot: Element, scene: Scene, i: int) -> None:
-    """Barrel and rod of cylinder `i` (0-based): a swivel at the barrel pin, and a prismatic joint for the stroke."""
+    """Add barrel and rod of cylinder `i` (0-based), a swivel at the barrel pin, and a prismatic joint for the stroke."""
     part, row, pivot = scene.joints[i].cylinder, linkage(scene, i), _pivot(scene, i)
     barrel, rod = f"cylinder_{i + 1}_barrel", f"cylinder_{i + 1}_rod"
     _barrel_and_rod(robot, barrel, rod, part)
@@ -102,7 +102,7 @@ def _barrel_and_rod(robot: Element, barrel: str, rod: str, part: Cylinder) -> No
 
 
 def _links(robot: Element, scene: Scene, i: int) -> None:
-    """Links L and R of the six-bar `i` (0-based), each on its pin on a section; one of them carries the rod pin."""
+    """Add links L and R of the six-bar `i` (0-based), each on its pin on a section. One of them carries the rod pin."""
     row, pivot = linkage(scene, i), _pivot(scene, i)
     left, right = f"link_l_{i + 1}", f"link_r_{i + 1}"
     for name, length, carries in ((left, row.length_l, row.mount == LINK_L), (right, row.length_r, row.mount != LINK_L)):
@@ -116,7 +116,7 @@ def _links(robot: Element, scene: Scene, i: int) -> None:
 
 
 def _tip(robot: Element, scene: Scene) -> None:
-    """From the end of the last section to the tip of the deflected boom, with its IMU."""
+    """Add the joints from the end of the last section to the tip of the deflected boom, and the IMU at the tip."""
     for name in (TIP_RIGID, TIP_ALONG, TIP_ACROSS, TIP, IMU):
         SubElement(robot, "link", name=name)
     _joint(robot, "tip_fixed", "fixed", f"section_{len(scene.sections)}", TIP_RIGID, (scene.sections[-1].length, 0.0))
@@ -129,19 +129,19 @@ def _tip(robot: Element, scene: Scene) -> None:
 
 
 def _carrier(i: int) -> str:
-    """The link that joint `i` (0-based) sits on."""
+    """Return the link that carries joint `i` (0-based)."""
     return f"section_{i}" if i else FRAME
 
 
 def _pivot(scene: Scene, i: int) -> tuple[float, float]:
-    """Pivot of joint `i` (0-based) in the frame of its carrier, m."""
+    """Return the pivot of joint `i` (0-based) in the frame of its carrier, m."""
     return (scene.sections[i - 1].length, 0.0) if i else scene.base.pivot
 
 
 def _joint(
     robot: Element, name: str, kind: str, parent: str, child: str, origin: Sequence[float], axis: str = UP_IS_POSITIVE
 ) -> Element:
-    """A joint whose origin (x, y of the model plane, m) is given in the frame of its parent."""
+    """Add a joint whose origin (x, y of the model plane, m) is given in the frame of its parent, and return it."""
     joint = SubElement(robot, "joint", name=name, type=kind)
     SubElement(joint, "parent", link=parent)
     SubElement(joint, "child", link=child)
@@ -156,7 +156,7 @@ def _limit(joint: Element, low: float, high: float) -> None:
 
 
 def _bar(link: Element, start: tuple[float, float], end: tuple[float, float], depth: float, colour: str) -> None:
-    """A square bar between two points of the model plane, m."""
+    """Add a square bar between two points of the model plane, m."""
     x, y = end[0] - start[0], end[1] - start[1]
     middle = start[0] + 0.5 * x, start[1] + 0.5 * y
     geometry = _visual(link, middle, f"0 {_number(-math.atan2(y, x))} 0", colour)
@@ -164,13 +164,13 @@ def _bar(link: Element, start: tuple[float, float], end: tuple[float, float], de
 
 
 def _tube(link: Element, start: float, end: float, radius: float, colour: str) -> None:
-    """A round bar along x, m."""
+    """Add a round bar along x; lengths in m."""
     geometry = _visual(link, (0.5 * (start + end), 0.0), f"0 {_number(0.5 * math.pi)} 0", colour)
     SubElement(geometry, "cylinder", length=_number(end - start), radius=_number(radius))
 
 
 def _visual(link: Element, middle: tuple[float, float], rpy: str, colour: str) -> Element:
-    """The empty geometry of a new visual."""
+    """Add a visual and return its empty geometry."""
     visual = SubElement(link, "visual")
     SubElement(visual, "origin", xyz=_xyz(*middle), rpy=rpy)
     geometry = SubElement(visual, "geometry")
@@ -179,10 +179,10 @@ def _visual(link: Element, middle: tuple[float, float], rpy: str, colour: str) -
 
 
 def _xyz(x: float, y: float) -> str:
-    """A point of the model plane in REP-103 axes."""
+    """Return a point of the model plane in REP-103 axes as text."""
     return f"{_number(x)} 0 {_number(y)}"
 
 
 def _number(value: float) -> str:
-    """Ten digits; -0 is 0."""
+    """Return a number as text with ten digits; -0 becomes 0."""
     return f"{value + 0.0:.10g}"

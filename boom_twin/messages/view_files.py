@@ -15,16 +15,16 @@ VIEWS = (RVIZ, FOXGLOVE, PLOTJUGGLER)
 DESCRIPTION = "/robot_description"
 """Topic of robot_state_publisher."""
 TF_PREFIX = "TF Prefix:"
-"""Of RViz's model of a robot."""
+"""Key of the frame prefix in RViz's display of a robot model."""
 
 
 def view_text(text: str, namespace: str = "", frame_prefix: str = "") -> str:
-    """A view of another boom than the default one.
+    """Return the text of a view with the namespace and the frame prefix of a boom.
 
     Parameters
     ----------
     text : str
-        Of one of `VIEWS`, or like it.
+        Text of one of `VIEWS`, or of a similar file.
     namespace : str
         ROS namespace of the twin. Quoted absolute names are put into it; relative ones, as RViz's, follow its own namespace.
     frame_prefix : str

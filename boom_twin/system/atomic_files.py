@@ -13,10 +13,10 @@ from tempfile import mkstemp
 from ..errors import BagError, UsageError
 
 DRAFT = ".draft"
-"""How the name of a file ends that is being written; it begins with a dot. A kill may leave one."""
+"""Suffix of a file that is being written; its name begins with a dot. A killed process may leave one."""
 
 HEAD = 4096
-"""Bytes of a file by which an earlier result is known."""
+"""Number of first bytes of a file that identify an earlier result."""
 
 _RECORDINGS = frozenset({".mcap", ".db3", ".bag"})
 _BESIDE_THEM = frozenset({"metadata.yaml", "session.yaml", "truth.csv.gz"})

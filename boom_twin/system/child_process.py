@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).absolute().parents[2]
-"""The folder, or zip archive, from which this process has its ``boom_twin``."""
+"""Folder or zip archive from which this process imported ``boom_twin``."""
 
 _START = (
     "import runpy, sys; from importlib import machinery, util; "
@@ -20,7 +20,7 @@ _START = (
 
 
 def python_command(module: str, *arguments: str) -> list[str]:
-    """The command line that runs `module` of this package as ``python -m`` does, without the working directory's modules.
+    """Return the command line that runs `module` of this package as ``python -m``, without the working directory's modules.
 
     ``python -m`` puts the working directory first on ``sys.path``, so that a ``numpy.py`` beside a received session would
     run; ``-P`` keeps it away. Environment and working directory are the parent's, so relative paths mean the same. The
@@ -29,15 +29,15 @@ def python_command(module: str, *arguments: str) -> list[str]:
     Parameters
     ----------
     module : str
-        Full name, ``boom_twin.cli.main``.
+        Full name, such as ``boom_twin.cli.main``.
     *arguments : str
-        Of the module.
+        Arguments of the module.
     """
     return [sys.executable, "-P", "-c", _START, str(ROOT), module, *arguments]
 
 
 def end_process(process: subprocess.Popen[Any], timeout: float, by: signal.Signals = signal.SIGTERM) -> None:
-    """End a child process by a signal, and by force where it has not ended within `timeout`, s; waits until it has."""
+    """End a child process by a signal and wait for its end. After `timeout` (s) it is killed."""
     process.send_signal(by)
     try:
         process.wait(timeout)

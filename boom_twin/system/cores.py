@@ -6,5 +6,5 @@ import os
 
 
 def usable_cores() -> int:
-    """Number of cores that this process may use, where the system tells, else of the machine's."""
+    """Return the number of cores that this process may use; if the system does not give it, the number of the machine."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -17,30 +17,30 @@ from ..errors import BoomTwinError
 from ..types import Array
 
 LONGEST_LINE = 2**16
-"""Characters of a line that are read."""
+"""Limit for the number of characters in a line."""
 
 NOTHING = {"", "-", "nan", "null", "none", "na", "n/a", "#n/a"}
-"""Cells without a value, in small letters."""
+"""Texts of cells without a value, in lower case."""
 
 _MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
-"""Encodings by the byte order mark that a file begins with."""
+"""Encodings by the byte order mark at the start of a file."""
 
 
 @dataclass(frozen=True, slots=True)
 class CsvTable:
-    """The cells of a CSV file below its header, or of some of its rows.
+    """Cells of a CSV file below its header, or of some of its rows.
 
     Attributes
     ----------
     path : Path
     names : list of str
-        Of the columns, from the header.
+        Names of the columns, from the header.
     rows : list of list of str
         The cells; empty lines are left out.
     lines : list of int
-        Line of each row in the file, from 1.
+        Line number of each row in the file, from 1.
     error : type
-        Of what is raised.
+        Type of the errors that are raised.
     """
 
     path: Path
@@ -50,7 +50,7 @@ class CsvTable:
     error: type[BoomTwinError]
 
     def column(self, name: str, blank: float | None = None) -> list[float]:
-        """The numbers of a column; `blank` for an empty cell, which without it is an error."""
+        """Return the numbers of a column, with `blank` for an empty cell. Without `blank`, an empty cell raises `error`."""
         place = self.names.index(name)
         return [self._number(row, place, line, blank) for row, line in zip(self.rows, self.lines, strict=True)]
 
@@ -78,19 +78,19 @@ class CsvTable:
 
 
 def read_csv(path: Path, error: type[BoomTwinError]) -> CsvTable:
-    """The table in a file; `error` if the file cannot be read or has no row below its header."""
+    """Return the table in a file. Raise `error` if the file cannot be read or has no row below its header."""
     pieces = list(read_csv_pieces(path, error))
     rows, lines = [row for piece in pieces for row in piece.rows], [line for piece in pieces for line in piece.lines]
     return CsvTable(path, pieces[0].names, rows, lines, error)
 
 
 def read_csv_pieces(path: Path, error: type[BoomTwinError], together: int = 4096) -> Iterator[CsvTable]:
-    """The table in a file, up to `together` of its rows at a time, so that a file of any size takes little memory.
+    """Yield the table in a file, up to `together` rows at a time, so that a file of any size takes little memory.
 
     Raises
     ------
     BoomTwinError
-        As `error`: the file cannot be read, a line is longer than `LONGEST_LINE`, or there is no row below the header.
+        The type `error`: the file cannot be read, a line is longer than `LONGEST_LINE`, or there is no row below the header.
     """
     try:
         with path.open("rb") as file:
@@ -124,7 +124,7 @@ def _lines(file: TextIO) -> Iterator[str]:
 
 
 def columns_text(columns: Mapping[str, Array]) -> str:
-    """A CSV file of `columns`, each (rows,), with their names as its header."""
+    """Return the text of a CSV file of `columns`, each of shape (rows,), with their names as its header."""
     text = StringIO(newline="")
     np.savetxt(text, np.column_stack(list(columns.values())), fmt="%.12g", delimiter=",", header=",".join(columns), comments="")
     return text.getvalue()

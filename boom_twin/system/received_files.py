@@ -1,7 +1,7 @@
 """Open files of a folder that was received from a stranger: only regular files that lie in it.
 
-A link in such a folder can lead to any file of the reader, a pipe makes a program wait for ever, a device can be a disk.
-What the user names on the command line may be a link; what a folder brings along may not.
+A link in such a folder can lead to any file of the reader. A pipe makes a program wait for ever. A device can be a disk.
+A path given on the command line may be a link; a file in a received folder may not.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
 """Result folders: built beside their place, renamed when whole, replaced only by their own command; marks of incomplete ones.
 
-Beside ``OUT`` a command builds ``OUT.unfinished``. In it ``unfinished.json`` names the command; as long as one of the
-command's processes lives, that file is locked, so a second command is refused and what a killed one left is told from work
-in progress. When all is there, ``manifest.json`` lists every file with its SHA-256, and the folder is renamed to ``OUT``.
-An earlier result, which is what its manifest says and nothing else, is moved to ``OUT.replaced`` first and removed last:
-whenever a kill comes, one of the two is there whole, and the next run of the command puts its name right.
+A command builds ``OUT.unfinished`` beside ``OUT``. In it ``unfinished.json`` names the command. That file is locked as long as
+one of the command's processes lives. So a second command is refused, and a remainder of a killed one is not taken for work in
+progress. At the end ``manifest.json`` lists every file with its SHA-256, and the folder is renamed to ``OUT``.
+
+An earlier result must be exactly as its manifest says. It is moved to ``OUT.replaced`` first and removed last. After a kill at
+any time one of the two results is whole, and the next run of the command restores its name.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from .received_files import real_path
 
 MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
 BUILDING, REPLACED = ".unfinished", ".replaced"
-"""What the names of the folders beside the result end with."""
+"""Suffixes of the folders beside the result."""
 OF_THE_SYSTEM = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
-"""Files that a file manager leaves where somebody looks."""
+"""Files that a file manager leaves in a folder."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Errors of a disk, a user's share of it, or a file that takes no more; those of writing name no file."""
+"""Errors of a full disk, a full quota, or a file at its size limit. Errors of writing name no file."""
 _LARGEST = 2**20  # bytes of a manifest that is read
 _WRITABLE = 0o222  # mode of a folder that somebody may write to
 

@@ -11,9 +11,9 @@ STDERR = 2  # number of the last of the three standard streams
 
 
 def printable(text: str, keep: str = "\n\t") -> str:
-    r"""The text with every character that is not printed (controls, escapes, marks of direction, lone surrogates) as ``\x1b``.
+    r"""Return the text with every unprintable character escaped, as in ``\x1b``.
 
-    Characters of `keep` stay as they are.
+    Unprintable are controls, escapes, marks of direction and lone surrogates. Characters of `keep` are unchanged.
     """
     if text.isprintable():
         return text
@@ -21,33 +21,33 @@ def printable(text: str, keep: str = "\n\t") -> str:
 
 
 def open_closed_streams() -> None:
-    """Open standard streams that the caller has closed: a file of results would get their number, and what is printed."""
+    """Open standard streams that the caller has closed. Otherwise a file of results gets their number and the printed text."""
     while (number := os.open(os.devnull, os.O_RDWR)) <= STDERR:
         os.set_inheritable(number, True)
     os.close(number)
 
 
 class PrintableStream:
-    """A text stream that writes what `printable` makes of a text; all else is that of the `stream` it writes to.
+    """Text stream that writes texts through `printable` to a `stream`, with all other methods of that stream.
 
-    Where the reader has gone, the text is dropped: the work goes on, and its exit code says how it went.
+    If the reader has ended, the text is dropped. The work goes on, and its exit code gives the result.
 
     Parameters
     ----------
     stream : TextIO
     name : str
-        Stands in the OSError of a stream that cannot be written; empty: its text is dropped then, too.
+        Name in the OSError of a stream that cannot be written. If it is empty, the text is dropped then, too.
     """
 
     def __init__(self, stream: TextIO, name: str) -> None:
         self._stream, self._name = stream, name
 
     def write(self, text: str) -> None:
-        """Write the text; a carriage return stays, for lines that are written over."""
+        """Write the text. A carriage return is kept, for lines that are written over."""
         self._do(lambda: self._stream.write(printable(text, keep="\n\t\r")))
 
     def flush(self) -> None:
-        """Pass on what was written so far."""
+        """Flush the stream."""
         self._do(self._stream.flush)
 
     def _do(self, act: Callable[[], object]) -> None:
@@ -60,7 +60,7 @@ class PrintableStream:
                 raise OSError(error.errno, error.strerror, self._name) from None
 
     def writelines(self, lines: Iterable[str]) -> None:
-        """Write all of them."""
+        """Write all lines."""
         for line in lines:
             self.write(line)
 

@@ -26,7 +26,7 @@ from .definitions import FileDefinitions, definitions_of
 from .scanner import DamagedBytes, SoundRecords, scan_damaged
 
 MOST_FAULTS = 1000
-"""Faults that are told one by one."""
+"""Limit for the number of faults that are reported one by one."""
 
 
 @dataclass(slots=True)
@@ -160,8 +160,8 @@ def _copy(
 def _is_copy(piece: SoundRecords, definitions: FileDefinitions, seen: Counter[bytes]) -> bool:
     """Return True if a piece is a chunk that was `seen` more often than the recorder wrote it.
 
-    Equal messages within one chunk are recorded ones. Equal chunks (as from a clock that stands still) are recorded ones
-    if the checksum of all data fits, or up to the number that a sound index lists.
+    Equal messages within one chunk are recorded ones. Equal chunks, as from a clock that stands still, are recorded
+    ones if the checksum of all data fits. Otherwise a sound index gives the number of recorded ones.
     """
     head = piece.chunk
     if head is None or definitions.is_summed:

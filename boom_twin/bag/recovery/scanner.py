@@ -17,7 +17,7 @@ from ..mcap_records import KINDS, MESSAGE_HEAD, MOST_HELD, PREFIX, UnpackBudget,
 from .chunk_head import ChunkHead, UnsoundError, head_at, sound_content, unverified_start
 
 _START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)
-"""Where a message, a chunk or the end of the data may begin: opcode, and a length below 2^40."""
+"""Pattern of a possible start of a message, a chunk or the end of the data: opcode, and a length below 2^40."""
 
 
 @dataclass(frozen=True, slots=True)
