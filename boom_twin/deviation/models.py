@@ -36,7 +36,6 @@ from .states import (
     FED,
     OPEN,
     PREDICTION,
-    STARTED,
     VALVES,
     all_states,
     drive_place,
@@ -89,7 +88,7 @@ def start_models(p, f, speed, swing):
     f.excess[:], f.ratio[:], f.shaking[0] = 1.0, 1.0, 0.0
     mix(f, PREDICTION, zero_place(p))
     follow_prediction(p, f)
-    f.status[STARTED], f.status[FED] = 1, 0
+    f.status[FED] = 0
 
 
 @kernel

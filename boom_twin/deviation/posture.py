@@ -32,6 +32,7 @@ from ..kernels.transfer.natural_frequency import condense
 from ..kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from ..kernels.transfer.time_step import ANEW, advance
 from ..types import Array
+from .sensor_model import Mounting
 
 FORCE_SIZE = 1.0  # N
 DRIVE_SIZE = 1e-6  # m, loads that differences are taken over
@@ -97,12 +98,10 @@ class Posture(NamedTuple):
     rate: Array
 
 
-def new_posture(
-    plan: Plan, most: int, lengths: Array, frames: NDArray[np.int64], absolute: NDArray[np.bool_], reads_length: bool
-) -> Posture:
+def new_posture(plan: Plan, most: int, lengths: Array, mounting: Mounting, reads_length: bool) -> Posture:
     """Return room for a boom whose sections are `lengths` (m) long, with `most` modes at most.
 
-    `frames` and `absolute` (n,) are those of `boom_twin.deviation.sensor_model.Mounting`; `reads_length`: see `Posture`.
+    `mounting` is that of the angle sensors; `reads_length`: see `Posture`.
     """
     n, unknowns, histories = plan.joints, len(plan.names), len(plan.masses)
     kinds, columns = plan.tables.operations.kind, 2 + n + most
@@ -113,7 +112,7 @@ def new_posture(
         forces=np.zeros((columns, n)), read=np.zeros(2 * n + TIP), pulled=np.zeros(n), omega=np.zeros(most),
         decay=np.zeros(most), compliance=np.zeros(n), lag=np.zeros(n),
         oil_read=np.zeros(n), reads_length=reads_length, slope=np.zeros(n), curvature=np.zeros(n),
-        frames=np.array(frames, np.int64), absolute=np.array(absolute), roots=roots.astype(np.int64), masses=plan.masses,
+        frames=mounting.frames.astype(np.int64), absolute=mounting.absolute, roots=roots.astype(np.int64), masses=plan.masses,
         lengths=lengths, closed=plan.closed_lengths, still=np.zeros(histories), position=np.zeros(histories),
         hat=np.zeros(histories), response=np.zeros((most, unknowns)), sides=np.zeros((2, 2 * n + TIP)),
         shifted=np.zeros((most, histories)), small=np.zeros((4, most, most)), target=np.zeros(n), rate=np.zeros(n),

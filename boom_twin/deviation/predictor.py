@@ -29,7 +29,7 @@ from ..types import SENSORS, Array, Mount, Outline, Prediction, Stream, StrokeRe
 from .estimate_row import MODES
 from .models import start_models
 from .posture import Posture, linearise, new_posture
-from .sensor_model import Mounting
+from .sensor_model import mounting_of
 from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, new_filters
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
@@ -110,9 +110,8 @@ class BoomPredictor:
         n, self.pins, weight = self.plan.joints, len(self.plan.pins), weight_of(scene)
         self._row, self.places = np.zeros(prediction_width(n, self.pins)), places_in(n, self.pins)
         self._bending = moments_by_unknowns(self.plan)
-        mounting = Mounting(self.plan, scene.base.inclination, mounts)
         lengths, self._reads_length = np.array([each.length for each in scene.sections]), reads is StrokeReading.LENGTH
-        self.posture = new_posture(self.plan, MODES, lengths, mounting.frames, mounting.absolute, self._reads_length)
+        self.posture = new_posture(self.plan, MODES, lengths, mounting_of(self.plan, mounts), self._reads_length)
         sizes = (USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)
         used = Stream.STROKES, Stream.ANGLES, Stream.IMU, Stream.FORCES
         variances = (settings.variance(SENSORS[stream]) for stream in used)

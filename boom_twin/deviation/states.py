@@ -13,7 +13,7 @@ from ..types import Array, Stream
 VALVES, OPEN, BURST, ALL_VALVES, ALL_OPEN = range(5)  # models: three of the prediction, two of the estimate
 ANGLES, IMU, FORCES = map(list(Stream).index, (Stream.ANGLES, Stream.IMU, Stream.FORCES))  # codes of these streams
 PREDICTION, ESTIMATE = range(2)  # mixtures of these
-STARTED, FED, FED_STAMP = range(3)  # of `status`
+FED, FED_STAMP = range(2)  # of `status`
 
 
 class SensorNoise(NamedTuple):
@@ -36,7 +36,7 @@ class Filters(NamedTuple):
     x, p : (5, s), (5, s, s) states and covariances of the models. chances : (5,) of them, in each mixture one in all.
     mean, spread : (2, s), (2, s, s) of the mixtures. load2 : (2,) variance of the fast load, N^2, of prediction and estimate.
     jerk : (n,) m^2/s^5. is_open : (n,) 1 where a valve is believed open. still : (n,) s since its drive began to stand still.
-    status : (3,) whether it has begun, whether the estimate has readings of its own, stamp of the newest of these.
+    status : (2,) whether the estimate has readings of its own, stamp of the newest of these.
     masked, deaf : (c,), (n,) measured channels, and strokes, that the estimate is not to use. noise : variances.
     excess : (c,) times the variance that channels are stated to have. ratio : (c,) mean square of their normalised innovations.
     drift : (z,) times the usual variance of the random walk of sensors' zeros. length2 : (n,) variances of lengths as learnt,
@@ -96,7 +96,7 @@ def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> F
     return Filters(
         x=np.zeros((5, states)), p=np.zeros((5, states, states)), chances=np.zeros(5), mean=np.zeros((2, states)),
         spread=np.zeros((2, states, states)), load2=np.zeros(2), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
-        still=np.zeros(n), status=np.zeros(3, np.int64), masked=np.zeros(channels, np.bool_),
+        still=np.zeros(n), status=np.zeros(2, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(4 + 2 * joints),
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(1), noise=noise,
         places=np.zeros((states, 6 + n), np.int64), weights=np.zeros((states, 6 + n)), counts=np.zeros(states, np.int64),

@@ -12,16 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.equilibrium import SHARE
-from ..compiler.plan import Plan
 from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor, Drawn
-from ..deviation.sensor_model import Mounting
 from ..health.blocks import MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
 from ..kernels.jit import SameTypes, hold
 from ..kernels.result_row import PIN
 from ..scene.schema import Scene
-from ..types import NANO, SECOND, Array, Health, Mount, Outline, Report, Stream, channels_of
+from ..types import NANO, SECOND, Array, Health, Outline, Report, Stream, channels_of
 from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
 from .health_rows import copy_predictions, copy_residuals, count_residuals
 from .load_shedding import LoadShedding
@@ -34,24 +32,22 @@ from .update import DONE, LOOK, ODD, measure, update
 CAPACITY = 4096  # samples that one call of the compiled update takes at most
 
 
-def limits_of(scene: Scene, plan: Plan, settings: Settings, mounts: Sequence[Mount | None], absent: Collection[str]) -> Limits:
-    """Return the limits of the compiled update for a scene compiled as `plan` with its load, and for its sensors."""
-    channels = list(channels_of(plan.joints).values())
+def limits_of(scene: Scene, boom: BoomPredictor, settings: Settings, absent: Collection[str]) -> Limits:
+    """Return the limits of the compiled update for `boom`, that of `scene` with its load, and for its sensors."""
+    channels = list(channels_of(boom.plan.joints).values())
     counts = np.array([len(names) for names in channels])
-    mounting, far = Mounting(plan, scene.base.inclination, mounts), FAR * settings.stroke_variance**0.5
+    far = FAR * settings.stroke_variance**0.5
     return Limits(
         gap=round(settings.gap * SECOND),
         leap=settings.leap / NANO,
         far=far,
         rate=settings.stroke_rate,
-        shortest=np.full(plan.joints, -far),
+        shortest=np.full(boom.plan.joints, -far),
         longest=np.array([joint.cylinder.max_stroke for joint in scene.joints]) + far,
         valid=SHARE * scene.reach,
-        gravity=np.array(plan.tables.gravity),
+        gravity=np.array(boom.plan.tables.gravity),
         inclination=scene.base.inclination,
-        is_mounted=mounting.has_any,
-        absolute=mounting.absolute,
-        frames=mounting.frames,
+        absolute=boom.posture.absolute,
         absent=np.array([name in absent for names in channels[1:] for name in names]),
         first=np.concatenate([[0], np.cumsum(counts[1:]) - counts[1:]]),
         channels=counts,

@@ -55,7 +55,7 @@ def loaded_model(
     boom = BoomPredictor(scene, settings, mounts, reads)
     judge = None if baseline is None else HealthMonitor(scene, settings, tuple(mounts), absent)
     _ = boom.held  # made here, where no sample waits for it
-    return LoadedModel(scene, limits_of(scene, boom.plan, settings, mounts, absent), boom, judge)
+    return LoadedModel(scene, limits_of(scene, boom, settings, absent), boom, judge)
 
 
 class ModelPreparation:

@@ -78,7 +78,7 @@ class Limits(NamedTuple):
     shortest, longest : (n,) strokes that its cylinder can have, m.
     valid : m, how far the tip may be from the undeformed boom's.
     gravity : (2,) m/s^2. inclination : rad.
-    is_mounted : whether any angle sensor is no encoder. absolute, frames : (n,) whether, and in which frame of the chain.
+    absolute : (n,) whether the angle sensor of a joint is an inclinometer.
     absent : (c,) measured channels without a sensor.
     first, channels : (s,) first column of every stream among the measured channels, and how many it has.
     """
@@ -92,9 +92,7 @@ class Limits(NamedTuple):
     valid: float
     gravity: Array
     inclination: float
-    is_mounted: bool
     absolute: Flags
-    frames: Integers
     absent: Flags
     first: Integers
     channels: Integers

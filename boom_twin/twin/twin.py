@@ -210,7 +210,7 @@ class Twin:
         events = ["load"] if before.load != self.settings.load else []
         if before.limits != self.settings.limits:
             events.append("limits")
-            self._compiled.limits = limits_of(self.scene, self.plan, self.settings, self.mounts, self.absent)
+            self._compiled.limits = limits_of(self.scene, self._boom, self.settings, self.absent)
             for line in self._lines.values():
                 line.tune(self.settings)
         if asked.zeros != self._zeros.values:

@@ -331,7 +331,7 @@ def write_residual(limits, state, stream, stamp, values, row, found):
             old = past.values[before, at + i]
             expected = old + share * (expected - old)
         value = values[i] - expected
-        if limits.is_mounted and at + i < limits.absolute.shape[0] and limits.absolute[at + i]:
+        if at + i < limits.absolute.shape[0] and limits.absolute[at + i]:
             value -= TURN * np.rint(value / TURN)
         state.recent.values[recent, i] = value
         found.values[k, i], found.sigmas[k, i] = value - state.zeros[zeros, stream, i], past.sigmas[after, at + i]

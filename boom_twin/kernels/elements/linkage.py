@@ -117,10 +117,3 @@ def angles_of_lengths(rows, lengths, near, lows, highs, samples, angles):
                 if abs(length - lengths[i]) < least:
                     start, least = phi, abs(length - lengths[i])
         angles[i] = angle_of_length(rows[i], lengths[i], start, lows[i], highs[i])
-
-
-@kernel
-def levers(rows, angles, found):
-    """Write the derivatives (n,) of cylinder lengths by joint `angles`, m/rad, of n linkages."""
-    for i in range(found.shape[0]):
-        _, found[i] = cylinder_length(rows[i], angles[i])
