@@ -1,4 +1,4 @@
-"""A worked example of ``docs/extending.md``: put on a copy of the package, run there in a process of its own.
+"""Worked example of how to extend the package: put on a copy of the package, run there in a process of its own.
 
 A folder beside this file is one example: ``change.patch`` and new files at their places in the package, and ``check.py``, which
 asserts that the new thing works.
