@@ -26,10 +26,9 @@ def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_python_of_the_pages_runs_as_it_is_pasted(clone: Path) -> None:
-    pages = "".join((ROOT / "docs" / name).read_text(encoding="utf-8") for name in ("api.md", "response.md"))
-    blocks = re.findall(r"```python\n(.*?)```", pages, re.DOTALL)
-    assert len(blocks) == 2
+def test_python_of_the_page_on_the_api_runs_as_it_is_pasted(clone: Path) -> None:
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "api.md").read_text(encoding="utf-8"), re.DOTALL)
+    assert blocks
     done = subprocess.run([sys.executable, "-c", "\n".join(blocks)], capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     assert re.search(r"[0-9a-f]{64}", done.stdout)
@@ -62,6 +61,14 @@ def test_the_mapping_is_one_and_info_judges_by_it(clone: Path, capsys: pytest.Ca
     assert main(["mapping"]) == 0
     (clone / "own.yaml").write_text(capsys.readouterr().out)
     assert load_mapping(clone / "own.yaml") == load_mapping()
+
+
+def test_the_mappings_of_the_page_are_ones(tmp_path: Path) -> None:
+    blocks = re.findall(r"```yaml\n(.*?)```", (ROOT / "docs" / "mapping.md").read_text(encoding="utf-8"), re.DOTALL)
+    assert len(blocks) == 2
+    for block in blocks:
+        (tmp_path / "rig.yaml").write_text(block, encoding="utf-8")
+        load_mapping(tmp_path / "rig.yaml", 4)
 
 
 def test_every_command_has_examples() -> None:

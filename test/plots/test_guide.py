@@ -72,7 +72,7 @@ def test_the_leanest_model_is_the_one_quoted(boom: Path, capsys: pytest.CaptureF
     command = "boom_twin check my_boom.yaml --need tip=1mm --out my_lean.yaml"
     assert main(command.split()[1:]) == 0
     printed, told = capsys.readouterr().out, quoted(command).removesuffix("..")
-    printed = printed[printed.index("Leanest") : printed.index("Run time")]
+    printed = printed[printed.index("Leanest") : printed.index("\nIts tip")]
     assert NUMBER.sub("#", printed).split() == NUMBER.sub("#", told).split()
     numbers = [[float(number) for number in NUMBER.findall(text)] for text in (printed, told)]
     assert numbers[0] == pytest.approx(numbers[1], rel=5e-3)
