@@ -88,8 +88,7 @@ def test_postures_out_of_travel_are_counted(boom: Scene) -> None:
 @pytest.fixture(scope="module")
 def rigid(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A file of the guide's boom with heights and without modes, which is quick."""
-    guide = (Path(__file__).parents[2] / "docs" / "your_boom.md").read_text(encoding="utf-8")
-    text = re.findall(r"```yaml\n(.*?)```", guide, re.DOTALL)[-1]
+    text = (Path(__file__).parents[2] / "examples" / "two_section_boom.yaml").read_text(encoding="utf-8")
     path = tmp_path_factory.mktemp("boom") / "boom.yaml"
     path.write_text(text.replace("beta: 1.0e-3", "height: 0.2") + "modes: 0\n", encoding="utf-8")
     return path

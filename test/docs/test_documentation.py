@@ -10,7 +10,7 @@ import pytest
 from ruamel.yaml import YAML
 
 import boom_twin
-from boom_twin.cli.main import COMMANDS
+from boom_twin.cli.main import COMMANDS, main
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")]
@@ -57,9 +57,9 @@ def test_every_page_stands_in_the_navigation() -> None:
 
 def test_readme_is_short_and_its_figures_stand_in_the_docs() -> None:
     readme = text_of("README.md")
-    assert len(readme.splitlines()) <= 120
+    assert len(readme.splitlines()) <= 100
     rows = [row.split("|")[2] for row in re.findall(r"^\|.*\|$", readme.partition("## What was measured")[2], re.MULTILINE)[2:]]
-    assert len(rows) == 10
+    assert len(rows) >= 8
     known = set(NUMBER.findall(text_of("docs/measured.md")))
     assert {number for row in rows for number in NUMBER.findall(row)} <= known
 
@@ -71,6 +71,19 @@ def test_every_command_is_told_and_every_told_command_is_one() -> None:
     everything = "\n".join(path.read_text(encoding="utf-8") for path in PAGES)
     told = set(re.findall(r"(?:^|`|bin/)boom_twin ([a-z]+)", everything, re.MULTILINE))
     assert told - set(COMMANDS) == set()
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_options_that_pages_give_a_command_are_in_its_help(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    pages = [path.read_text(encoding="utf-8") for path in PAGES if path.name not in NOT_OF_NOW]
+    blocks = "\n".join(block for page in pages for block in FENCED.findall(page))
+    lines = [re.split(" #|--ros-args", line)[0] for line in re.findall(rf"^boom_twin {name}\b(.*)", blocks, re.MULTILINE)]
+    for kind in ("error", "stability", "parts") if name == "study" else ("",):
+        with pytest.raises(SystemExit):
+            main([name, *filter(None, [kind]), "--help"])
+        known = capsys.readouterr().out
+        told = {option for line in lines if kind in line for option in re.findall(r"(?<= )--[a-z-]+", line)}
+        assert [option for option in told if option not in known] == []
 
 
 def test_topics_are_those_of_the_table() -> None:
