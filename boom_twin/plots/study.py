@@ -26,9 +26,6 @@ FAMILIES: dict[str, tuple[str, dict[str, Any], tuple[float, float]]] = {
     "default": ("boom_twin, default method", {"color": BLUE, "linewidth": 2.4, "marker": "o", "zorder": 5}, (9, 3)),
     "exudyn": ("Exudyn, by elements a section (l: lumped)", {"color": ORANGE, "linewidth": 1.6, "marker": "s"}, (7, -4)),
     "scipy": ("SciPy's Radau, by segments", {"color": GREEN, "linewidth": 1.6, "marker": "^", "markersize": 7}, (7, 3)),
-    "elastic": ("boom_twin, all rods' pins, elastic boom", {"color": SKY, "linewidth": 1.6, "marker": "D"}, (7, 3)),
-    "play": ("boom_twin, one pin, rigid boom", {"color": BLUE, "linewidth": 2.4, "marker": "o", "zorder": 5}, (9, 3)),
-    "events": ("SciPy cut at contacts, one pin, rigid boom", {"color": GREEN, "linewidth": 1.6, "marker": "^"}, (7, 3)),
 }
 
 

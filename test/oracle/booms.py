@@ -32,6 +32,14 @@ def scene_of(spec):
     return Scene.model_validate(spec)
 
 
+def short_boom(sections):
+    """The first sections of the default boom, with postures cut to them: quick to study."""
+    spec = document()
+    spec["sections"], spec["joints"] = spec["sections"][:sections], spec["joints"][:sections]
+    spec["postures"] = {name: angles[:sections] for name, angles in spec["postures"].items() if name in ("arch", "low")}
+    return scene_of(spec)
+
+
 def random_boom(seed):
     """Scene with a posture "test"; what it holds follows from the seed."""
     rng = np.random.default_rng(seed)

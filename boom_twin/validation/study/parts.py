@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ...analysis.motions import DURATION
-from ...compiler.compile import compile_scene
 from ...errors import SolverError
 from ...plots.study import Bars, parts_picture
 from ...reduction.deviation import (
@@ -28,7 +27,6 @@ from ...reduction.variants import Variant, variants
 from ...scene.schema import Scene
 from ...system.atomic_files import write_atomic
 from ...types import Array
-from .low_speed import tip_of_move
 from .report import machine, provenance, table, write_json
 
 ROUNDS, QUICK_ROUNDS = 30, 5
@@ -96,8 +94,6 @@ def measure(scene: Scene, course: StrokeCourse, rounds: int = ROUNDS) -> PartsSt
     least = step_times([scene, *(found[k].of(scene) for k in able), scene], course, rounds)
     times[able] = least[1:-1]
     parts = [_part(scene, *row, full, course) for row in zip(found, answers, times.tolist(), strict=True)]
-    if not compile_scene(scene).pins:
-        parts.append(_low_speed(scene, full, course))
     parts.sort(key=lambda part: (part.deviation.worst, part.variant.name))
     return PartsStudy(course, full.frequencies, (float(least[0]), float(least[-1])), unknowns(scene), tuple(parts))
 
@@ -107,21 +103,6 @@ def _part(scene: Scene, variant: Variant, found: Response, time: float, full: Re
     both = min(len(found.frequencies), len(full.frequencies))
     shifts[:both] = found.frequencies[:both] / full.frequencies[:both] - 1.0
     return VariantCost(variant, deviation(found, full, course), shifts, time, unknowns(variant.of(scene)), found.status)
-
-
-LOW_SPEED = Variant("without Coriolis and centrifugal accelerations", "low-speed form", ())
-
-
-def _low_speed(scene: Scene, full: Response, course: StrokeCourse) -> VariantCost:
-    """The papers' low-speed form: no edit of a scene, the same at rest, and not timed, for its program is not compiled."""
-    try:
-        tip = tip_of_move(scene, course.motion, course.step, course.every, velocity_terms=False)[:, :2]
-    except SolverError as error:
-        nothing = Deviation(np.inf, "", np.inf, np.inf)
-        return VariantCost(LOW_SPEED, nothing, np.full(FREQUENCIES, np.nan), float("nan"), unknowns(scene), str(error))
-    off = np.linalg.norm(tip - full.tip, axis=1)
-    apart = Deviation(0.0, course.names[0], float(np.sqrt(np.mean(off**2))), float(off.max()))
-    return VariantCost(LOW_SPEED, apart, np.zeros(FREQUENCIES), float("nan"), unknowns(scene), "ok")
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
@@ -177,8 +158,7 @@ def as_markdown(found: PartsStudy) -> str:
         f"frequencies {frequencies} Hz.",
         f"At rest: the largest distance of the tips in {', '.join(found.course.names)}. Move: {found.course.motion.label}; "
         f"steps of {1e3 * found.course.step:g} ms. Frequencies: change about the rest at the start of the move. Time: stepping "
-        "alone, least of interleaved runs of the move's beginning; what is negative costs time. Another motion may differ. The "
-        "low-speed form, without Coriolis and centrifugal accelerations, is made by a program of its own and not timed.\n",
+        "alone, least of interleaved runs of the move's beginning; what is negative costs time. Another motion may differ.\n",
         table(HEAD, [_row(found, part) for part in found.parts]),
         provenance(),
     ]
@@ -198,8 +178,7 @@ def bars(found: PartsStudy) -> Bars:
 
     def shown(part: VariantCost) -> bool:
         single = part.variant.kind == "modes" and len(part.variant.edits) == 1
-        timed = np.isfinite(part.step_time)
-        return part.status == "ok" and timed and not (single and part.unknowns > found.unknowns)
+        return part.status == "ok" and not (single and part.unknowns > found.unknowns)
 
     good = [part for part in found.parts if shown(part)]
     return Bars(

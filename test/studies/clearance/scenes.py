@@ -7,9 +7,9 @@ from typing import Literal
 
 from ruamel.yaml import YAML
 
-from ....scene.checks.clearance import names_of
-from ....scene.load import clearance_text
-from ....scene.schema import Clearance, Pin, Scene
+from boom_twin.scene.checks.clearance import names_of
+from boom_twin.scene.load import clearance_text
+from boom_twin.scene.schema import Clearance, Pin, Scene
 
 Treatment = Literal["contact", "spring-damper"]
 

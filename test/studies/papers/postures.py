@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from studies.clearance.scenes import ideal, treated, with_play, without_friction
 
-from ....analysis.methods import MethodRun, integrate_with
-from ....analysis.motions import StopMotion, halt
-from ....scene.schema import Scene
-from ....types import Array
-from ..clearance.scenes import ideal, treated, with_play, without_friction
+from boom_twin.analysis.methods import MethodRun, integrate_with
+from boom_twin.analysis.motions import StopMotion, halt
+from boom_twin.scene.schema import Scene
+from boom_twin.types import Array
 
 RAMP, STOP, BRAKE = 0.3, 0.6, 0.05  # s
 STEP, ROW = 1e-3, 2e-3  # s, of this model; of all rows
@@ -94,7 +94,7 @@ def run_own(scene: Scene, posture: str, pins: str, span: float) -> PostureRun:
 
 def run_peer(scene: Scene, posture: str, pins: str, span: float, step: float) -> PostureRun:
     """Run one posture by Exudyn: geometrically exact beams, contact by user functions."""
-    from ...rig.exudyn.solve import at_rest, move
+    from boom_twin.validation.rig.exudyn.solve import at_rest, move
 
     drive, one = stop_in(scene, posture), worn(scene) if pins == "worn" else ideal(scene)
     resting = at_rest(one, drive.first, ELEMENTS, nodally_exact=True)

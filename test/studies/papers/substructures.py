@@ -20,11 +20,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....compiler.plan import Plan
-from ....errors import UsageError
-from ....kernels.elements.linkage import LINK_L
-from ....kernels.tables import BEAM, BODY, JOINT_B, OFFSET, ROD_PIN, STATION, Z_LINK_L, Z_LINK_R, Z_SECTION, State
-from ....types import Array
+from boom_twin.compiler.plan import Plan
+from boom_twin.errors import UsageError
+from boom_twin.kernels.elements.linkage import LINK_L
+from boom_twin.kernels.tables import BEAM, BODY, JOINT_B, OFFSET, ROD_PIN, STATION, Z_LINK_L, Z_LINK_R, Z_SECTION, State
+from boom_twin.types import Array
+
 from .element_matrices import (
     QX,
     Step,

@@ -6,21 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from studies.clearance.scenes import with_play
+from studies.papers import low_speed, report
+from studies.papers.boundary_zeros import bisect, equilibrium, frequencies
+from studies.papers.items import ITEMS
+from studies.papers.pictures import LetGoTrace
+from studies.papers.postures import compare, run_own, run_peer
+from studies.papers.sweep_matrices import boundary_solution, chain_of, difference
 
 from boom_twin import load_scene
 from boom_twin.analysis.equilibrium import statics
 from boom_twin.analysis.methods import integrate_with
 from boom_twin.analysis.motions import motion_of
 from boom_twin.errors import UsageError
-from boom_twin.plots.papers import LetGoTrace
 from boom_twin.scene.schema import Scene
-from boom_twin.validation.study import low_speed
-from boom_twin.validation.study.clearance.scenes import with_play
-from boom_twin.validation.study.papers import report
-from boom_twin.validation.study.papers.boundary_zeros import bisect, equilibrium, frequencies
-from boom_twin.validation.study.papers.items import ITEMS
-from boom_twin.validation.study.papers.postures import compare, run_own, run_peer
-from boom_twin.validation.study.papers.sweep_matrices import boundary_solution, chain_of, difference
 
 SCENE = load_scene()
 LOADED = Scene.model_validate(

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ....kernels.elements.cylinder import compliance_and_lag
-from ....kernels.tables import Motion, Tables
-from ....types import Array
+from boom_twin.kernels.elements.cylinder import compliance_and_lag
+from boom_twin.kernels.tables import Motion, Tables
+from boom_twin.types import Array
 
 Complex = NDArray[np.complex128]
 Vector = Any  # of floats, or complex while a map is differentiated

@@ -6,19 +6,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ....analysis.drive import PASSES, TOLERANCE
-from ....analysis.equilibrium import settle
-from ....analysis.motions import motion_of
-from ....compiler.compile import BasisName, compile_scene
-from ....compiler.plan import Plan
-from ....errors import SolverError
-from ....kernels.integrators import GENERALISED_ALPHA, prepare
-from ....kernels.tables import OK, Motion, State, Work
-from ....kernels.transfer.matrix_product import SIX, new_product, open_end, transfer_matrix
-from ....kernels.transfer.riccati_sweep import FREE, clear_cut, sweep_in
-from ....kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance
-from ....scene.schema import Scene
-from ....types import Array
+from boom_twin.analysis.drive import PASSES, TOLERANCE
+from boom_twin.analysis.equilibrium import settle
+from boom_twin.analysis.motions import motion_of
+from boom_twin.compiler.compile import BasisName, compile_scene
+from boom_twin.compiler.plan import Plan
+from boom_twin.errors import SolverError
+from boom_twin.kernels.integrators import GENERALISED_ALPHA, prepare
+from boom_twin.kernels.tables import OK, Motion, State, Work
+from boom_twin.kernels.transfer.matrix_product import SIX, new_product, open_end, transfer_matrix
+from boom_twin.kernels.transfer.riccati_sweep import FREE, clear_cut, sweep_in
+from boom_twin.kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance
+from boom_twin.scene.schema import Scene
+from boom_twin.types import Array
+
 from .element_matrices import Step
 from .substructures import Substructure, substructures
 

@@ -1,4 +1,4 @@
-"""Report of the study of the papers, `boom_twin study papers`."""
+"""Report of the study of the papers."""
 
 from __future__ import annotations
 
@@ -7,24 +7,25 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from studies.clearance.scenes import ideal
 
-from ....analysis.equilibrium import settle, statics
-from ....analysis.initial_state import undeflected
-from ....analysis.modal import damping_ratio, natural_modes
-from ....analysis.motions import motion_of
-from ....analysis.simulate import simulate
-from ....compiler.compile import BasisName, compile_scene
-from ....errors import UsageError
-from ....plots.papers import LetGoTrace, StopTrace, low_speed_picture, posture_picture
-from ....scene.kinematics import posture_angles, skeleton, strokes_of_posture
-from ....scene.schema import Scene
-from ....system.atomic_files import write_atomic
-from ....types import Array
-from ..clearance.scenes import ideal
-from ..low_speed import error_by_speed
-from ..report import machine, provenance, table, write_json
+from boom_twin.analysis.equilibrium import settle, statics
+from boom_twin.analysis.initial_state import undeflected
+from boom_twin.analysis.modal import damping_ratio, natural_modes
+from boom_twin.analysis.motions import motion_of
+from boom_twin.analysis.simulate import simulate
+from boom_twin.compiler.compile import BasisName, compile_scene
+from boom_twin.errors import UsageError
+from boom_twin.scene.kinematics import posture_angles, skeleton, strokes_of_posture
+from boom_twin.scene.schema import Scene
+from boom_twin.system.atomic_files import write_atomic
+from boom_twin.types import Array
+from boom_twin.validation.study.report import machine, provenance, table, write_json
+
 from .boundary_zeros import BoundaryZero, equilibrium, frequencies
 from .items import ITEMS
+from .low_speed import error_by_speed
+from .pictures import LetGoTrace, StopTrace, low_speed_picture, posture_picture
 from .postures import PEER_STEPS, Comparison, PostureRun, compare, run_own, run_peer
 from .sweep_matrices import boundary_solution, chain_of, difference
 

@@ -13,16 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....analysis.equilibrium import clamp_pins, rest_at, set_undeformed
-from ....analysis.modal import natural_modes
-from ....compiler.compile import compile_scene
-from ....errors import SolverError, UsageError
-from ....kernels.tables import OK, Z_FORCE_A, Z_SECTION, Motion
-from ....kernels.transfer.forward_kinematics import place
-from ....kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
-from ....scene.kinematics import posture_angles, strokes_of_posture
-from ....scene.schema import Scene, refuse_clearance
-from ....types import Array
+from boom_twin.analysis.equilibrium import clamp_pins, rest_at, set_undeformed
+from boom_twin.analysis.modal import natural_modes
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.errors import SolverError, UsageError
+from boom_twin.kernels.tables import OK, Z_FORCE_A, Z_SECTION, Motion
+from boom_twin.kernels.transfer.forward_kinematics import place
+from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
+from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+from boom_twin.scene.schema import Scene, refuse_clearance
+from boom_twin.types import Array
 
 WIDTH = 1e-7  # rad, the papers' tolerance of the interval
 BEYOND, LONGEST, SETTLED, PASSES = 0.05, 0.1, 1e-11, 60  # rad

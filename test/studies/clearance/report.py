@@ -1,4 +1,4 @@
-"""Report of the clearance study, `boom_twin study clearance`."""
+"""Report of the study of play in the pins."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from ....analysis.methods import integrate_with
-from ....compiler.compile import compile_scene
-from ....errors import UsageError
-from ....plots.history import Orbits
-from ....plots.posture import orbits_picture
-from ....plots.stability import RestOffsetCurve, Trace, sinking_picture, swing_picture
-from ....plots.study import Curve, Panel, work_precision_picture
-from ....scene.schema import IDEAL_BELOW, Scene
-from ....system.atomic_files import write_atomic
-from ..report import machine, provenance, table, write_json
+from boom_twin.analysis.methods import integrate_with
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.errors import UsageError
+from boom_twin.plots.history import Orbits
+from boom_twin.plots.posture import orbits_picture
+from boom_twin.scene.schema import IDEAL_BELOW, Scene
+from boom_twin.system.atomic_files import write_atomic
+from boom_twin.validation.study.report import machine, provenance, table, write_json
+
 from . import convergence as near
 from .convergence import MEASURES, Convergence, ErrorCurve, convergence
+from .pictures import RestOffsetCurve, Trace, convergence_picture, sinking_picture, swing_picture
 from .rest_stop_cost import (
     BRAKE,
     COUNT,
@@ -157,11 +157,6 @@ def _costs(found: list[Cost]) -> list[str]:
 
 NOTE = "surrogate parameters; computed, not measured on a rig"
 SHOWN = 3.0  # s after the stop
-FAMILIES = {
-    ("all rods' pins, elastic boom", "boom_twin"): "elastic",
-    ("one pin, rigid boom", "boom_twin"): "play",
-    ("one pin, rigid boom", "SciPy"): "events",
-}
 
 
 @dataclass(frozen=True)
@@ -203,7 +198,7 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     swing_picture(paths[2], "The tip after a stop: ideal pins, contact, linearised pins", NOTE, traces, SHOWN)
     sinking = [RestOffsetCurve(own.posture, own.pin, own.clearances, own.shifts) for own in found.shifts]
     sinking_picture(paths[3], "The resting tip with play in the pin of one rod", NOTE, sinking, IDEAL_BELOW)
-    work_precision_picture(paths[4], "Motions with play: error against run time", NOTE, panels(found.convergence))
+    convergence_picture(paths[4], "Motions with play: error against run time", NOTE, found.convergence)
     _orbits(paths[5], scene, posture)
     return paths
 
@@ -218,21 +213,6 @@ def as_json(found: Study) -> dict[str, Any]:
         "references_differ": dict(zip(MEASURES, found.convergence.apart, strict=True)),
         "costs": [asdict(own) for own in found.costs],
     }
-
-
-def panels(found: Convergence) -> tuple[Panel, ...]:
-    """A panel a measure; the boom with one pin against the independent model where there is one."""
-    chosen = [line for line in found.lines if line.against == "independent" or line.case.startswith("all")]
-    curves = [tuple(_curve(found, line, k) for line in chosen) for k in range(len(MEASURES))]
-    return tuple(Panel(name.split(",")[0], name, own) for name, own in zip(MEASURES, curves, strict=True))
-
-
-def _curve(found: Convergence, line: ErrorCurve, measure: int) -> Curve:
-    family = FAMILIES[line.case, line.program]
-    notes = [f"{1e3 * mark:g} ms" if line.program == "boom_twin" else f"{mark:.0e}" for mark in line.marks]
-    some = tuple(note if number % 3 == 1 else "" for number, note in enumerate(notes))
-    seconds = tuple(second / found.span for second in line.seconds)
-    return Curve(line.case, family, seconds, tuple(line.errors[:, measure].tolist()), some)
 
 
 def _orbits(path: Path, scene: Scene, posture: str | None) -> None:

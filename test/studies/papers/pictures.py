@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..types import Array
-from .style import BLUE, GREY, INK, ORANGE, picture
+from boom_twin.plots.style import BLUE, GREY, INK, ORANGE, picture
+from boom_twin.types import Array
 
 LOOKS = {  # pins, program: colour, width, dashes
     ("ideal", "own"): (GREY, 2.4, "-"),

@@ -10,19 +10,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...analysis.drive import TOLERANCE
-from ...analysis.equilibrium import settle
-from ...analysis.motions import Motion as StrokeMotion
-from ...analysis.simulate import RHO
-from ...compiler.compile import compile_scene
-from ...compiler.plan import Plan
-from ...errors import SolverError
-from ...kernels.integrators import GENERALISED_ALPHA, HAT, OFFSET, OLD, ROWS, A, V, X, prepare
-from ...kernels.tables import OK, SENTENCES, Motion, State, Work
-from ...kernels.transfer.forward_kinematics import place
-from ...kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
-from ...scene.schema import Scene, refuse_clearance
-from ...types import Array
+from boom_twin.analysis.drive import TOLERANCE
+from boom_twin.analysis.equilibrium import settle
+from boom_twin.analysis.motions import Motion as StrokeMotion
+from boom_twin.analysis.simulate import RHO
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.compiler.plan import Plan
+from boom_twin.errors import SolverError
+from boom_twin.kernels.integrators import GENERALISED_ALPHA, HAT, OFFSET, OLD, ROWS, A, V, X, prepare
+from boom_twin.kernels.tables import OK, SENTENCES, Motion, State, Work
+from boom_twin.kernels.transfer.forward_kinematics import place
+from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
+from boom_twin.scene.schema import Scene, refuse_clearance
+from boom_twin.types import Array
 
 SPAN = 1e-4  # rad or m, of a difference quotient
 PASSES = 20

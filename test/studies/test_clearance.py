@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from studies.clearance import report as clearance
+from studies.clearance.convergence import Convergence, MotionRows, convergence, errors, one_pin
+from studies.clearance.rest_stop_cost import main_frequency, shifts, swings
+from studies.clearance.scenes import ideal, pins_of, rods_and_joints, treated, with_play
 
 from boom_twin.analysis.motions import halt
 from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.schema import IDEAL_BELOW
-from boom_twin.validation.study.clearance import report as clearance
-from boom_twin.validation.study.clearance.convergence import Convergence, MotionRows, convergence, errors, one_pin
-from boom_twin.validation.study.clearance.rest_stop_cost import main_frequency, shifts, swings
-from boom_twin.validation.study.clearance.scenes import ideal, pins_of, rods_and_joints, treated, with_play
 
 
 def test_a_scene_without_play_gets_the_package_s_pins(two_sections: Scene) -> None:

@@ -12,13 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....analysis.methods import MethodRun, integrate_with
-from ....analysis.motions import StopMotion, halt
-from ....scene.schema import Cylinder, Joint, Scene
-from ....types import Array
-from ...reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
-from ...reference.worn_pin.geometry import cylinder_length
-from ...reference.worn_pin.motion import PinMotion, PinnedBoom, freed
+from boom_twin.analysis.methods import MethodRun, integrate_with
+from boom_twin.analysis.motions import StopMotion, halt
+from boom_twin.scene.schema import Cylinder, Joint, Scene
+from boom_twin.types import Array
+from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
+from boom_twin.validation.reference.worn_pin.geometry import cylinder_length
+from boom_twin.validation.reference.worn_pin.motion import PinMotion, PinnedBoom, freed
+
 from .scenes import pin_like, pins_of, treated, with_pins, without_friction
 
 STEPS = (2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6)  # s

@@ -8,14 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....analysis.equilibrium import rest_at, statics
-from ....analysis.methods import MethodRun, integrate_with
-from ....analysis.motions import StopMotion, halt, motion_of
-from ....compiler.plan import first_row, taken_apart
-from ....scene.kinematics import posture_angles, strokes_of_posture
-from ....scene.schema import IDEAL_BELOW, Scene
-from ....types import Array
-from ...reference.worn_pin import geometry
+from boom_twin.analysis.equilibrium import rest_at, statics
+from boom_twin.analysis.methods import MethodRun, integrate_with
+from boom_twin.analysis.motions import StopMotion, halt, motion_of
+from boom_twin.compiler.plan import first_row, taken_apart
+from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+from boom_twin.scene.schema import IDEAL_BELOW, Scene
+from boom_twin.types import Array
+from boom_twin.validation.reference.worn_pin import geometry
+
 from .scenes import Treatment, ideal, pin_like, rods_and_joints, treated, with_pins
 
 WIDEST = 1e-3  # m
