@@ -25,7 +25,6 @@ def machine() -> dict[str, str | int | None]:
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "cpu": _cpu(),
         "cores": usable_cores(),
-        "system": platform.system(),
         "python": platform.python_version(),
         **versions,
     }

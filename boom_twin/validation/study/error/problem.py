@@ -17,7 +17,8 @@ from ....analysis.motions import Motion
 from ....errors import BoomTwinError
 from ....scene.schema import Scene
 from ....types import Array
-from .cases import STEPS, with_modes
+from ..scene_changes import with_modes
+from .cases import STEPS
 
 
 def load_rig() -> tuple[ModuleType | None, str]:

@@ -9,8 +9,8 @@ from typing import Literal
 
 from ....scene.load import load_scene
 from ....scene.schema import Scene
+from .. import scene_changes as made
 from ..long_booms import long_boom, seven_sections
-from . import setups as made
 from .setups import Setup, dead_stop, first_cylinder, one_cylinder, smooth, to_the_ends
 
 Truth = Literal["fine steps", "equilibrium", "swing", "none"]

@@ -16,11 +16,11 @@ from ....errors import SolverError
 from ....scene.kinematics import joint_angles_of_strokes
 from ....scene.schema import Scene
 from ....types import Array
+from .. import scene_changes as made
 from ..long_booms import long_boom, seven_sections
-from . import setups as made
 from .cases import short
 from .exact_step import StepRoundoff, one_step
-from .setups import Setup, lighter_gravity, smooth
+from .setups import Setup, smooth
 
 COUNTS, QUICK_COUNTS = (2, 3, 5, 10, 20, 50, 100, 200), (2, 5, 20)
 STEPS, QUICK_STEPS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 5e-2), (1e-5, 1e-3)  # s
@@ -172,7 +172,7 @@ def _slowest(setup: Setup, share: float) -> float:
     strokes = setup.drive(np.zeros(1))[0][0]
     angles = joint_angles_of_strokes(setup.scene, strokes, near=setup.angles)
     try:
-        plan, state, work = rest_at(lighter_gravity(setup.scene, share), strokes, angles)
+        plan, state, work = rest_at(made.lighter_gravity(setup.scene, share), strokes, angles)
     except SolverError:
         return float("nan")
     return natural_modes(plan, state, work, 1, COUNTED)[0].frequency
