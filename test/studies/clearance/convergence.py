@@ -1,7 +1,7 @@
 """Convergence of motions with clearance towards steps of 1 us, beside a SciPy reference.
 
 The study's four pins on the elastic boom, and one pin on the rigid boom whose other cylinders are incompressible: that is the
-boom part which `boom_twin.validation.reference.worn_pin` moves with equations and contact of its own.
+boom part which `reference.worn_pin` moves with equations and contact of its own.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from reference.worn_pin.geometry import cylinder_length
+from reference.worn_pin.motion import PinMotion, PinnedBoom, freed
 
 from boom_twin.analysis.methods import MethodRun, integrate_with
 from boom_twin.analysis.motions import StopMotion, halt
 from boom_twin.scene.schema import Cylinder, Joint, Scene
 from boom_twin.types import Array
-from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
-from boom_twin.validation.reference.worn_pin.geometry import cylinder_length
-from boom_twin.validation.reference.worn_pin.motion import PinMotion, PinnedBoom, freed
+from boom_twin.validation.contact_law import HYSTERESIS, Contact, stiffness
 
 from .scenes import pin_like, pins_of, treated, with_pins, without_friction
 

@@ -112,7 +112,7 @@ def _convergence(found: Convergence) -> list[str]:
         "errors are rms over the rows, of acceleration and force as a share of their own rms. Own reference: boom_twin with "
         f"steps of {1e6 * near.FINEST:g} us. Independent: the rigid boom on one compliant cylinder, Lagrange's equations by "
         "hand in three coordinates, integrated by SciPy's LSODA between touch and release "
-        f"(`boom_twin/validation/reference/worn_pin`), tolerance {near.TIGHTEST:g}. It shares no equation with boom_twin but "
+        f"(`test/reference/worn_pin`), tolerance {near.TIGHTEST:g}. It shares no equation with boom_twin but "
         "states the same contact law.\n",
     ]
     if np.isfinite(found.apart).all():

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from reference.worn_pin import geometry
 
 from boom_twin.analysis.equilibrium import rest_at, statics
 from boom_twin.analysis.methods import MethodRun, integrate_with
@@ -15,7 +16,6 @@ from boom_twin.compiler.plan import first_row, taken_apart
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.scene.schema import IDEAL_BELOW, Scene
 from boom_twin.types import Array
-from boom_twin.validation.reference.worn_pin import geometry
 
 from .scenes import Treatment, ideal, pin_like, rods_and_joints, treated, with_pins
 

@@ -100,7 +100,14 @@ def test_same_step_is_compared(content):
 
 def test_text_and_pictures(report):
     text = (report / "error.md").read_text()
-    for part in ("## The default", "Methods at a step of 1 ms", "At equal error", "Exudyn, 4 elements, lumped", "one pass", "surrogates"):
+    for part in (
+        "## The default",
+        "Methods at a step of 1 ms",
+        "At equal error",
+        "Exudyn, 4 elements, lumped",
+        "one pass",
+        "surrogates",
+    ):
         assert part in text
     assert "nan" not in text and "What failed" not in text
     from matplotlib.image import imread

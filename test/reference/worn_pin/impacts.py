@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ....types import Array
+from boom_twin.types import Array
 
 MOST = 20_000  # pieces of a motion
 

@@ -1,4 +1,4 @@
-"""Contact force of the reference boom with a worn pin: force over penetration and its rate.
+"""Contact law of a worn pin for the virtual rig and the tests' reference models: force over penetration and its rate.
 
 F = K d^n (1 + chi g' / v_in) >= 0 ,      d = (g + sqrt(g^2 + eps^2)) / 2 ,      g = |offset| - c
 

@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ....scene.schema import Cylinder, CylinderPart, Joint, Point, RigidPart, Scene
-from ....types import Array
+from boom_twin.scene.schema import Cylinder, CylinderPart, Joint, Point, RigidPart, Scene
+from boom_twin.types import Array
 
 
 class Bodies:

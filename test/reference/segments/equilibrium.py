@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....errors import SolverError
-from ....types import Array
+from boom_twin.errors import SolverError
+from boom_twin.types import Array
+
 from .boom import SegmentBoom, Segments
 from .equations import Jet
 from .geometry import oil_stiffness

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....types import Array
+from boom_twin.types import Array
 
 Document = dict[str, Any]  # a scene's file, or a part of it
 

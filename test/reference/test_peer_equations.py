@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from convergence import motions
 from oracle import booms, lagrange, segments
+from reference.segments.equations import Equations
+from reference.segments.geometry import Linkages, link_headings, pieces
 
 from boom_twin.scene import load_scene
-from boom_twin.validation.reference.segments.equations import Equations
-from boom_twin.validation.reference.segments.geometry import Linkages, link_headings, pieces
 
 
 def kept(scene, fineness):

@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ....scene.schema import Cylinder, Joint, Scene, refuse_clearance
-from ....types import Array
+from boom_twin.scene.schema import Cylinder, Joint, Scene, refuse_clearance
+from boom_twin.types import Array
+
 from .equations import Jet, angle, constant, coordinates, cos, inverse, root, sin
 from .geometry import gravity_in_base, half_segment, link_headings, pieces, pins, rigid_masses, spring_stiffness
 

@@ -23,11 +23,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from ....errors import UsageError
-from ....types import Array
+from boom_twin.errors import UsageError
+from boom_twin.types import Array
+from boom_twin.validation.contact_law import Contact
+
 from . import geometry
 from .bodies import Lever, OilCylinder, SixBar
-from .contact import Contact
 from .geometry import Document, Point, dot
 from .impacts import ContactMotion, Episode, follow
 

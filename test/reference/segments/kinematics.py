@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ....scene.schema import Scene
-from ....types import Array
+from boom_twin.scene.schema import Scene
+from boom_twin.types import Array
+
 from .geometry import half_segment, pieces, pins, rigid_masses, spring_stiffness
 
 Places = NDArray[np.int64]

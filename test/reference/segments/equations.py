@@ -14,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....scene.schema import Scene
-from ....types import Array
+from boom_twin.scene.schema import Scene
+from boom_twin.types import Array
+
 from .geometry import Bodies, Linkages, gravity_in_base, oil_stiffness
 from .kinematics import Quantities, carried, chain_points, fixed, joined, segment_tables, spans
 

@@ -9,9 +9,10 @@ from typing import Any, Literal
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ....errors import SolverError, UsageError
-from ....scene.schema import Scene
-from ....types import Array
+from boom_twin.errors import SolverError, UsageError
+from boom_twin.scene.schema import Scene
+from boom_twin.types import Array
+
 from .boom import Segments
 from .equations import Drive, Equations
 from .equilibrium import equilibrium
