@@ -63,7 +63,7 @@ test-extra: warm $(COLCON_READY) ament client
 
 study: warm
 	for kind in error stability parts; do $(BIN)/boom_twin study $$kind --out out/study/$$kind || exit 1; done
-	for kind in papers clearance; do PYTHONPATH=test $(BIN)/python -m studies $$kind --out out/study/$$kind || exit 1; done
+	for kind in papers clearance roundoff; do PYTHONPATH=test $(BIN)/python -m studies $$kind --out out/study/$$kind || exit 1; done
 	mkdir -p docs/study && cp out/study/*/*.md out/study/*/*.png docs/study/
 
 soak: warm

@@ -12,7 +12,7 @@ from boom_twin import load_scene
 def main() -> None:
     """Write the report, the numbers and the pictures of a study."""
     parser = ArgumentParser(prog="python -m studies", description=__doc__)
-    parser.add_argument("kind", choices=("papers", "clearance"))
+    parser.add_argument("kind", choices=("papers", "clearance", "roundoff"))
     parser.add_argument("scene", nargs="?", help="file of a boom (default: the default scene)")
     parser.add_argument("--out", required=True, type=Path, help="folder; files of this study in it are replaced")
     parser.add_argument("--posture", help="where the motion starts")

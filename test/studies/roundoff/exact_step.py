@@ -10,18 +10,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import linalg
 
-from ....analysis.equilibrium import set_undeformed
-from ....analysis.methods import FAMILIES
-from ....compiler.compile import compile_scene
-from ....compiler.plan import Plan
-from ....kernels.elements.cylinder import compliance_and_lag
-from ....kernels.integrators import prepare
-from ....kernels.tables import OK, Motion, State, Work
-from ....kernels.transfer.forward_kinematics import place
-from ....kernels.transfer.matrix_product import new_product, plain_pass
-from ....kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
-from ....scene.schema import Scene
-from ....types import Array
+from boom_twin.analysis.equilibrium import set_undeformed
+from boom_twin.analysis.methods import FAMILIES
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.compiler.plan import Plan
+from boom_twin.kernels.elements.cylinder import compliance_and_lag
+from boom_twin.kernels.integrators import prepare
+from boom_twin.kernels.tables import OK, Motion, State, Work
+from boom_twin.kernels.transfer.forward_kinematics import place
+from boom_twin.kernels.transfer.matrix_product import new_product, plain_pass
+from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
+from boom_twin.scene.schema import Scene
+from boom_twin.types import Array
+
 from .dense_solver import Kinematics, Long
 
 EPS = float(np.finfo(float).eps)

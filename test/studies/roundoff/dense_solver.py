@@ -15,11 +15,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ....compiler.plan import Plan
-from ....kernels.elements.cylinder import BARREL
-from ....kernels.elements.linkage import LINK_L
-from ....kernels.tables import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION, Z_LAMBDA, Z_LINK_L, Z_LINK_R
-from ....types import Array
+from boom_twin.compiler.plan import Plan
+from boom_twin.kernels.elements.cylinder import BARREL
+from boom_twin.kernels.elements.linkage import LINK_L
+from boom_twin.kernels.tables import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION, Z_LAMBDA, Z_LINK_L, Z_LINK_R
+from boom_twin.types import Array
 
 Long = np.longdouble
 

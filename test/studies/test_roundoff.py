@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from studies.roundoff import report
+from studies.roundoff.dense_solver import Kinematics
+from studies.roundoff.exact_step import digits, one_step
+from studies.roundoff.report import TARGET, TURN_UP_STEPS, TurnUp, turn_up
 
 from boom_twin.analysis.equilibrium import set_undeformed
 from boom_twin.compiler.compile import compile_scene
@@ -11,9 +15,6 @@ from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles
 from boom_twin.validation.study.long_booms import long_boom
-from boom_twin.validation.study.stability.dense_solver import Kinematics
-from boom_twin.validation.study.stability.exact_step import digits, one_step
-from boom_twin.validation.study.stability.roundoff import TARGET, TURN_UP_STEPS, TurnUp, turn_up
 
 
 @pytest.mark.parametrize("scene", [load_scene(), long_boom(4, kinds=("B3", "B2", "B1"))], ids=["default", "long"])
@@ -55,3 +56,11 @@ def test_a_turn_up_above_the_target_is_seen():
     steps = np.array([1e-3, 1e-4, 1e-5])
     assert TurnUp(steps, np.array([1e-6, 1e-7, 2e-7]), steps, 1.0, 2.0).turned_up_above_target
     assert not TurnUp(steps, np.array([1e-6, 1e-9, 2e-7]), steps, 1.0, 2.0).turned_up_above_target
+
+
+def test_the_page():
+    scene = long_boom(2)
+    lost = [report.Loss("sections", "2", 2.0, one_step(scene, posture_angles(scene, "test"), 1e-3, 0.8))]
+    steps = np.array([1e-3, 1e-4])
+    text = report.text(lost, TurnUp(steps, 1e-9 * steps, steps, 10.0, 2.0))
+    assert "| 2 | 36 |" in text and "turns up below 1e-08" in text and "surrogates" in text
