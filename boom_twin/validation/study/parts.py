@@ -31,19 +31,15 @@ from .report import machine, provenance, table, write_json
 
 ROUNDS, QUICK_ROUNDS = 30, 5
 QUICK_DURATION = 2.0  # s
-NOTE = "surrogate parameters; one motion, another may differ"
-HEAD = ("variant", "tip at rest, mm", "in", "tip in the move, rms mm", "largest mm", "f1, %", "f2, %", "f3, %", "step, us",
-        "time saved, %", "unknowns", "status")  # fmt: skip
+HEAD = ("variant", "at rest, mm", "moving, mm", "f1, %", "time saved, %")
 
 
 @dataclass(frozen=True)
 class VariantCost:
-    """One variant and what it does.
+    """One variant, its deviation from the full model, and its cost.
 
     Attributes
     ----------
-    deviation : Deviation
-        Of its tip from the full model's.
     shifts : ndarray, shape (`FREQUENCIES`,)
         Relative change of the natural frequencies about the start of the move; NaN where one of the models has none.
     step_time : float
@@ -75,9 +71,15 @@ class PartsStudy:
         """Share of the full model's run time that leaving the part out saves; negative where it costs."""
         return 1.0 - part.step_time / self.full_times[0]
 
+    @property
+    def shown(self) -> tuple[VariantCost, ...]:
+        """Variants of the page: without other numbers of shapes in one section of several, which the numbers have."""
+        several = len(self.course.motion.first) > 1
+        return tuple(p for p in self.parts if not (several and p.variant.kind == "modes" and len(p.variant.edits) == 1))
+
 
 def measure(scene: Scene, course: StrokeCourse, rounds: int = ROUNDS) -> PartsStudy:
-    """Every variant of a scene against the scene itself, times the least of `rounds`.
+    """Compare every variant of a scene with the scene itself; times are the least of `rounds`.
 
     Raises
     ------
@@ -116,12 +118,12 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     paths = [out / f"parts.{kind}" for kind in ("json", "md", "png")]
     write_json(paths[0], {"machine": machine(), **as_json(found)})
     write_atomic(paths[1], as_markdown(found))
-    parts_picture(paths[2], bars(found), NOTE)
+    parts_picture(paths[2], bars(found), "surrogate parameters; one motion, another may differ")
     return paths
 
 
 def as_json(found: PartsStudy) -> dict[str, Any]:
-    """All numbers, SI units, shares as fractions."""
+    """Return all numbers, SI units, shares as fractions."""
     return {
         "at_rest_in": found.course.names,
         "move": found.course.motion.label,
@@ -148,39 +150,36 @@ def as_json(found: PartsStudy) -> dict[str, Any]:
 
 
 def as_markdown(found: PartsStudy) -> str:
-    """The report: how it was measured, and one table, ascending in the error of the tip."""
-    frequencies = ", ".join(f"{value:.3f}" for value in found.frequencies)
+    """Return the report: how it was measured, and one table, ascending in the error of the tip."""
     first, second = (1e6 * time for time in found.full_times)
-    lines = [
-        "# What the parts of a model cost, and what leaving them out changes\n",
-        f"Every row is the scene after an edit (`parts.json` names it), against the scene as it is: {found.unknowns} unknowns, "
-        f"{first:.2f} us a step (at the end of the rounds {second:.2f} us: what differs less than that is noise), natural "
-        f"frequencies {frequencies} Hz.",
-        f"At rest: the largest distance of the tips in {', '.join(found.course.names)}. Move: {found.course.motion.label}; "
-        f"steps of {1e3 * found.course.step:g} ms. Frequencies: change about the rest at the start of the move. Time: stepping "
-        "alone, least of interleaved runs of the move's beginning; what is negative costs time. Another motion may differ.\n",
-        table(HEAD, [_row(found, part) for part in found.parts]),
+    parts = [
+        "# What the parts of a model cost, and what leaving them out changes",
+        "![What leaving a part out changes, and what it saves](parts.png)",
+        f"Each row is the scene after an edit, against the scene as it is ({found.unknowns} unknowns, {first:.2f} us a step, "
+        f"at the end {second:.2f} us: a smaller difference is noise). At rest: the largest distance of the tips in "
+        f"{', '.join(found.course.names)}. Moving: the largest distance in a move, {found.course.motion.label}; steps of "
+        f"{1e3 * found.course.step:g} ms. f1: change of the first natural frequency, {found.frequencies[0]:.3f} Hz. Time: "
+        "stepping alone, the least of interleaved runs; negative where it costs time.",
+        "Every row above the error that you can bear may be left out; it is worth it where it saves time. "
+        "`boom_twin check --need` makes such a scene. `parts.json` has the edits, other frequencies, and single sections with "
+        "other numbers of shapes.",
+        table(HEAD, [_row(found, part) for part in found.shown]),
+        "Limits: one motion, another may differ; several parts left out at once may err more.",
         provenance(),
     ]
-    return "\n".join(lines)
+    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
 
 
 def _row(found: PartsStudy, part: VariantCost) -> Sequence[object]:
-    off, good = part.deviation, part.status == "ok"
-    errors = (1e3 * off.rest, off.where, 1e3 * off.rms, 1e3 * off.most) if good else (None, None, None, None)
-    shifts = [100.0 * float(shift) for shift in part.shifts]
-    time = (1e6 * part.step_time, 100.0 * found.saved(part)) if good else (None, None)
-    return [part.variant.name, *errors, *shifts, *time, part.unknowns, part.status]
+    if part.status != "ok":
+        return [f"{part.variant.name}: {part.status}", *[None] * (len(HEAD) - 1)]
+    off = part.deviation
+    return [part.variant.name, 1e3 * off.rest, 1e3 * off.most, 100.0 * float(part.shifts[0]), 100.0 * found.saved(part)]
 
 
 def bars(found: PartsStudy) -> Bars:
-    """Return the bars of the picture: all but single sections with more modes than they have."""
-
-    def shown(part: VariantCost) -> bool:
-        single = part.variant.kind == "modes" and len(part.variant.edits) == 1
-        return part.status == "ok" and not (single and part.unknowns > found.unknowns)
-
-    good = [part for part in found.parts if shown(part)]
+    """Return the bars of the picture."""
+    good = [part for part in found.shown if part.status == "ok"]
     return Bars(
         names=tuple(part.variant.name for part in good),
         rest=np.array([part.deviation.rest for part in good]),
