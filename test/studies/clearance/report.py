@@ -2,156 +2,108 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from boom_twin.analysis.methods import integrate_with
-from boom_twin.compiler.compile import compile_scene
 from boom_twin.errors import UsageError
-from boom_twin.plots.history import Orbits
-from boom_twin.plots.posture import orbits_picture
 from boom_twin.scene.schema import IDEAL_BELOW, Scene
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.validation.study.report import machine, provenance, table, write_json
 
 from . import convergence as near
-from .convergence import MEASURES, Convergence, ErrorCurve, convergence
+from .convergence import MEASURES, Convergence, convergence
 from .pictures import RestOffsetCurve, Trace, convergence_picture, sinking_picture, swing_picture
 from .rest_stop_cost import (
     BRAKE,
     COUNT,
-    HARD_BRAKE,
     HOLD,
+    MODELS,
     QUICK_COUNT,
     QUICK_HOLD,
-    RAMP,
-    SETTLED,
-    STEP,
-    STOP,
-    VIOLENT,
     Cost,
     Shift,
     Swing,
     costs,
-    hard_stop,
     shifts,
     swings,
 )
-from .scenes import pins_of, treated, with_play
+from .scenes import pins_of, with_play
 
-STOP_HEAD = ("posture", "pins", "rest, mm", "peak, mm", "rms, mm", "peak acc., m/s²", "rms acc., m/s²", "halved after, s",
-             "frequency, Hz", "contacts lost")  # fmt: skip
+PINS = ("ideal", "contact", "linear")
+SHOWN_CLEARANCE = 1e-4  # m, of the table of rests
 
 
 def report(scene: Scene, swings: list[Swing], shifts: list[Shift], found: Convergence, costs: list[Cost]) -> str:
-    """All sections."""
+    """Return all sections."""
     block = pins_of(scene)
-    told = ", ".join(f"{pin.at} {1e6 * pin.radial_clearance:g} um" for pin in block.pins)
-    head = [
-        "# Play in the pins\n",
-        f"Radial clearance: {told}; {block.contact.law}, exponent {block.contact.exponent:g}, restitution "
-        f"{block.contact.restitution:g}, friction {block.contact.friction:g}. Radii and clearances of the package's block are "
-        "surrogates.\n",
-    ]
-    parts = [_stops(swings), _rests(shifts), _convergence(found), _costs(costs)]
-    return "\n".join([*head, *(line for part in parts for line in part), provenance()])
+    sizes = ", ".join(f"{1e6 * size:g}" for size in sorted({pin.radial_clearance for pin in block.pins}))
+    parts = [
+        "# Play in the pins",
+        f"{len(block.pins)} pins with a radial clearance of {sizes} um; {block.contact.law}, restitution "
+        f"{block.contact.restitution:g}. `make study` writes all numbers.",
+        *_stops(swings), *_rests(shifts), *_convergence(found), *_costs(costs),
+        "Limits: one motion a posture.", provenance(),
+    ]  # fmt: skip
+    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
 
 
 def _stops(found: list[Swing]) -> list[str]:
-    rows = [
-        (own.posture, own.model, 1e3 * own.rest, 1e3 * own.peak, 1e3 * own.rms, own.top, own.effective,
-         own.settling if np.isfinite(own.settling) else "not seen", own.frequency, own.lost)
-        for own in found
-    ]  # fmt: skip
+    by = {(own.posture, own.model): own for own in found}
+    rows = []
+    for posture in dict.fromkeys(own.posture for own in found):
+        each = [by[posture, model] for model in MODELS]
+        rows.append((posture, 1e3 * each[1].rest, *(1e3 * own.peak for own in each), *(own.effective for own in each)))
     return [
-        "## After a stop\n",
-        "![The tip after a stop](clearance.png)\n",
-        "From rest in each posture the cylinders of the study's motion run at full speed (the whole stroke in 10 s, or as "
-        f"fast as the motion's travel allows), brake within {1e3 * BRAKE:g} ms, and hold for up to {HOLD:g} s. Vertical "
-        "movement of the tip, step 1 ms. Rest: where the tip comes to lie, against ideal pins. Peak and rms: distance from "
-        f"that rest after the stop (linearised pins: from the mean). Halved: stays within {SETTLED:g} of the peak from then "
-        "on. Contacts lost are those seen from row to row; of linearised pins, which pull as well, those that contact would "
-        "have lost.\n",
-        table(STOP_HEAD, rows),
+        "## After a stop",
+        "![The tip after a stop](clearance.png)",
+        f"Full speed, brakes within {1e3 * BRAKE:g} ms, hold. Rest: the tip with contact against ideal pins. Peak: largest "
+        "distance from rest, mm. m/s²: vertical acceleration, rms. Linear: pins as springs and dampers.",
+        table(("posture", "rest, mm", *(f"peak, {name}" for name in PINS), *(f"m/s², {name}" for name in PINS)), rows),
     ]
 
 
 def _rests(found: list[Shift]) -> list[str]:
-    first = found[0].clearances
-    shown = [int(np.argmin(np.abs(first - c))) for c in (1e-3, 1e-4, 1e-5)]
-    head = ("posture", "pin", "lever, m/m", "loaded", *(f"{1e6 * first[k]:.3g} um" for k in shown),
-            f"jump at {1e6 * IDEAL_BELOW:g} um", "force, N", "ratio")  # fmt: skip
-    rows = [
-        (own.posture, own.pin, own.lever, own.loaded, *(1e3 * float(own.shifts[k]) for k in shown), 1e3 * own.jump, own.force,
-         f"{own.ratios.min():.4f} to {own.ratios.max():.4f}")
-        for own in found
-    ]  # fmt: skip
+    postures = tuple(dict.fromkeys(own.posture for own in found))
+    at = {(own.pin, own.posture): 1e3 * float(own.shifts[np.argmin(np.abs(own.clearances - SHOWN_CLEARANCE))]) for own in found}
+    rows = [(pin, *(at[pin, posture] for posture in postures)) for pin in dict.fromkeys(own.pin for own in found)]
+    ratios = np.concatenate([own.ratios for own in found])
     worst = max(found, key=lambda own: own.jump)
     return [
-        "## At rest\n",
-        "![The resting tip](clearance_static.png)\n",
-        "Distance (mm) of the resting tip from that with ideal pins, with play in one pin only. Lever: way of the tip for "
-        "the way of the cylinder, of the rigid boom's geometry; loaded: of the elastic boom under its weight, by moving the "
-        "stroke. Ratio: the shift over loaded lever x (clearance + penetration), least and greatest over all clearances. "
-        f"Below {1e6 * IDEAL_BELOW:g} um a pin is ideal; the tip then jumps by what the column says, at worst "
-        f"{1e3 * worst.jump:.3g} mm ({worst.pin}, {worst.posture}): mostly penetration, which the cap on the contact's "
-        "stiffness leaves when the clearance is gone.\n",
-        table(head, rows),
+        "## At rest",
+        "![The resting tip](clearance_static.png)",
+        f"Shift of the resting tip (mm) by play of {1e6 * SHOWN_CLEARANCE:g} um in one pin: lever x (clearance + penetration) "
+        f"x {ratios.min():.3f} to {ratios.max():.3f}. Below {1e6 * IDEAL_BELOW:g} um a pin is ideal: the tip jumps, at worst "
+        f"by {1e3 * worst.jump:.3g} mm ({worst.pin}, {worst.posture}).",
+        table(("pin", *postures), rows),
     ]
 
 
 def _convergence(found: Convergence) -> list[str]:
-    lines = [
-        "## Convergence\n",
-        "![Error against run time](clearance_convergence.png)\n",
-        f"A stop within {1e3 * near.BRAKE:g} ms out of full speed, {found.span:g} s in all, rows every {1e3 * near.ROW:g} ms; "
-        "errors are rms over the rows, of acceleration and force as a share of their own rms. Own reference: boom_twin with "
-        f"steps of {1e6 * near.FINEST:g} us. Independent: the rigid boom on one compliant cylinder, Lagrange's equations by "
-        "hand in three coordinates, integrated by SciPy's LSODA between touch and release "
-        f"(`test/reference/worn_pin`), tolerance {near.TIGHTEST:g}. It shares no equation with boom_twin but "
-        "states the same contact law.\n",
-    ]
-    if np.isfinite(found.apart).all():
-        lines.append(
-            f"Both references of the one pin differ by {found.apart[0]:.2g} mm, {found.apart[1]:.2g} % of the acceleration "
-            f"and {found.apart[2]:.2g} % of the force. Accelerations at steps below 20 us carry the round-off of positions "
-            "over the square of the step: the run of 1 us is no reference for them, the independent one is.\n"
-        )
-    else:
-        lines.append("Without the independent model: no cylinder has k, barrel and rod.\n")
-    rows = [row for line in found.lines for row in _line(line)]
-    orders = [
-        (line.case, line.against, name, *(f"{order:.2f}" if np.isfinite(order) else None for order in line.orders(among)))
-        for line in found.lines
-        if line.program == "boom_twin"
-        for name, among in (("2 to 0.2 ms", near.COARSE), ("100 to 10 us", near.FINE))
-    ]
+    lines = [line for line in found.lines if line.program == "boom_twin" and line.against == "independent"]
+    if not lines:
+        return ["## Convergence", "There is no independent model: no cylinder has k, barrel and rod."]
+    rows = [(f"{1e3 * step:g}", *errors) for step, errors in zip(lines[0].marks, lines[0].errors.tolist(), strict=True)][1::3]
     return [
-        *lines,
-        table(("boom", "reference", "steps", *(f"order, {name.split(',')[0]}" for name in MEASURES)), orders),
-        table(("boom", "program", "reference", "step or tolerance", *MEASURES, "run time, s"), rows),
+        "## Convergence",
+        "![Error against run time](clearance_convergence.png)",
+        f"Rms errors of a stop within {1e3 * near.BRAKE:g} ms on one pin of the rigid boom, against Lagrange's equations "
+        "integrated by SciPy between touch and release (`test/reference/worn_pin`).",
+        table(("step, ms", *MEASURES), rows),
     ]
-
-
-def _line(line: ErrorCurve) -> list[Sequence[object]]:
-    unit = (1e3, "ms") if line.program == "boom_twin" else (1.0, "")
-    marks = [f"{unit[0] * mark:g} {unit[1]}".strip() for mark in line.marks]
-    rows = zip(marks, line.errors.tolist(), line.seconds, strict=True)
-    return [(line.case, line.program, line.against, mark, *errors, seconds) for mark, errors, seconds in rows]
 
 
 def _costs(found: list[Cost]) -> list[str]:
-    rows = [(own.pins, own.treatment, 1e6 * own.gentle, own.factors[0], 1e6 * own.violent, own.factors[1]) for own in found]
+    by = {(own.pins, own.treatment): (1e6 * own.gentle, 1e6 * own.violent) for own in found}
+    counts = sorted({pins for pins, _ in by if pins})
+    rows = [(0, *by[0, "ideal"], None, None)]
+    rows += [(pins, *by[pins, "contact"], *by[pins, "spring-damper"]) for pins in counts]
     return [
-        "## What a pin costs\n",
-        f"Step 1 ms. Gentle: the move of the other studies. Violent: to full speed within {1e3 * RAMP:g} ms, after "
-        f"{1e3 * STOP:g} ms to a stop within {1e3 * HARD_BRAKE:g} ms, {VIOLENT:g} s in all. Least of several runs. Factor: "
-        "real time over run time.\n",
-        table(("pins", "treatment", "gentle, us a step", "factor", "violent, us a step", "factor"), rows),
+        "## What a pin costs",
+        "Time of a step of 1 ms, us: in the usual move, and in a violent start and stop.",
+        table(("pins", "contact", "contact, violent", "linear", "linear, violent"), rows),
     ]
 
 
@@ -190,7 +142,7 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
         costs(scene, posture, quick),
     )
     out.mkdir(parents=True, exist_ok=True)
-    paths = [out / f"clearance{part}" for part in (".json", ".md", ".png", "_static.png", "_convergence.png", "_orbits.png")]
+    paths = [out / f"clearance{part}" for part in (".json", ".md", ".png", "_static.png", "_convergence.png")]
     write_json(paths[0], {"machine": machine(), **as_json(found)})
     text = report(scene, found.swings, found.shifts, found.convergence, found.costs)
     write_atomic(paths[1], text)
@@ -199,7 +151,6 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     sinking = [RestOffsetCurve(own.posture, own.pin, own.clearances, own.shifts) for own in found.shifts]
     sinking_picture(paths[3], "The resting tip with play in the pin of one rod", NOTE, sinking, IDEAL_BELOW)
     convergence_picture(paths[4], "Motions with play: error against run time", NOTE, found.convergence)
-    _orbits(paths[5], scene, posture)
     return paths
 
 
@@ -213,12 +164,3 @@ def as_json(found: Study) -> dict[str, Any]:
         "references_differ": dict(zip(MEASURES, found.convergence.apart, strict=True)),
         "costs": [asdict(own) for own in found.costs],
     }
-
-
-def _orbits(path: Path, scene: Scene, posture: str | None) -> None:
-    """Write a picture of the journals' orbits in the violent stop that the costs are measured in."""
-    contact, drive = treated(scene, "contact"), hard_stop(scene, posture)
-    moved, plan = integrate_with(contact, drive, VIOLENT, STEP, angles=drive.angles), compile_scene(contact)
-    lost = np.sum(np.diff(moved.pins[:, :, 3], axis=0) < 0.0, axis=0)
-    orbits = Orbits(moved.times, plan.pins, plan.tables.clearances.gap, moved.pins, lost)
-    orbits_picture(path, "Journals in their bushes: a violent start and stop", orbits, NOTE)
