@@ -19,7 +19,7 @@ LEAST_SPEED = 1e-3  # m/s, of approach at entry
 
 
 def keeping(restitution: float) -> float:
-    """chi with which an impact keeps just this share e of its speed: chi (1 + e) = log[(1 + chi)/(1 - chi e)]."""
+    """Return chi with which an impact keeps the share e of its speed: chi (1 + e) = log[(1 + chi)/(1 - chi e)]."""
 
     def excess(chi: float) -> float:
         return chi * (1.0 + restitution) - log1p(chi) + log1p(-chi * restitution)
@@ -41,7 +41,7 @@ HYSTERESIS: dict[str, Callable[[float], float]] = {
 
 
 def stiffness(pin_radius: float, clearance: float, young: float, poisson: float) -> float:
-    """K (N/m^1.5) of pin and bush of one material; m, Pa."""
+    """Return K (N/m^1.5) of pin and bush of one material; m, Pa."""
     softness = 2.0 * (1.0 - poisson**2) / young
     return 4.0 / (3.0 * softness) * sqrt(pin_radius * (pin_radius + clearance) / clearance)
 
@@ -87,7 +87,7 @@ class Contact:
         return 0.5 * (gap + long) if gap > 0.0 else 0.5 * self.smoothing**2 / (long - gap)
 
     def normal(self, gap: float, gap_rate: float, entry: float | None) -> float:
-        """F, N. `entry`: approach speed (m/s) when the pin touched, or None in flight, where nothing is damped."""
+        """Return F, N. `entry`: approach speed (m/s) when the pin touched, or None in flight, where nothing is damped."""
         depth = self.penetration(gap)
         elastic = float(self.stiffness * depth**self.exponent)
         if entry is None or depth == 0.0:
@@ -95,7 +95,7 @@ class Contact:
         return max(elastic * (1.0 + self.hysteresis * gap_rate / max(entry, LEAST_SPEED)), 0.0)
 
     def force(self, offset: complex, rate: complex, entry: float | None) -> complex:
-        """Force (N) of the bush on the pin, complex; offset (m) and rate (m/s) of the pin against the bush."""
+        """Return the force (N) of the bush on the pin, complex; offset (m) and rate (m/s) of the pin against the bush."""
         distance = abs(offset)
         if distance == 0.0:
             return 0j

@@ -68,12 +68,12 @@ class PartsStudy:
     parts: tuple[VariantCost, ...]
 
     def saved(self, part: VariantCost) -> float:
-        """Share of the full model's run time that leaving the part out saves; negative where it costs."""
+        """Return the share of the full model's run time that leaving the part out saves; negative where it costs."""
         return 1.0 - part.step_time / self.full_times[0]
 
     @property
     def shown(self) -> tuple[VariantCost, ...]:
-        """Variants of the page: without other numbers of shapes in one section of several, which the numbers have."""
+        """Return the variants of the page: no other numbers of shapes in one section of several; the JSON has them."""
         several = len(self.course.motion.first) > 1
         return tuple(p for p in self.parts if not (several and p.variant.kind == "modes" and len(p.variant.edits) == 1))
 

@@ -19,7 +19,7 @@ PACKAGES = ("numpy", "scipy", "numba", "exudyn", "boom_twin")
 
 
 def machine() -> dict[str, str | int | None]:
-    """Date (UTC), CPU model, cores that this process may use, and versions; None for a package that is not there."""
+    """Return date (UTC), CPU model, usable cores and versions; None for a package that is not installed."""
     versions = {package: _version(package) for package in PACKAGES}
     return {
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
@@ -38,7 +38,7 @@ def _version(package: str) -> str | None:
 
 
 def _cpu() -> str:
-    """Model of the processor, as far as the system tells."""
+    """Return the model of the processor, as far as the system tells."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -51,7 +51,7 @@ SYNTHETIC = "Scene parameters are surrogates; nothing here was measured on a rig
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A Markdown table; floats with 3 significant digits or whole, None and NaN as a dash. Ends with a newline."""
+    """Return a Markdown table; floats with 3 significant digits or whole, None and NaN as a dash. Ends with a newline."""
     lines = [list(head), ["---"] * len(head), *([_text(value) for value in row] for row in rows)]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 

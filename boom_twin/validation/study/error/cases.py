@@ -39,7 +39,7 @@ class Own:
 
     @property
     def label(self) -> str:
-        """All but the step."""
+        """Return all settings but the step."""
         method, scheme = self.method, self.method.integrator
         if scheme in ("generalised-alpha", "newmark", "wilson"):
             scheme += f" {method.parameter:g}"
@@ -85,12 +85,12 @@ class Peer:
 
     @property
     def model(self) -> str:
-        """Model of the boom, in words."""
+        """Return the model of the boom, in words."""
         return f"Exudyn, {self.elements} element{'s' if self.elements > 1 else ''}{', lumped' if self.lumped else ''}"
 
     @property
     def label(self) -> str:
-        """All but the step."""
+        """Return all settings but the step."""
         times = {0: "anew", 1: "kept for 1 pass"}.get(self.kept, f"kept for {self.kept} passes")
         return f"{self.model}, tangent {times}, tolerance {self.tolerance:g}"
 

@@ -65,12 +65,12 @@ def same_step(runner: Runner, rows: Sequence[Row], turns: int) -> dict[str, Any]
     """
     own = Own()
     peers = [row for row in of(rows, Peer) if row.case.step == own.step]
-    best = fastest(peers, EQUAL[0]) or fastest(peers, EQUAL[-1])
+    most, best = next(((most, row) for most in EQUAL if (row := fastest(peers, most)) is not None), (EQUAL[-1], None))
     if best is None or not isinstance(best.case, Peer):
         return None
     ours, theirs = zip(*((runner.row(own).seconds, runner.row(best.case).seconds) for _ in range(turns)), strict=True)
     return {
-        "step_s": own.step, "elements": best.case.elements, "exudyn_method": best.case.label,
+        "step_s": own.step, "elements": best.case.elements, "exudyn_method": best.case.label, "exudyn_error_at_most_mm": most,
         "boom_twin_s": ours, "exudyn_s": theirs,
         "ratio_of_medians": statistics.median(theirs) / statistics.median(ours),
         "ratio_of_minima": min(theirs) / min(ours),

@@ -109,7 +109,7 @@ def _varies_rest(case: Own) -> bool:
 
 
 def _by_label(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Own rows that went through, by method."""
+    """Return own rows that went through, by method."""
     groups: dict[str, list[Row]] = {}
     for row in of(rows, Own):
         if row.good:

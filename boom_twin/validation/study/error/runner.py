@@ -50,12 +50,12 @@ class Row:
 
     @property
     def tip_mm(self) -> float:
-        """The larger of both errors: no program is judged by itself alone."""
+        """Return the larger of both errors: no program is judged by itself alone."""
         return float(np.fmax(self.own_mm, self.independent_mm))
 
     @property
     def acceleration(self) -> float:
-        """The larger of both errors."""
+        """Return the larger of both errors."""
         return float(np.fmax(self.own_acceleration, self.independent_acceleration))
 
     @property

@@ -125,7 +125,7 @@ def _default(rows: Sequence[CaseResult]) -> str:
 
 
 def _others(rows: Sequence[CaseResult]) -> str:
-    """One entry for all methods that are worse than the default in the same cases."""
+    """Return one entry for all methods that are worse than the default in the same cases."""
     ranks = {mark: rank for rank, mark in enumerate(("holds", "refuses", "degrades", "fails", "silent"))}
     methods: dict[str, list[str]] = {}
     for method in rows[0].cells:

@@ -12,7 +12,6 @@ from ....analysis.methods import Method, MethodRun, integrate_with
 from ....analysis.modal import natural_modes
 from ....errors import SolverError
 from ....scene.kinematics import joint_angles_of_strokes
-from ....scene.schema import Scene
 from ....types import Array
 from ..scene_changes import lighter_gravity
 from .cases import Case
@@ -47,7 +46,7 @@ class Cell:
 
     @property
     def verdict(self) -> CaseVerdict:
-        """Verdict on the facts."""
+        """Return the verdict on the facts."""
         return verdict(self.facts)
 
 
@@ -123,19 +122,19 @@ def _march(setup: Setup, step: float, every: int, method: Method) -> MethodRun:
 
 
 def _thinned(motion: MethodRun, stride: int) -> MethodRun:
-    """Every `stride`-th row."""
+    """Return every `stride`-th row."""
     names = ("times", "tip", "tip_acceleration", "joints", "cylinder_forces")
     return replace(motion, **{name: getattr(motion, name)[::stride] for name in names})
 
 
 def _strokes(setup: Setup, time: float) -> tuple[Array, Array]:
-    """Strokes (m) at a time (s), and joint angles (rad) of the undeformed boom there."""
+    """Return strokes (m) at a time (s), and joint angles (rad) of the undeformed boom there."""
     strokes = setup.drive(np.array([time]))[0][0]
     return strokes, joint_angles_of_strokes(setup.scene, strokes, near=setup.angles)
 
 
 def _equilibrium(setup: Setup) -> Array:
-    """Tip (m), shape (2,), at rest at the last strokes."""
+    """Return the tip (m), shape (2,), at rest at the last strokes."""
     return rest_at(setup.scene, *_strokes(setup, setup.duration))[1].frames[-1, :2].copy()
 
 
@@ -161,10 +160,9 @@ def limit_of(setup: Setup) -> Limit:
 
 
 def _slowest(setup: Setup, share: float) -> float:
-    """First natural frequency (Hz) at the setup's first strokes under `share` of gravity; NaN without an equilibrium."""
-    scene: Scene = lighter_gravity(setup.scene, share)
+    """Return the first natural frequency (Hz) at the first strokes under `share` of gravity; NaN without an equilibrium."""
     try:
-        plan, state, work = rest_at(scene, *_strokes(setup, 0.0))
+        plan, state, work = rest_at(lighter_gravity(setup.scene, share), *_strokes(setup, 0.0))
     except SolverError:
         return float("nan")
     return natural_modes(plan, state, work, 1, WIDTH)[0].frequency

@@ -57,7 +57,7 @@ class DeadStop:
     stop: float
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
+        """Return strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
         moving = times < self.stop - 1e-9
         x = np.clip(times / self.ramp, 0.0, 1.0)
         gone = self.ramp * ease_integral(x) + np.clip(times, self.ramp, self.stop) - self.ramp
@@ -69,27 +69,29 @@ def smooth(
     scene: Scene, posture: str | None = None, share: float = 1.0, rise: float = 1.0, duration: float = 2.0, step: float = 1e-3,
     every: int = 1,
 ) -> Setup:  # fmt: skip
-    """`share` of the study's move in `rise` (s), then a hold until `duration` (s)."""
+    """Make `share` of the study's move in `rise` (s), then a hold until `duration` (s)."""
     own = motion_of(scene, posture)
     move = replace(own, travel=share * own.travel, rise=rise, duration=duration)
     return Setup(scene, move, own.angles, duration, step, rise, every)
 
 
 def move_in_words(scene: Scene) -> str:
-    """Strokes of the study's move on a scene."""
+    """Return the strokes of the study's move on a scene, in words."""
     travel = motion_of(scene).travel
     return "from rest, " + ", ".join(f"stroke {i + 1} by {1e3 * travel[i]:+.1f} mm" for i in np.flatnonzero(travel))
 
 
 def first_cylinder(scene: Scene, posture: str, turn: float, step: float, rise: float = 1.0, duration: float = 2.0) -> Setup:
-    """Cylinder 1 turns joint 1 by `turn` (rad) in `rise` (s), then holds."""
-    return one_cylinder(scene, posture, 0, _stroke_for(scene, posture, turn), step, rise, duration)
+    """Turn joint 1 by `turn` (rad) in `rise` (s) by its cylinder, then hold."""
+    angle = motion_of(scene, posture).angles[0]
+    first, last = stroke_curve(scene, 0, np.array([angle, angle + turn]))
+    return one_cylinder(scene, posture, 0, float(last - first), step, rise, duration)
 
 
 def one_cylinder(
     scene: Scene, posture: str, index: int, travel: float, step: float = 1e-3, rise: float = 1.0, duration: float = 2.0
 ) -> Setup:
-    """Cylinder `index` travels by `travel` (m) in `rise` (s), then holds."""
+    """Move cylinder `index` by `travel` (m) in `rise` (s), then hold."""
     own = motion_of(scene, posture)
     far = np.zeros(len(own.first))
     far[index] = travel
@@ -97,7 +99,7 @@ def one_cylinder(
 
 
 def dead_stop(scene: Scene, step: float = 1e-3) -> Setup:
-    """The study's move at full speed of the drives, from 0.3 s on, stopped dead at 0.8 s; 2 s in all."""
+    """Make the study's move at full speed of the drives from 0.3 s on, stop dead at 0.8 s and hold until 2 s."""
     own = motion_of(scene)
     full = np.array([joint.cylinder.max_stroke for joint in scene.joints]) / FULL_STROKE
     drive = DeadStop(own.first, np.sign(own.travel) * full, 0.3, 0.8)
@@ -105,16 +107,9 @@ def dead_stop(scene: Scene, step: float = 1e-3) -> Setup:
 
 
 def to_the_ends(scene: Scene, longest: bool) -> Setup:
-    """All cylinders, from near by, to their longest or shortest stroke that range and cylinder allow."""
-    ends, aside = np.array([stroke_range(scene, i, SAMPLES) for i in range(len(scene.joints))]), SHARE
+    """Move all cylinders, from near by, to the longest or shortest stroke that range and cylinder allow."""
+    ends = np.array([stroke_range(scene, i, SAMPLES) for i in range(len(scene.joints))])
     last, other = (ends[:, 1], ends[:, 0]) if longest else (ends[:, 0], ends[:, 1])
-    first = last + aside * (other - last)
+    first = last + SHARE * (other - last)
     move = Motion("to the ends", joint_angles_of_strokes(scene, first), first, last - first, 1.0, 2.0)
     return Setup(scene, move, move.angles, 2.0, 1e-3, 1.0)
-
-
-def _stroke_for(scene: Scene, posture: str, turn: float) -> float:
-    """Travel (m) of cylinder 1 that turns joint 1 by `turn` (rad) from a posture."""
-    angle = motion_of(scene, posture).angles[0]
-    first, last = stroke_curve(scene, 0, np.array([angle, angle + turn]))
-    return float(last - first)

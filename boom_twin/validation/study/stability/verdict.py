@@ -73,7 +73,7 @@ class CaseVerdict:
 
     @property
     def mark(self) -> str:
-        """Word of the verdict, or "silent"."""
+        """Return the word of the verdict, or "silent"."""
         return "silent" if self.silent else self.word
 
 
@@ -134,7 +134,7 @@ def against_motion(found: MethodRun, right: MethodRun, still: float, jump: float
 
 
 def _lasting(found: MethodRun, right: MethodRun, jump: float, largest: float) -> float:
-    """Rows from a jump of speed to the last one where cylinder forces are wrong; NaN without a jump."""
+    """Return the rows from a jump of speed to the last one where cylinder forces are wrong; NaN without a jump."""
     if math.isnan(jump):
         return math.nan
     wrong = np.linalg.norm(found.cylinder_forces - right.cylinder_forces, axis=1) > WRONG * largest
@@ -179,7 +179,7 @@ def alternating(values: Array) -> Array:
 
 
 def _rings(found: MethodRun, right: MethodRun | None, late: Mask) -> tuple[float, float]:
-    """Ringing of tip acceleration and cylinder forces in the rows `late`, beyond that of the reference."""
+    """Return the ringing of tip acceleration and cylinder forces in the rows `late`, beyond that of the reference."""
 
     def ring(own: Array, other: Array | None) -> float:
         more = own if other is None else own - other
