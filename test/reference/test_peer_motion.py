@@ -19,8 +19,9 @@ def drive_of(scene, motion):
     closed = np.array([joint.cylinder.closed_length for joint in scene.joints])
 
     def drive(time):
-        strokes, rates, accelerations = motion.at(time)
-        return closed + strokes, rates, accelerations
+        strokes, rates = motion(np.array([time]))
+        x = min(max(time / motion.rise, 0.0), 1.0)
+        return closed + strokes[0], rates[0], 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) / motion.rise**2 * motion.travel
 
     return drive
 

@@ -11,8 +11,8 @@ from studies.clearance import report as clearance
 from studies.clearance.convergence import Convergence, MotionRows, convergence, errors, one_pin
 from studies.clearance.rest_stop_cost import main_frequency, shifts, swings
 from studies.clearance.scenes import ideal, pins_of, rods_and_joints, treated, with_play
+from studies.stops import halt
 
-from boom_twin.analysis.motions import halt
 from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.schema import IDEAL_BELOW
 

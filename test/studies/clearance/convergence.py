@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from reference.worn_pin.geometry import cylinder_length
 from reference.worn_pin.motion import PinMotion, PinnedBoom, freed
+from studies.stops import StopMotion, halt
 
 from boom_twin.analysis.methods import MethodRun, integrate_with
-from boom_twin.analysis.motions import StopMotion, halt
 from boom_twin.scene.schema import Cylinder, Joint, Scene
 from boom_twin.types import Array
 from boom_twin.validation.contact_law import HYSTERESIS, Contact, stiffness

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from reference.worn_pin import geometry
+from studies.stops import StopMotion, halt
 
 from boom_twin.analysis.equilibrium import rest_at, statics
 from boom_twin.analysis.methods import MethodRun, integrate_with
-from boom_twin.analysis.motions import StopMotion, halt, motion_of
+from boom_twin.analysis.motions import motion_of
 from boom_twin.compiler.plan import first_row, taken_apart
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.scene.schema import IDEAL_BELOW, Scene

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from studies.clearance.scenes import ideal, treated, with_play, without_friction
+from studies.stops import StopMotion, halt
 
 from boom_twin.analysis.methods import MethodRun, integrate_with
-from boom_twin.analysis.motions import StopMotion, halt
 from boom_twin.scene.schema import Scene
 from boom_twin.types import Array
 

@@ -8,13 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ....analysis.methods import Drive
-from ....analysis.motions import FULL_STROKE, Motion, ease, ease_integral, motion_of
+from ....analysis.motions import Motion, motion_of
 from ....scene.kinematics import joint_angles_of_strokes, stroke_curve, stroke_range
+from ....scene.pump_pulses import ease
 from ....scene.schema import Scene
 from ....types import Array
 
 SHARE = 0.05  # of a cylinder's travel, from where it goes to the end
 SAMPLES = 1001  # of a joint's range
+FULL_STROKE = 10.0  # s that a drive at full speed takes for its whole stroke
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,11 @@ class DeadStop:
         gone = self.ramp * ease_integral(x) + np.clip(times, self.ramp, self.stop) - self.ramp
         rate = np.where(moving, ease(x), 0.0)
         return self.first + np.outer(gone, self.speed), np.outer(rate, self.speed)
+
+
+def ease_integral(x: Array) -> Array:
+    """Return the integral of `ease` from 0, for x in [0, 1]."""
+    return 2.5 * x**4 - 3.0 * x**5 + x**6
 
 
 def smooth(
