@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+from reference.ideal_pins import refuse_clearance
 
-from boom_twin.scene.schema import Cylinder, Joint, Scene, refuse_clearance
+from boom_twin.scene.schema import Cylinder, Joint, Scene
 from boom_twin.types import Array
 
 from .equations import Jet, angle, constant, coordinates, cos, inverse, root, sin

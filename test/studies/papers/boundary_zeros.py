@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from reference.ideal_pins import refuse_clearance
 
 from boom_twin.analysis.equilibrium import clamp_pins, rest_at, set_undeformed
 from boom_twin.analysis.modal import natural_modes
@@ -21,7 +22,7 @@ from boom_twin.kernels.tables import OK, Z_FORCE_A, Z_SECTION, Motion
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.scene.schema import Scene, refuse_clearance
+from boom_twin.scene.schema import Scene
 from boom_twin.types import Array
 
 WIDTH = 1e-7  # rad, the papers' tolerance of the interval

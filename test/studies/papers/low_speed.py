@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from reference.ideal_pins import refuse_clearance
 
 from boom_twin.analysis.drive import TOLERANCE
 from boom_twin.analysis.equilibrium import settle
@@ -21,7 +22,7 @@ from boom_twin.kernels.integrators import GENERALISED_ALPHA, HAT, OFFSET, OLD, R
 from boom_twin.kernels.tables import OK, SENTENCES, Motion, State, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
-from boom_twin.scene.schema import Scene, refuse_clearance
+from boom_twin.scene.schema import Scene
 from boom_twin.types import Array
 
 SPAN = 1e-4  # rad or m, of a difference quotient
