@@ -8,6 +8,7 @@ import math
 import re
 from contextlib import redirect_stderr
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from oracle import booms
 from boom_twin.analysis.methods import Method
 from boom_twin.analysis.motions import motion_of
 from boom_twin.cli.main import main
+from boom_twin.errors import SolverError
 from boom_twin.scene import load_scene
 from boom_twin.validation.study.error import problem as error_problem
 from boom_twin.validation.study.error import report as error
@@ -48,8 +50,9 @@ def content(report):
 def problem() -> Problem:
     """Half a second without Exudyn."""
     scene = load_scene()
-    motion = motion_of(scene, duration=0.48)
-    return Problem(scene, motion, error_problem._own(scene, motion, True), None, "left out")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(error_problem, "load_rig", lambda: (None, "left out"))
+        return pose(scene, motion_of(scene, duration=0.48), True)
 
 
 def rows_of(content, **wanted):
@@ -130,13 +133,10 @@ def test_without_exudyn_the_report_goes_on(tmp_path, monkeypatch):
 
 
 def test_independent_reference_that_fails_is_told(monkeypatch):
-    from boom_twin.errors import SolverError
-
-    def fail(*_):
+    def fail(*_, **__):
         raise SolverError("The rig stopped.")
 
-    monkeypatch.setattr(error_problem, "load_rig", lambda: (object(), ""))
-    monkeypatch.setattr(error_problem, "_independent", fail)
+    monkeypatch.setattr(error_problem, "load_rig", lambda: (SimpleNamespace(at_rest=fail), ""))
     scene = load_scene()
     found = pose(scene, motion_of(scene, duration=0.2), True)
     assert found.exudyn is None and found.missing == "The rig stopped."

@@ -13,7 +13,7 @@ from ....offline.progress import progress_of
 from ....scene.schema import Scene
 from ....system.atomic_files import write_atomic
 from ..report import machine, provenance, table, write_json
-from .cases import Case, Own, Peer, own_cases, peer_cases
+from .cases import PAPERS, Case, Own, Peer, own_cases, peer_cases
 from .pareto import EQUAL, acceleration, fastest, front, of, order, same_step, tip
 from .pictures import methods_picture, programs_picture
 from .problem import Problem, build, pose
@@ -132,12 +132,13 @@ def _at_same_step(duel: dict[str, Any] | None) -> str:
 
 
 def _methods(rows: Sequence[Row]) -> str:
-    """Return a table of the methods at the default step, without most combinations of two changes."""
+    """Return a table of the methods at the default step; other numbers of modes only where nothing else differs."""
     default = Own().label
     lines = []
     for row in of(rows, Own):
         case = row.case
-        if isinstance(case, Own) and case.step == Own().step and (case.modes in (None, 3) or case == Own(modes=case.modes)):
+        plain = isinstance(case, Own) and (case.modes in (None, PAPERS.modes) or case == Own(modes=case.modes))
+        if plain and case.step == Own().step:
             numbers = (_ms(row), row.tip_mm, 100.0 * row.acceleration) if row.good else ("failed", None, None)
             lines.append((case.label.removeprefix(f"{default}, "), *numbers))
     return table(("method", "ms/s", "tip, mm", "acceleration, %"), lines)
