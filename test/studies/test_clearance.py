@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from studies.clearance import report as clearance
 from studies.clearance.convergence import Convergence, MotionRows, convergence, errors, one_pin
-from studies.clearance.rest_stop_cost import main_frequency, shifts, swings
+from studies.clearance.rest_stop_cost import shifts, swings
 from studies.clearance.scenes import ideal, pins_of, rods_and_joints, treated, with_play
 from studies.stops import halt
 
@@ -50,13 +50,7 @@ def test_swings_of_a_stop(two_sections: Scene) -> None:
     found = {own.model: own for own in swings(with_play(two_sections), ("arch",), 0.3)}
     assert list(found) == ["ideal", "contact", "spring-damper"]
     assert found["ideal"].rest == 0.0 and found["contact"].rest == found["spring-damper"].rest < 0.0
-    assert all(own.peak > own.rms > 0.0 and own.top > own.effective > 0.0 for own in found.values())
-
-
-def test_main_frequency() -> None:
-    times = 1e-3 * np.arange(4000)
-    values = np.sin(2.0 * np.pi * 1.37 * times) + 0.3 * np.sin(40.0 * times)
-    assert main_frequency(values, 1e-3) == pytest.approx(1.37, abs=0.011)
+    assert all(own.peak > own.rms > 0.0 and own.effective > 0.0 for own in found.values())
 
 
 def test_errors_are_shares_of_what_is_right() -> None:

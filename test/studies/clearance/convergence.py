@@ -31,7 +31,6 @@ ROW = 2e-3  # s, between rows that are compared
 SPAN = 0.2  # s, from the beginning of the braking, which the start of the motion is moved close to
 RAMP, STOP, BRAKE = 0.1, 0.15, 0.01  # s
 SMOOTH = 1e-6  # m, as the contact of boom_twin has it
-COARSE, FINE = (2e-4, 1.0), (9e-6, 1.1e-4)  # s, steps that an order is fitted to
 MEASURES = ("tip, mm", "acceleration of the tip, %", "force of the pin, %")
 
 
@@ -70,14 +69,6 @@ class ErrorCurve:
     marks: tuple[float, ...]
     errors: Array
     seconds: tuple[float, ...]
-
-    def orders(self, among: tuple[float, float]) -> Array:
-        """Slopes over the steps within two bounds (s), shape (3,); NaN for tolerances, and for fewer than two steps."""
-        steps = np.array(self.marks)
-        taken = (steps >= 0.999 * among[0]) & (steps <= 1.001 * among[1])
-        if self.program != "boom_twin" or taken.sum() < 2:
-            return np.full(3, np.nan)
-        return np.asarray(np.polyfit(np.log(steps[taken]), np.log(self.errors[taken]), 1)[0])
 
 
 @dataclass(frozen=True)

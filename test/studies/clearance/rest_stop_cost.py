@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -99,9 +98,6 @@ def _rest(scene: Scene, posture: str, more: float | Array = 0.0) -> tuple[Array,
 STEP = 1e-3  # s
 HOLD, QUICK_HOLD = 15.0, 0.9  # s after the stop
 BRAKE = 0.1  # s
-SETTLED = 0.5  # of the largest swing after the stop
-UNSEEN = 1.0  # s before the end: a swing then may be followed by another
-FINEST = 0.01  # Hz, of a spectrum
 MODELS = ("ideal", "contact", "spring-damper")
 
 
@@ -117,15 +113,8 @@ class Swing:
         Height at rest at the end, m, likewise.
     peak, rms : float
         Largest distance from that rest after the stop, and its root mean square, m.
-    top, effective : float
-        Vertical acceleration after the stop: largest, root mean square, m/s^2.
-    settling : float
-        After it the tip stays within `SETTLED` of `peak`, s; infinite if that is not seen.
-    frequency : float
-        Of the largest line in the spectrum of the height, Hz.
-    doubt : str
-    lost : int
-        Rows at which any pin has just lost contact.
+    effective : float
+        Vertical acceleration after the stop, root mean square, m/s^2.
     """
 
     posture: str
@@ -136,12 +125,7 @@ class Swing:
     rest: float
     peak: float
     rms: float
-    top: float
     effective: float
-    settling: float
-    frequency: float
-    doubt: str
-    lost: int
 
 
 def swings(scene: Scene, postures: tuple[str, ...], hold: float = HOLD) -> list[Swing]:
@@ -169,21 +153,8 @@ def _swing(posture: str, model: str, moved: MethodRun, drive: StopMotion, rest: 
     after = times >= -1e-9
     off = height[after] - (rest if model != "spring-damper" else float(np.mean(height[after])))
     peak = float(np.abs(off).max())
-    wide = np.flatnonzero(np.abs(off) > SETTLED * peak)
-    settling = float(times[after][wide[-1]]) if times[-1] - times[after][wide[-1]] > UNSEEN else math.inf
-    lost = int(np.sum(np.diff(moved.pins[:, :, 3], axis=0) < 0.0)) if moved.pins.shape[1] else 0
-    return Swing(
-        posture, model, times, height, acceleration, rest, peak, float(np.sqrt(np.mean(off**2))),
-        float(np.abs(acceleration[after]).max()), float(np.sqrt(np.mean(acceleration[after] ** 2))),
-        settling, main_frequency(off, STEP), moved.doubt or moved.status.replace("ok", ""), lost,
-    )  # fmt: skip
-
-
-def main_frequency(values: Array, step: float) -> float:
-    """Frequency (Hz) of the largest line of `values` (m,), `step` s apart."""
-    count = max(len(values), round(1.0 / (FINEST * step)))
-    spectrum = np.abs(np.fft.rfft((values - values.mean()) * np.hanning(len(values)), count))
-    return float(np.argmax(spectrum) / (count * step))
+    effective = float(np.sqrt(np.mean(acceleration[after] ** 2)))
+    return Swing(posture, model, times, height, acceleration, rest, peak, float(np.sqrt(np.mean(off**2))), effective)
 
 
 GENTLE, QUICK_GENTLE = 2.0, 0.2  # s
@@ -200,11 +171,6 @@ class Cost:
     treatment: str
     gentle: float
     violent: float
-
-    @property
-    def factors(self) -> tuple[float, float]:
-        """Real time over run time, of both."""
-        return STEP / self.gentle, STEP / self.violent
 
 
 def costs(scene: Scene, posture: str | None, quick: bool = False) -> list[Cost]:
