@@ -11,7 +11,7 @@ from studies.clearance.scenes import ideal
 
 from boom_twin.analysis.equilibrium import settle, statics
 from boom_twin.analysis.initial_state import undeflected
-from boom_twin.analysis.modal import damping_ratio, natural_modes
+from boom_twin.analysis.modal import natural_modes
 from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import simulate
 from boom_twin.compiler.compile import BasisName, compile_scene
@@ -48,13 +48,12 @@ class MatrixCheck:
 
 @dataclass(frozen=True)
 class BasisRow:
-    """One posture: sag (m) of the tip, frequencies (Hz) by default shapes and by cantilever modes, damping ratio of mode 1."""
+    """One posture: sag (m) of the tip, frequencies (Hz) by default shapes and by cantilever modes."""
 
     posture: str
     sag: float
     default: tuple[float, ...]
     cantilever: tuple[float, ...]
-    damping: float
 
 
 @dataclass(frozen=True)
@@ -92,7 +91,7 @@ def measure(scene: Scene, postures: Sequence[str], quick: bool) -> PapersStudy:
 def _matrices(scene: Scene, step: float) -> MatrixCheck:
     own, swept = chain_of(scene, INSTANT, step)
     differences = tuple(difference(one.matrix, other) for one, other in zip(own, swept, strict=True))
-    first = boundary_solution(own)[0]
+    first = boundary_solution(own)
     right = own[0].inlet
     error = float(np.abs(first[4:] - right[4:]).max() / np.abs(right[4:]).max())
     return MatrixCheck(step, tuple(one.name for one in own), differences, error)
@@ -108,10 +107,9 @@ def _bases(scene: Scene, posture: str) -> BasisRow:
         settle(plan, state, work, strokes, angles)
         modes = natural_modes(plan, state, work, MODES)
         found[basis] = tuple(mode.frequency for mode in modes)
-        damping = damping_ratio(plan, modes[0])
     rest = statics(scene, posture=posture, modes=0)
     sag = float(np.hypot(*(rest.tip - rest.tip_rigid)))
-    return BasisRow(posture, sag, found["end-shapes"], found["cantilever"], damping)
+    return BasisRow(posture, sag, found["end-shapes"], found["cantilever"])
 
 
 def _let_go(scene: Scene, posture: str) -> tuple[LetGoTrace, ...]:

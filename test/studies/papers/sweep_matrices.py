@@ -96,8 +96,8 @@ def difference(one: Array, other: Array) -> float:
     return float(np.abs(a - b).max() / np.abs(a).max())
 
 
-def boundary_solution(chain: Sequence[Substructure]) -> tuple[Array, float]:
-    """Base vector (6,) by the product of all matrices, the base's place and the free tip being known; condition number."""
+def boundary_solution(chain: Sequence[Substructure]) -> Array:
+    """Return the base vector (6,) by the product of all matrices; the base's place and the free tip are known."""
     product = np.eye(7)
     for one in chain:
         product = one.matrix @ product
@@ -107,4 +107,4 @@ def boundary_solution(chain: Sequence[Substructure]) -> tuple[Array, float]:
     block = product[np.ix_([3, 4, 5], unknown)]
     scale = np.abs(block).max(axis=1, keepdims=True)
     first[unknown] = np.linalg.solve(block / scale, right / scale[:, 0])
-    return first, float(np.linalg.cond(block / scale / np.abs(block / scale).max(axis=0)))
+    return first
