@@ -165,7 +165,7 @@ def text(lost: Sequence[Loss], turned: TurnUp) -> str:
     rows = [
         (loss.name, loss.step.unknowns,
          *(f"{digits(error):.1f}" for error in (loss.step.riccati, loss.step.plain, loss.step.dense)))
-        for loss in lost
+        for loss in lost if loss.group != "sections"
     ]  # fmt: skip
     parts = [
         "# Round-off",
@@ -174,7 +174,7 @@ def text(lost: Sequence[Loss], turned: TurnUp) -> str:
         "Decimal digits of 16 that the increment of the tip loses in one pass: by the Riccati form, by the plain product of "
         "transfer matrices, and by LU of the whole system. The exact increment is that of the whole system, refined in "
         "extended precision. Step 1 ms unless named. The Riccati form loses about as many as LU; the plain product "
-        "loses digits with every section.",
+        "loses digits with every section (right panel).",
         table(("boom", "unknowns", "Riccati", "plain product", "LU"), rows),
         "## Error of the tip over the step",
         f"The left panel, of one smooth move. Order {turned.order:.2f}; smallest error {error:.1e} of the length at "
