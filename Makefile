@@ -62,7 +62,8 @@ test-extra: warm $(COLCON_READY) ament client
 	@if command -v xmllint >/dev/null; then xmllint --noout package.xml && echo "package.xml: well-formed"; else echo "skipped: package.xml, because xmllint is not there (Debian: libxml2-utils)"; fi
 
 study: warm
-	for kind in error stability parts papers clearance; do $(BIN)/boom_twin study $$kind --out out/study/$$kind || exit 1; done
+	for kind in error stability parts; do $(BIN)/boom_twin study $$kind --out out/study/$$kind || exit 1; done
+	for kind in papers clearance roundoff; do PYTHONPATH=test $(BIN)/python -m studies $$kind --out out/study/$$kind || exit 1; done
 	mkdir -p docs/study && cp out/study/*/*.md out/study/*/*.png docs/study/
 
 soak: warm

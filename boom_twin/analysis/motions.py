@@ -1,4 +1,4 @@
-"""Stroke motions used by studies: a quintic move from rest, and a drive at full speed that is stopped.
+"""Stroke motion of studies: a quintic move from rest.
 
 The default boom in its posture `arch` moves as everywhere in the documentation: stroke 1 by 50 mm, stroke 3 by 30 mm. On any
 other boom every second cylinder turns its joint by `TURN`, up and down in turn so that a long boom does not curl up: the other
@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TypeVar
 
 import numpy as np
 
@@ -27,7 +26,6 @@ HALVINGS = 4
 RISE = 1.5  # s
 DURATION = 4.0  # s
 SAMPLES = 181  # of a joint's range
-T = TypeVar("T", float, Array)
 
 
 @dataclass(frozen=True)
@@ -56,13 +54,8 @@ class Motion:
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
         x = np.clip(np.asarray(times, float) / self.rise, 0.0, 1.0)[:, None]
-        place, rate, _ = quintic(x)
+        place, rate = x * x * x * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * (x * (1.0 - x)) * (x * (1.0 - x))
         return self.first + place * self.travel, rate / self.rise * self.travel
-
-    def at(self, time: float) -> tuple[Array, Array, Array]:
-        """Strokes (m), rates (m/s) and accelerations (m/s^2), each (n,), at one `time` (s)."""
-        place, rate, bend = quintic(min(max(time / self.rise, 0.0), 1.0))
-        return self.first + place * self.travel, rate / self.rise * self.travel, bend / self.rise**2 * self.travel
 
 
 def motion_of(scene: Scene, posture: str | None = None, duration: float = DURATION) -> Motion:
@@ -99,12 +92,6 @@ def motion_of(scene: Scene, posture: str | None = None, duration: float = DURATI
     more = ", .." if np.count_nonzero(travel) > 6 else ""
     label = f"from rest in {start}: {far}{more} in {RISE:g} s, {duration:g} s in all"
     return Motion(label, angles, first, travel, RISE, duration)
-
-
-def quintic(x: T) -> tuple[T, T, T]:
-    """Return a rise from 0 to 1 over x in [0, 1] with two derivatives, which vanish at both ends."""
-    y = 1.0 - x
-    return x * x * x * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * (x * y) * (x * y), 60.0 * x * y * (y - x)
 
 
 @lru_cache(maxsize=1)
@@ -151,64 +138,3 @@ def _stroke_after(scene: Scene, index: int, angle: float, turn: float) -> float 
     inside = np.isfinite(curve).all() and 0.0 <= curve[-1] <= joint.cylinder.max_stroke
     way = np.sign(np.diff(curve))
     return float(curve[-1]) if inside and bool(np.all(way == way[0])) and way[0] != 0.0 else None
-
-
-RAMP, STOP = 0.3, 1.0  # s, until full speed; begin of braking
-FULL_STROKE = 10.0  # s that a drive at full speed takes for its whole stroke
-
-
-@dataclass(frozen=True)
-class StopMotion:
-    """Strokes that reach full speed within `ramp`, brake from `stop` on within `brake` (s), and hold. n cylinders.
-
-    Attributes
-    ----------
-    angles : ndarray, shape (n,)
-        Joint angles (rad) of the undeformed boom at the start.
-    first, speed : ndarray, shape (n,)
-        Strokes at the start, m; full speed, m/s.
-    """
-
-    angles: Array
-    first: Array
-    speed: Array
-    brake: float
-    ramp: float = RAMP
-    stop: float = STOP
-
-    @property
-    def still(self) -> float:
-        """Time from which the drives hold, s."""
-        return self.stop + self.brake
-
-    @property
-    def last(self) -> Array:
-        """Strokes (m) in the end, shape (n,)."""
-        return np.asarray(self(np.array([self.still]))[0][0])
-
-    def __call__(self, times: Array) -> tuple[Array, Array]:
-        """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
-        x, y = np.clip(times / self.ramp, 0.0, 1.0), np.clip((times - self.stop) / self.brake, 0.0, 1.0)
-        cruise = np.clip(times, self.ramp, self.stop) - self.ramp
-        gone = self.ramp * ease_integral(x) + cruise + self.brake * (y - ease_integral(y))
-        return self.first + np.outer(gone, self.speed), np.outer(ease(x) - ease(y), self.speed)
-
-
-def halt(scene: Scene, posture: str | None, brake: float, only: int | None = None) -> StopMotion:
-    """Full speed in the directions of the study's motion, no farther than it goes; `only` one cylinder (from 0): up to half."""
-    own = motion_of(scene, posture)
-    full = np.array([joint.cylinder.max_stroke for joint in scene.joints]) / FULL_STROKE
-    travel = np.where(np.arange(len(full)) == only, 0.5 * full, 0.0) if only is not None else own.travel
-    lasting = STOP - 0.5 * RAMP + 0.5 * brake
-    speed = np.sign(travel) * np.minimum(full, np.abs(travel) / lasting)
-    return StopMotion(own.angles, own.first, speed, brake)
-
-
-def ease(x: Array) -> Array:
-    """Quintic from 0 to 1 over x in [0, 1] with zero slope and curvature at both ends, any shape."""
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
-
-
-def ease_integral(x: Array) -> Array:
-    """Integral of `ease` from 0."""
-    return 2.5 * x**4 - 3.0 * x**5 + x**6

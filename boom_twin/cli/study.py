@@ -9,11 +9,9 @@ from pathlib import Path
 
 # kind: (module in boom_twin.validation.study with write(scene, out, quick, posture) -> paths, what it does)
 KINDS: dict[str, tuple[str, str]] = {
-    "error": ("error.report", "error against run time of all methods, beside two other programs"),
+    "error": ("error.report", "error against run time of all methods, beside Exudyn"),
     "stability": ("stability.report", "where each method holds, degrades or fails on stiff and extreme cases"),
     "parts": ("parts", "what every part of a model costs, and what leaving it out changes"),
-    "papers": ("papers.report", "every equation, figure and claim of the method's two papers, with its counterpart"),
-    "clearance": ("clearance.report", "play in the pins: the tip after a stop and at rest, convergence, what a pin costs"),
 }
 
 

@@ -1,7 +1,8 @@
-"""Pictures of the error and parts studies: error over run time, cost of parts."""
+"""Pictures of the studies: error over run time, cost of parts, verdicts by case and method."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..types import Array
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, SKY, TONES, picture
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,36 +18,22 @@ if TYPE_CHECKING:
 
 STAR: dict[str, Any] = {"marker": "*", "markersize": 20, "color": PURPLE, "markeredgecolor": "white", "linewidth": 0}
 RING: dict[str, Any] = {"marker": "o", "markersize": 11, "markerfacecolor": "none", "markeredgewidth": 1.2}
-SMALL = 10.5  # points, of notes and of long legends
+SMALL = 10.5  # points, of notes and of legends
 WIDE = 25  # characters; legends with a longer entry have one column
-
-# family: (legend, line and marker, where its notes stand)
-FAMILIES: dict[str, tuple[str, dict[str, Any], tuple[float, float]]] = {
-    "own": ("boom_twin, all other methods", {"color": SKY, "linewidth": 0, "marker": ".", "markersize": 6}, (0, 0)),
-    "default": ("boom_twin, default method", {"color": BLUE, "linewidth": 2.4, "marker": "o", "zorder": 5}, (9, 3)),
-    "exudyn": ("Exudyn, by elements a section (l: lumped)", {"color": ORANGE, "linewidth": 1.6, "marker": "s"}, (7, -4)),
-    "scipy": ("SciPy's Radau, by segments", {"color": GREEN, "linewidth": 1.6, "marker": "^", "markersize": 7}, (7, 3)),
-    "elastic": ("boom_twin, all rods' pins, elastic boom", {"color": SKY, "linewidth": 1.6, "marker": "D"}, (7, 3)),
-    "play": ("boom_twin, one pin, rigid boom", {"color": BLUE, "linewidth": 2.4, "marker": "o", "zorder": 5}, (9, 3)),
-    "events": ("SciPy cut at contacts, one pin, rigid boom", {"color": GREEN, "linewidth": 1.6, "marker": "^"}, (7, 3)),
-}
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One method at several steps: wall seconds per simulated second and errors, each (k,).
+    """One method at several steps: seconds per simulated second and errors, each (k,).
 
-    ``family`` is the legend's entry that it belongs to, a key of `FAMILIES`; `notes` stand at its points. Among own methods
-    ``tone`` is its colour and marker (0 to 5, of `TONES`), and it may be `dashed`.
+    `look` holds line properties of Matplotlib; `notes` stand at the points. Curves with the same `label` share a legend entry.
     """
 
     label: str
-    family: str
     seconds: tuple[float, ...]
     errors: tuple[float, ...]
+    look: dict[str, Any]
     notes: tuple[str, ...] = ()
-    tone: int = 0
-    dashed: bool = False
 
 
 @dataclass(frozen=True)
@@ -71,41 +58,25 @@ class Panel:
     floor: float | None = None
 
 
-def work_precision_picture(path: Path, title: str, note: str, panels: tuple[Panel, ...]) -> Path:
-    """Write the picture of all programs; returns `path`."""
-    with picture(path, title, note, (16.0, 9.8)) as figure:
-        grid = figure.subplots(1, len(panels), squeeze=False)[0]
+def work_precision_picture(path: Path, title: str, note: str, panels: Sequence[Panel], size: tuple[float, float]) -> None:
+    """Write a picture of errors over run time, its panels side by side; of one scale if all have one label."""
+    shared = len({panel.label for panel in panels}) == 1
+    with picture(path, title, note, size) as figure:
+        grid = figure.subplots(1, len(panels), squeeze=False, sharex=shared, sharey=shared)[0]
         for axes, panel in zip(grid, panels, strict=True):
             _frame(axes, panel)
             for curve in panel.curves:
-                _, look, offset = FAMILIES[curve.family]
-                axes.plot(_ms(curve.seconds), curve.errors, **look)
-                _notes(axes, curve, str(look["color"]), offset)
+                axes.plot(_ms(curve.seconds), curve.errors, label=curve.label, **curve.look)
+                _notes(axes, curve)
             _marks(axes, panel)
-        figure.legend(handles=_legend(panels[0]), loc="outside lower center", ncols=4)
-    return path
-
-
-def methods_picture(path: Path, title: str, note: str, panels: tuple[Panel, ...]) -> Path:
-    """Write the picture of own methods among themselves, every curve with a look of its own; returns `path`."""
-    with picture(path, title, note, (19.0, 10.0)) as figure:
-        grid = figure.subplots(1, len(panels), squeeze=False, sharex=True, sharey=True)[0]
-        for axes, panel in zip(grid, panels, strict=True):
-            _frame(axes, panel)
-            for curve in panel.curves:
-                colour, marker = TONES[curve.tone]
-                bold = curve.family == "default"
-                axes.plot(
-                    _ms(curve.seconds), curve.errors, color=colour, marker=marker, markersize=7 if bold else 5.5,
-                    linewidth=2.6 if bold else 1.2, linestyle=(0, (4, 2)) if curve.dashed else "-",
-                    markerfacecolor="white" if curve.dashed else colour, label=curve.label, zorder=5 if bold else 3,
-                )  # fmt: skip
-            _marks(axes, panel)
-            columns = 1 if max(len(curve.label) for curve in panel.curves) > WIDE else 2
-            axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=columns, fontsize=SMALL)
-        for axes in grid[1:]:
+            handles, labels = axes.get_legend_handles_labels()
+            entries = dict(zip(labels, handles, strict=True))
+            columns = 1 if max(map(len, entries)) > WIDE and len(panels) > 2 else 2
+            axes.legend(
+                entries.values(), entries.keys(), loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=columns, fontsize=SMALL
+            )
+        for axes in grid[1:] if shared else ():
             axes.set_ylabel("")
-    return path
 
 
 def _ms(seconds: tuple[float, ...]) -> Any:
@@ -125,40 +96,28 @@ def _frame(axes: Axes, panel: Panel) -> None:
     axes.grid(True, which="minor", color="#F4F4F4", linewidth=0.6)
 
 
-def _notes(axes: Axes, curve: Curve, colour: str, offset: tuple[float, float]) -> None:
+def _notes(axes: Axes, curve: Curve) -> None:
     """Draw small print beside those points of a curve that have any."""
     paper = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.6}
+    colour = curve.look["color"]
     for note, x, y in zip(curve.notes, _ms(curve.seconds), curve.errors, strict=False):
         if note:
-            axes.annotate(note, (x, y), offset, textcoords="offset points", fontsize=SMALL, color=colour, bbox=paper, zorder=6)
+            axes.annotate(note, (x, y), (9, 3), textcoords="offset points", fontsize=SMALL, color=colour, bbox=paper, zorder=6)
 
 
 def _marks(axes: Axes, panel: Panel) -> None:
     """Draw front, default and floor."""
     if panel.front:
         x, y = np.array(panel.front).T
-        axes.plot(1e3 * x, y, color=INK, linewidth=1.0, linestyle=(0, (2, 2)), markeredgecolor=INK, zorder=4, **RING)
+        look = {"color": INK, "linewidth": 1.0, "linestyle": (0, (2, 2)), "markeredgecolor": INK, "zorder": 4, **RING}
+        axes.plot(1e3 * x, y, label="Pareto front", **look)
     if panel.chosen:
-        axes.plot([1e3 * panel.chosen[0]], [panel.chosen[1]], zorder=7, **STAR)
+        axes.plot([1e3 * panel.chosen[0]], [panel.chosen[1]], label="the default, step 1 ms", zorder=7, **STAR)
     if panel.floor:
         low, _ = axes.get_ylim()
-        axes.axhspan(min(low, panel.floor), panel.floor, color=PALE, alpha=0.5, linewidth=0, zorder=0.5)
+        less = "less than the references differ"
+        axes.axhspan(min(low, panel.floor), panel.floor, color=PALE, alpha=0.5, linewidth=0, zorder=0.5, label=less)
         axes.set_ylim(bottom=low)
-
-
-def _legend(panel: Panel) -> list[Any]:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    used = {curve.family for curve in panel.curves}
-    found: list[Any] = [Line2D([], [], label=text, **look) for name, (text, look, _) in FAMILIES.items() if name in used]
-    if panel.chosen:
-        found.append(Line2D([], [], label="the default, step 1 ms", **STAR | {"markersize": 15}))
-    if panel.front:
-        found.append(Line2D([], [], color=INK, linestyle=(0, (2, 2)), label="Pareto front", **RING))
-    if panel.floor:
-        found.append(Patch(color=PALE, alpha=0.5, label="less than the references differ"))
-    return found
 
 
 LEAST = 1e-4  # mm; errors below are drawn as this
@@ -219,3 +178,78 @@ def _savings(axes: Axes, bars: Bars, rows: Array) -> None:
     reach = max(10.0, float(np.abs(saved).max()))
     axes.set_xlim(min(-10.0, 1.2 * float(saved.min())), 1.15 * reach)
     axes.set_xlabel("run time of a step saved, % (grey: it costs more)")
+
+
+# mark: (letter, fill, ink, meaning); blue, yellow and dark red-brown differ in lightness as well as in hue
+MARKS: dict[str, tuple[str, str, str, str]] = {
+    "holds": ("H", "#DCE9F3", "#5B7F9B", "holds"),
+    "refuses": ("R", "#FFFFFF", INK, "refuses: there is no solution, the status says so"),
+    "degrades": ("D", "#F0C75E", INK, "degrades"),
+    "fails": ("F", "#D55E00", "#FFFFFF", "fails, and says so"),
+    "silent": ("S", "#4A0E0E", "#FFFFFF", "fails silently: wrong numbers, no word"),
+}
+LINE, TOP, BELOW = 0.25, 1.6, 0.9  # inches
+NAMES, METHODS, ASIDE = 4.6, 0.85, 0.8  # widths, inches
+
+
+@dataclass(frozen=True)
+class MatrixRow:
+    """Row of the matrix: `marks` (keys of MARKS), one a method."""
+
+    group: str
+    name: str
+    marks: Sequence[str]
+
+
+def matrix_picture(path: Path, title: str, methods: Sequence[str], lines: Sequence[MatrixRow], note: str = "") -> None:
+    """Write the matrix as PNG."""
+    width, height = NAMES + METHODS * len(methods) + ASIDE, TOP + LINE * len(lines) + BELOW
+    with picture(path, title, note, (width, height)) as figure:
+        figure.set_layout_engine("none")
+        box = (NAMES / width, BELOW / height, METHODS * len(methods) / width, LINE * len(lines) / height)
+        axes = figure.add_axes(box)
+        _matrix_frame(axes, methods, len(lines))
+        for row, line in enumerate(lines):
+            new_group = row == 0 or line.group != lines[row - 1].group
+            _row(axes, row, line, new_group)
+        _legend(axes, len(lines), [mark for line in lines for mark in line.marks])
+
+
+def _matrix_frame(axes: Axes, methods: Sequence[str], rows: int) -> None:
+    axes.set_xlim(0.0, len(methods))
+    axes.set_ylim(rows, 0.0)
+    axes.grid(False)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    axes.set_xticks([i + 0.5 for i in range(len(methods))], methods, rotation=35, ha="left", fontsize=12)
+    axes.xaxis.tick_top()
+    axes.tick_params(length=0, pad=2)
+    axes.set_yticks([])
+
+
+def _row(axes: Axes, row: int, line: MatrixRow, new_group: bool) -> None:
+    from matplotlib.patches import Rectangle
+
+    left = -NAMES / METHODS
+    if new_group:
+        axes.plot([left + 0.1, len(line.marks)], [row, row], color=GREY, linewidth=0.8, clip_on=False)
+        axes.text(left + 0.15, row + 0.5, line.group, va="center", fontsize=11, color=INK, weight="bold")
+    axes.text(-0.12, row + 0.5, line.name, va="center", ha="right", fontsize=11, color=INK)
+    for column, mark in enumerate(line.marks):
+        letter, fill, ink, _ = MARKS[mark]
+        axes.add_patch(Rectangle((column + 0.03, row + 0.06), 0.94, 0.88, facecolor=fill, edgecolor="none"))
+        axes.text(column + 0.5, row + 0.53, letter, va="center", ha="center", fontsize=10.5, color=ink, weight="bold")
+
+
+def _legend(axes: Axes, rows: int, present: Sequence[str]) -> None:
+    from matplotlib.patches import Patch
+
+    handles = [
+        Patch(facecolor=fill, edgecolor=GREY, linewidth=0.5, label=f"{letter}  {meaning}")
+        for mark, (letter, fill, _, meaning) in MARKS.items()
+        if mark in present
+    ]
+    axes.legend(
+        handles=handles, loc="upper left", bbox_to_anchor=(-NAMES / METHODS / axes.get_xlim()[1], -0.1 / LINE / rows),
+        ncols=3, fontsize=11, borderaxespad=0.0,
+    )  # fmt: skip

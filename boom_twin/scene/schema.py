@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ..errors import UsageError
 from ..kernels.elements.pin_contact import LAWS, restitution_of
 from ..system.summary_display import SummaryDisplay, numbers
 
@@ -308,11 +307,3 @@ def section_depth(scene: Scene, i: int) -> float:
     if section.A is None or section.I is None:
         return SHARE * section.length
     return DEEP * math.sqrt(section.I / section.A)
-
-
-def refuse_clearance(scene: Scene, model: str) -> None:
-    """Raise UsageError if `scene` has pins with clearance, which `model` (as a reader would call it) does not know."""
-    pins = () if scene.clearance is None else scene.clearance.pins
-    if pins:
-        names = ", ".join(pin.at for pin in pins)
-        raise UsageError(f"clearance.pins = {names}: {model} knows ideal pins only. Leave out the block `clearance`.")

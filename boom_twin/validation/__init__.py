@@ -1,1 +1,1 @@
-"""Checks of the twin: virtual rig, reference models, studies."""
+"""Checks of the twin: virtual rig, studies."""

@@ -7,14 +7,14 @@ import pytest
 from oracle import booms
 from oracle.clearance import rigid
 from oracle.clearance.scenes import PINS, RADII, RODS, with_pins
+from reference.worn_pin import geometry
+from reference.worn_pin.motion import freed
 
 from boom_twin.analysis.equilibrium import statics
 from boom_twin.analysis.methods import integrate_with
 from boom_twin.kernels.elements.pin_contact import SMOOTH
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.validation.reference.worn_pin import geometry
-from boom_twin.validation.reference.worn_pin.contact import Contact, stiffness
-from boom_twin.validation.reference.worn_pin.motion import freed
+from boom_twin.validation.contact_law import Contact, stiffness
 
 CLEARANCE, STEP = 1e-4, 1e-9
 

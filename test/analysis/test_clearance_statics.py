@@ -11,14 +11,14 @@ from oracle import booms
 from oracle.clearance import rigid
 from oracle.clearance.free_play import lengthening, tip_shift
 from oracle.clearance.scenes import LINKS, PINS, RADII, RODS, with_pins
+from reference.worn_pin import geometry
+from reference.worn_pin.motion import freed
 
 from boom_twin.analysis.equilibrium import statics
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.elements.pin_contact import LEAST_GAP, SMOOTH
 from boom_twin.scene.schema import IDEAL_BELOW
-from boom_twin.validation.reference.worn_pin import geometry
-from boom_twin.validation.reference.worn_pin.contact import Contact, stiffness
-from boom_twin.validation.reference.worn_pin.motion import freed
+from boom_twin.validation.contact_law import Contact, stiffness
 
 POSTURES = ["horizontal", "arch", "high", "low"]
 DOCUMENT = booms.document()

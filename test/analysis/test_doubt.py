@@ -10,7 +10,8 @@ import pytest
 from boom_twin.analysis.methods import Method, integrate_with
 from boom_twin.analysis.motions import motion_of
 from boom_twin.scene import load_scene
-from boom_twin.validation.study.stability.setups import cylinders, dead_stop, smooth
+from boom_twin.validation.study.scene_changes import cylinders
+from boom_twin.validation.study.stability.setups import dead_stop, smooth
 
 SCENE = load_scene()
 

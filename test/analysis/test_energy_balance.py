@@ -7,12 +7,13 @@ import math
 import numpy as np
 import pytest
 from published import scenes
+from studies.clearance.scenes import treated, with_play
+from studies.stops import StopMotion, halt
 
 from boom_twin import load_scene, undeflected
 from boom_twin.analysis.energy_balance import energy_balance, numerical_damping
-from boom_twin.analysis.motions import StopMotion, halt, motion_of
+from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import course_of
-from boom_twin.validation.study.clearance.scenes import treated, with_play
 
 SCENE = load_scene()
 

@@ -10,7 +10,7 @@ from boom_twin.errors import SolverError
 from boom_twin.kernels.integrators import X
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.validation.study.stability import setups as made
+from boom_twin.validation.study import scene_changes as made
 
 
 @pytest.mark.parametrize(

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from published import scenes
+from studies.clearance.scenes import with_play
+from studies.stops import halt
 
 from boom_twin import load_scene, simulate, undeflected
 from boom_twin.analysis.initial_state import read_state, write_state
-from boom_twin.analysis.motions import halt, motion_of
+from boom_twin.analysis.motions import motion_of
 from boom_twin.cli.main import main
 from boom_twin.errors import UsageError
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.validation.study.clearance.scenes import with_play
 
 SCENE = load_scene()
 QUIET = {"estimate_errors": False}

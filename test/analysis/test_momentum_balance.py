@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracle import booms
+from studies.clearance.scenes import treated, with_play
+from studies.stops import StopMotion, halt
 
 from boom_twin import load_scene
 from boom_twin.analysis.momentum_balance import Momenta, momentum_balance
-from boom_twin.analysis.motions import StopMotion, halt, motion_of
+from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import course_of
-from boom_twin.validation.study.clearance.scenes import treated, with_play
 
 SCENE = load_scene()
 

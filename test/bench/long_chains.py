@@ -1,15 +1,13 @@
-"""What a step costs as a boom gets longer, and what round-off does to it: a table, and a straight line through the cost.
+"""What a step costs as a boom gets longer: a table, and a straight line through the cost.
 
-    python test/bench/long_chains.py [--round-off]
+    python test/bench/long_chains.py
 
 Booms of 2 to 200 flexible sections in the same 20 m, steps of 1 ms; the smallest of many short interleaved runs. Above 100
-sections a boom fills the cache of a core, so other work on the machine shows. ``--round-off`` adds the tip's relative error in
-one linear step, of the sweeps and of LU of the whole system, each against an exact solution (half a minute).
+sections a boom fills the cache of a core, so other work on the machine shows.
 """
 
 from __future__ import annotations
 
-import sys
 import time
 
 import numpy as np
@@ -26,7 +24,6 @@ from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.scene.schema import Scene
 from boom_twin.scene.segmentation import LEAST
 from boom_twin.validation.study.long_booms import long_boom
-from boom_twin.validation.study.stability.exact_step import one_step
 
 SECTIONS = (2, 5, 10, 20, 50, 100, 150, 200)
 KINDS = ("B1", "B2", "B3")
@@ -86,8 +83,7 @@ def line(counts: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def main() -> None:
     """Measure and print."""
     counts = np.array(SECTIONS)
-    scenes = [boom(int(count)) for count in counts]
-    runners = [Runner(scene) for scene in scenes]
+    runners = [Runner(boom(int(count))) for count in counts]
     seconds = costs(runners)
     (fixed, each), residuals = line(counts, seconds)
     head = ["sections", "unknowns", "us per step", "passes", "us per section", "off the line"]
@@ -95,11 +91,6 @@ def main() -> None:
     for n, one, t, off in zip(counts, runners, seconds, residuals, strict=True):
         row = [f"{n}", f"{len(one.plan.names)}", f"{1e6 * t:.1f}", f"{one.passes:.2f}", f"{1e6 * t / n:.2f}"]
         rows.append([*row, "-" if np.isnan(off) else f"{100 * off:+.1f} %"])
-    if "--round-off" in sys.argv:
-        head += ["error", "of LU"]
-        for row, scene in zip(rows, scenes, strict=True):
-            found = one_step(scene, posture_angles(scene, "test"), STEP, RHO)
-            row += [f"{found.riccati:.1e}", f"{found.dense:.1e}"]
     print(f"| {' | '.join(head)} |\n{'|---' * len(head)}|")
     for row in rows:
         print(f"| {' | '.join(row)} |")

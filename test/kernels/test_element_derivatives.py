@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reference.segments.equations import coordinates, cos, sin
 
 from boom_twin.kernels import plane_algebra as algebra
 from boom_twin.kernels.elements import beam, cylinder
@@ -15,7 +16,6 @@ from boom_twin.kernels.elements import beam_shapes as modes
 from boom_twin.kernels.elements import rigid_body as rigid
 from boom_twin.kernels.plane_algebra import turned
 from boom_twin.kernels.tables import Motion
-from boom_twin.validation.reference.segments.equations import coordinates, cos, sin
 
 GRAVITY = np.array([0.7, -9.5])
 GAIN, RATE = 3.0e3, 90.0

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from bench.long_chains import Runner, boom, costs
 from kernels.dense import NUDGE, Dense
+from studies.roundoff.exact_step import one_step
 
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.integrators import GENERALISED_ALPHA, HAT, OFFSET, OLD, prepare
 from boom_twin.kernels.tables import Motion, State
 from boom_twin.kernels.transfer.time_step import advance
 from boom_twin.scene.kinematics import posture_angles
-from boom_twin.validation.study.stability.exact_step import one_step
 
 STEP, RHO, STEPS = 1e-3, 0.8, 20
 LENGTH = 20.0  # m, of every boom

@@ -9,6 +9,7 @@ from oracle import booms
 from oracle.clearance import drop
 from oracle.clearance.drop import restitution
 from oracle.clearance.scenes import RODS, with_pins
+from reference.worn_pin.impacts import follow
 from scipy.integrate import solve_ivp
 
 from boom_twin.compiler.compile import compile_scene
@@ -26,8 +27,7 @@ from boom_twin.kernels.elements.pin_contact import (
     limited,
     restitution_of,
 )
-from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact
-from boom_twin.validation.reference.worn_pin.impacts import follow
+from boom_twin.validation.contact_law import HYSTERESIS, Contact
 
 WITHIN = 0.005  # of a coefficient of restitution
 rng = np.random.default_rng(4)

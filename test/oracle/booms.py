@@ -6,12 +6,12 @@ from copy import deepcopy
 from functools import cache
 
 import numpy as np
+from reference.segments.boom import Segments
+from reference.segments.geometry import link_headings
 from ruamel.yaml import YAML
 
 from boom_twin.scene.load import default_text
 from boom_twin.scene.schema import Scene
-from boom_twin.validation.reference.segments.boom import Segments
-from boom_twin.validation.reference.segments.geometry import link_headings
 
 LEAST_LEVER = 0.08  # m/rad, of every cylinder at the posture
 BARREL_PINS = ("root", "beam", "head", "given")
@@ -30,6 +30,14 @@ def _default():
 def scene_of(spec):
     """A `Scene` from plain dicts."""
     return Scene.model_validate(spec)
+
+
+def short_boom(sections):
+    """The first sections of the default boom, with postures cut to them: quick to study."""
+    spec = document()
+    spec["sections"], spec["joints"] = spec["sections"][:sections], spec["joints"][:sections]
+    spec["postures"] = {name: angles[:sections] for name, angles in spec["postures"].items() if name in ("arch", "low")}
+    return scene_of(spec)
 
 
 def random_boom(seed):

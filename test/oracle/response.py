@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from kernels.dense import Dense, slopes
 from oracle import segments
+from reference.segments.geometry import oil_stiffness
 
 from boom_twin.kernels.elements.cylinder import compliance_and_lag
 from boom_twin.kernels.tables import Motion
-from boom_twin.validation.reference.segments.geometry import oil_stiffness
 
 
 class SegmentResponse:

@@ -1,16 +1,16 @@
-"""Statics of the finite-segment boom of `boom_twin.validation.reference.segments`: forces, small vibrations, extrapolation."""
+"""Statics of the finite-segment boom of `reference.segments`: forces, small vibrations, extrapolation."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+from reference.segments.boom import Segments
+from reference.segments.equilibrium import energy, equilibrium
+from reference.segments.geometry import oil_stiffness
 from scipy.linalg import eigh, null_space
 
 from boom_twin.errors import SolverError
-from boom_twin.validation.reference.segments.boom import Segments
-from boom_twin.validation.reference.segments.equilibrium import energy, equilibrium
-from boom_twin.validation.reference.segments.geometry import oil_stiffness
 
 
 def mass_matrix(boom):

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from oracle.clearance import rigid
 from oracle.clearance.scenes import RODS, with_pins
+from reference.worn_pin import geometry
+from reference.worn_pin.motion import freed
 
 from boom_twin.analysis.methods import integrate_with
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.elements.pin_contact import SMOOTH
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.validation.reference.worn_pin import geometry
-from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact
-from boom_twin.validation.reference.worn_pin.motion import freed
+from boom_twin.validation.contact_law import HYSTERESIS, Contact
 
 MOVE, END = 0.2, 0.3  # s
 TRAVEL = (0.03, 0.02, 0.02, 0.02)  # m

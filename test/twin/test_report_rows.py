@@ -9,6 +9,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from drive_twin import drive_twin
+from studies.clearance.scenes import with_play
 
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.config.settings import Settings
@@ -17,7 +18,6 @@ from boom_twin.messages.topic_table import Output
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.schema import Scene
 from boom_twin.types import Prediction, Report
-from boom_twin.validation.study.clearance.scenes import with_play
 
 
 def reports(scene: Scene, count: int = 120) -> list[Report]:

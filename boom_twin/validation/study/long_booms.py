@@ -49,7 +49,7 @@ class _Sizes:
 
 
 def long_boom(count: int, length: float = 20.0, kinds: Sequence[str] = ("B1",)) -> Scene:
-    """A boom of `count` equal sections (2 or more), `length` m in all, with the posture ``test``: a gentle arch.
+    """Return a boom of `count` equal sections (2 or more), `length` m in all, with the posture ``test``: a gentle arch.
 
     `kinds` of joints 2, 3, .. are taken in turn.
     """
@@ -57,13 +57,13 @@ def long_boom(count: int, length: float = 20.0, kinds: Sequence[str] = ("B1",)) 
 
 
 def seven_sections() -> Scene:
-    """A boom of 101 m in seven sections with all kinds of joints, in the posture ``test``: an arch."""
+    """Return a boom of 101 m in seven sections with all kinds of joints; the posture ``test`` is an arch."""
     lengths = np.array([20.0, 17.0, 15.0, 14.0, 13.0, 12.0, 10.0])
     return boom_of(lengths, ("B1", "B2", "B3"), np.array([75.0, 55.0, 35.0, 10.0, -15.0, -40.0, -60.0]))
 
 
 def boom_of(lengths: Array, kinds: Sequence[str], headings: Array) -> Scene:
-    """A boom of sections of these `lengths` (m), shape (n,), at `headings` (deg, falling, less than 165 each), shape (n,)."""
+    """Return a boom of sections of `lengths` (m) at falling `headings` (deg, steps below 165), both of shape (n,)."""
     sizes, relative = _sizes(lengths), np.diff(headings, prepend=0.0)
     scale = np.append(lengths[0], np.minimum(lengths[1:], lengths[:-1])) / UNIT
     base = Base(pivot=(0.0, 0.0), cylinder_pin=(0.45 * scale[0], -1.25 * scale[0]))
@@ -93,7 +93,7 @@ def _sizes(lengths: Array) -> _Sizes:
 
 
 def _section(sizes: _Sizes, i: int, base_scale: float) -> Section:
-    """Section `i`, flexible between a rigid root and a rigid head."""
+    """Return section `i`, flexible between a rigid root and a rigid head."""
     length, beam_mass = float(sizes.length[i]), float(sizes.per_metre[i] * sizes.length[i])
     root, head = (0.6 * base_scale if i == 0 else 0.08 * length), 0.08 * length
     second_moment = sizes.moment[i] * sizes.length.sum() / (BENT * sizes.modulus)
@@ -109,7 +109,7 @@ def _section(sizes: _Sizes, i: int, base_scale: float) -> Section:
 
 
 def _links(kind: str, scale: float, mass: float) -> dict[str, Any]:
-    """Links of a six-bar, those of the default scene times `scale`, for a section of `mass` (kg)."""
+    """Return links of a six-bar, those of the default scene times `scale`, for a section of `mass` (kg)."""
 
     def scaled(value: Any) -> Any:
         return tuple(scale * x for x in value) if isinstance(value, tuple) else scale * value
@@ -118,7 +118,7 @@ def _links(kind: str, scale: float, mass: float) -> dict[str, Any]:
 
 
 def _joint(kind: str, sizes: _Sizes, i: int, scale: float, angle: float, ground: tuple[Base, Section]) -> Joint:
-    """Joint `i` that turns `REACH` degrees to either side of `angle` (deg); `ground` carries cylinder 1."""
+    """Return joint `i` that turns `REACH` degrees to either side of `angle` (deg); `ground` carries cylinder 1."""
     lever = 0.55 * scale if kind == "A" else LEVER * scale
     stiffness = sizes.moment[i] * len(sizes.length) / (GIVEN_WAY * lever**2)
     low, high = angle - REACH, angle + REACH

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ...analysis.motions import DURATION
-from ...compiler.compile import compile_scene
 from ...errors import SolverError
 from ...plots.study import Bars, parts_picture
 from ...reduction.deviation import (
@@ -28,24 +27,19 @@ from ...reduction.variants import Variant, variants
 from ...scene.schema import Scene
 from ...system.atomic_files import write_atomic
 from ...types import Array
-from .low_speed import tip_of_move
 from .report import machine, provenance, table, write_json
 
 ROUNDS, QUICK_ROUNDS = 30, 5
 QUICK_DURATION = 2.0  # s
-NOTE = "surrogate parameters; one motion, another may differ"
-HEAD = ("variant", "tip at rest, mm", "in", "tip in the move, rms mm", "largest mm", "f1, %", "f2, %", "f3, %", "step, us",
-        "time saved, %", "unknowns", "status")  # fmt: skip
+HEAD = ("variant", "at rest, mm", "moving, mm", "f1, %", "time saved, %")
 
 
 @dataclass(frozen=True)
 class VariantCost:
-    """One variant and what it does.
+    """One variant, its deviation from the full model, and its cost.
 
     Attributes
     ----------
-    deviation : Deviation
-        Of its tip from the full model's.
     shifts : ndarray, shape (`FREQUENCIES`,)
         Relative change of the natural frequencies about the start of the move; NaN where one of the models has none.
     step_time : float
@@ -74,12 +68,18 @@ class PartsStudy:
     parts: tuple[VariantCost, ...]
 
     def saved(self, part: VariantCost) -> float:
-        """Share of the full model's run time that leaving the part out saves; negative where it costs."""
+        """Return the share of the full model's run time that leaving the part out saves; negative where it costs."""
         return 1.0 - part.step_time / self.full_times[0]
+
+    @property
+    def shown(self) -> tuple[VariantCost, ...]:
+        """Return the variants of the page: no other numbers of shapes in one section of several; the JSON has them."""
+        several = len(self.course.motion.first) > 1
+        return tuple(p for p in self.parts if not (several and p.variant.kind == "modes" and len(p.variant.edits) == 1))
 
 
 def measure(scene: Scene, course: StrokeCourse, rounds: int = ROUNDS) -> PartsStudy:
-    """Every variant of a scene against the scene itself, times the least of `rounds`.
+    """Compare every variant of a scene with the scene itself; times are the least of `rounds`.
 
     Raises
     ------
@@ -96,8 +96,6 @@ def measure(scene: Scene, course: StrokeCourse, rounds: int = ROUNDS) -> PartsSt
     least = step_times([scene, *(found[k].of(scene) for k in able), scene], course, rounds)
     times[able] = least[1:-1]
     parts = [_part(scene, *row, full, course) for row in zip(found, answers, times.tolist(), strict=True)]
-    if not compile_scene(scene).pins:
-        parts.append(_low_speed(scene, full, course))
     parts.sort(key=lambda part: (part.deviation.worst, part.variant.name))
     return PartsStudy(course, full.frequencies, (float(least[0]), float(least[-1])), unknowns(scene), tuple(parts))
 
@@ -107,21 +105,6 @@ def _part(scene: Scene, variant: Variant, found: Response, time: float, full: Re
     both = min(len(found.frequencies), len(full.frequencies))
     shifts[:both] = found.frequencies[:both] / full.frequencies[:both] - 1.0
     return VariantCost(variant, deviation(found, full, course), shifts, time, unknowns(variant.of(scene)), found.status)
-
-
-LOW_SPEED = Variant("without Coriolis and centrifugal accelerations", "low-speed form", ())
-
-
-def _low_speed(scene: Scene, full: Response, course: StrokeCourse) -> VariantCost:
-    """The papers' low-speed form: no edit of a scene, the same at rest, and not timed, for its program is not compiled."""
-    try:
-        tip = tip_of_move(scene, course.motion, course.step, course.every, velocity_terms=False)[:, :2]
-    except SolverError as error:
-        nothing = Deviation(np.inf, "", np.inf, np.inf)
-        return VariantCost(LOW_SPEED, nothing, np.full(FREQUENCIES, np.nan), float("nan"), unknowns(scene), str(error))
-    off = np.linalg.norm(tip - full.tip, axis=1)
-    apart = Deviation(0.0, course.names[0], float(np.sqrt(np.mean(off**2))), float(off.max()))
-    return VariantCost(LOW_SPEED, apart, np.zeros(FREQUENCIES), float("nan"), unknowns(scene), "ok")
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
@@ -135,12 +118,12 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     paths = [out / f"parts.{kind}" for kind in ("json", "md", "png")]
     write_json(paths[0], {"machine": machine(), **as_json(found)})
     write_atomic(paths[1], as_markdown(found))
-    parts_picture(paths[2], bars(found), NOTE)
+    parts_picture(paths[2], bars(found), "surrogate parameters; one motion, another may differ")
     return paths
 
 
 def as_json(found: PartsStudy) -> dict[str, Any]:
-    """All numbers, SI units, shares as fractions."""
+    """Return all numbers, SI units, shares as fractions."""
     return {
         "at_rest_in": found.course.names,
         "move": found.course.motion.label,
@@ -167,41 +150,36 @@ def as_json(found: PartsStudy) -> dict[str, Any]:
 
 
 def as_markdown(found: PartsStudy) -> str:
-    """The report: how it was measured, and one table, ascending in the error of the tip."""
-    frequencies = ", ".join(f"{value:.3f}" for value in found.frequencies)
+    """Return the report: how it was measured, and one table, ascending in the error of the tip."""
     first, second = (1e6 * time for time in found.full_times)
-    lines = [
-        "# What the parts of a model cost, and what leaving them out changes\n",
-        f"Every row is the scene after an edit (`parts.json` names it), against the scene as it is: {found.unknowns} unknowns, "
-        f"{first:.2f} us a step (at the end of the rounds {second:.2f} us: what differs less than that is noise), natural "
-        f"frequencies {frequencies} Hz.",
-        f"At rest: the largest distance of the tips in {', '.join(found.course.names)}. Move: {found.course.motion.label}; "
-        f"steps of {1e3 * found.course.step:g} ms. Frequencies: change about the rest at the start of the move. Time: stepping "
-        "alone, least of interleaved runs of the move's beginning; what is negative costs time. Another motion may differ. The "
-        "low-speed form, without Coriolis and centrifugal accelerations, is made by a program of its own and not timed.\n",
-        table(HEAD, [_row(found, part) for part in found.parts]),
+    parts = [
+        "# What the parts of a model cost, and what leaving them out changes",
+        "![What leaving a part out changes, and what it saves](parts.png)",
+        f"Each row is the scene after an edit, against the scene as it is ({found.unknowns} unknowns, {first:.2f} us a step, "
+        f"at the end {second:.2f} us: a smaller difference is noise). At rest: the largest distance of the tips in "
+        f"{', '.join(found.course.names)}. Moving: the largest distance in a move, {found.course.motion.label}; steps of "
+        f"{1e3 * found.course.step:g} ms. f1: change of the first natural frequency, {found.frequencies[0]:.3f} Hz. Time: "
+        "stepping alone, the least of interleaved runs; negative where it costs time.",
+        "Every row above the error that you can bear may be left out; it is worth it where it saves time. "
+        "`boom_twin check --need` makes such a scene. `parts.json` has the edits, other frequencies, and single sections with "
+        "other numbers of shapes.",
+        table(HEAD, [_row(found, part) for part in found.shown]),
+        "Limits: one motion, another may differ; several parts left out at once may err more.",
         provenance(),
     ]
-    return "\n".join(lines)
+    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
 
 
 def _row(found: PartsStudy, part: VariantCost) -> Sequence[object]:
-    off, good = part.deviation, part.status == "ok"
-    errors = (1e3 * off.rest, off.where, 1e3 * off.rms, 1e3 * off.most) if good else (None, None, None, None)
-    shifts = [100.0 * float(shift) for shift in part.shifts]
-    time = (1e6 * part.step_time, 100.0 * found.saved(part)) if good else (None, None)
-    return [part.variant.name, *errors, *shifts, *time, part.unknowns, part.status]
+    if part.status != "ok":
+        return [f"{part.variant.name}: {part.status}", *[None] * (len(HEAD) - 1)]
+    off = part.deviation
+    return [part.variant.name, 1e3 * off.rest, 1e3 * off.most, 100.0 * float(part.shifts[0]), 100.0 * found.saved(part)]
 
 
 def bars(found: PartsStudy) -> Bars:
-    """Return the bars of the picture: all but single sections with more modes than they have."""
-
-    def shown(part: VariantCost) -> bool:
-        single = part.variant.kind == "modes" and len(part.variant.edits) == 1
-        timed = np.isfinite(part.step_time)
-        return part.status == "ok" and timed and not (single and part.unknowns > found.unknowns)
-
-    good = [part for part in found.parts if shown(part)]
+    """Return the bars of the picture."""
+    good = [part for part in found.shown if part.status == "ok"]
     return Bars(
         names=tuple(part.variant.name for part in good),
         rest=np.array([part.deviation.rest for part in good]),

@@ -19,13 +19,12 @@ PACKAGES = ("numpy", "scipy", "numba", "exudyn", "boom_twin")
 
 
 def machine() -> dict[str, str | int | None]:
-    """Date (UTC), CPU model, cores that this process may use, and versions; None for a package that is not there."""
+    """Return date (UTC), CPU model, usable cores and versions; None for a package that is not installed."""
     versions = {package: _version(package) for package in PACKAGES}
     return {
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "cpu": _cpu(),
         "cores": usable_cores(),
-        "system": platform.system(),
         "python": platform.python_version(),
         **versions,
     }
@@ -39,7 +38,7 @@ def _version(package: str) -> str | None:
 
 
 def _cpu() -> str:
-    """Model of the processor, as far as the system tells."""
+    """Return the model of the processor, as far as the system tells."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -52,21 +51,20 @@ SYNTHETIC = "Scene parameters are surrogates; nothing here was measured on a rig
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A Markdown table; floats with 3 significant digits or whole, None and NaN as a dash. Ends with a newline."""
+    """Return a Markdown table; floats with 3 significant digits or whole, None and NaN as a dash. Ends with a newline."""
     lines = [list(head), ["---"] * len(head), *([_text(value) for value in row] for row in rows)]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def provenance(**more: object) -> str:
-    """Return one paragraph: when, where and with which versions; `more` follows, then that the parameters are surrogates."""
-    told = {**machine(), **more}
-    return ", ".join(f"{name} {value}" for name, value in told.items() if value is not None) + f". {SYNTHETIC}\n"
+def provenance() -> str:
+    """Return one paragraph: when, where and with which versions, and that the parameters are surrogates."""
+    return ", ".join(f"{name} {value}" for name, value in machine().items() if value is not None) + f". {SYNTHETIC}\n"
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write a mapping or list as JSON, one line per innermost block; numbers that are not finite become null."""
+    """Write a mapping or list as JSON; numbers that are not finite become null."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomic(path, _lines(_plain(content), "") + "\n")
+    write_atomic(path, json.dumps(_plain(content), indent=1, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 def _text(value: object) -> str:
@@ -90,15 +88,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
-
-
-def _lines(value: Any, indent: str) -> str:
-    """JSON text; a dict or list that holds no other on one line."""
-    inner = list(value.values() if isinstance(value, dict) else value) if isinstance(value, dict | list) else []
-    if not any(isinstance(item, dict | list) for item in inner):
-        return json.dumps(value, allow_nan=False, ensure_ascii=False)
-    deeper = indent + " "
-    if isinstance(value, dict):
-        parts = [f"{deeper}{json.dumps(key)}: {_lines(item, deeper)}" for key, item in value.items()]
-        return "{\n" + ",\n".join(parts) + f"\n{indent}}}"
-    return "[\n" + ",\n".join(deeper + _lines(item, deeper) for item in value) + f"\n{indent}]"

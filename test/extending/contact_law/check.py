@@ -13,7 +13,7 @@ from boom_twin.scene import load_scene
 from boom_twin.scene.glossary import MEANING
 from boom_twin.scene.load import default_text
 from boom_twin.scene.schema import Clearance, ContactLaw, Pin
-from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS
+from boom_twin.validation.contact_law import HYSTERESIS
 
 E, SPEED, MASS = 0.8, 0.1, 20.0  # restitution; m/s; kg
 CHI = 3.0 * (1.0 - E**2) / 4.0 * math.exp(2.0 * (1.0 - E))

@@ -11,9 +11,8 @@ from __future__ import annotations
 from math import log
 
 import numpy as np
+from reference.worn_pin.impacts import follow
 from scipy.optimize import brentq
-
-from boom_twin.validation.reference.worn_pin.impacts import follow
 
 APPROACH = 100.0  # smoothing lengths, from where a smoothed contact is out of reach
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-
-from boom_twin.validation.reference.worn_pin.geometry import levers, pins
+from reference.worn_pin.geometry import levers, pins
 
 
 def lengthening(contact, force, axis):

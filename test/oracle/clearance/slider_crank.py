@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from math import asin, pi
 
 import numpy as np
+from reference.worn_pin.impacts import ContactMotion, follow
 
-from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
-from boom_twin.validation.reference.worn_pin.impacts import ContactMotion, follow
+from boom_twin.validation.contact_law import HYSTERESIS, Contact, stiffness
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, LEAST_SPEED, Contact, stiffness
+from boom_twin.validation.contact_law import HYSTERESIS, LEAST_SPEED, Contact, stiffness
 
 STEEL = stiffness(0.025, 1e-4, 2.06e11, 0.3)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from oracle.clearance.drop import rebound, restitution
 
-from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
+from boom_twin.validation.contact_law import HYSTERESIS, Contact, stiffness
 
 STEEL = stiffness(0.030, 1e-4, 2.06e11, 0.3)
 PUBLISHED = [

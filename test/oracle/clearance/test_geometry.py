@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracle import booms, segments
-
-from boom_twin.validation.reference.worn_pin import geometry
-from boom_twin.validation.reference.worn_pin.motion import freed
+from reference.worn_pin import geometry
+from reference.worn_pin.motion import freed
 
 POSTURES = ["horizontal", "arch", "high", "low"]
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from oracle import booms, lagrange
 from oracle.clearance import rigid
+from reference.worn_pin import geometry
+from reference.worn_pin.motion import freed
 
-from boom_twin.validation.reference.worn_pin import geometry
-from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
-from boom_twin.validation.reference.worn_pin.motion import freed
+from boom_twin.validation.contact_law import HYSTERESIS, Contact, stiffness
 
 STEEL = stiffness(0.030, 1e-4, 2.06e11, 0.3)
 HEADINGS = np.array([0.5, -0.3])

@@ -7,10 +7,10 @@ import pytest
 from oracle import booms, segments
 from oracle.clearance import rigid
 from oracle.clearance.free_play import lengthening, loaded_lever, tip_shift
+from reference.worn_pin import geometry
+from reference.worn_pin.motion import freed
 
-from boom_twin.validation.reference.worn_pin import geometry
-from boom_twin.validation.reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
-from boom_twin.validation.reference.worn_pin.motion import freed
+from boom_twin.validation.contact_law import HYSTERESIS, Contact, stiffness
 
 RADII = (0.030, 0.025, 0.025, 0.020)
 POSTURES = ["horizontal", "arch", "high", "low"]

@@ -10,13 +10,9 @@ import pytest
 
 from boom_twin.analysis.methods import Method
 from boom_twin.scene import load_scene
-from boom_twin.scene.kinematics import posture_angles
-from boom_twin.validation.study.long_booms import long_boom
 from boom_twin.validation.study.stability import report as stability
 from boom_twin.validation.study.stability.cases import Case, cases, long_holds
-from boom_twin.validation.study.stability.exact_step import one_step
-from boom_twin.validation.study.stability.roundoff import Loss, TurnUp, limit_of
-from boom_twin.validation.study.stability.runner import METHODS, one, run
+from boom_twin.validation.study.stability.runner import METHODS, limit_of, one, run
 from boom_twin.validation.study.stability.setups import DeadStop, smooth, to_the_ends
 
 COARSE = {"dt 2e-2 s", "dt 5e-2 s", "dt 5e-2 s, fast"}
@@ -86,22 +82,19 @@ def test_a_boom_beyond_the_dead_centre_loses_its_stiffness():
 # -- files ------------------------------------------------------------------------------------------------------------
 
 
-def test_files_hold_the_matrix_and_its_symptoms(tmp_path, two_sections):
+def test_files_hold_the_verdicts_and_their_symptoms(tmp_path, two_sections):
     short = partial(smooth, two_sections, None, 1.0, 0.1, 0.2)
     beyond = next(case for case in QUICK if case.name == "beyond")
     methods = {"default": METHODS["default"], "hasty": Method(passes=1, tolerance=1e-30)}
     rows = run([Case("scene", "short", "nothing", short), beyond], methods)
-    boom = long_boom(2)
-    lost = [Loss("sections", "2", 2.0, one_step(boom, posture_angles(boom, "test"), 1e-3, 0.8))]
-    steps = np.array([1e-3, 1e-4])
     limits = {"dead centre: beyond": limit_of(beyond.make())}
-    stability.write_files(tmp_path, rows, [], limits, lost, TurnUp(steps, 1e-9 * steps, steps, 10.0, 2.0), "2 sections")
+    stability.write_files(tmp_path, rows, [], limits, "2 sections")
     found = json.loads((tmp_path / "stability.json").read_text())
     assert [case["methods"]["default"]["word"] for case in found["cases"]] == ["holds", "refuses"]
     text = (tmp_path / "stability.md").read_text()
-    assert "| scene: short | ● holds | ● holds |" in text and "None: no method" in text and "no equilibrium" in text
-    for name in ("stability.png", "stability_roundoff.png"):
-        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+    assert "| default | 1 | 0 | 0 | 0 | 1 |" in text and "dead centre: beyond (weight on the wrong side): refuses;" in text
+    assert "no equilibrium" in text and "carries 0.48" in text
+    assert (tmp_path / "stability.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.slow

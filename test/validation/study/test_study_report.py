@@ -23,4 +23,4 @@ def test_json_holds_no_numbers_that_are_none(tmp_path):
 def test_machine_names_versions():
     found = machine()
     assert found["cores"] >= 1 and found["numpy"] and found["boom_twin"] and found["cpu"]
-    assert "surrogates" in provenance(elements=16) and "elements 16" in provenance(elements=16)
+    assert "surrogates" in provenance() and "numpy " in provenance()

@@ -14,7 +14,7 @@ import numpy as np
 from ....errors import UsageError
 from ....scene.schema import Material, Pin, Scene
 from ....types import Array
-from ...reference.worn_pin.contact import HYSTERESIS, Contact, stiffness
+from ...contact_law import HYSTERESIS, Contact, stiffness
 from .module import exudyn
 
 LEAST_GAP = 3e-5  # m, of the radii in K, which grows without bound while the pin becomes ideal

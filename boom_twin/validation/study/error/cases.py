@@ -1,14 +1,14 @@
-"""Cases of the error study: ways of stepping the boom, here and in two other programs."""
+"""Cases of the error study: ways of stepping the boom, here and in Exudyn."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 from ....analysis.methods import Method
 from ....compiler.compile import BasisName
 from ....scene.schema import Scene
-from ...reference.segments.stiff_solver import Solver
+from ..scene_changes import with_modes
 
 STEPS = (2.5e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 4e-2)  # s; every one divides the longest
 DEFAULT_STEP = 1e-3
@@ -20,13 +20,10 @@ INTEGRATORS = (
     Method("houbolt", 0.0),
     Method("park", 0.0),
 )
-EXUDYN_STEPS = STEPS[1:]
 LUMPED_ELEMENTS = (1, 2, 3, 4)
 LUMPED_SCHEMES = ((1, 1e-3), (1, 5e-4), (1, 3e-4), (2, 3e-3), (2, 1e-3), (0, 1e-3))  # passes with a kept tangent, tolerance
 ELEMENTS = (4, 8, 16)
 SCHEMES = ((1, 1e-4), (2, 1e-3), (0, 1e-3))
-FINENESS = (1, 2, 4)
-TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 
 
 @dataclass(frozen=True)
@@ -42,7 +39,7 @@ class Own:
 
     @property
     def label(self) -> str:
-        """All but the step."""
+        """Return all settings but the step."""
         method, scheme = self.method, self.method.integrator
         if scheme in ("generalised-alpha", "newmark", "wilson"):
             scheme += f" {method.parameter:g}"
@@ -56,7 +53,7 @@ class Own:
         return ", ".join(parts)
 
     def scene(self, scene: Scene) -> Scene:
-        """The scene as this case models it; sections that the scene makes rigid stay so."""
+        """Return the scene as this case models it; sections that the scene makes rigid stay so."""
         changed = scene if self.modes is None else with_modes(scene, self.modes)
         parts = {"axial": self.axial and scene.axial, "geometric": self.geometric and scene.geometric}
         return changed if all(parts.values()) else changed.model_copy(update=parts)
@@ -64,6 +61,16 @@ class Own:
 
 PAPERS = Own(method=Method("newmark", 0.5, passes=1, product="plain"), modes=3, basis="cantilever")
 """The papers' way: Newmark, one linearised pass, the plain product, three cantilever modes."""
+VARIANTS = (
+    *(Own(method=method) for method in INTEGRATORS),
+    Own(method=Method(passes=1)),
+    Own(method=Method(product="plain")),
+    PAPERS,
+    *(Own(modes=modes, basis=basis) for modes in range(1, 7) for basis in ("end-shapes", "cantilever")),
+    *(Own(axial=axial, geometric=geometric) for axial, geometric in ((False, True), (True, False), (False, False))),
+    *(Own(modes=modes, method=Method(passes=1)) for modes in (1, 2)),
+)
+FEW_VARIANTS = (Own(method=Method("newmark", 0.6)), Own(method=Method(passes=1)), Own(modes=1))
 
 
 @dataclass(frozen=True)
@@ -78,84 +85,30 @@ class Peer:
 
     @property
     def model(self) -> str:
-        """Model of the boom, in words."""
+        """Return the model of the boom, in words."""
         return f"Exudyn, {self.elements} element{'s' if self.elements > 1 else ''}{', lumped' if self.lumped else ''}"
 
     @property
     def label(self) -> str:
-        """All but the step."""
+        """Return all settings but the step."""
         times = {0: "anew", 1: "kept for 1 pass"}.get(self.kept, f"kept for {self.kept} passes")
         return f"{self.model}, tangent {times}, tolerance {self.tolerance:g}"
 
 
-@dataclass(frozen=True)
-class Stiff:
-    """The finite-segment boom stepped by a stiff solver of SciPy."""
-
-    fineness: int
-    tolerance: float
-    solver: Solver
-
-    @property
-    def label(self) -> str:
-        """All but the tolerance."""
-        return f"SciPy {self.solver}, {4 * self.fineness} segments"
-
-
-Case = Own | Peer | Stiff
-
-
-def with_modes(scene: Scene, modes: int) -> Scene:
-    """The scene with `modes` bending coordinates in every part that bends."""
-    own = {"modes": modes}
-    sections = tuple(section.model_copy(update=own) if section.modes else section for section in scene.sections)
-    return scene.model_copy(update={"sections": sections, **own})
+Case = Own | Peer
 
 
 def own_cases(scene: Scene, quick: bool) -> list[Own]:
-    """Every variant of the default at every step; the default itself first, and only once."""
-    steps = STEPS[2:6] if quick else STEPS
-    variants = _few_variants() if quick else _variants()
+    """Return every variant of the default at every step; the default itself first, and only once."""
+    variants = FEW_VARIANTS if quick else VARIANTS
     kept = [variant for variant in variants if replace(variant, modes=None) != Own() or variant.scene(scene) != scene]
-    return [replace(variant, step=step) for variant in [Own(), *kept] for step in steps]
-
-
-def _few_variants() -> Iterator[Own]:
-    yield Own(method=Method("newmark", 0.6))
-    yield Own(method=Method(passes=1))
-    yield Own(modes=1)
-
-
-def _variants() -> Iterator[Own]:
-    for method in INTEGRATORS:
-        yield Own(method=method)
-    yield Own(method=Method(passes=1))
-    yield Own(method=Method(product="plain"))
-    yield PAPERS
-    for modes in range(1, 7):
-        yield Own(modes=modes)
-        yield Own(modes=modes, basis="cantilever")
-    for axial, geometric in ((False, True), (True, False), (False, False)):
-        yield Own(axial=axial, geometric=geometric)
-    for modes in (1, 2):
-        yield Own(modes=modes, method=Method(passes=1))
+    return [replace(variant, step=step) for variant in (Own(), *kept) for step in (STEPS[2:6] if quick else STEPS)]
 
 
 def peer_cases(quick: bool) -> list[Peer]:
-    """Elements and steps with every way to solve a step that may be the fastest; with bodies for all parts where that shows."""
+    """Return elements and steps with every way to solve a step that may be the fastest; bodies for all parts where it shows."""
     if quick:
-        return [Peer(step, n, *LUMPED_SCHEMES[0]) for n in LUMPED_ELEMENTS[1::2] for step in EXUDYN_STEPS[1:5]]
-    kinds = ((LUMPED_ELEMENTS, LUMPED_SCHEMES, EXUDYN_STEPS[1:], True), (ELEMENTS, SCHEMES, EXUDYN_STEPS, False))
-    return [
-        Peer(step, n, *scheme, lumped) for elements, schemes, steps, lumped in kinds
-        for n in elements for scheme in schemes for step in steps
-    ]  # fmt: skip
-
-
-def stiff_cases(quick: bool) -> list[Stiff]:
-    """Radau at every subdivision; the other solvers at the middle one."""
-    if quick:
-        return [Stiff(1, tolerance, "Radau") for tolerance in TOLERANCES[1:3]]
-    cases = [Stiff(fineness, tolerance, "Radau") for fineness in FINENESS for tolerance in TOLERANCES]
-    others: tuple[Solver, ...] = ("BDF", "LSODA")
-    return cases + [Stiff(2, tolerance, solver) for solver in others for tolerance in TOLERANCES[1:]]
+        return [Peer(step, elements, *LUMPED_SCHEMES[0]) for elements in LUMPED_ELEMENTS[1::2] for step in STEPS[2:6]]
+    lumped = product(LUMPED_ELEMENTS, LUMPED_SCHEMES, STEPS[2:], (True,))
+    whole = product(ELEMENTS, SCHEMES, STEPS[1:], (False,))
+    return [Peer(step, n, kept, tolerance, lumps) for n, (kept, tolerance), step, lumps in (*lumped, *whole)]

@@ -17,11 +17,12 @@ from ....analysis.motions import Motion
 from ....errors import BoomTwinError
 from ....scene.schema import Scene
 from ....types import Array
-from .cases import STEPS, with_modes
+from ..scene_changes import with_modes
+from .cases import STEPS
 
 
 def load_rig() -> tuple[ModuleType | None, str]:
-    """`boom_twin.validation.rig`, or None and the reason. Exudyn's build without range checks, if none is loaded."""
+    """Return `boom_twin.validation.rig`, or None and the reason; load Exudyn's build without range checks if none is loaded."""
     if "exudyn" not in sys.modules:
         sys.exudynFast = True  # type: ignore[attr-defined]  # where Exudyn looks
     try:
@@ -50,7 +51,7 @@ class Path:
     acceleration: Array
 
     def away(self, other: Path) -> tuple[float, float]:
-        """Root mean square over the motion: of the tip (mm), of its acceleration over that of `other`."""
+        """Return the root mean square over the motion: of the tip (mm), of its acceleration over that of `other`."""
         return 1e3 * rms(self.tip - other.tip), rms(self.acceleration - other.acceleration) / rms(other.acceleration)
 
 
@@ -76,7 +77,7 @@ class Problem:
 
     @property
     def apart(self) -> tuple[float, float] | None:
-        """Distance of the references from each other: tip (mm), acceleration (relative)."""
+        """Return the distance of the references from each other: tip (mm), acceleration (relative)."""
         return None if self.exudyn is None else self.own.path.away(self.exudyn.path)
 
     def errors(self, path: Path) -> tuple[tuple[float, float], tuple[float, float] | None]:
@@ -85,7 +86,7 @@ class Problem:
 
 
 def rms(vectors: Array) -> float:
-    """Root mean square length of `vectors`, shape (m, 2)."""
+    """Return the root mean square length of `vectors`, shape (m, 2)."""
     return float(np.sqrt(np.mean(np.sum(np.square(vectors), axis=-1))))
 
 
@@ -102,12 +103,12 @@ def pose(scene: Scene, motion: Motion, quick: bool) -> Problem:
 
 
 def every(step: float) -> int:
-    """Steps between the compared instants."""
+    """Return the steps between the compared instants."""
     return round(ROW / step)
 
 
 def _own(scene: Scene, motion: Motion, quick: bool) -> Reference:
-    """Many bending shapes and a fine step; its error is estimated by fewer shapes and a step twice as long."""
+    """Take many bending shapes and a fine step; estimate its error by fewer shapes and a step twice as long."""
     coarse, fine = OWN_STEP if not quick else (1e-3, 5e-4)
     paths = []
     for modes, step in ((OWN_MODES[1], fine), (OWN_MODES[0], fine), (OWN_MODES[1], coarse)):
@@ -119,9 +120,9 @@ def _own(scene: Scene, motion: Motion, quick: bool) -> Reference:
 
 
 def _independent(rig: Any, scene: Scene, motion: Motion, quick: bool) -> Reference:
-    """Exudyn, extrapolated in elements and in steps; both extrapolations are of second order.
+    """Extrapolate Exudyn in elements and in steps, both of second order.
 
-    What they add is the error of the finer runs; a tenth of it is taken as what is left.
+    What this adds is the error of the finer runs. A tenth of it is taken as what is left.
     """
     (few, many), (coarse, fine) = (ELEMENTS, EXUDYN_STEP) if not quick else ((8, 16), (2e-3, 1e-3))
     paths = {}
@@ -141,17 +142,17 @@ def _independent(rig: Any, scene: Scene, motion: Motion, quick: bool) -> Referen
 
 
 def at_rest(rig: Any, scene: Scene, strokes: Array, elements: int, lumped: bool) -> Any:
-    """Exudyn's boom at rest as the study makes it: no shear, beams that are exact at their nodes; see `rig.at_rest`."""
+    """Return Exudyn's boom at rest without shear, with beams that are exact at their nodes; see `rig.at_rest`."""
     return rig.at_rest(scene, strokes, elements, nodally_exact=True, lumped=lumped, shear_over_axial=SHEAR_OVER_AXIAL)
 
 
 def _extrapolated(coarse: Array, finer: Array, longer: Array) -> Array:
-    """Richardson, twice: `finer` halves the step of `coarse`, `longer` doubles its elements."""
+    """Extrapolate by Richardson, twice: `finer` halves the step of `coarse`, `longer` doubles its elements."""
     return longer + (longer - coarse) / 3.0 + 4.0 * (finer - coarse) / 3.0
 
 
 def path_of(rows: dict[str, Array]) -> Path:
-    """The path in the columns of a simulation of Exudyn."""
+    """Return the path in the columns of a simulation of Exudyn."""
     return Path(
         np.column_stack([rows["tip_x_m"], rows["tip_y_m"]]), np.column_stack([rows["tip_ax_m_s2"], rows["tip_ay_m_s2"]])
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -9,124 +10,17 @@ from typing import Any
 
 from ....analysis.motions import DURATION, motion_of
 from ....offline.progress import progress_of
-from ....plots.study import methods_picture, work_precision_picture
 from ....scene.schema import Scene
 from ....system.atomic_files import write_atomic
-from ..report import machine, provenance, write_json
-from .cases import Case, Own, Peer, Stiff, own_cases, peer_cases, stiff_cases
-from .default_choice import paragraph
-from .panels import main_panels, method_panels
-from .pareto_tables import (
-    EQUAL,
-    PairedTiming,
-    acceleration,
-    cheapest_table,
-    equal_error_table,
-    failures_table,
-    fastest_at_step,
-    feeding_share,
-    front,
-    front_table,
-    matches,
-    matrices,
-    of,
-    order_table,
-    tip,
-)
+from ..report import machine, provenance, table, write_json
+from .cases import PAPERS, Case, Own, Peer, own_cases, peer_cases
+from .pareto import EQUAL, acceleration, fastest, front, of, order, same_step, tip
+from .pictures import methods_picture, programs_picture
 from .problem import Problem, build, pose
-from .runner import ROUNDS, Row, Runner, in_turn
-
-EXUDYN_BOOM = (
-    "sparse solver, one thread, generalised-alpha 0.8. Its beams are exact at their nodes (what an element of constant "
-    "curvature lacks in bending is given back as shear; GA = 160 EA); they are cut at brackets, with rigid roots and heads on "
-    "their end nodes and no joints between. A lumped boom (l in the picture) has no bodies for cylinders and two-force links: "
-    "weights act at their pins by the law of the lever, barrels turn with the sections that carry them, rods are masses at "
-    "their pins; of the default boom in its arch that is 0.08 mm and 0.4 %, and leaves 10 pins and rods of 29 pins and "
-    "guides. A tangent is kept over the steps and made anew in the first that needs more passes with it than the tables say. "
-    "No faster at equal error were: stiff springs for pins and links, dense solvers, the beams' weight at their nodes, "
-    "tangents kept for more passes, looser tolerances."
-)
-
-
-def report(problem: Problem, rows: Sequence[Row], duel: PairedTiming | None) -> str:
-    """The whole report in Markdown."""
-    parts = [
-        "# Error against run time", provenance(), _setting(problem), "![Error against run time](error.png)",
-        "## The default", paragraph(rows, problem.scene), order_table(rows, Own().label),
-        "## At equal error of the tip", _equal(problem, rows, duel),
-        "## The fastest of boom_twin at an error", cheapest_table(rows),
-        "## The Pareto front", front_table(rows),
-        "## All methods", "![Methods of boom_twin](error_methods.png)", "### boom_twin", matrices(rows, Own),
-    ]  # fmt: skip
-    for title, kind in (("Exudyn", Peer), ("SciPy", Stiff)):
-        if of(rows, kind):
-            parts += [f"### {title}", matrices(rows, kind)]
-    if any(not row.good for row in rows):
-        parts += ["## What failed", failures_table(rows)]
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
-
-
-def _setting(problem: Problem) -> str:
-    """Return a paragraph on the motion, the errors and the times."""
-    own, other = problem.own, problem.exudyn
-    if other is None or problem.apart is None:
-        second = f"There is no independent reference: {problem.missing}"
-    else:
-        tip, acceleration = problem.apart
-        second = (
-            f"The independent one is {other.what}; about {other.tip_mm:.2g} mm and {100 * other.acceleration:.2g} % are left "
-            f"in it. Both differ by {tip:.2g} mm and {100 * acceleration:.2g} %. Where one error is given, it is the larger of "
-            "both, so that no program is judged by itself alone."
-        )
-    return (
-        f"Motion: {problem.motion.label}. Errors are root mean squares over the motion of the tip's place, and of its "
-        f"acceleration over that acceleration's own. The own reference is {own.what}; about {own.tip_mm:.2g} mm and "
-        f"{100 * own.acceleration:.2g} % are left in it. {second}\n\nRun time is the CPU time of the stepping alone, compiled, "
-        "without assembly and equilibrium, in milliseconds per simulated second; every program on one core, in turn with the "
-        "others, the fastest of several runs. Other work may share the machine, so only ratios of one run count."
-    )
-
-
-def _equal(problem: Problem, rows: Sequence[Row], duel: PairedTiming | None) -> str:
-    """Tables against the other programs, and how these were run."""
-    parts = [equal_error_table(matches(rows), "Exudyn")] if problem.exudyn else [problem.missing + "\n"]
-    parts.append(equal_error_table(matches(rows, Stiff), "SciPy"))
-    if duel is not None:
-        own, peer = (1e6 * seconds * duel.case.step for seconds in duel.medians)
-        share = feeding_share(rows)
-        parts.append(
-            f"At the same step of {1e3 * duel.case.step:g} ms, in turn: boom_twin {own:.3g} us a step; {duel.case.label}, "
-            f"{peer:.4g} us, {peer / own:.3g} times as long (of the fastest runs: {duel.ratio_of_minima:.3g}). It is Exudyn's "
-            f"fastest at this step that errs at most {EQUAL[0]:g} mm."
-        )
-        parts.append(
-            f"Exudyn: build {build()}, {EXUDYN_BOOM} The drives get their lengths from a Python function before every step, "
-            + (f"which takes {100 * share:.2g} % of the time." if share else "whose time was not measured.")
-        )
-    parts.append(
-        "SciPy: `solve_ivp` on finite segments with all kinematics closed, vectorised in numpy, with the Jacobian of the stiff "
-        "forces; steps are its own. Cutting into segments errs by the square of their length whatever the tolerance"
-        f"{_segments(rows)}."
-    )
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
-
-
-def _segments(rows: Sequence[Row]) -> str:
-    """Return the error of cutting into segments alone, by the rows of Radau at the least tolerance."""
-    listed = [row for row in of(rows, Stiff) if isinstance(row.case, Stiff) and row.case.solver == "Radau" and row.good]
-    least = min((row.case.tolerance for row in listed if isinstance(row.case, Stiff)), default=0.0)
-    told = [
-        f"{row.tip_mm:.2g} mm with {4 * row.case.fineness} a section"
-        for row in listed
-        if isinstance(row.case, Stiff) and row.case.tolerance == least
-    ]
-    return f": {', '.join(told)}" if told else ""
-
+from .runner import ROUNDS, Row, Runner
 
 QUICK_DURATION = 0.6  # s
 TURNS, QUICK_TURNS = 5, 2  # of both programs at the same step
-SAME_STEP = 1e-3
-NOTE = "surrogate parameters; computed, not measured on a rig"
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
@@ -139,38 +33,138 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     posture : str, optional
         Where the motion starts, see `motion_of`.
     """
-    out.mkdir(parents=True, exist_ok=True)
     problem = pose(scene, motion_of(scene, posture, QUICK_DURATION if quick else DURATION), quick)
-    rows = _rows(problem, quick)
-    duel = _duel(problem, rows, QUICK_TURNS if quick else TURNS)
+    cases: list[Case] = [*own_cases(scene, quick), *(peer_cases(quick) if problem.exudyn else ())]
+    runner, rounds = Runner(problem), 1 if quick else ROUNDS
+    bar = progress_of(rounds * len(cases), "cases", "study error")
+    rows = runner.rows(cases, rounds, lambda: bar.update(1))
+    bar.close()
+    duel = same_step(runner, rows, QUICK_TURNS if quick else TURNS)
+    out.mkdir(parents=True, exist_ok=True)
     paths = [out / name for name in ("error.json", "error.md", "error.png", "error_methods.png")]
     write_json(paths[0], _content(problem, rows, duel))
     write_atomic(paths[1], report(problem, rows, duel))
-    work_precision_picture(paths[2], "Error against run time", NOTE, main_panels(problem, rows))
-    methods_picture(paths[3], "Methods of boom_twin: error against run time", NOTE, method_panels(scene, rows))
+    programs_picture(paths[2], problem, rows)
+    methods_picture(paths[3], scene, rows)
     return paths
 
 
-def _rows(problem: Problem, quick: bool) -> list[Row]:
-    cases: list[Case] = [*own_cases(problem.scene, quick), *(peer_cases(quick) if problem.exudyn else ()), *stiff_cases(quick)]
-    rounds = 1 if quick else ROUNDS
-    bar = progress_of(rounds * len(cases), "cases", "study error")
-    found = Runner(problem).rows(cases, rounds, lambda: bar.update(1))
-    bar.close()
-    return found
+def report(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -> str:
+    """Return the whole report in Markdown."""
+    parts = [
+        "# Error against run time", _setting(problem), "![Error against run time](error.png)",
+        "## The default by step",
+        "Order: slope of the error from the step above; 2 is that of the scheme, until errors reach those of the references.",
+        _by_step(rows),
+        "## At equal error of the tip",
+        "The fastest case of each program that errs no more; ratio: how many times as long Exudyn takes.",
+        _equal(problem, rows), _at_same_step(duel),
+        f"## Methods at a step of {1e3 * Own().step:g} ms",
+        "The first is the default; the others differ from it in what they name. Other steps: picture below, `error.json`.",
+        _methods(rows), "![Methods of boom_twin](error_methods.png)",
+    ]  # fmt: skip
+    if failed := _failed(rows):
+        parts += ["## What failed", failed]
+    parts += [
+        "## Limits",
+        "One motion of one boom. Other work may share the machine, so only ratios within this page count. Exudyn's models and "
+        "schemes are the fastest of those tried; another setting may be faster.",
+        provenance(),
+    ]
+    return "\n\n".join(part.rstrip("\n") for part in parts if part) + "\n"
 
 
-def _duel(problem: Problem, rows: list[Row], turns: int) -> PairedTiming | None:
-    """The default against Exudyn's fastest at the same step that is exact enough, in turn."""
-    best = fastest_at_step(rows, SAME_STEP) or fastest_at_step(rows, SAME_STEP, EQUAL[-1])
-    if best is None or not isinstance(best.case, Peer):
-        return None
-    own, peer = in_turn(problem, Own(SAME_STEP), best.case, turns)
-    return PairedTiming(best.case, tuple(own), tuple(peer))
+def _setting(problem: Problem) -> str:
+    """Return a paragraph on the motion, the errors and the times."""
+    own, other = problem.own, problem.exudyn
+    second = f"There is no independent reference: {problem.missing}"
+    if other is not None and problem.apart is not None:
+        apart = problem.apart
+        second = (
+            f"The independent one is {other.what} (left in it: {_errors(other.tip_mm, other.acceleration)}). They differ by "
+            f"{_errors(*apart)}. Where one error is given, it is the larger of both."
+        )
+    return (
+        f"Motion: {problem.motion.label}. Errors are rms over the motion: of the tip, and of its acceleration as a share of "
+        f"its own. The own reference is {own.what} (left in it: {_errors(own.tip_mm, own.acceleration)}). {second}\n\n"
+        "Run time is CPU time of compiled stepping on one core, in ms per simulated second (ms/s): the least of several runs "
+        "in turn with the other program."
+    )
 
 
-def _content(problem: Problem, rows: list[Row], duel: PairedTiming | None) -> dict[str, Any]:
-    fronts = {"tip": {id(row) for row in front(rows, tip)}, "acceleration": {id(row) for row in front(rows, acceleration)}}
+def _errors(tip_mm: float, relative: float) -> str:
+    return f"{tip_mm:.2g} mm, {100 * relative:.2g} %"
+
+
+def _by_step(rows: Sequence[Row]) -> str:
+    listed = [row for row in of(rows, Own) if row.case.label == Own().label]
+    head = ("step, ms", "tip, mm, own reference", "order", "tip, mm, independent", "acceleration, %", "ms/s", "passes")
+    lines = [
+        (f"{1e3 * row.case.step:g}", row.own_mm, slope, row.independent_mm, 100.0 * row.acceleration, _ms(row), row.passes)
+        for row, slope in order(listed)
+    ]
+    return table(head, lines)
+
+
+def _equal(problem: Problem, rows: Sequence[Row]) -> str:
+    """Return a table of the fastest of both programs at equal errors."""
+    if problem.exudyn is None:
+        return problem.missing
+    lines = []
+    for most in EQUAL:
+        own, peer = fastest(of(rows, Own), most), fastest(of(rows, Peer), most)
+        ratio = peer.seconds / own.seconds if own and peer else math.nan
+        told = None if math.isnan(ratio) else f"{ratio:.{0 if ratio > 10.0 else 1}f}"
+        lines.append((f"{most:g}", own and _name(own), own and _ms(own), peer and _name(peer), peer and _ms(peer), told))
+    return table(("tip error, mm", "boom_twin", "ms/s", "Exudyn", "ms/s", "ratio"), lines)
+
+
+def _at_same_step(duel: dict[str, Any] | None) -> str:
+    if duel is None:
+        return ""
+    return (
+        f"At the same step of {1e3 * duel['step_s']:g} ms, in turn, {duel['exudyn_method']} (its fastest that errs at most "
+        f"{duel['exudyn_error_at_most_mm']:g} mm) takes {duel['ratio_of_medians']:.3g} times as long as the default.\n\n"
+        f"Exudyn: build {build()}, sparse solver, one thread, generalised-alpha 0.8, beams exact at their nodes. Lumped (l in "
+        "the picture): masses of cylinders and two-force links act at their pins. A kept tangent is made anew in the step that "
+        "needs more passes than named. Its time includes the Python function that hands its drives their lengths."
+    )
+
+
+def _methods(rows: Sequence[Row]) -> str:
+    """Return a table of the methods at the default step; other numbers of modes only where nothing else differs."""
+    default = Own().label
+    lines = []
+    for row in of(rows, Own):
+        case = row.case
+        plain = isinstance(case, Own) and (case.modes in (None, PAPERS.modes) or case == Own(modes=case.modes))
+        if plain and case.step == Own().step:
+            numbers = (_ms(row), row.tip_mm, 100.0 * row.acceleration) if row.good else ("failed", None, None)
+            lines.append((case.label.removeprefix(f"{default}, "), *numbers))
+    return table(("method", "ms/s", "tip, mm", "acceleration, %"), lines)
+
+
+def _failed(rows: Sequence[Row]) -> str:
+    """Return a list of the reasons of failure, each with its cases."""
+    cases: dict[str, list[str]] = {}
+    for row in rows:
+        if not row.good:
+            why = row.status if row.status != "ok" else "the numbers are not finite"
+            cases.setdefault(why, []).append(_name(row))
+    return "".join(f"- {why}: {'; '.join(names)}.\n" for why, names in cases.items())
+
+
+def _ms(row: Row) -> float:
+    """Return CPU milliseconds per simulated second."""
+    return 1e3 * row.seconds
+
+
+def _name(row: Row) -> str:
+    return f"{row.case.label.removeprefix('Exudyn, ')}, step {1e3 * row.case.step:g} ms"
+
+
+def _content(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -> dict[str, Any]:
+    fronts = {name: {id(row) for row in front(rows, error)} for name, error in (("tip", tip), ("acceleration", acceleration))}
     return {
         "machine": machine(),
         "motion": problem.motion.label,
@@ -181,16 +175,17 @@ def _content(problem: Problem, rows: list[Row], duel: PairedTiming | None) -> di
         },
         "references_differ": problem.apart and dict(zip(("tip_mm", "acceleration"), problem.apart, strict=True)),
         "exudyn_missing": problem.missing or None,
-        "same_step": None if duel is None else duel.told,
+        "same_step": duel,
         "rows": [_flat(row) | {f"on_front_{name}": id(row) in chosen for name, chosen in fronts.items()} for row in rows],
     }
 
 
 def _flat(row: Row) -> dict[str, Any]:
-    """A row as one flat object; settings first."""
-    program = {Own: "boom_twin", Peer: "exudyn", Stiff: "scipy"}[type(row.case)]
+    """Return a row as one flat object; settings first."""
     settings = asdict(row.case)
     settings |= settings.pop("method", {})
     numbers = {key: value for key, value in vars(row).items() if key not in ("case", "status")}
-    both = {"tip_mm": row.tip_mm, "acceleration": row.acceleration}
-    return {"program": program, "method": row.case.label} | settings | numbers | both | {"status": row.status}
+    return {
+        "program": "boom_twin" if isinstance(row.case, Own) else "exudyn", "method": row.case.label, **settings, **numbers,
+        "tip_mm": row.tip_mm, "acceleration": row.acceleration, "status": row.status,
+    }  # fmt: skip

@@ -9,8 +9,8 @@ from typing import Literal
 
 from ....scene.load import load_scene
 from ....scene.schema import Scene
+from .. import scene_changes as made
 from ..long_booms import long_boom, seven_sections
-from . import setups as made
 from .setups import Setup, dead_stop, first_cylinder, one_cylinder, smooth, to_the_ends
 
 Truth = Literal["fine steps", "equilibrium", "swing", "none"]
@@ -43,7 +43,7 @@ class Case:
 
 
 def short(value: float) -> str:
-    """A power of ten times a digit: 1e-6, 5e-2, 1e13."""
+    """Return a digit times a power of ten as text: 1e-6, 5e-2, 1e13."""
     digit, _, power = f"{value:.0e}".partition("e")
     return f"{digit}e{int(power)}"
 
@@ -63,7 +63,7 @@ HOLD, DAY, STEP = 600.0, 86400.0, 2e-2  # s
 
 
 def cases(scene: Scene) -> tuple[Case, ...]:
-    """All cases of a scene but the holds of a day; those that need a geometry of their own take the default boom."""
+    """Return all cases of a scene but the holds of a day; those with a geometry of their own take the default boom."""
     found = (
         Case("scene", "as it is", "nothing", partial(smooth, scene), quick=True),
         *_stiffness(scene), *_masses(scene), *_steps(scene), *_sections(), *_geometry(scene),
@@ -131,7 +131,7 @@ def _geometry(scene: Scene) -> Iterator[Case]:
 
 
 def _dead_centres() -> Iterator[Case]:
-    """Joint 2 of the default boom: its cylinder has its dead centre at -170 deg, its links are in line at -174.2 deg."""
+    """Yield cases of joint 2 of the default boom: dead centre of its cylinder at -170 deg, links in line at -174.2 deg."""
     group, boom = "dead centre", load_scene()
     near, before, beyond = (made.freed(boom, 1, -178.0, 0.6, angle) for angle in (-168.0, -165.0, -172.0))
     stiff, toggle = (made.with_modes(made.cylinders(own, None), 0) for own in (before, beyond))
@@ -174,7 +174,7 @@ def _payload_and_modes(scene: Scene) -> Iterator[Case]:
 
 
 def long_holds(scene: Scene) -> tuple[Case, ...]:
-    """Holds of 24 simulated hours."""
+    """Return the holds of 24 simulated hours."""
     booms: tuple[tuple[str, Scene, Truth], ...] = (
         ("24 h", scene, "equilibrium"),
         ("24 h, undamped", made.undamped(scene), "swing"),

@@ -1,4 +1,4 @@
-"""Run the stability study: every case by every method, judged against what is right there."""
+"""Run the stability study: every case by every method, judged against its reference."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ import numpy as np
 
 from ....analysis.equilibrium import rest_at
 from ....analysis.methods import Method, MethodRun, integrate_with
+from ....analysis.modal import natural_modes
 from ....errors import SolverError
 from ....scene.kinematics import joint_angles_of_strokes
 from ....types import Array
+from ..scene_changes import lighter_gravity
 from .cases import Case
 from .setups import Setup
 from .verdict import CaseVerdict, Facts, against_motion, against_rest, verdict
@@ -29,9 +31,11 @@ METHODS: dict[str, Method] = {
     "single pass": Method(passes=1),
     "plain product": Method(product="plain"),
 }
-RIGHT = Method(tolerance=1e-10)
+REFERENCE = Method(tolerance=1e-10)
 NOTHING = "there is no solution"
-FINER, FINEST = 8, 5e-6  # steps of what is right: an eighth, but not below this (s), where round-off takes over
+FINER, FINEST = 8, 5e-6  # steps of the reference: an eighth, but not below this (s), where round-off takes over
+HALVINGS = 20  # of the bracket of a load
+WIDTH = 1e-6  # relative, of a frequency's bracket
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,11 @@ class Cell:
     """Result of one method in one case."""
 
     facts: Facts
-    verdict: CaseVerdict
+
+    @property
+    def verdict(self) -> CaseVerdict:
+        """Return the verdict on the facts."""
+        return verdict(self.facts)
 
 
 @dataclass(frozen=True)
@@ -66,22 +74,17 @@ def one(case: Case, methods: dict[str, Method]) -> CaseResult:
     """March one case by `methods`."""
     try:
         setup = case.make()
-        judge, told = _judge(case, setup)
+        judge, reference = _judge(case, setup)
     except SolverError as error:
-        refused = _cell(Facts(str(error), solvable=False))
-        return CaseResult(case, NOTHING, dict.fromkeys(methods, refused))
-    return CaseResult(case, told, {name: _cell(_facts(case, setup, method, judge)) for name, method in methods.items()})
+        return CaseResult(case, NOTHING, dict.fromkeys(methods, Cell(Facts(str(error), solvable=False))))
 
+    def cell(method: Method) -> Cell:
+        try:
+            return Cell(judge(_march(setup, setup.step, setup.every, method)))
+        except SolverError as error:
+            return Cell(Facts(str(error), solvable=case.truth != "none"))
 
-def _cell(facts: Facts) -> Cell:
-    return Cell(facts, verdict(facts))
-
-
-def _facts(case: Case, setup: Setup, method: Method, judge: Callable[[MethodRun], Facts]) -> Facts:
-    try:
-        return judge(_marched(setup, method))
-    except SolverError as error:
-        return Facts(str(error), solvable=case.truth != "none")
+    return CaseResult(case, reference, {name: cell(method) for name, method in methods.items()})
 
 
 def _judge(case: Case, setup: Setup) -> tuple[Callable[[MethodRun], Facts], str]:
@@ -92,54 +95,74 @@ def _judge(case: Case, setup: Setup) -> tuple[Callable[[MethodRun], Facts], str]
     SolverError
         No equilibrium to start from.
     """
+
+    def unsolvable(found: MethodRun) -> Facts:
+        return Facts(found.status, solvable=False, doubt=found.doubt, passes=found.passes)
+
+    def ended(found: MethodRun) -> Facts | None:
+        return None if found.status == "ok" else Facts(found.status, passes=found.passes)
+
     if case.truth == "none":
-        return _none, NOTHING
+        return unsolvable, NOTHING
     if case.truth == "fine steps":
-        right, stride = _right(setup)
+        step = max(setup.step / FINER, FINEST)
+        every, stride = max(round(setup.step / step), 1), max(round(step / setup.step), 1)
+        right = _march(setup, step, every, REFERENCE)
         if right.status != "ok":
-            return _none, f"{NOTHING}: the reference ended, {right.status}"
-        return lambda found: _against(found, right, stride, setup), f"default method at {_fine(setup):.3g} s"
+            return unsolvable, f"{NOTHING}: the reference ended, {right.status}"
+        told = f"default method at {step:.3g} s"
+        return lambda found: ended(found) or against_motion(_thinned(found, stride), right, setup.still, setup.jump), told
     rest = _equilibrium(setup) if case.truth == "equilibrium" else None
     told = "equilibrium of the last strokes" if rest is not None else "a vibration that does not grow about a mean that stays"
-    return lambda found: _ended(found) or against_rest(found, rest, setup.still, setup.every), told
+    return lambda found: ended(found) or against_rest(found, rest, setup.still, setup.every), told
 
 
-def _none(found: MethodRun) -> Facts:
-    return Facts(found.status, solvable=False, doubt=found.doubt, passes=found.passes)
-
-
-def _against(found: MethodRun, right: MethodRun, stride: int, setup: Setup) -> Facts:
-    return _ended(found) or against_motion(_thinned(found, stride), right, setup.still, setup.jump)
-
-
-def _ended(found: MethodRun) -> Facts | None:
-    """Facts of a motion that did not reach its end; None if it did."""
-    return None if found.status == "ok" else Facts(found.status, passes=found.passes)
-
-
-def _marched(setup: Setup, method: Method) -> MethodRun:
-    return integrate_with(setup.scene, setup.drive, setup.duration, setup.step, setup.every, method, angles=setup.angles)
-
-
-def _fine(setup: Setup) -> float:
-    return max(setup.step / FINER, FINEST)
-
-
-def _right(setup: Setup) -> tuple[MethodRun, int]:
-    """Return the reference motion, and how many rows of the case's motion there are to one of its rows."""
-    step = _fine(setup)
-    every, stride = max(round(setup.step / step), 1), max(round(step / setup.step), 1)
-    return integrate_with(setup.scene, setup.drive, setup.duration, step, every, RIGHT, angles=setup.angles), stride
+def _march(setup: Setup, step: float, every: int, method: Method) -> MethodRun:
+    return integrate_with(setup.scene, setup.drive, setup.duration, step, every, method, angles=setup.angles)
 
 
 def _thinned(motion: MethodRun, stride: int) -> MethodRun:
-    """Every `stride`-th row."""
+    """Return every `stride`-th row."""
     names = ("times", "tip", "tip_acceleration", "joints", "cylinder_forces")
     return replace(motion, **{name: getattr(motion, name)[::stride] for name in names})
 
 
+def _strokes(setup: Setup, time: float) -> tuple[Array, Array]:
+    """Return strokes (m) at a time (s), and joint angles (rad) of the undeformed boom there."""
+    strokes = setup.drive(np.array([time]))[0][0]
+    return strokes, joint_angles_of_strokes(setup.scene, strokes, near=setup.angles)
+
+
 def _equilibrium(setup: Setup) -> Array:
-    """Tip (m), shape (2,), at rest at the last strokes."""
-    strokes = setup.drive(np.array([setup.duration]))[0][0]
-    _, state, _ = rest_at(setup.scene, strokes, joint_angles_of_strokes(setup.scene, strokes, near=setup.angles))
-    return state.frames[-1, :2].copy()
+    """Return the tip (m), shape (2,), at rest at the last strokes."""
+    return rest_at(setup.scene, *_strokes(setup, setup.duration))[1].frames[-1, :2].copy()
+
+
+@dataclass(frozen=True)
+class Limit:
+    """`share` of gravity carried at most; `frequency` (Hz) of the slowest vibration just below, and without load."""
+
+    share: float
+    frequency: float
+    unloaded: float
+
+
+def limit_of(setup: Setup) -> Limit:
+    """Halve the bracket of the load that still has a stable equilibrium, from no load to all of it.
+
+    At a true limit the slowest frequency goes to zero: stiffness is used up, and no equilibrium is near.
+    """
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if np.isnan(_slowest(setup, middle)) else (middle, high)
+    return Limit(low, _slowest(setup, low), _slowest(setup, 0.0))
+
+
+def _slowest(setup: Setup, share: float) -> float:
+    """Return the first natural frequency (Hz) at the first strokes under `share` of gravity; NaN without an equilibrium."""
+    try:
+        plan, state, work = rest_at(lighter_gravity(setup.scene, share), *_strokes(setup, 0.0))
+    except SolverError:
+        return float("nan")
+    return natural_modes(plan, state, work, 1, WIDTH)[0].frequency

@@ -13,6 +13,12 @@ from ....analysis.methods import MethodRun
 from ....types import Array
 
 Word = Literal["holds", "degrades", "fails", "refuses"]
+Mask = NDArray[np.bool_]
+QUIET = 1e-3  # share of the peak acceleration below which vibration is not followed
+IMPULSE = 0.05  # s after a jump of speed
+WRONG = 0.05  # of the largest cylinder force, above which an impulse still rings
+SHORTEST_PATH = 1e-9  # m
+TINY = 1e-12  # m/s^2 or N, instead of a zero to divide by
 
 
 @dataclass(frozen=True)
@@ -26,18 +32,17 @@ class Facts:
     solvable : bool
         Whether there is a solution at all.
     doubt : str
-        What the motion itself gave reason to doubt, see `analysis.error_estimate`.
+        Warning of the motion itself, see `analysis.error_estimate`.
     error : float
         Largest error of the tip, as a share of the tip's path.
     acceleration, force : float
         Error of the tip's acceleration, rms over its own rms; of the cylinder forces, rms over the largest.
     ringing, force_ringing : float
-        Part that changes sign from step to step, rms after the drives hold, as a share of the peak: of the tip's acceleration;
-        of the cylinder forces.
+        Part that changes sign from step to step, rms after the drives hold, as a share of the peak.
     growth : float
-        Vibration in the last quarter of the hold over that in the first, as a multiple of what is right.
+        Vibration in the last quarter of the hold over that in the first, as a multiple of the reference's.
     drift : float
-        From the equilibrium, or of the mean, at the end of a long hold, as a share of the tip's path.
+        Distance from the equilibrium, or way of the mean, at the end of a long hold, as a share of the tip's path.
     lasting : float
         Steps after a jump of speed until cylinder forces are right again.
     passes : float
@@ -60,11 +65,16 @@ class Facts:
 
 @dataclass(frozen=True)
 class CaseVerdict:
-    """`silent`: the numbers are wrong, the status says "ok" and nothing is doubted."""
+    """Verdict with its symptom; `silent`: the numbers are wrong, the status is "ok" and there is no warning."""
 
     word: Word
     symptom: str
     silent: bool = False
+
+    @property
+    def mark(self) -> str:
+        """Return the word of the verdict, or "silent"."""
+        return "silent" if self.silent else self.word
 
 
 # quantity: (degrades above, fails above, symptom)
@@ -82,42 +92,23 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
 
 
 def verdict(facts: Facts) -> CaseVerdict:
-    """The verdict on `facts`, by `BOUNDS`."""
+    """Return the verdict on `facts` by `BOUNDS`; an infinite value is beyond every bound, NaN within."""
     if facts.status != "ok":
         return CaseVerdict("fails" if facts.solvable else "refuses", facts.status)
-    told = f" (it says: {facts.doubt})" if facts.doubt else ""
+    warned = f" (it says: {facts.doubt})" if facts.doubt else ""
     if not facts.solvable:
-        return CaseVerdict("fails", "gives numbers where there is no solution" + told, silent=not facts.doubt)
-    beyond = {name: _grade(name, getattr(facts, name)) for name in BOUNDS}
-    symptoms = {
-        grade: [BOUNDS[name][2].format(_shown(getattr(facts, name))) for name, own in beyond.items() if own == grade]
-        for grade in ("fails", "degrades")
-    }
-    if symptoms["fails"]:
-        return CaseVerdict("fails", "; ".join(symptoms["fails"] + symptoms["degrades"]) + told, silent=not facts.doubt)
-    if symptoms["degrades"]:
-        return CaseVerdict("degrades", "; ".join(symptoms["degrades"]) + told)
-    return CaseVerdict("holds", "")
-
-
-def _grade(name: str, value: float) -> Word:
-    """Return the grade of a value. Infinite is beyond every bound; NaN is a quantity without meaning here."""
-    degrades, fails, _ = BOUNDS[name]
-    if value > fails or math.isinf(value):
-        return "fails"
-    return "degrades" if value > degrades else "holds"
-
-
-def _shown(value: float) -> str:
-    return f"{float(f'{value:.2g}'):g}"
-
-
-Mask = NDArray[np.bool_]
-
-QUIET = 1e-3  # share of the peak acceleration below which vibration is not followed
-IMPULSE = 0.05  # s after a jump of speed
-WRONG = 0.05  # of the largest cylinder force, above which an impulse still rings
-SHORTEST_PATH = 1e-9  # m
+        return CaseVerdict("fails", "gives numbers where there is no solution" + warned, silent=not facts.doubt)
+    failing, degrading = list[str](), list[str]()
+    for name, (degrades, fails, symptom) in BOUNDS.items():
+        value = getattr(facts, name)
+        beyond = failing if value > fails or math.isinf(value) else degrading if value > degrades else None
+        if beyond is not None:
+            beyond.append(symptom.format(f"{float(f'{value:.2g}'):g}"))
+    if not failing and not degrading:
+        return CaseVerdict("holds", "")
+    return CaseVerdict(
+        "fails" if failing else "degrades", "; ".join(failing + degrading) + warned, bool(failing) and not facts.doubt
+    )
 
 
 def against_motion(found: MethodRun, right: MethodRun, still: float, jump: float = math.nan) -> Facts:
@@ -125,32 +116,30 @@ def against_motion(found: MethodRun, right: MethodRun, still: float, jump: float
 
     Accelerations and forces are not compared right after a `jump` (s) of speed, where they are impulses.
     """
-    path, late = _path(right), right.times > still
     smooth = ~(np.abs(right.times - jump - 0.5 * IMPULSE) <= 0.5 * IMPULSE + 1e-9)
-    shares = _rings(found, right, late & smooth)
+    acceleration, force = right.tip_acceleration[smooth], right.cylinder_forces[smooth]
+    ringing = _rings(found, right, (right.times > still) & smooth)
     return Facts(
         found.status,
         doubt=found.doubt,
-        error=_largest(found.tip - right.tip) / path,
-        acceleration=_rms((found.tip_acceleration - right.tip_acceleration)[smooth])
-        / max(_rms(right.tip_acceleration[smooth]), 1e-12),
-        force=_rms((found.cylinder_forces - right.cylinder_forces)[smooth])
-        / max(_largest(right.cylinder_forces[smooth]), 1e-12),
-        ringing=shares[0],
-        force_ringing=shares[1],
+        error=_largest(found.tip - right.tip) / _path(right),
+        acceleration=_rms(found.tip_acceleration[smooth] - acceleration) / max(_rms(acceleration), TINY),
+        force=_rms(found.cylinder_forces[smooth] - force) / max(_largest(force), TINY),
+        ringing=ringing[0],
+        force_ringing=ringing[1],
         growth=growth(found, still) / max(growth(right, still), 1e-3),
-        lasting=_lasting(found, right, jump, smooth),
+        lasting=_lasting(found, right, jump, _largest(force)),
         passes=found.passes,
     )
 
 
-def _lasting(found: MethodRun, right: MethodRun, jump: float, smooth: Mask) -> float:
-    """Rows from a jump of speed to the last one where cylinder forces are wrong; NaN without a jump."""
+def _lasting(found: MethodRun, right: MethodRun, jump: float, largest: float) -> float:
+    """Return the rows from a jump of speed to the last one where cylinder forces are wrong; NaN without a jump."""
     if math.isnan(jump):
         return math.nan
-    wrong = np.linalg.norm(found.cylinder_forces - right.cylinder_forces, axis=1)
-    beyond = (wrong > WRONG * _largest(right.cylinder_forces[smooth])) & (right.times >= jump - 1e-9)
-    return float((right.times[beyond].max() - jump) / right.times[1]) if beyond.any() else 0.0
+    wrong = np.linalg.norm(found.cylinder_forces - right.cylinder_forces, axis=1) > WRONG * largest
+    late = right.times[wrong & (right.times >= jump - 1e-9)]
+    return float((late.max() - jump) / right.times[1]) if late.size else 0.0
 
 
 def against_rest(found: MethodRun, equilibrium: Array | None, still: float, every: int = 1) -> Facts:
@@ -161,47 +150,45 @@ def against_rest(found: MethodRun, equilibrium: Array | None, still: float, ever
     late = np.flatnonzero(found.times > still)
     first, last = late[: len(late) // 4], late[-(len(late) // 4) :]
     away = found.tip[-1] - equilibrium if equilibrium is not None else found.tip[last].mean(0) - found.tip[first].mean(0)
-    shares = _rings(found, None, found.times > still) if every == 1 else (math.nan, math.nan)
+    ringing = _rings(found, None, found.times > still) if every == 1 else (math.nan, math.nan)
     return Facts(
         found.status,
         doubt=found.doubt,
         drift=float(np.linalg.norm(away)) / _path(found),
-        ringing=shares[0],
-        force_ringing=shares[1],
+        ringing=ringing[0],
+        force_ringing=ringing[1],
         growth=growth(found, still),
         passes=found.passes,
     )
 
 
 def growth(motion: MethodRun, still: float) -> float:
-    """Vibration of the tip's acceleration in the last quarter of the hold over that in the first; 1 where it is still."""
+    """Return the vibration of the tip's acceleration in the last quarter of the hold over that in the first; 1 where still."""
     late = np.flatnonzero(motion.times > still)
     quarter = max(len(late) // 4, 1)
-    first, last = (_spread(motion.tip_acceleration[rows]) for rows in (late[:quarter], late[-quarter:]))
-    if last <= QUIET * _largest(motion.tip_acceleration):
+    first, last = (motion.tip_acceleration[rows] for rows in (late[:quarter], late[-quarter:]))
+    before, after = (_rms(values - values.mean(0)) for values in (first, last))
+    if after <= QUIET * _largest(motion.tip_acceleration):
         return 1.0
-    return last / first if first > 0.0 else math.inf
+    return after / before if before > 0.0 else math.inf
 
 
 def alternating(values: Array) -> Array:
-    """The part of rows (m, c) that changes sign from row to row, (m - 2, c); a smooth curve leaves next to nothing."""
+    """Return the part of rows (m, c) that changes sign from row to row, (m - 2, c); nearly zero for a smooth curve."""
     return np.asarray(0.25 * (2.0 * values[1:-1] - values[2:] - values[:-2]))
 
 
 def _rings(found: MethodRun, right: MethodRun | None, late: Mask) -> tuple[float, float]:
-    """Ringing of tip acceleration and cylinder forces in the rows `late`, beyond that of what is right."""
-    shares = []
-    for name in ("tip_acceleration", "cylinder_forces"):
-        own = getattr(found, name)
-        other = np.zeros_like(own) if right is None else getattr(right, name)
-        peak = _largest(other if right is not None else own)
-        ring = alternating((own - other)[late])
-        shares.append(_rms(ring) / max(peak, 1e-12))
-    return shares[0], shares[1]
+    """Return the ringing of tip acceleration and cylinder forces in the rows `late`, beyond that of the reference."""
 
+    def ring(own: Array, other: Array | None) -> float:
+        more = own if other is None else own - other
+        return _rms(alternating(more[late])) / max(_largest(own if other is None else other), TINY)
 
-def _spread(values: Array) -> float:
-    return _rms(values - values.mean(0))
+    return (
+        ring(found.tip_acceleration, None if right is None else right.tip_acceleration),
+        ring(found.cylinder_forces, None if right is None else right.cylinder_forces),
+    )
 
 
 def _rms(values: Array) -> float:
@@ -217,6 +204,6 @@ def _path(motion: MethodRun) -> float:
 
 
 def _largest(values: Array) -> float:
-    """Largest length of the rows; infinite if any is not finite."""
+    """Return the largest length of the rows; infinite if any is not finite."""
     sizes = np.linalg.norm(values, axis=-1)
     return float(sizes.max()) if np.isfinite(sizes).all() else math.inf

@@ -1,0 +1,14 @@
+"""Refusal of scenes that a model with ideal pins alone does not know."""
+
+from __future__ import annotations
+
+from boom_twin.errors import UsageError
+from boom_twin.scene.schema import Scene
+
+
+def refuse_clearance(scene: Scene, model: str) -> None:
+    """Raise UsageError if `scene` has pins with clearance, which `model` (as a reader would call it) does not know."""
+    pins = () if scene.clearance is None else scene.clearance.pins
+    if pins:
+        names = ", ".join(pin.at for pin in pins)
+        raise UsageError(f"clearance.pins = {names}: {model} knows ideal pins only. Leave out the block `clearance`.")

@@ -1,0 +1,70 @@
+"""Equilibrium of the finite-segment reference boom, from its energy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from boom_twin.errors import SolverError
+from boom_twin.types import Array
+
+from .boom import SegmentBoom, Segments
+from .equations import Jet
+from .geometry import oil_stiffness
+
+PASSES = 60
+SETTLED = 1e-11  # m and rad, largest increment
+LONGEST = 0.1  # m and rad, in one pass
+
+
+def energy(model: Segments, boom: SegmentBoom, drive: Array) -> tuple[Jet, list[Jet]]:
+    """Potential energy (J), and the list of all constraints: closures first, then incompressible cylinders."""
+    n = len(boom.tip[0].g)
+    v, g, h = 0.0, np.zeros(n), np.zeros((n, n))
+    terms = [-m.mass * (model.gravity[0] * m.x + model.gravity[1] * m.y) for m in boom.masses]
+    terms += [0.5 * k * (e * e) for k, _, e in boom.springs]
+    constraints = list(boom.closures)
+    for joint, length, reference in zip(model.scene.joints, boom.lengths, drive, strict=True):
+        stretch = length - float(reference)
+        if joint.cylinder.is_compressible:
+            terms.append(0.5 * oil_stiffness(joint.cylinder, float(reference)) * (stretch * stretch))
+        else:
+            constraints.append(stretch)
+    for term in terms:
+        v, g, h = v + term.v, g + term.g, h + term.h
+    return Jet(v, g, h), constraints
+
+
+def equilibrium(model: Segments, drive: Array, angles: Array) -> tuple[Array, SegmentBoom, Array, Array]:
+    """Newton's method on the energy, from the undeformed boom at relative joint `angles` (rad).
+
+    Returns
+    -------
+    tuple
+        Coordinates, boom, multipliers of the constraints, Hessian of the Lagrangian.
+
+    Raises
+    ------
+    SolverError
+        None was found.
+    """
+    q, multipliers = model.start(angles), None
+    for iteration in range(PASSES):
+        boom = model.place(q)
+        potential, constraints = energy(model, boom, drive)
+        jacobian = np.array([c.g for c in constraints]).reshape(-1, len(q))
+        if multipliers is None:
+            multipliers = np.zeros(len(constraints))
+        hessian = potential.h.copy()
+        for multiplier, constraint in zip(multipliers, constraints, strict=True):
+            hessian += multiplier * constraint.h
+        matrix = np.block([[hessian, jacobian.T], [jacobian, np.zeros((len(constraints),) * 2)]])
+        right = np.concatenate([potential.g, [c.v for c in constraints]])
+        step = np.linalg.solve(matrix, -right)
+        dq = step[: len(q)]
+        size = float(np.abs(dq).max(initial=0.0))
+        if size < SETTLED and iteration > 0:  # the first pass finds the multipliers of a boom that cannot move
+            return q, boom, multipliers, hessian
+        share = LONGEST / max(size, LONGEST)
+        q = q + share * dq
+        multipliers = step[len(q) :] if share == 1.0 else multipliers + share * (step[len(q) :] - multipliers)
+    raise SolverError("the finite-segment boom found no equilibrium. Check masses and stiffnesses, or take another posture.")

@@ -1,0 +1,236 @@
+"""Motion of the reference boom with a worn pin: Lagrange's equations in three coordinates, equilibrium, set-up from a scene.
+
+With the pin held at an offset, one equation in the heading is left: the oil, as long as it then is, must carry the part. Its
+force tells on which side of the bush the pin really lies and how deep. The offset hardly changes the force, so that a few
+passes suffice.
+
+phi, the part's heading; l and psi, length and heading of the cylinder from its barrel pin B to its rod's pin r. The rod's
+pin lies at offset = r - P(phi) from the bush, and is pushed by F (contact). With u = e^(i psi), <a, b> = Re(conj(a) b):
+
+    J phi''   + J' phi'^2 / 2               = -<F, P'> + <g, sum m z'>
+    m_r l''   - m_r (l - a_r) psi'^2        =  <F, u>  + m_r <g, u> - k (l - l_ref) - d (l' - l_ref')
+    I psi''   + 2 m_r (l - a_r) l' psi'     =  <F, i l u> + (m_b a_b + m_r (l - a_r)) <g, i u> .
+
+J(phi) and P(phi) are the part's (`parts`), I(l) the cylinder's. The mass matrix is diagonal, and nothing but F joins the two.
+"""
+
+from __future__ import annotations
+
+from cmath import exp, phase
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from boom_twin.errors import UsageError
+from boom_twin.types import Array
+from boom_twin.validation.contact_law import Contact
+
+from . import geometry
+from .bodies import Lever, OilCylinder, SixBar
+from .geometry import Document, Point, dot
+from .impacts import ContactMotion, Episode, follow
+
+NEAR = 0.05  # rad, about the guess
+PASSES = 40
+SAME = 1e-14  # m, offsets
+
+
+@dataclass(frozen=True)
+class Rest:
+    """An equilibrium: heading phi, length l, heading psi of the cylinder; offset (m) and force (N) of the pin, complex."""
+
+    phi: float
+    length: float
+    psi: float
+    tip: complex
+    offset: complex
+    force: complex
+    tension: float
+
+
+Drive = Callable[[float], tuple[float, float]]
+
+LONGEST = 1e-2  # s, step
+
+
+@dataclass(frozen=True)
+class PinMotion:
+    """A motion in m rows.
+
+    Tip (m), its acceleration (m/s^2), offset of the pin in the bush (m), force of the bush on the pin (N), each (m, 2).
+
+    `phi`, `tension` (N, of the oil) and `energy` (J, oil, weight and motion, without that of the contact): (m,).
+    """
+
+    times: Array
+    tip: Array
+    acceleration: Array
+    offset: Array
+    force: Array
+    phi: Array
+    tension: Array
+    energy: Array
+    episodes: list[Episode]
+
+
+@dataclass(frozen=True)
+class PinnedBoom:
+    """`part`: a `Lever` or `SixBar`; `contact` None: an ideal pin, for `rest` only; gravity complex, m/s^2."""
+
+    part: Lever | SixBar
+    cylinder: OilCylinder
+    contact: Contact | None
+    gravity: complex
+
+    def rest(self, drive: float, phi: float) -> Rest:
+        """Equilibrium at a length of the drive (m), within `NEAR` of heading `phi` (rad); ArithmeticError if there is none."""
+        offset = 0j
+        for _ in range(PASSES):
+            rest = self._held(drive, phi, offset)
+            found = 0j if self.contact is None else self.contact.resting_offset(-rest.force)
+            if abs(found - offset) < SAME:
+                return rest
+            offset = found
+        raise ArithmeticError(f"no side to lie on at {drive:g} m near {phi:g} rad: the pin bears {abs(rest.force):g} N")
+
+    def follow(
+        self,
+        drive: Drive,
+        rest: Rest,
+        times: Array,
+        breaks: Sequence[float] = (),
+        tolerance: float = 1e-8,
+        method: str = "LSODA",
+        rate: float = 0.0,
+    ) -> PinMotion:
+        """Motion from an equilibrium, as `PinMotion`.
+
+        Parameters
+        ----------
+        drive : callable
+            Time (s) -> length (m) and rate (m/s) of the drive.
+        rest : Rest
+        times : ndarray, shape (m,)
+            s, ascending, of the rows.
+        breaks : sequence of float
+            Times at which the drive is not smooth.
+        rate : float
+            Rate of phi at the start, rad/s.
+        """
+        # states are deviations from the rest, so that a relative tolerance means something
+        zero = np.array([rest.phi, rest.length, rest.psi, 0.0, 0.0, 0.0])
+        found = follow(
+            lambda time, state, entry: self.rates(drive(time), zero + state, entry),
+            lambda time, state: self.gap(zero + state),
+            [0.0, 0.0, 0.0, rate, 0.0, 0.0], times, tolerance, tolerance * np.repeat([1e-5, 1e-2], 3),
+            breaks, LONGEST, method,
+        )  # fmt: skip
+        return self._rows(drive, found, zero + found.states)
+
+    def rates(self, drive: tuple[float, float], state: Array, entry: float | None) -> list[float]:
+        """Derivative of (phi, l, psi, phi', l', psi') at length and rate of the drive."""
+        phi, length, psi, turn, speed, swing = (float(value) for value in state)
+        c, g, u, placed = self.cylinder, self.gravity, exp(1j * psi), self.part.at(phi)
+        force = self._bush.force(*self._pin(length, u, turn, speed, swing, placed.pin), entry)
+        arm = length - c.rod_com
+        moment = dot(g, placed.moments) - dot(force, placed.pin.first) - 0.5 * placed.slope * turn**2
+        pull = dot(force, u) - c.tension(length, speed, drive)
+        tilt = dot(force, 1j * length * u) + c.moment(length) * dot(g, 1j * u) - 2.0 * c.rod_mass * arm * speed * swing
+        bends = moment / placed.inertia, pull / c.rod_mass + dot(g, u) + arm * swing**2, tilt / c.inertia(length)
+        return [turn, speed, swing, *bends]
+
+    def gap(self, state: Array) -> tuple[float, float]:
+        """Gap (m, positive in contact) and its rate (m/s)."""
+        offset, rate = self.pin(state)
+        distance = abs(offset)
+        return self._bush.gap(offset), dot(offset, rate) / distance if distance else abs(rate)
+
+    def pin(self, state: Array) -> tuple[complex, complex]:
+        """Offset (m) of the pin in the bush and its rate (m/s), complex."""
+        phi, length, psi, turn, speed, swing = (float(value) for value in state)
+        return self._pin(length, exp(1j * psi), turn, speed, swing, self.part.at(phi).pin)
+
+    def energy(self, drive: float, state: Array) -> float:
+        """Return the energy of motion, weight and oil, J, without that of the contact."""
+        phi, length, psi, turn, speed, swing = state
+        placed = self.part.at(phi)
+        own = 0.5 * placed.inertia * turn**2 - dot(self.gravity, placed.height)
+        return float(own + self.cylinder.energy(length, psi, speed, swing, drive, self.gravity))
+
+    @property
+    def _bush(self) -> Contact:
+        if self.contact is None:
+            raise UsageError("contact = None: an ideal pin has an equilibrium but no motion here. Give a `Contact`.")
+        return self.contact
+
+    def _held(self, drive: float, phi: float, offset: complex) -> Rest:
+        """The equilibrium with the pin at `offset`."""
+
+        def at(angle: float) -> tuple[float, Rest]:
+            placed = self.part.at(angle)
+            axis = placed.pin.value + offset - self.cylinder.pin
+            length, psi = abs(axis), phase(axis)
+            tension = self.cylinder.k * (length - drive)
+            force = self.cylinder.holding(length, psi, tension, self.gravity)
+            moment = dot(self.gravity, placed.moments) - dot(force, placed.pin.first)
+            return moment, Rest(angle, length, psi, self.part.tip_at(angle), offset, force, tension)
+
+        return at(brentq(lambda angle: at(angle)[0], phi - NEAR, phi + NEAR, xtol=1e-15))[1]
+
+    def _pin(self, length: float, u: complex, turn: float, speed: float, swing: float, bush: Point) -> tuple[complex, complex]:
+        rate = (speed + 1j * length * swing) * u - bush.first * turn
+        return self.cylinder.pin + length * u - bush.value, rate
+
+    def _rows(self, drive: Drive, found: ContactMotion, states: Array) -> PinMotion:
+        pins = [self.pin(state) for state in states]
+        entries = [None if np.isnan(entry) else entry for entry in found.entries]
+        drives = [drive(time) for time in found.times]
+        both = list(zip(states, drives, strict=True))
+        return PinMotion(
+            found.times,
+            _pairs([self.part.tip_at(state[0]) for state in states]),
+            _pairs([self._tip_acceleration(*row) for row in zip(drives, states, entries, strict=True)]),
+            _pairs([offset for offset, _ in pins]),
+            _pairs([self._bush.force(*pin, entry) for pin, entry in zip(pins, entries, strict=True)]),
+            states[:, 0],
+            np.array([self.cylinder.tension(state[1], state[4], at) for state, at in both]),
+            np.array([self.energy(at[0], state) for state, at in both]),
+            found.episodes,
+        )
+
+    def _tip_acceleration(self, drive: tuple[float, float], state: Array, entry: float | None) -> complex:
+        arm = self.part.tip_at(state[0]) - self.part.pivot
+        return complex((1j * self.rates(drive, state, entry)[3] - state[3] ** 2) * arm)
+
+
+def _pairs(values: Sequence[complex]) -> Array:
+    both = np.array(values)
+    return np.column_stack([both.real, both.imag])
+
+
+def freed(document: Document, headings: Sequence[float] | Array, index: int, contact: Contact | None) -> PinnedBoom:
+    """`PinnedBoom` of cylinder `index` (0-based): what lies outboard turns as one body, what lies inboard is ground.
+
+    Parameters
+    ----------
+    document : dict
+        A scene's file; that cylinder has k, barrel and rod.
+    headings : sequence of float
+        rad, of the sections to the base's x axis.
+    contact : Contact or None
+        None: an ideal pin, for equilibria only.
+    """
+    joint, places = document["joints"][index], geometry.pivots(document, headings)
+    body = geometry.outboard(document, headings, index)
+    tip = (places[-1] - places[index]) * exp(-1j * headings[index])
+    part: Lever | SixBar
+    if index == 0:
+        part = Lever(places[0], body, complex(*document["sections"][0]["rod_pin"]), tip)
+    else:
+        part = SixBar(places[index], body, joint, headings[index - 1], tip)
+    cylinder, pin = joint["cylinder"], geometry.pins(document, headings, index)[0]
+    barrel, rod = ([p["mass"], p["inertia"], p["com"]] for p in (cylinder["barrel"], cylinder["rod"]))
+    oil = OilCylinder(pin, cylinder["k"], cylinder.get("d", 0.0), *barrel, *rod)
+    return PinnedBoom(part, oil, contact, geometry.gravity(document))

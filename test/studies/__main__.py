@@ -1,0 +1,27 @@
+"""Studies that only the documentation needs: ``PYTHONPATH=test python -m studies papers --out DIR``."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from importlib import import_module
+from pathlib import Path
+
+from boom_twin import load_scene
+
+
+def main() -> None:
+    """Write the report, the numbers and the pictures of a study."""
+    parser = ArgumentParser(prog="python -m studies", description=__doc__)
+    parser.add_argument("kind", choices=("papers", "clearance", "roundoff"))
+    parser.add_argument("scene", nargs="?", help="file of a boom (default: the default scene)")
+    parser.add_argument("--out", required=True, type=Path, help="folder; files of this study in it are replaced")
+    parser.add_argument("--posture", help="where the motion starts")
+    parser.add_argument("--quick", action="store_true", help="few cases on a short motion")
+    args = parser.parse_args()
+    write = import_module(f"studies.{args.kind}.report").write
+    for path in write(load_scene(args.scene), args.out, args.quick, args.posture):
+        print(path)
+
+
+if __name__ == "__main__":
+    main()

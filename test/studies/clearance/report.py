@@ -1,0 +1,166 @@
+"""Report of the study of play in the pins."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from boom_twin.errors import UsageError
+from boom_twin.scene.schema import IDEAL_BELOW, Scene
+from boom_twin.system.atomic_files import write_atomic
+from boom_twin.validation.study.report import machine, provenance, table, write_json
+
+from . import convergence as near
+from .convergence import MEASURES, Convergence, convergence
+from .pictures import RestOffsetCurve, Trace, convergence_picture, sinking_picture, swing_picture
+from .rest_stop_cost import (
+    BRAKE,
+    COUNT,
+    HOLD,
+    MODELS,
+    QUICK_COUNT,
+    QUICK_HOLD,
+    Cost,
+    Shift,
+    Swing,
+    costs,
+    shifts,
+    swings,
+)
+from .scenes import pins_of, with_play
+
+PINS = ("ideal", "contact", "linear")
+SHOWN_CLEARANCE = 1e-4  # m, of the table of rests
+
+
+def report(scene: Scene, swings: list[Swing], shifts: list[Shift], found: Convergence, costs: list[Cost]) -> str:
+    """Return all sections."""
+    block = pins_of(scene)
+    sizes = ", ".join(f"{1e6 * size:g}" for size in sorted({pin.radial_clearance for pin in block.pins}))
+    parts = [
+        "# Play in the pins",
+        f"{len(block.pins)} pins with a radial clearance of {sizes} um; {block.contact.law}, restitution "
+        f"{block.contact.restitution:g}. `make study` writes all numbers.",
+        *_stops(swings), *_rests(shifts), *_convergence(found), *_costs(costs),
+        "Limits: one motion a posture.", provenance(),
+    ]  # fmt: skip
+    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+
+
+def _stops(found: list[Swing]) -> list[str]:
+    by = {(own.posture, own.model): own for own in found}
+    rows = []
+    for posture in dict.fromkeys(own.posture for own in found):
+        each = [by[posture, model] for model in MODELS]
+        rows.append((posture, 1e3 * each[1].rest, *(1e3 * own.peak for own in each), *(own.effective for own in each)))
+    return [
+        "## After a stop",
+        "![The tip after a stop](clearance.png)",
+        f"Full speed, brakes within {1e3 * BRAKE:g} ms, hold. Rest: the tip with contact against ideal pins. Peak: largest "
+        "distance from rest, mm. m/s²: vertical acceleration, rms. Linear: pins as springs and dampers.",
+        table(("posture", "rest, mm", *(f"peak, {name}" for name in PINS), *(f"m/s², {name}" for name in PINS)), rows),
+    ]
+
+
+def _rests(found: list[Shift]) -> list[str]:
+    postures = tuple(dict.fromkeys(own.posture for own in found))
+    at = {(own.pin, own.posture): 1e3 * float(own.shifts[np.argmin(np.abs(own.clearances - SHOWN_CLEARANCE))]) for own in found}
+    rows = [(pin, *(at[pin, posture] for posture in postures)) for pin in dict.fromkeys(own.pin for own in found)]
+    ratios = np.concatenate([own.ratios for own in found])
+    worst = max(found, key=lambda own: own.jump)
+    return [
+        "## At rest",
+        "![The resting tip](clearance_static.png)",
+        f"Shift of the resting tip (mm) by play of {1e6 * SHOWN_CLEARANCE:g} um in one pin: lever x (clearance + penetration) "
+        f"x {ratios.min():.3f} to {ratios.max():.3f}. Below {1e6 * IDEAL_BELOW:g} um a pin is ideal: the tip jumps, at worst "
+        f"by {1e3 * worst.jump:.3g} mm ({worst.pin}, {worst.posture}).",
+        table(("pin", *postures), rows),
+    ]
+
+
+def _convergence(found: Convergence) -> list[str]:
+    lines = [line for line in found.lines if line.program == "boom_twin" and line.against == "independent"]
+    if not lines:
+        return ["## Convergence", "There is no independent model: no cylinder has k, barrel and rod."]
+    rows = [(f"{1e3 * step:g}", *errors) for step, errors in zip(lines[0].marks, lines[0].errors.tolist(), strict=True)][1::3]
+    return [
+        "## Convergence",
+        "![Error against run time](clearance_convergence.png)",
+        f"Rms errors of a stop within {1e3 * near.BRAKE:g} ms on one pin of the rigid boom, against Lagrange's equations "
+        "integrated by SciPy between touch and release (`test/reference/worn_pin`).",
+        table(("step, ms", *MEASURES), rows),
+    ]
+
+
+def _costs(found: list[Cost]) -> list[str]:
+    by = {(own.pins, own.treatment): (1e6 * own.gentle, 1e6 * own.violent) for own in found}
+    counts = sorted({pins for pins, _ in by if pins})
+    rows = [(0, *by[0, "ideal"], None, None)]
+    rows += [(pins, *by[pins, "contact"], *by[pins, "spring-damper"]) for pins in counts]
+    return [
+        "## What a pin costs",
+        "Time of a step of 1 ms, us: in the usual move, and in a violent start and stop.",
+        table(("pins", "contact", "contact, violent", "linear", "linear, violent"), rows),
+    ]
+
+
+NOTE = "surrogate parameters; computed, not measured on a rig"
+SHOWN = 3.0  # s after the stop
+
+
+@dataclass(frozen=True)
+class Study:
+    """All that is reported."""
+
+    swings: list[Swing]
+    shifts: list[Shift]
+    convergence: Convergence
+    costs: list[Cost]
+
+
+def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
+    """Measure, and write ``clearance.json``, ``clearance.md`` and pictures into `out`; returns their paths.
+
+    The pins are those of the scene, or else the package's. Stops and rests are in all postures of the scene, convergence and
+    cost from `posture`.
+
+    Raises
+    ------
+    UsageError
+        The scene has no posture.
+    """
+    if not scene.postures:
+        raise UsageError("postures: the scene has none, and the study starts from them. Add one.")
+    scene, postures = with_play(scene), tuple(scene.postures)
+    found = Study(
+        swings(scene, postures, QUICK_HOLD if quick else HOLD),
+        shifts(scene, postures, QUICK_COUNT if quick else COUNT),
+        convergence(scene, posture, quick),
+        costs(scene, posture, quick),
+    )
+    out.mkdir(parents=True, exist_ok=True)
+    paths = [out / f"clearance{part}" for part in (".json", ".md", ".png", "_static.png", "_convergence.png")]
+    write_json(paths[0], {"machine": machine(), **as_json(found)})
+    text = report(scene, found.swings, found.shifts, found.convergence, found.costs)
+    write_atomic(paths[1], text)
+    traces = [Trace(own.posture, own.model, own.times, own.height, own.acceleration) for own in found.swings]
+    swing_picture(paths[2], "The tip after a stop: ideal pins, contact, linearised pins", NOTE, traces, SHOWN)
+    sinking = [RestOffsetCurve(own.posture, own.pin, own.clearances, own.shifts) for own in found.shifts]
+    sinking_picture(paths[3], "The resting tip with play in the pin of one rod", NOTE, sinking, IDEAL_BELOW)
+    convergence_picture(paths[4], "Motions with play: error against run time", NOTE, found.convergence)
+    return paths
+
+
+def as_json(found: Study) -> dict[str, Any]:
+    """All numbers but the traces, SI units."""
+    traces = ("times", "height", "acceleration")
+    return {
+        "stops": [{key: value for key, value in asdict(own).items() if key not in traces} for own in found.swings],
+        "rests": [asdict(own) | {"jump": own.jump, "ratios": own.ratios} for own in found.shifts],
+        "convergence": {"span_s": found.convergence.span, "lines": [asdict(line) for line in found.convergence.lines]},
+        "references_differ": dict(zip(MEASURES, found.convergence.apart, strict=True)),
+        "costs": [asdict(own) for own in found.costs],
+    }

@@ -1,0 +1,204 @@
+"""Clearance study: its effect at rest, its effect after a stop, and its cost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from reference.worn_pin import geometry
+from studies.stops import StopMotion, halt
+
+from boom_twin.analysis.equilibrium import rest_at, statics
+from boom_twin.analysis.methods import MethodRun, integrate_with
+from boom_twin.analysis.motions import motion_of
+from boom_twin.compiler.plan import first_row, taken_apart
+from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+from boom_twin.scene.schema import IDEAL_BELOW, Scene
+from boom_twin.types import Array
+
+from .scenes import Treatment, ideal, pin_like, rods_and_joints, treated, with_pins
+
+WIDEST = 1e-3  # m
+NUDGE = 1e-4  # m
+COUNT, QUICK_COUNT = 13, 3
+
+
+@dataclass(frozen=True)
+class Shift:
+    """Tip at rest with play in one rod's pin against ideal pins. k clearances, falling to `IDEAL_BELOW`.
+
+    Attributes
+    ----------
+    clearances, shifts, penetrations : ndarray, shape (k,)
+        m; distance of the tips; how far the journal presses into the bush.
+    force : float
+        Of the pin at the last clearance, N.
+    lever, loaded : float
+        The tip's way for the cylinder's: of the rigid boom's geometry, and of the loaded elastic boom with ideal pins.
+    """
+
+    posture: str
+    pin: str
+    clearances: Array
+    shifts: Array
+    penetrations: Array
+    force: float
+    lever: float
+    loaded: float
+
+    @property
+    def jump(self) -> float:
+        """Jump of the tip at the switch to the ideal pin, m."""
+        return float(self.shifts[-1])
+
+    @property
+    def ratios(self) -> Array:
+        """Shifts over loaded lever x (clearance + penetration), shape (k,)."""
+        return np.asarray(self.shifts / (self.loaded * (self.clearances + self.penetrations)))
+
+
+def shifts(scene: Scene, postures: tuple[str, ...], count: int = COUNT) -> list[Shift]:
+    """Every cylinder in every posture."""
+    document, contact = scene.model_dump(exclude_none=True), treated(scene, "contact")
+    found = []
+    for posture in postures:
+        tip, joints = _rest(ideal(scene), posture)[:2]
+        levers = np.abs(geometry.levers(document, np.cumsum(joints)))
+        for i, lever in enumerate(levers.tolist()):
+            found.append(_shift(contact, posture, i, (lever, _loaded(ideal(scene), posture, i)), tip, count))
+    return found
+
+
+def _shift(scene: Scene, posture: str, index: int, levers: tuple[float, float], tip: Array, count: int) -> Shift:
+    clearances = np.geomspace(WIDEST, IDEAL_BELOW, count)
+    clearances[-1] = IDEAL_BELOW
+    name = f"cylinder_{index + 1}.rod"
+    rests = [_rest(with_pins(scene, [pin_like(scene, name, float(c))]), posture) for c in clearances]
+    pins = np.array([pin[0] for _, _, pin in rests])
+    return Shift(
+        posture, name, clearances, np.array([np.hypot(*(own - tip)) for own, _, _ in rests]),
+        np.hypot(pins[:, 0], pins[:, 1]) - clearances, float(pins[-1, 2]), *levers,
+    )  # fmt: skip
+
+
+def _loaded(scene: Scene, posture: str, index: int) -> float:
+    """Way of the resting tip per metre of stroke `index`, by central differences."""
+    ways = [_rest(scene, posture, side * NUDGE * np.eye(len(scene.joints))[index])[0] for side in (-1.0, 1.0)]
+    return float(np.hypot(*(ways[1] - ways[0])) / (2.0 * NUDGE))
+
+
+def _rest(scene: Scene, posture: str, more: float | Array = 0.0) -> tuple[Array, Array, Array]:
+    """Tip (2,) in m, joint angles (n,) in rad, pins (k, 4) as in `compiler.plan`."""
+    plan, state, _ = rest_at(scene, strokes_of_posture(scene, posture) + more, posture_angles(scene, posture))
+    found = taken_apart(plan, first_row(plan, state))
+    return found.tip[0, :2], found.joints, found.pins
+
+
+STEP = 1e-3  # s
+HOLD, QUICK_HOLD = 15.0, 0.9  # s after the stop
+BRAKE = 0.1  # s
+MODELS = ("ideal", "contact", "spring-damper")
+
+
+@dataclass(frozen=True)
+class Swing:
+    """The tip after a stop, in one posture with one kind of pins. m rows.
+
+    Attributes
+    ----------
+    times, height, acceleration : ndarray, shape (m,)
+        s, from the stop (the drives hold from 0); height over the rest at the end with ideal pins, m; vertical, m/s^2.
+    rest : float
+        Height at rest at the end, m, likewise.
+    peak, rms : float
+        Largest distance from that rest after the stop, and its root mean square, m.
+    effective : float
+        Vertical acceleration after the stop, root mean square, m/s^2.
+    """
+
+    posture: str
+    model: str
+    times: Array
+    height: Array
+    acceleration: Array
+    rest: float
+    peak: float
+    rms: float
+    effective: float
+
+
+def swings(scene: Scene, postures: tuple[str, ...], hold: float = HOLD) -> list[Swing]:
+    """Every posture with ideal pins, contact and linearised pins."""
+    found = []
+    for posture in postures:
+        drive = halt(scene, posture, BRAKE)
+        scenes = (ideal(scene), treated(scene, "contact"), treated(scene, "spring-damper"))
+        reference = _rest_of(scenes[0], drive)
+        for model, one in zip(MODELS, scenes, strict=True):
+            moved = integrate_with(one, drive, drive.still + hold, STEP, angles=drive.angles)
+            # a linearised pin belongs to the rest at the start; at the end contact says where it lies
+            rest = _rest_of(scenes[1] if model != "ideal" else one, drive)
+            found.append(_swing(posture, model, moved, drive, rest - reference, reference))
+    return found
+
+
+def _rest_of(scene: Scene, drive: StopMotion) -> float:
+    """Height (m) of the tip at rest where the drives have stopped."""
+    return float(statics(scene, strokes=drive.last, modes=0).tip[1])
+
+
+def _swing(posture: str, model: str, moved: MethodRun, drive: StopMotion, rest: float, reference: float) -> Swing:
+    times, height, acceleration = moved.times - drive.still, moved.tip[:, 1] - reference, moved.tip_acceleration[:, 1]
+    after = times >= -1e-9
+    off = height[after] - (rest if model != "spring-damper" else float(np.mean(height[after])))
+    peak = float(np.abs(off).max())
+    effective = float(np.sqrt(np.mean(acceleration[after] ** 2)))
+    return Swing(posture, model, times, height, acceleration, rest, peak, float(np.sqrt(np.mean(off**2))), effective)
+
+
+GENTLE, QUICK_GENTLE = 2.0, 0.2  # s
+RAMP, STOP, HARD_BRAKE, VIOLENT = 0.05, 0.1, 0.01, 0.3  # s: full speed, stop, its length, end
+REPEATS, QUICK_REPEATS = 7, 1
+TREATMENTS: tuple[Treatment, ...] = ("contact", "spring-damper")
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Time (s) of a step of 1 ms: in the gentle move, and in the violent start and stop."""
+
+    pins: int
+    treatment: str
+    gentle: float
+    violent: float
+
+
+def costs(scene: Scene, posture: str | None, quick: bool = False) -> list[Cost]:
+    """Return costs of play in no pin, the first rod's, all rods', and all joints' too; least of several runs that lie apart."""
+    cases = list(_cases(scene))
+    gentle, least = QUICK_GENTLE if quick else GENTLE, np.full((len(cases), 2), np.inf)
+    for _ in range(QUICK_REPEATS if quick else REPEATS):
+        least = np.minimum(least, [_seconds(one, posture, gentle) for _, _, one in cases])
+    rows = zip(cases, (least * STEP / (gentle, VIOLENT)).tolist(), strict=True)
+    return [Cost(count, name, *times) for (count, name, _), times in rows]
+
+
+def hard_stop(scene: Scene, posture: str | None) -> StopMotion:
+    """Return a motion to full speed and to a stop, harder than any operator would make it."""
+    return replace(halt(scene, posture, HARD_BRAKE), ramp=RAMP, stop=STOP)
+
+
+def _cases(scene: Scene) -> Iterator[tuple[int, str, Scene]]:
+    yield 0, "ideal", ideal(scene)
+    names = rods_and_joints(scene)
+    for treatment in TREATMENTS:
+        for count in sorted({1, len(scene.joints), len(names)}):
+            own = [pin_like(scene, name) for name in names[:count]]
+            yield count, treatment, treated(with_pins(scene, own), treatment)
+
+
+def _seconds(scene: Scene, posture: str | None, gentle: float) -> list[float]:
+    """Run times (s) of both motions."""
+    move = motion_of(scene, posture)
+    runs = ((move, gentle), (hard_stop(scene, posture), VIOLENT))
+    return [integrate_with(scene, drive, span, STEP, round(span / STEP), angles=move.angles).seconds for drive, span in runs]

@@ -1,0 +1,261 @@
+"""Report of the study of the papers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from studies.clearance.scenes import ideal
+
+from boom_twin.analysis.equilibrium import settle, statics
+from boom_twin.analysis.initial_state import undeflected
+from boom_twin.analysis.modal import natural_modes
+from boom_twin.analysis.motions import motion_of
+from boom_twin.analysis.simulate import simulate
+from boom_twin.compiler.compile import BasisName, compile_scene
+from boom_twin.errors import UsageError
+from boom_twin.scene.kinematics import posture_angles, skeleton, strokes_of_posture
+from boom_twin.scene.schema import Scene
+from boom_twin.system.atomic_files import write_atomic
+from boom_twin.types import Array
+from boom_twin.validation.study.report import machine, provenance, table, write_json
+
+from .boundary_zeros import BoundaryZero, equilibrium, frequencies
+from .low_speed import error_by_speed
+from .pictures import LetGoTrace, StopTrace, low_speed_picture, posture_picture
+from .postures import PEER_STEPS, Comparison, PostureRun, compare, run_own, run_peer
+from .sweep_matrices import boundary_solution, chain_of, difference
+
+SPAN, INSTANT = 1.2, 0.5  # s: of the stops; of the reference move where matrices are made
+STEPS = (1e-3, 1e-2, 0.1)  # s
+RISES, QUICK_RISES = (24.0, 12.0, 6.0, 3.0, 1.5, 0.75), (6.0, 3.0)  # s
+HELD = 3.0  # s, of a boom that is let go
+MODES = 4
+NOTE = "surrogate parameters; nothing was measured on a rig"
+
+
+@dataclass(frozen=True)
+class MatrixCheck:
+    """One step size: difference from the sweep by substructure; error of the base force by the product."""
+
+    step: float
+    names: tuple[str, ...]
+    differences: tuple[float, ...]
+    base_error: float
+
+
+@dataclass(frozen=True)
+class BasisRow:
+    """One posture: sag (m) of the tip, frequencies (Hz) by default shapes and by cantilever modes."""
+
+    posture: str
+    sag: float
+    default: tuple[float, ...]
+    cantilever: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class PapersStudy:
+    """All that was computed; see the fields' classes. `speeds`: see `low_speed.error_by_speed`."""
+
+    matrices: tuple[MatrixCheck, ...]
+    zeros: tuple[BoundaryZero, ...]
+    bisected: tuple[tuple[float, float], ...]
+    bases: tuple[BasisRow, ...]
+    speeds: Array
+    let_go: tuple[LetGoTrace, ...]
+    stops: tuple[Comparison, ...]
+
+
+def measure(scene: Scene, postures: Sequence[str], quick: bool) -> PapersStudy:
+    """Compute everything; scenes with clearance are taken with ideal pins where the papers' form knows no other."""
+    bare = ideal(scene)
+    stops = [
+        compare(run_own(scene, posture, pins, SPAN), run_peer(scene, posture, pins, SPAN, step))
+        for posture in postures
+        for pins, step in PEER_STEPS.items()
+    ]
+    return PapersStudy(
+        tuple(_matrices(bare, step) for step in STEPS),
+        tuple(equilibrium(bare, posture) for posture in postures),
+        tuple(frequencies(bare, postures[0], MODES)),
+        tuple(_bases(bare, posture) for posture in postures),
+        error_by_speed(bare, motion_of(bare), QUICK_RISES if quick else RISES),
+        _let_go(bare, postures[0]),
+        tuple(stops),
+    )
+
+
+def _matrices(scene: Scene, step: float) -> MatrixCheck:
+    own, swept = chain_of(scene, INSTANT, step)
+    differences = tuple(difference(one.matrix, other) for one, other in zip(own, swept, strict=True))
+    first = boundary_solution(own)
+    right = own[0].inlet
+    error = float(np.abs(first[4:] - right[4:]).max() / np.abs(right[4:]).max())
+    return MatrixCheck(step, tuple(one.name for one in own), differences, error)
+
+
+def _bases(scene: Scene, posture: str) -> BasisRow:
+    strokes, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)
+    found: dict[BasisName, tuple[float, ...]] = {}
+    bases: tuple[BasisName, ...] = ("cantilever", "end-shapes")
+    for basis in bases:
+        plan = compile_scene(scene, basis)
+        state, work = plan.state(), plan.work()
+        settle(plan, state, work, strokes, angles)
+        modes = natural_modes(plan, state, work, MODES)
+        found[basis] = tuple(mode.frequency for mode in modes)
+    rest = statics(scene, posture=posture, modes=0)
+    sag = float(np.hypot(*(rest.tip - rest.tip_rigid)))
+    return BasisRow(posture, sag, found["end-shapes"], found["cantilever"])
+
+
+def _let_go(scene: Scene, posture: str) -> tuple[LetGoTrace, ...]:
+    """The boom held in a posture, and moved up from it, from the undeflected posture."""
+    strokes, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)
+    start, move = undeflected(scene, strokes, angles=angles), motion_of(scene, posture)
+    times = np.arange(0.0, HELD + 1e-9, 5e-3)
+    height = float(skeleton(scene, angles).pivots[-1][1])
+    found = []
+    for name, drive in (("drives held", np.tile(strokes, (len(times), 1))), ("drives lift the boom", move(times)[0])):
+        moved = simulate(scene, times, drive, 1e-3, angles, estimate_errors=False, start=start)
+        rest = simulate(scene, np.zeros(1), drive[-1:], 1e-3, estimate_errors=False).tip[0, 1]
+        found.append(LetGoTrace(name, times, 1e3 * (moved.tip[:, 1] - height), 1e3 * float(rest - height)))
+    return tuple(found)
+
+
+def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
+    """Measure, and write ``papers.json``, ``papers.md`` and two pictures into the folder `out`; returns their paths.
+
+    `posture`: only this one; `quick`: only the first, and few speeds.
+
+    Raises
+    ------
+    UsageError
+        The scene names no posture.
+    """
+    postures = [posture] if posture else list(scene.postures)[: 1 if quick else None]
+    if not postures:
+        raise UsageError("postures: none in this scene. Name at least one: the study starts there.")
+    found = measure(scene, postures, quick)
+    out.mkdir(parents=True, exist_ok=True)
+    paths = [out / name for name in ("papers.json", "papers.md", "papers_postures.png", "papers_low_speed.png")]
+    write_json(paths[0], {"machine": machine(), **_numbers(found)})
+    write_atomic(paths[1], as_markdown(found))
+    posture_picture(paths[2], "A stop in the papers' postures", NOTE, "Exudyn", [*_traces(found.stops)])
+    low_speed_picture(
+        paths[3], "Let go from the undeflected posture; the low-speed form", NOTE, found.speeds[:, 0], found.speeds[:, 1],
+        list(found.let_go),
+    )  # fmt: skip
+    return paths
+
+
+def _traces(stops: Sequence[Comparison]) -> list[StopTrace]:
+    def trace(run: PostureRun, program: str) -> StopTrace:
+        rise = 1e3 * (run.tip[:, 1] - run.tip[0, 1])
+        return StopTrace(run.posture, run.pins, program, run.times, rise, run.acceleration[:, 1], 1e-3 * run.forces[:, 0])
+
+    return [trace(run, program) for stop in stops for run, program in ((stop.own, "own"), (stop.peer, "peer"))]
+
+
+def _numbers(found: PapersStudy) -> dict[str, object]:
+    """All numbers but the traces, SI."""
+    return {
+        "matrices": found.matrices,
+        "zeros": found.zeros,
+        "frequencies_bisected_Hz": found.bisected,
+        "bases": found.bases,
+        "low_speed": {"tip_m_s": found.speeds[:, 0], "error_max_m": found.speeds[:, 1], "error_rms_m": found.speeds[:, 2]},
+        "stops": [
+            {
+                "posture": s.own.posture,
+                "pins": s.own.pins,
+                "until_s": s.flight,
+                "tip_rms_m": s.tip,
+                "tip_rms_throughout_m": s.tip_throughout,
+                "forces": s.forces,
+                "acceleration": s.acceleration,
+                "penetration": s.penetration,
+            }
+            for s in found.stops
+        ],
+    }
+
+
+def slope(found: PapersStudy) -> float:
+    """Return the slope of the low-speed form's error over the speed, in logarithms, over the two slowest moves."""
+    speeds, errors = np.log(found.speeds[:2, 0]), np.log(found.speeds[:2, 1])
+    return float((errors[1] - errors[0]) / (speeds[1] - speeds[0]))
+
+
+def as_markdown(found: PapersStudy) -> str:
+    """Return the report."""
+    parts = [
+        "# The method's papers",
+        "[Z] Zhang et al. 2016, *Research on the rigid-flexible multibody dynamics of concrete placing boom*; [R] Ren et al. "
+        "2014, doi 10.1155/2014/943847. Their rigs and data are not public: no curve of theirs can be laid over one of ours.",
+        *_matrices_text(found), *_zeros_text(found), *_bases_text(found), *_low_speed_text(found), *_stops_text(found),
+        provenance(),
+    ]  # fmt: skip
+    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+
+
+def _matrices_text(found: PapersStudy) -> list[str]:
+    rows = [(1e3 * one.step, max(one.differences), one.base_error) for one in found.matrices]
+    return [
+        "## Transfer matrices",
+        "Matrices of A and B1 to B3, assembled as in the papers, beside those that the Riccati sweep "
+        "condenses: largest relative difference. The product of all, solved for the force at the base, loses digits.",
+        table(("step, ms", "difference", "error of the product"), rows),
+    ]
+
+
+def _zeros_text(found: PapersStudy) -> list[str]:
+    angle = max(abs(zero.bisected - zero.newton) for zero in found.zeros)
+    share = max(abs(near / right - 1.0) for near, right in found.bisected)
+    return [
+        "## Boundary zeros by bisection",
+        f"[R] bisects the boundary's residual to 1e-7. So found, section 1 at rest in {len(found.zeros)} postures is within "
+        f"{angle:.1e} rad of Newton's angle; {len(found.bisected)} frequencies are within {share:.1e} of those counted.",
+    ]
+
+
+def _bases_text(found: PapersStudy) -> list[str]:
+    rows = [
+        (row.posture, 1e3 * row.sag, row.default[0], 100.0 * (row.cantilever[0] / row.default[0] - 1.0)) for row in found.bases
+    ]
+    return [
+        "## Three cantilever modes a part",
+        "They are too stiff: parts end in torques and shear forces, which no sum of cantilever modes has.",
+        table(("posture", "sag, mm", "f1, Hz", "cantilever, %"), rows),
+    ]
+
+
+def _low_speed_text(found: PapersStudy) -> list[str]:
+    held, lifted = found.let_go[:2]
+    return [
+        "## Without velocity terms",
+        f"[R] leaves out Coriolis and centrifugal accelerations. The error grows as speed to the power {slope(found):.2f}.",
+        table(("fastest tip, m/s", "largest error, mm"), found.speeds[:, :2] * [1.0, 1e3]),
+        f"Let go undeflected, the tip falls to {held.height.min():.0f} mm. Lifted meanwhile, it falls to "
+        f"{lifted.height.min():.0f} mm, then rises to {lifted.rest:.0f} mm, as [R] says.",
+        "![Tip of a boom let go; error of the low-speed form](papers_low_speed.png)",
+    ]
+
+
+def _stops_text(found: PapersStudy) -> list[str]:
+    by = {(stop.own.posture, stop.own.pins): stop for stop in found.stops}
+    rows = [
+        (name, 1e3 * by[name, "ideal"].tip if (name, "ideal") in by else None, 1e3 * worn.tip, 100.0 * worn.acceleration,
+         100.0 * worn.forces, 100.0 * worn.penetration)
+        for (name, pins), worn in by.items() if pins == "worn"
+    ]  # fmt: skip
+    return [
+        "## Stops in four postures",
+        "Differences from Exudyn, rms, until a journal first flies; all but the first column with worn rod pins. Why "
+        "accelerations differ by several per cent in two postures was not sought.",
+        table(("posture", "tip, ideal, mm", "tip, worn, mm", "acceleration, %", "forces, %", "penetration, %"), rows),
+        "![Stops in four postures](papers_postures.png)",
+    ]

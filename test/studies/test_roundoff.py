@@ -1,0 +1,66 @@
+"""Round-off: the witness, digits lost by the two ways of combining elements, the error over ever smaller steps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from studies.roundoff import report
+from studies.roundoff.dense_solver import Kinematics
+from studies.roundoff.exact_step import digits, one_step
+from studies.roundoff.report import TARGET, TURN_UP_STEPS, TurnUp, turn_up
+
+from boom_twin.analysis.equilibrium import set_undeformed
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.kernels.transfer.forward_kinematics import place
+from boom_twin.scene import load_scene
+from boom_twin.scene.kinematics import posture_angles
+from boom_twin.validation.study.long_booms import long_boom
+
+
+@pytest.mark.parametrize("scene", [load_scene(), long_boom(4, kinds=("B3", "B2", "B1"))], ids=["default", "long"])
+def test_kinematics_of_the_witness_are_those_of_the_model(scene):
+    plan = compile_scene(scene)
+    state, work = plan.state(), plan.work()
+    set_undeformed(plan, state, posture_angles(scene, next(iter(scene.postures))))
+    place(plan.tables, state, work)
+    z, still = state.z.copy(), plan.tables.moving == 0.0
+    moved = Kinematics(plan, z).moved.astype(float)
+    moved[len(z) :, still] = 0.0
+    for k in np.flatnonzero(~still):
+        sides = []
+        for nudge in (1e-5, -1e-5):
+            state.z[:] = z
+            state.z[k] += nudge
+            place(plan.tables, state, work)
+            sides.append(work.position.copy())
+        slope = (sides[0] - sides[1]) / 2e-5
+        assert moved[len(z) :, k] == pytest.approx(slope[len(z) :], abs=2e-8), plan.names[k]
+
+
+def test_plain_product_loses_digits_with_the_length_and_riccati_does_not():
+    steps = [one_step(boom, posture_angles(boom, "test"), 1e-3, 0.8) for boom in map(long_boom, (2, 3, 5, 20))]
+    plain, riccati = ([digits(getattr(step, name)) for step in steps] for name in ("plain", "riccati"))
+    assert np.all(np.diff(plain) > 0.5) and plain[-1] > 15.0
+    assert max(riccati) < 2.5
+    assert max(step.exact for step in steps) < 1e-15
+
+
+def test_error_of_the_tip_falls_with_the_square_of_the_step():
+    found = turn_up(load_scene(), tuple(step for step in TURN_UP_STEPS if step >= 1e-5))
+    assert found.order == pytest.approx(2.0, abs=0.05)
+    assert not found.turned_up_above_target
+    assert found.floor[1] < 0.1 * TARGET
+
+
+def test_a_turn_up_above_the_target_is_seen():
+    steps = np.array([1e-3, 1e-4, 1e-5])
+    assert TurnUp(steps, np.array([1e-6, 1e-7, 2e-7]), steps, 1.0, 2.0).turned_up_above_target
+    assert not TurnUp(steps, np.array([1e-6, 1e-9, 2e-7]), steps, 1.0, 2.0).turned_up_above_target
+
+
+def test_the_page():
+    scene = long_boom(2)
+    lost = [report.Loss("extremes", "2", 2.0, one_step(scene, posture_angles(scene, "test"), 1e-3, 0.8))]
+    steps = np.array([1e-3, 1e-4])
+    text = report.text(lost, TurnUp(steps, 1e-9 * steps, steps, 10.0, 2.0))
+    assert "| 2 | 36 |" in text and "turns up below 1e-08" in text and "surrogates" in text
