@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from boom_twin.config.settings import Thresholds
-from boom_twin.diagnostics.levels import Evaluation, Level, Status
-from boom_twin.diagnostics.recorder_status import DiskState, RecordingJudge, TopicState
+from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
+from boom_twin.diagnostics.recorder_status import DiskState, TopicState, recording_status
 
 TOPICS = {"/a": TopicState(500, 0), "/b": TopicState(30, None)}
 DISK = {"lag": 0.3, "waiting": 0, "written": 1000, "free": 10**9, "left": inf}
@@ -17,9 +17,9 @@ DISK = {"lag": 0.3, "waiting": 0, "written": 1000, "free": 10**9, "left": inf}
 
 def judged(topics: dict[str, TopicState] = TOPICS, end: str | None = None, **disk: Any) -> Status:
     """After ten seconds of it."""
-    judge, state = RecordingJudge(), DiskState(**(DISK | disk))
+    judge, state = ComponentJudge("recording"), DiskState(**(DISK | disk))
     for now in range(10):
-        status = judge.status(topics, state, end, Evaluation(Thresholds(), float(now), 1e9))
+        status = recording_status(judge.begin(Evaluation(Thresholds(), float(now), 1e9)), topics, state, end)
     return status
 
 

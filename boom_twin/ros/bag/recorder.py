@@ -19,8 +19,8 @@ from std_srvs.srv import Trigger
 from ...bag.async_writer import Storage
 from ...bag.writer import LARGEST_MESSAGE
 from ...config.settings import Settings, Thresholds
-from ...diagnostics.levels import Evaluation
-from ...diagnostics.recorder_status import RecordingJudge, TopicState
+from ...diagnostics.levels import ComponentJudge, Evaluation
+from ...diagnostics.recorder_status import TopicState, recording_status
 from ...errors import BagError, BoomTwinError
 from ...messages.topic_table import NODE, Output, load_topics
 from ...types import NANO
@@ -188,7 +188,8 @@ class _Recording:
     ) -> None:
         self.node, self.storage, self._thresholds = node, storage, thresholds
         self.channels = [_Channel(each, storage, tell) for each in wanted]
-        self._publisher, self._judge = DiagnosticsPublisher(node, load_topics().outputs[Output.DIAGNOSTICS]), RecordingJudge()
+        self._publisher = DiagnosticsPublisher(node, load_topics().outputs[Output.DIAGNOSTICS])
+        self._judge = ComponentJudge("recording")
         self._twin_values = twin_values(node)
 
     def look(self) -> bool:
@@ -204,11 +205,11 @@ class _Recording:
         return {name: value for name, each in self._twin_values.items() if (value := each.poll())}
 
     def tell(self, end: str | None = None) -> None:
-        """Publish the recording's state; `end` as for `boom_twin.diagnostics.recorder_status.RecordingJudge`."""
+        """Publish the recording's state; `end` as for `boom_twin.diagnostics.recorder_status.recording_status`."""
         topics = {each.count.topic: TopicState(each.count.received, each.missed) for each in self.channels}
         clock = self.node.get_clock().now().nanoseconds * NANO
         at = Evaluation(self._thresholds, time.monotonic(), clock)
-        self._publisher.show([self._judge.status(topics, self.storage.state(), end, at)])
+        self._publisher.show([recording_status(self._judge.begin(at), topics, self.storage.state(), end)])
         if end is not None:
             self._publisher.settle()
 

@@ -18,8 +18,8 @@ from rclpy.qos import LivelinessPolicy, QoSCompatibility, QoSProfile, qos_check_
 from ...bag.joint_names import extra_names_message, strange_names_message
 from ...config.settings import Thresholds
 from ...diagnostics.levels import Level, Status
+from ...diagnostics.model_status import stress_model
 from ...diagnostics.sensor_status import sensors_of
-from ...diagnostics.stress_status import stress_watch
 from ...diagnostics.topic_status import Peers
 from ...diagnostics.twin_status import TwinWatch
 from ...messages.sample_decoder import ODDITIES, SampleDecoder
@@ -218,7 +218,7 @@ class Diagnostics:
     def watch(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
         """Watch the twin that the node is configured with."""
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts, twin.absent)
-        stress = stress_watch(twin.scene, twin.reads)
+        stress = stress_model(twin.scene, twin.reads)
         self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds, stress=stress)
         self._counts, self._shedding = {"samples": twin.counts, "messages": decoder.oddities}, twin.shedding
         self._queue.oddities.clear()

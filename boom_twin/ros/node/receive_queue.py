@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from math import nan
 from typing import Any
 
-from ...diagnostics.source_status import Reception
+from ...diagnostics.topic_status import Reception
 from ...types import NANO
 from ..subscription_callback import with_information
 
