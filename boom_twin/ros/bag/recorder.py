@@ -25,8 +25,7 @@ from ...errors import BagError, BoomTwinError
 from ...messages.topic_table import NODE, Output, load_topics
 from ...types import NANO
 from ..node.diagnostics import DiagnosticsPublisher
-from ..runtime import callback_turns
-from ..subscription_callback import with_information
+from ..runtime import CallbackTurns, with_information
 from .subscriptions import RequestedTopic, subscription_of
 
 NAMES = ("scene", "mapping", "frame_prefix", *Settings.model_fields)
@@ -290,9 +289,9 @@ def _spin(
     recording.look()
     tell(f"recording {len(recording.channels)} topics; Ctrl-C ends it")
     due, looks, is_complete = time.monotonic() + LOOK, 0, False
-    with callback_turns(recording.node, lambda: stopped() or time.monotonic() >= due) as call_back:
+    with CallbackTurns(recording.node, lambda: stopped() or time.monotonic() >= due) as turns:
         while not stopped():
-            call_back()
+            turns.run()
             if time.monotonic() < due:
                 continue
             due, looks = time.monotonic() + LOOK, looks + 1

@@ -29,8 +29,7 @@ from ...twin.events import EVENTS, TOLD_AT_ONCE
 from ...twin.load_shedding import LoadShedding
 from ...twin.twin import Twin
 from ...types import NANO, Health, Report, Sample, Stream
-from ..log import Log
-from ..runtime import qos_profile
+from ..runtime import Log, qos_profile
 from .receive_queue import LARGEST, ReceiveQueue
 
 MOST_LINES, LINES_SPAN = 4, 600.0

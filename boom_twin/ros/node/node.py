@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from time import perf_counter
@@ -27,8 +28,7 @@ from ...twin.driver import drive_one
 from ...twin.loaded_model import ModelPreparation
 from ...twin.twin import Twin
 from ...types import SENSORS, Report, Sample, Stream
-from ..log import Log
-from ..runtime import message_class, one_line, qos_profile
+from ..runtime import Log, message_class, one_line, qos_profile
 from .diagnostics import Diagnostics
 from .monitor_process import MonitorProcess
 from .parameters import baseline_of, baseline_text, current, declare, frame_of, guard, path_of, refusal
@@ -164,7 +164,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     def leave(self) -> None:
         """Shut down from whatever state; leave an interrupted transition as it is."""
-        if self._state_machine.current_state[1] in ("unconfigured", "inactive", "active"):
+        with suppress(RuntimeError):  # RCLError: no transition goes on from here
             self.trigger_shutdown()
 
     def _build(self) -> None:
