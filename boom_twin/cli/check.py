@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,9 +17,9 @@ from ..scene.summary import UNKNOWNS_PIN, Account, JointAccount, SectionAccount,
 from ..system.atomic_files import check_target
 from . import accuracy
 from . import reduce as need
-from .main import add_json, add_scene, open_scene, print_result
+from .arguments import add_file, add_json, add_scene, files_of
+from .output import columns, open_scene, print_result, tell
 
-"""Sample rates (Hz) of strokes."""
 PNG = b"\x89PNG"
 """How a picture begins; one that is there is replaced."""
 SIZE_A = "angle of the section, cylinder force"
@@ -32,8 +31,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser)
     add_json(parser)
     parser.add_argument("--strict", action="store_true", help="warnings are errors: the exit code is 1 if there are any")
-    told = "PNG file to draw: all pins, links and cylinders over the range of each joint"
-    parser.add_argument("--picture", metavar="FILE", type=Path, help=told)
+    add_file(parser, "--picture", "PNG file to draw: all pins, links and cylinders over the range of each joint")
     need.add_arguments(parser)
     accuracy.add_arguments(parser)
 
@@ -42,14 +40,14 @@ def run(args: Namespace) -> int:
     """Check and explain; a scene that cannot be used raises `SceneError`."""
     need.refuse_misuse(args)
     if args.picture is not None:
-        check_target(args.picture, [Path(args.scene)] if args.scene else [], PNG)
+        check_target(args.picture, files_of(args, "scene"), PNG)
     sensors = None if args.sensors is None else accuracy.sensors_of(args.sensors)
     scene, oddities = examine(args.scene)
     name = args.scene or DEFAULT_NAME
     drawn = [] if args.picture is None else [f"Written: {_draw(args.picture, scene, name)}"]
     if args.strict and any(not oddity.is_note for oddity in oddities):
         for line in drawn:  # the picture shows what the warnings are about
-            print(line, file=sys.stderr)
+            tell(line)
         raise SceneError(name, tuple(oddity for oddity in oddities if not oddity.is_note))
     account = explain(scene)
     values, lines = summary(name, account, oddities) | _restitutions(scene), report(name, scene, account, oddities)
@@ -123,17 +121,17 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
     lines = [f"{name}: this scene can be used"]
     lines += [f"  {scene.description}"] if scene.description else []
     lines += [f"  {count} section{'s' * (count > 1)}, {kinds}, {account.length:.2f} m, {account.mass:.1f} kg"]
-    lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_indent(_masses(account))]
-    lines += ["", "Sections", *_indent(_sections(account))]
-    lines += ["", "Joints and cylinders", *_indent(_cylinders(account))]
+    lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_masses(account)]
+    lines += ["", "Sections", *_sections(account)]
+    lines += ["", "Joints and cylinders", *_cylinders(account)]
     lines += ["", "Joints over their range: lever of the cylinder, angle of the links, pins, what runs over the pivot"]
-    lines += _indent(_linkages(account))
+    lines += _linkages(account)
     if any(joint.k_over_stroke for joint in account.joints):
-        lines += ["", "Stiffness of the oil over the stroke, kN/mm", *_indent(_over_stroke(account))]
+        lines += ["", "Stiffness of the oil over the stroke, kN/mm", *_over_stroke(account)]
     if scene.clearance is not None and account.pins:
-        lines += ["", _clearance_title(scene.clearance), *_indent(_pins(account))]
-    lines += ["", "Left out of the model (absent from the scene, zero or false)", *_indent(_left_out(account))]
-    lines += ["", "Unknowns per step", *_indent(_unknowns(account))]
+        lines += ["", _clearance_title(scene.clearance), *_pins(account)]
+    lines += ["", "Left out of the model (absent from the scene, zero or false)", *_left_out(account)]
+    lines += ["", "Unknowns per step", *_unknowns(account)]
     warnings = [oddity for oddity in oddities if not oddity.is_note]
     lines += ["", *(f"Note: {oddity}" for oddity in oddities if oddity.is_note)]
     lines += [f"Warnings: {len(warnings) or 'none'}", *(f"  {warning}" for warning in warnings)]
@@ -247,15 +245,5 @@ def _unknowns(account: Account) -> list[str]:
 
 
 def _table(rows: list[list[str]], left: int = 1) -> list[str]:
-    """Return aligned columns, the first `left` of them to the left, the others to the right."""
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    lines = []
-    for row in rows:
-        cells = [cell.ljust(w) for cell, w in zip(row[:left], widths[:left], strict=True)]
-        cells += [cell.rjust(w) for cell, w in zip(row[left:], widths[left:], strict=True)]
-        lines.append("  ".join(cells).rstrip())
-    return lines
-
-
-def _indent(lines: list[str]) -> list[str]:
-    return [f"  {line}" for line in lines]
+    """Return aligned and indented columns, the first `left` of them to the left, the others to the right."""
+    return [f"  {line}" for line in columns(rows, range(left))] if rows else []

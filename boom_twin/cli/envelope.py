@@ -9,7 +9,8 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .main import add_json, add_scene, open_scene, print_result
+from .arguments import add_file, add_json, add_scene, files_of
+from .output import columns, open_scene, plain_values, print_result
 
 if TYPE_CHECKING:
     from ..analysis.envelope import Envelope
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    parser.add_argument("--out", metavar="DIR", type=Path, help="folder for envelope.csv (a row a posture), .json and .png")
+    add_file(parser, "--out", "folder for envelope.csv (a row a posture), .json and .png", "DIR")
     add_json(parser)
 
 
@@ -43,7 +44,7 @@ def run(args: Namespace) -> int:
     if args.out is None:
         values, lines = _examined(scene, None)
     else:
-        with result_folder(args.out, ENVELOPE, [Path(args.scene)] if args.scene else []) as building:
+        with result_folder(args.out, ENVELOPE, files_of(args, "scene")) as building:
             values, lines = _examined(scene, building.folder)
         lines += ["", *(f"Written: {args.out / name}" for name in ("envelope.csv", "envelope.json", "envelope.png"))]
     print_result(args.json, values, lines)
@@ -74,7 +75,7 @@ def _examined(scene: Scene, folder: Path | None) -> tuple[dict[str, Any], list[s
 
 def quantities_of(found: Envelope) -> list[Quantity]:
     """Return all columns of numbers, in the order of the table; without stresses of sections that have no height."""
-    columns = [Quantity("deflection_m", "tip deflection", found.deflections, 1e3, "mm")]
+    found_columns = [Quantity("deflection_m", "tip deflection", found.deflections, 1e3, "mm")]
     for key, words, values, factor, unit in (
         ("cylinder_{}_force_N", "cylinder {} force", found.forces, 1e-3, "kN"),
         ("frequency_{}_Hz", "frequency {}", found.frequencies, 1.0, "Hz"),
@@ -83,8 +84,8 @@ def quantities_of(found: Envelope) -> list[Quantity]:
     ):
         for i, column in enumerate(values.T, 1):
             if not (column != column).any():
-                columns.append(Quantity(key.format(i), words.format(i), column, factor, unit))
-    return columns
+                found_columns.append(Quantity(key.format(i), words.format(i), column, factor, unit))
+    return found_columns
 
 
 def _summary(found: Envelope, quantities: list[Quantity]) -> dict[str, Any]:
@@ -108,10 +109,7 @@ def _report(found: Envelope, quantities: list[Quantity]) -> list[str]:
         for place in (int(quantity.values.argmin()), int(quantity.values.argmax())):
             row += [f"{quantity.factor * quantity.values[place]:.4g}", found.posture(place)]
         rows.append(row)
-    widths = [max(len(row[i]) for row in rows) for i in range(5)]
-    for row in rows:
-        cells = [cell.rjust(w) if i in (1, 3) else cell.ljust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))]
-        lines.append("  ".join(cells).rstrip())
+    lines += columns(rows, left=(0, 2, 4))
     if not any(quantity.unit == "MPa" for quantity in quantities):
         lines += ["", "No stresses: give sections[i].height, the outer height of the box in m."]
     return lines
@@ -119,7 +117,6 @@ def _report(found: Envelope, quantities: list[Quantity]) -> list[str]:
 
 def _write(folder: Path, found: Envelope, quantities: list[Quantity], values: dict[str, Any], scene: Scene) -> None:
     from ..plots.envelope import envelope_picture
-    from .main import plain_values
 
     (folder / "envelope.csv").write_text(_csv(found, quantities), encoding="utf-8")
     (folder / "envelope.json").write_text(json.dumps(plain_values(values)) + "\n", encoding="utf-8")

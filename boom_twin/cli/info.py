@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..system.terminal_text import printable
 from ..types import NANO
-from .arguments import SESSION, add_mapping, add_window, window_of
-from .main import add_json, add_session_scene, open_session_scene, print_result
+from .arguments import SESSION, add_json, add_mapping, add_session_scene, add_window, window_of
+from .output import open_session_scene, print_result
 
 if TYPE_CHECKING:
     from ..bag.inspect import BagInfo, Tally

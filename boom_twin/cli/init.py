@@ -19,7 +19,7 @@ from ..scene.checks.values import NEEDED
 from ..scene.first_scene import first_scene
 from ..scene.yaml_reader import NUMBER, Document, Place, words
 from ..system.atomic_files import check_new, check_target, write_atomic
-from .main import tell
+from .output import tell_oddities
 
 KEPT = ".table.yaml"
 """How the name of the file ends that keeps the answers, beside the scene."""
@@ -55,7 +55,7 @@ def run(args: Namespace) -> int:
         table, source = checked_table(document, str(kept)), str(kept)
     text, scene, oddities = first_scene(table, document, source)
     write_atomic(args.out, text)
-    tell(oddities, source)
+    tell_oddities(oddities, source)
     count = len(scene.sections)
     size = f"{count} section{'s' * (count > 1)}, {scene.reach:.2f} m"
     print(f"Written: {args.out}, {size}. {_next(args.out, source, len(oddities))}")

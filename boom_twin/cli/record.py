@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Mapping
@@ -20,8 +19,8 @@ from ..errors import BagError, BoomTwinError
 from ..messages.mapping import load_mapping
 from ..messages.topic_table import DEFAULT_FILE, Topic, Topics
 from ..ros.startup import require_rclpy
-from .arguments import positive
-from .main import add_ros_args, ros_arguments, tell
+from .arguments import add_ros_args, positive, ros_arguments
+from .output import tell, tell_oddities, warn
 
 if TYPE_CHECKING:
     from ..ros.bag.recorder import Count
@@ -93,15 +92,15 @@ def run(args: Namespace) -> int:
                 more.write(args.out)
                 sheet = more
             except BagError as error:
-                _say(f"warning: what the running twin told is not kept: {error}")
+                warn(f"what the running twin told is not kept: {error}")
 
-        storage = Storage(bag, FileSplit(args.split_size, args.split_duration), _say)
+        storage = Storage(bag, FileSplit(args.split_size, args.split_duration), tell)
         end = float("inf") if args.duration is None else time.monotonic() + args.duration
-        counts = record(node, storage, wanted, thresholds, lambda: bool(signals) or time.monotonic() >= end, _say, on_twin)
-    _tell(counts)
+        counts = record(node, storage, wanted, thresholds, lambda: bool(signals) or time.monotonic() >= end, tell, on_twin)
+    _tell_counts(counts)
     sheet.write(args.out, [asdict(count) for count in counts])
     if sheet.scene is None:
-        _say("no scene is kept in session.yaml: none was given by --scene, and no twin told its own")
+        tell("no scene is kept in session.yaml: none was given by --scene, and no twin told its own")
     if not any(count.received for count in counts):
         remedy = "Check that the publishers run, as the same user, and ROS_DOMAIN_ID."
         raise BoomTwinError(f"{args.out}: nothing came. {remedy}")
@@ -115,7 +114,7 @@ def _sheet(args: Namespace) -> SessionSheet:
 
     scene = None if args.scene is None else scene_from(args.scene)
     if scene is not None:
-        tell(scene.oddities, scene.source)
+        tell_oddities(scene.oddities, scene.source)
     if args.baseline:
         load_baseline(args.baseline)
     return SessionSheet(
@@ -143,8 +142,8 @@ def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any], frame: str, 
         changes["mapping"] = with_mapped(sheet.mapping or "", ("frame",), prefix + frame)
     own_mapping = told.get("parameters", {}).get("mapping")
     if own_mapping and (not given_mapping or Path(own_mapping).resolve() != Path(given_mapping).resolve()):
-        _say(
-            f"warning: the running twin has the mapping {own_mapping}, and session.yaml holds "
+        warn(
+            f"the running twin has the mapping {own_mapping}, and session.yaml holds "
             f"{given_mapping or 'the default one'}: a replay would differ. Record with --mapping {own_mapping}"
         )
     for name in TEXTS:
@@ -153,20 +152,16 @@ def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any], frame: str, 
             if given is None:
                 changes[name] = own
             elif given != own:
-                _say(f"warning: the running twin has another {name} than --{name} gives; session.yaml holds the one given")
+                warn(f"the running twin has another {name} than --{name} gives; session.yaml holds the one given")
     return replace(sheet, **changes)
 
 
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
-
-
-def _tell(counts: list[Count]) -> None:
+def _tell_counts(counts: list[Count]) -> None:
     """Print one line for each topic."""
-    _say(" received   written  never arrived")
+    tell(" received   written  never arrived")
     for count in counts:
         missed = "unknown" if count.missed is None else str(count.missed)
-        _say(f"{count.received:9d} {count.written:9d} {missed:>14}  {count.topic}")
+        tell(f"{count.received:9d} {count.written:9d} {missed:>14}  {count.topic}")
 
 
 def _wanted(args: Namespace, known: Topics) -> list[RequestedTopic]:

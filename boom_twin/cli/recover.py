@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..system.terminal_text import printable
-from .main import add_json, print_result
+from .arguments import add_json
+from .output import print_result, tell
 
 if TYPE_CHECKING:
     from ..bag.recovery.recover import Recovery
@@ -37,9 +37,9 @@ def run(args: Namespace) -> int:
 
     outcome = recover(Path(args.bag), Path(args.out), args.unverified)
     for path, fault in outcome.faults[:SHOWN]:
-        print(f"{path}: bytes {fault.offset} to {fault.offset + fault.length}: {fault.reason}", file=sys.stderr)
+        tell(f"{path}: bytes {fault.offset} to {fault.offset + fault.length}: {fault.reason}")
     if outcome.fault_count > SHOWN:
-        print(f"and {outcome.fault_count - SHOWN} faults more", file=sys.stderr)
+        tell(f"and {outcome.fault_count - SHOWN} faults more")
     told = as_json(outcome, args.out)
     print_result(args.json, told, as_text(outcome, told))
     return 0

@@ -9,11 +9,11 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import UsageError
 from ..scene import Scene
 from ..scene.load import default_text
 from ..scene.yaml_reader import read_text, with_end_mark
 from ..system.atomic_files import check_new, write_atomic
+from .arguments import add_file, files_of, refuse_given
 
 if TYPE_CHECKING:
     from ..reduction.search import Proposal
@@ -40,18 +40,17 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare ``--need``, and the options that go with it."""
     purpose = "propose the leanest model whose tip stays so near to this scene's (mm, cm, m)"
     parser.add_argument("--need", type=tip_error, metavar="tip=1mm", help=purpose)
-    parser.add_argument("--out", type=Path, metavar="LEAN", help="with --need: write the lean scene file here")
+    add_file(parser, "--out", "with --need: write the lean scene file here", "LEAN")
     purpose = "with --need: measure against this scene of the same boom, not against SCENE itself"
     parser.add_argument("--against", metavar="FULL", help=purpose)
 
 
 def refuse_misuse(args: Namespace) -> None:
     """Raise UsageError for an option that needs ``--need``, without it, and for writing over a file."""
-    for option in ("out", "against"):
-        if args.need is None and getattr(args, option) is not None:
-            raise UsageError(f"--{option} {getattr(args, option)}: goes with --need only. Add --need tip=1mm.")
-    if args.out is not None:
-        check_new(args.out, [Path(source) for source in (args.scene, args.against) if source])
+    if args.need is None:
+        refuse_given(args, "goes with --need only. Add --need tip=1mm.", "out", "against")
+    elif args.out is not None:
+        check_new(args.out, files_of(args, "scene", "against"))
 
 
 def tip_error(text: str) -> float:
@@ -73,16 +72,12 @@ def search(scene: Scene, most: float, against: Scene | None) -> Proposal:
     """Search for the leanest model, with progress on stderr."""
     from ..reduction.search import propose
 
-    shown = sys.stderr.isatty()
+    def show(what: str) -> None:
+        if sys.stderr.isatty():
+            print(f"\r{what:70s}\r", end="", file=sys.stderr, flush=True)
 
-    def tell(what: str) -> None:
-        if shown:
-            print(f"\r{what:70s}", end="", file=sys.stderr, flush=True)
-
-    found = propose(against or scene, most, scene, tell)
-    tell("")
-    if shown:
-        print("\r", end="", file=sys.stderr)
+    found = propose(against or scene, most, scene, show)
+    show("")
     return found
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from functools import partial
 from math import hypot
@@ -11,17 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
 from ..offline.progress import progress_of
-from .arguments import SESSION, add_mapping, add_window, window_of
-from .main import (
+from .arguments import (
+    SESSION,
+    add_file,
     add_json,
+    add_mapping,
     add_namespace,
     add_params,
     add_session_scene,
-    open_session_scene,
-    open_session_settings,
-    print_json,
-    warn_incomplete,
+    add_window,
+    files_of,
+    window_of,
 )
+from .output import open_session_scene, open_session_settings, print_result, tell, warn_incomplete
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
@@ -44,7 +45,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
     )
     usual = "what is known of this rig while all is well; by default as the session was recorded, else the package's"
-    parser.add_argument("--baseline", metavar="FILE", type=Path, help=usual)
+    add_file(parser, "--baseline", usual)
     told = (
         "name what is wrong with the boom, if one cause explains the readings, by twins that have it; takes ten times as long"
     )
@@ -82,13 +83,10 @@ def run(args: Namespace) -> int:
     check_kind(args.table)
     window = window_of(args)
     if window.start:
-        print(
-            f"at {window.start:g} s the model starts at rest, whatever the boom did: its first seconds show that",
-            file=sys.stderr,
-        )
-    print("preparing the model (compiles for up to a minute the first time) ..", file=sys.stderr)
-    out, given = Path(args.out), (args.bag, args.scene, args.params, args.mapping, args.baseline)
-    with result_folder(out, REPLAY, [Path(each) for each in given if each]) as building:
+        tell(f"at {window.start:g} s the model starts at rest, whatever the boom did: its first seconds show that")
+    tell("preparing the model (compiles for up to a minute the first time) ..")
+    out, sources = Path(args.out), files_of(args, "bag", "scene", "params", "mapping", "baseline")
+    with result_folder(out, REPLAY, sources) as building:
         progress = partial(progress_of, unit="messages", name="replay")
         asked = args.mapping, not args.no_changes, not args.no_health, args.baseline
         options = settings, progress, *asked, window, args.namespace
@@ -108,12 +106,8 @@ def run(args: Namespace) -> int:
             table.finish()
             files.append(name)
     warn_incomplete(result.session)
-    if args.json:
-        print_json(flat(result.summary))
-        return 0
-    print("\n".join(as_text(result.summary)))
-    for name in ["summary.json", *([] if args.no_bag else ["bag"]), *files]:
-        print(out / name)
+    written = ["summary.json", *([] if args.no_bag else ["bag"]), *files]
+    print_result(args.json, flat(result.summary), [*as_text(result.summary), *(str(out / name) for name in written)])
     return 0
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,8 +16,8 @@ from ..errors import UsageError
 from ..scene import Scene
 from ..system.csv_table import columns_text, read_csv
 from ..types import Array
-from .main import add_json, add_scene, open_scene, print_result
-from .statics import numbers
+from .arguments import add_json, add_place, add_scene, files_of, numbers
+from .output import open_scene, print_result, warn
 
 if TYPE_CHECKING:
     from ..analysis.frequency_response import FrequencyResponse
@@ -45,12 +44,8 @@ class Answer:
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    where = parser.add_mutually_exclusive_group(required=True)
-    where.add_argument("--posture", metavar="P", help="a posture of the scene, or section angles, deg: 60,-20,-30")
-    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes of the drives, m")
-    where.add_argument("--lengths", type=numbers, metavar="L1,..,LN", help="cylinder lengths at rest less closed_length, m")
     told = "resonance map over these postures (angles in brackets), or `all` of the scene's; needs --pump, whose rate it varies"
-    where.add_argument("--map", metavar="P1,P2,..", help=told)
+    add_place(parser).add_argument("--map", metavar="P1,P2,..", help=told)
     load = parser.add_mutually_exclusive_group()
     load.add_argument("--tip", type=numbers, metavar="FX,FY", help="harmonic force at the tip, N (default 0,1)")
     load.add_argument("--drive", type=int, metavar="CYLINDER", help="harmonic drive of this cylinder, from 1, amplitude 1 m")
@@ -61,15 +56,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--to", dest="high", type=float, default=HIGH, metavar="F", help="highest frequency, Hz (default 30)")
     parser.add_argument("--points", type=int, default=POINTS, metavar="N", help="frequencies, evenly in their logarithm (300)")
     parser.add_argument("--rates", type=_rates, default=RATES, metavar="F:F:N", help="of a map (default 0.2:1.2:201)")
-    parser.add_argument(
-        "--steps",
-        type=int,
-        default=STEPS,
-        metavar="N",
-        help="of a map, from each posture to the next (default 1)",
-    )
-    out = "folder for table and picture: new, empty, or of an earlier response"
-    parser.add_argument("--out", metavar="DIR", help=out)
+    steps = "of a map, from each posture to the next (default 1)"
+    parser.add_argument("--steps", type=int, default=STEPS, metavar="N", help=steps)
+    parser.add_argument("--out", metavar="DIR", help="folder for table and picture: new, empty, or of an earlier response")
     add_json(parser)
 
 
@@ -112,10 +101,9 @@ def run(args: Namespace) -> int:
     else:
         answer = _response(scene, args)
     for doubt in answer.doubts:
-        print(f"boom_twin response: warning: {doubt}.", file=sys.stderr)
+        warn(f"{doubt}.")
     if args.out:
-        sources = [Path(path) for path in (args.scene, args.load) if path]
-        with result_folder(Path(args.out), RESPONSE, sources) as building:
+        with result_folder(Path(args.out), RESPONSE, files_of(args, "scene", "load")) as building:
             write_atomic(building.folder / f"{answer.name}.csv", columns_text(answer.columns))
             answer.draw(building.folder / f"{answer.name}.png")
         answer.lines.append(f"Written: {args.out}")
@@ -179,10 +167,8 @@ def _response(scene: Scene, args: Namespace) -> Answer:
 
 
 MODES = 40  # natural frequencies that are looked for within the band
-BESIDE, SHARP = (
-    1.0 + 1e-6,
-    3.0,
-)  # times a natural frequency; a peak that is so much higher than there is bounded by rounding alone
+BESIDE, SHARP = 1.0 + 1e-6, 3.0
+"""Times a natural frequency; a peak that is so much higher than there is bounded by rounding alone."""
 
 
 def _undamped(frequencies: Array) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,8 +15,8 @@ from ..system.atomic_files import check_new, check_target, write_atomic
 from ..system.csv_table import columns_text, read_csv
 from ..system.summary_display import numbers
 from ..types import Array
-from .arguments import not_negative
-from .main import add_json, add_scene, open_scene, print_result
+from .arguments import add_json, add_scene, files_of, not_negative, refuse_given
+from .output import open_scene, print_result, warn
 
 if TYPE_CHECKING:
     from ..analysis.energy_balance import EnergyBalance
@@ -82,14 +81,14 @@ def run(args: Namespace) -> int:
     _check_sampling(args)
     if args.orbits and not compile_scene(scene).pins:
         raise UsageError("--orbits: the scene has no pin with clearance. `boom_twin scene --clearance` prints one that has.")
-    sources = _sources(args)
+    sources = files_of(args, "drive", "lengths", "scene")
     check_target(Path(args.out), sources, _is_earlier)
     for picture_or_state in filter(None, (args.orbits, args.save_state)):
         check_new(Path(picture_or_state), sources)
     _check_targets({"--out": args.out, "--orbits": args.orbits, "--save-state": args.save_state})
     times, strokes, stem = read_history(sources[0], len(scene.joints), ("length", "stroke") if args.lengths else ("stroke",))
     for oddity in odd_in_drive(times, strokes, stem):
-        print(f"boom_twin simulate: warning: {sources[0]}: {oddity}", file=sys.stderr)
+        warn(f"{sources[0]}: {oddity}")
     angles = None if args.posture is None else _angles_near(scene, args.posture, strokes[0], bool(args.lengths))
     if args.samples is not None:
         return _sample(args, scene, times, strokes, angles)
@@ -101,7 +100,7 @@ def run(args: Namespace) -> int:
         scene, times, dt=args.dt, angles=angles, rho=rho, estimate_errors=not args.no_error_estimate, start=start, **followed
     )
     for doubt in result.doubts:
-        print(f"boom_twin simulate: warning: {doubt}.", file=sys.stderr)
+        warn(f"{doubt}.")
     write_atomic(Path(args.out), columns_text(result.columns()))
     if args.save_state:
         write_state(Path(args.save_state), result.end)
@@ -115,11 +114,6 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _sources(args: Namespace) -> list[Path]:
-    """Return the files that are read: the history first, then the scene if one is given."""
-    return [Path(path) for path in (args.drive, args.lengths, args.scene) if path is not None]
-
-
 def _check_targets(targets: dict[str, str | None]) -> None:
     """Raise UsageError if two options would write the same file."""
     seen: dict[Path, str] = {}
@@ -131,16 +125,11 @@ def _check_targets(targets: dict[str, str | None]) -> None:
 def _check_sampling(args: Namespace) -> None:
     """Raise UsageError for options that do not go with ``--samples``, or only with it."""
     if args.samples is None:
-        if args.vary:
-            raise UsageError(f"--vary {args.vary[0]}: goes with --samples N. Add it, or leave --vary out.")
+        refuse_given(args, "goes with --samples N. Add it, or leave --vary out.", "vary")
         return
-    single = {"--check": args.check, "--start": args.start != "rest", "--save-state": args.save_state, "--orbits": args.orbits}
-    single["--rho"] = args.rho is not None
-    for option, is_given in single.items():
-        if is_given:
-            raise UsageError(f"{option}: is of one motion, --samples of many. Leave one of them out.")
-    if args.lengths:
-        raise UsageError(f"--lengths {args.lengths}: --samples draws booms that follow drives. Give --drive instead.")
+    single = ["check", "save_state", "orbits", "rho", *(["start"] if args.start != "rest" else [])]
+    refuse_given(args, "is of one motion, --samples of many. Leave one of them out.", *single)
+    refuse_given(args, "--samples draws booms that follow drives. Give --drive instead.", "lengths")
 
 
 def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles: Array | None) -> int:
@@ -150,15 +139,15 @@ def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles:
 
     out = Path(args.out)
     table = out.with_name(f"{out.stem}_samples.csv")
-    check_new(table, _sources(args))
+    check_new(table, files_of(args, "drive", "lengths", "scene"))
     progress = progress_of(args.samples, "samples", "simulate")
     deviations = dict(map(_deviation, args.vary or ()))
     found = simulate_samples(scene, times, strokes, deviations, args.samples, args.seed, args.dt, angles, progress.update)
     progress.close()
     for failure in found.failures:
-        print(f"boom_twin simulate: warning: left out: {failure}", file=sys.stderr)
+        warn(f"left out: {failure}")
     if found.doubtful:
-        print(f"boom_twin simulate: warning: {found.doubtful} samples move in a way that simulate doubts.", file=sys.stderr)
+        warn(f"{found.doubtful} samples move in a way that simulate doubts.")
     write_atomic(out, columns_text(found.columns()))
     write_atomic(table, columns_text(found.samples))
     spread = {name: np.quantile(values, (0.025, 0.5, 0.975)) for name, values in found.samples.items()}
@@ -245,7 +234,7 @@ def _draw_orbits(args: Namespace, scene: Scene, result: Simulation) -> None:
 
     gaps = compile_scene(scene).tables.clearances.gap
     orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)
-    orbits_picture(Path(args.orbits), f"{_sources(args)[0].name}: journals in their bushes", orbits)
+    orbits_picture(Path(args.orbits), f"{Path(args.drive or args.lengths).name}: journals in their bushes", orbits)
 
 
 def _is_earlier(start: bytes) -> bool:

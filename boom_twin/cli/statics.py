@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import sys
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from .main import add_json, add_scene, open_scene, print_result
+from .arguments import add_json, add_place, add_scene
+from .output import open_scene, print_result, warn
 
 if TYPE_CHECKING:
     from ..analysis.equilibrium import Equilibrium
@@ -16,20 +16,8 @@ if TYPE_CHECKING:
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    where = parser.add_mutually_exclusive_group(required=True)
-    where.add_argument("--posture", metavar="P", help="a posture of the scene, or section angles, deg: 60,-20,-30")
-    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes of the drives, m")
-    read = "cylinder lengths less closed_length, m: what stroke transducers read of the boom at rest"
-    where.add_argument("--lengths", type=numbers, metavar="L1,..,LN", help=read)
+    add_place(parser)
     add_json(parser)
-
-
-def numbers(text: str) -> list[float]:
-    """Parse numbers between commas."""
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise ArgumentTypeError(f"{text!r} is not a list of numbers like 0.1,0.2") from None
 
 
 def run(args: Namespace) -> int:
@@ -39,7 +27,7 @@ def run(args: Namespace) -> int:
     scene = open_scene(args.scene)
     found = statics(scene, strokes=args.strokes, posture=args.posture, lengths=args.lengths)
     for doubt in found.doubts:
-        print(f"boom_twin statics: warning: {doubt}.", file=sys.stderr)
+        warn(f"{doubt}.")
     print_result(args.json, as_json(found), as_text(found))
     return 0
 
