@@ -23,7 +23,7 @@ from .arguments import add_ros_args, positive, ros_arguments
 from .output import tell, tell_oddities, warn
 
 if TYPE_CHECKING:
-    from ..ros.bag.recorder import Count
+    from ..diagnostics.recorder_status import TopicCount
     from ..ros.bag.subscriptions import RequestedTopic
 
 
@@ -62,7 +62,7 @@ def run(args: Namespace) -> int:
     from ..bag.async_writer import FileSplit, Storage
     from ..bag.session_sheet import incompleteness
     from ..bag.writer import BagWriter
-    from ..ros.bag.recorder import record, recorder_node
+    from ..ros.bag.recorder import Recorder, recorder_node
     from ..ros.bag.subscriptions import resolved, resolved_mapping
     from ..ros.runtime import ros
     from ..ros.startup import on_stop_signal
@@ -96,7 +96,8 @@ def run(args: Namespace) -> int:
 
         storage = Storage(bag, FileSplit(args.split_size, args.split_duration), tell)
         end = float("inf") if args.duration is None else time.monotonic() + args.duration
-        counts = record(node, storage, wanted, thresholds, lambda: bool(signals) or time.monotonic() >= end, tell, on_twin)
+        recorder = Recorder(node, storage, wanted, thresholds, tell)
+        counts = recorder.run(lambda: bool(signals) or time.monotonic() >= end, on_twin)
     _tell_counts(counts)
     sheet.write(args.out, [asdict(count) for count in counts])
     if sheet.scene is None:
@@ -156,7 +157,7 @@ def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any], frame: str, 
     return replace(sheet, **changes)
 
 
-def _tell_counts(counts: list[Count]) -> None:
+def _tell_counts(counts: list[TopicCount]) -> None:
     """Print one line for each topic."""
     tell(" received   written  never arrived")
     for count in counts:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .levels import Bounds, ComponentJudge, Level, Status
@@ -33,16 +33,26 @@ class DiskState:
 
 
 @dataclass(frozen=True, slots=True)
-class TopicState:
-    """Message counts of one topic: received, and published but never received (None: not known)."""
+class TopicCount:
+    """Message counts of one topic.
 
+    Attributes
+    ----------
+    topic : str
+    received, written : int
+    missed : int or None
+        Published but never received, by the publisher's numbers, or left out; None where there were several publishers or none.
+    """
+
+    topic: str
     received: int
+    written: int
     missed: int | None
 
 
-def recording_status(judge: ComponentJudge, topics: Mapping[str, TopicState], disk: DiskState, end: str | None) -> Status:
+def recording_status(judge: ComponentJudge, counts: Sequence[TopicCount], disk: DiskState, end: str | None) -> Status:
     """Return the status of a recording; `end`: why it ended too early, empty if in order, None while it runs."""
-    thresholds, missed = judge.at.thresholds, sum(topic.missed or 0 for topic in topics.values())
+    thresholds, missed = judge.at.thresholds, sum(count.missed or 0 for count in counts)
     if end:
         judge.fault(Level.ERROR, end)
     judge.check("never_arrived", missed, Bounds(warn=0), f"{missed} messages were published and never arrived")
@@ -52,7 +62,7 @@ def recording_status(judge: ComponentJudge, topics: Mapping[str, TopicState], di
     judge.check("disk_left_s", disk.left, room, f"the disk is full in {disk.left:.0f} s")
     judge.note({} if end is None else {ENDED: 1})
     judge.note({"disk_free_bytes": disk.free, "waiting_bytes": disk.waiting, "written_bytes": disk.written})
-    for name, topic in topics.items():
-        missing = "nan" if topic.missed is None else topic.missed
-        judge.note({f"received {name}": topic.received, f"never_arrived {name}": missing})
+    for count in counts:
+        missing = "nan" if count.missed is None else count.missed
+        judge.note({f"received {count.topic}": count.received, f"never_arrived {count.topic}": missing})
     return judge.finish("running" if end is None else "ended")

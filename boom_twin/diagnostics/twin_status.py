@@ -119,6 +119,10 @@ class TwinWatch:
             self.health = self.health or HealthWatch()
             self.health.took(health)
 
+    def acknowledge(self) -> str:
+        """Acknowledge the alarms of the rig's health; return in words which of them have ended and are released."""
+        return "health is not judged" if self.health is None else self.health.acknowledge()
+
     def broken(self, reason: str) -> None:
         """Count a message that could not be handled at all."""
         self._model.break_down(reason)

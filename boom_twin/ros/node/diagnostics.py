@@ -28,7 +28,7 @@ from ...system.terminal_text import printable
 from ...twin.events import EVENTS, TOLD_AT_ONCE
 from ...twin.load_shedding import LoadShedding
 from ...twin.twin import Twin
-from ...types import NANO, Health, Report, Sample, Stream
+from ...types import NANO, Stream
 from ..runtime import Log, qos_profile
 from .receive_queue import LARGEST, ReceiveQueue
 
@@ -174,6 +174,25 @@ def node_name(endpoint: Any) -> str:
     return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
 
 
+class ClockCheck:
+    """Comparison of the newest stamp with a clock."""
+
+    def __init__(self) -> None:
+        self._was_apart, self._newest, self._since = False, 0, 0.0
+
+    def apart(self, clock: float, newest: int, tolerance: float, now: float) -> float:
+        """Return by how much `clock` (s) is ahead of the `newest` stamp (ns), if it is for two looks; else 0.
+
+        A bag that begins again steps at another moment than its clock. While nothing comes, the newest stamp grows old: that
+        is time of the clock `now` (s), which only goes forward.
+        """
+        if newest != self._newest:
+            self._newest, self._since = newest, now
+        apart, before = clock - newest * NANO, self._was_apart
+        self._was_apart = abs(apart) > tolerance + now - self._since
+        return apart if self._was_apart and before else 0.0
+
+
 WORDS = {**EVENTS, **ODDITIES, "too large": f"a message of more than {LARGEST >> 10} KiB, which is left out"}
 """Descriptions that are logged with the first sample of a kind."""
 TICK = 0.1  # s of steady time between looks at whether something is urgent
@@ -191,6 +210,11 @@ class Diagnostics:
     topics : Topics
     queue : ReceiveQueue
         Of the inputs.
+
+    Attributes
+    ----------
+    watch : TwinWatch
+        Takes what happens; another one from each `configure` on.
     """
 
     def __init__(self, node: Node, topics: Topics, queue: ReceiveQueue) -> None:
@@ -206,32 +230,27 @@ class Diagnostics:
         self._work: Iterator[None] | None = None
         self._newest_piece, self._is_peers_turn = 0.0, False
         self._due, self._active = time.monotonic() + PERIOD, False
-        self._watch = TwinWatch({}, {}, Thresholds())
+        self.watch = TwinWatch({}, {}, Thresholds())
         self._counts: dict[str, Mapping[str, int]] = {}
         self._shedding: LoadShedding | None = None
-        self._scene, self._joints = "", 0
         self._decoder: SampleDecoder | None = None
+        self._scene, self._joints = "", 0
         self._told: set[str] = set()
-        self._was_apart, self._newest = False, (0, 0.0)  # newest stamp (ns), and when it was first seen
+        self._clock = ClockCheck()
 
-    def watch(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
+    def configure(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
         """Watch the twin that the node is configured with."""
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts, twin.absent)
         stress = stress_model(twin.scene, twin.reads)
-        self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds, stress=stress)
-        self._counts, self._shedding = {"samples": twin.counts, "messages": decoder.oddities}, twin.shedding
+        self.watch = TwinWatch(sensors, self._inputs, self.watch.thresholds, stress=stress)
         self._queue.oddities.clear()
-        self._counts["received"] = self._queue.oddities
-        self._scene, self._joints, self._decoder = scene, twin.plan.joints, decoder
+        self._counts = {"samples": twin.counts, "messages": decoder.oddities, "received": self._queue.oddities}
+        self._scene, self._joints, self._decoder, self._shedding = scene, twin.plan.joints, decoder, twin.shedding
         self._told.clear()
-
-    def tune(self, thresholds: Thresholds) -> None:
-        """Set the thresholds from now on."""
-        self._watch.thresholds = thresholds
 
     def start(self) -> None:
         """Start watching, because the node is active: from now on an input that is silent is stale."""
-        self._watch.begin()
+        self.watch.begin()
         self._drop_work()
         self._active = True
 
@@ -240,34 +259,13 @@ class Diagnostics:
         self._drop_work()
         self._active = False
 
-    def seen(self, stream: Stream, stamp: int) -> None:
-        """Count a message."""
-        self._watch.seen(stream, stamp)
-
-    def took(self, sample: Sample, report: Report, duration: float) -> None:
-        """Take the `report` that the twin made of `sample` in `duration` seconds."""
-        self._watch.took(sample, report, duration)
-
-    def judged(self, health: Health | None, duration: float) -> None:
-        """Take the result of a look at the rig's health, which took `duration` seconds; None if there is no news."""
-        self._watch.judged(health, duration)
-
-    def acknowledge(self) -> str:
-        """Acknowledge the alarms of the rig's health; return in words which of them have ended and are released."""
-        health = self._watch.health
-        return "health is not judged" if health is None else health.acknowledge()
-
-    def broken(self, stream: Stream, error: Exception) -> None:
-        """Count a message that could not be handled at all."""
-        self._watch.broken(f"a message of {stream.value} could not be handled: {type(error).__name__}: {error}")
-
     def _tick(self) -> None:
         """Look up one topic's other ends at every second call; begin a look at everything, if it is due."""
         self._is_peers_turn = not self._is_peers_turn
         if self._is_peers_turn:
             self._peers.look()
         now = time.monotonic()
-        if self._work is None and (now >= self._due - 0.5 * TICK or (self._active and self._watch.is_urgent())):
+        if self._work is None and (now >= self._due - 0.5 * TICK or (self._active and self.watch.is_urgent())):
             self._due = now + PERIOD
             self._work, self._newest_piece = self._look(), now
             self._pieces.reset()
@@ -293,7 +291,7 @@ class Diagnostics:
         ends = peers.publishers, peers.subscribers.values()
         shed = self._shedding
         left_out = {} if shed is None else {"shapes": shed.shapes, "looks at health": shed.health}
-        found = yield from self._watch.look(told, self._active, *ends, clock, received, wrong, left_out, WORDS)
+        found = yield from self.watch.look(told, self._active, *ends, clock, received, wrong, left_out, WORDS)
         yield
         self._publisher.show(found)
         self._tell_oddities()
@@ -327,26 +325,16 @@ class Diagnostics:
 
     def _tell_clock(self, clock: float, wait: float) -> None:
         """Warn if the stamps of strokes are not of the node's clock; messages waited at most `wait` seconds."""
-        newest = self._watch.newest if self._active else None
-        if newest is not None and clock == 0.0:
-            self._tell(
-                "no clock", "use_sim_time is set and no /clock came yet: play with --clock, or set use_sim_time to false"
-            )
-            return
+        newest, is_simulated = self.watch.newest if self._active else None, self._node.get_parameter("use_sim_time").value
         if newest is None:
             return
-        if newest != self._newest[0]:
-            self._newest = newest, time.monotonic()
-        silent = time.monotonic() - self._newest[1]
-        apart, before = clock - newest * NANO, self._was_apart
-        self._was_apart = abs(apart) > self._watch.thresholds.stamp_offset + wait + silent
-        if self._was_apart and before:  # a bag that begins again steps at another moment than its clock
-            self._tell("clock", f"newest stamp is {apart:.1f} s from {self._clock_in_words()}")
-
-    def _clock_in_words(self) -> str:
-        if self._node.get_parameter("use_sim_time").value:
-            return "/clock: is this the clock of what is played?"
-        return "the node's clock: set use_sim_time or play with --clock"
+        if clock == 0.0:
+            told = "use_sim_time is set and no /clock came yet: play with --clock, or set use_sim_time to false"
+            self._tell("no clock", told)
+        elif apart := self._clock.apart(clock, newest, self.watch.thresholds.stamp_offset + wait, time.monotonic()):
+            own = "the node's clock: set use_sim_time or play with --clock"
+            own = "/clock: is this the clock of what is played?" if is_simulated else own
+            self._tell("clock", f"newest stamp is {apart:.1f} s from {own}")
 
     def _tell(self, name: str, text: str) -> None:
         """Log a warning once."""
