@@ -104,7 +104,8 @@ def refuse_given(args: Namespace, told: str, *names: str) -> None:
     for name in names:
         value = getattr(args, name)
         if value is not None and value is not False:
-            shown = "" if value is True else f" {value[0] if isinstance(value, list) else value}"
+            first = value[0] if isinstance(value, list) else value
+            shown = "" if value is True else f" {first:g}" if isinstance(first, float) else f" {first}"
             raise UsageError(f"--{name.replace('_', '-')}{shown}: {told}")
 
 

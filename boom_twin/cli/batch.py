@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import closing
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -65,9 +66,11 @@ def run(args: Namespace) -> int:
                 dashboard = f"; dashboard: {workers.dashboard}" if workers.dashboard else ""
                 tell(f"{len(done)} of {len(tasks)} sessions are done{dashboard}")
                 try:
-                    for row in _shown(rows_of(workers, waiting), len(done), len(tasks)):
-                        folder.keep(row)
-                        done[row["key"]] = row
+                    with closing(progress_of(len(tasks), "sessions", "batch", len(done))) as progress:
+                        for row in rows_of(workers, waiting):
+                            folder.keep(row)
+                            done[row["key"]] = row
+                            progress.update(1)
                 finally:
                     folder.mark(len(tasks), len(done))
         rows = [done[task.key] for task in tasks]
@@ -125,12 +128,3 @@ def _kept(args: Namespace, folder: BatchFolder, task: SessionTask) -> Row | None
         warn(str(error))
         return None
     return None if row is not None and row["status"] != OK and args.retry_failed else row
-
-
-def _shown(rows: Iterator[Row], before: int, total: int) -> Iterator[Row]:
-    """Yield the rows and show their progress."""
-    progress = progress_of(total, "sessions", "batch", before)
-    for row in rows:
-        yield row
-        progress.update(1)
-    progress.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from argparse import ArgumentParser, Namespace
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,11 +43,32 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Calibrate; write the scene and print the result."""
     from ..bag.reader import scan
+    from ..calibration.output import as_object, as_text, mapping_path, refuse_overwriting, write_mapping, write_scene
+    from ..calibration.run import Choice, calibrate
 
-    code = _calibrate(args)
+    sources = files_of(args, "bags", "scene", "params", "mapping")
+    refuse_overwriting(args.out, sources, args.force)
+    scene = _scene(args)
+    settings = open_session_settings(args.bags[0], args.params)
+    names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
+    choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
+    began = time.perf_counter()
+    with closing(progress_of(100, "%", "calibrate")) as bar:
+        found = calibrate(args.bags, scene.scene, choice, settings, args.mapping, _moving(bar), window_of(args))
+    wall = time.perf_counter() - began
+    credit = f"{args.date or time.strftime('%Y-%m-%d')} by boom_twin {__version__}"
+    refuse_overwriting(args.out, sources, args.force)  # again: somebody may have put something there meanwhile
+    # the scene last: without its zeros it would pass for the whole result
+    mapping = write_mapping(found, Path(args.bags[0]), args.mapping, args.out, credit, len(scene.scene.joints))
+    write_scene(found, scene.scene, scene.text, args.out, credit)
+    if mapping is None and (earlier := mapping_path(args.out)).exists():
+        warn(f"{earlier}: of an earlier calibration; {args.out} has no zeros of its own.")
+    files = [args.out, *([mapping] if mapping else []), *([] if args.no_pictures else _draw(found, args.out))]
+    written = [str(path) for path in files]
+    print_result(args.json, as_object(found) | {"wall_s": wall, "files": written}, [*as_text(found), f"{wall:.1f} s", *written])
     for bag in args.bags:
         warn_incomplete(scan(Path(bag)))
-    return code
+    return 0
 
 
 def _scene(args: Namespace) -> SessionScene:
@@ -60,52 +82,16 @@ def _scene(args: Namespace) -> SessionScene:
     return found
 
 
-def _sources(args: Namespace) -> list[Path]:
-    """Return the paths of all files that are read."""
-    return files_of(args, "bags", "scene", "params", "mapping")
-
-
-def _credit(args: Namespace) -> str:
-    return f"{args.date or time.strftime('%Y-%m-%d')} by boom_twin {__version__}"
-
-
-def _calibrate(args: Namespace) -> int:
-    from ..calibration.output import as_object, as_text, mapping_path, refuse_overwriting, write_mapping, write_scene
-    from ..calibration.run import Choice, calibrate
-
-    refuse_overwriting(args.out, _sources(args), args.force)
-    scene = _scene(args)
-    settings = open_session_settings(args.bags[0], args.params)
-    names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
-    choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
-    began = time.perf_counter()
-    bar, progress = _progress()
-    found = calibrate(args.bags, scene.scene, choice, settings, args.mapping, progress, window_of(args))
-    bar.close()
-    wall = time.perf_counter() - began
-    credit = _credit(args)
-    refuse_overwriting(args.out, _sources(args), args.force)  # again: somebody may have put something there meanwhile
-    # the scene last: without its zeros it would pass for the whole result
-    mapping = write_mapping(found, Path(args.bags[0]), args.mapping, args.out, credit, len(scene.scene.joints))
-    write_scene(found, scene.scene, scene.text, args.out, credit)
-    if mapping is None and (earlier := mapping_path(args.out)).exists():
-        warn(f"{earlier}: of an earlier calibration; {args.out} has no zeros of its own.")
-    files = [args.out, *([mapping] if mapping else []), *([] if args.no_pictures else _draw(found, args.out))]
-    written = [str(path) for path in files]
-    print_result(args.json, as_object(found) | {"wall_s": wall, "files": written}, [*as_text(found), f"{wall:.1f} s", *written])
-    return 0
-
-
-def _progress() -> tuple[ProgressBar, Progress]:
-    """Return a progress bar, and the function that moves it to a share of the whole."""
-    bar, done = progress_of(100, "%", "calibrate"), 0.0
+def _moving(bar: ProgressBar) -> Progress:
+    """Return a function that moves a bar of 100 % to a share of the whole."""
+    done = 0.0
 
     def progress(share: float, what: str) -> None:
         nonlocal done
         bar.update(100.0 * share - done)
         done = 100.0 * share
 
-    return bar, progress
+    return progress
 
 
 def _draw(found: Calibration, out: Path) -> list[Path]:

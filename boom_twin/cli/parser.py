@@ -1,25 +1,16 @@
-"""The parser of the command line: defaults in every help, and the nearest name where one is not known."""
+"""The parser of the command line: the nearest name where one is not known."""
 
 from __future__ import annotations
 
 import re
-from argparse import SUPPRESS, Action, ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from argparse import Action, ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import NoReturn
 
 
-class DefaultsFormatter(RawDescriptionHelpFormatter):
-    """Help formatter that adds the default of an option unless its help states it, and keeps the lines of examples."""
-
-    def _get_help_string(self, action: Action) -> str | None:
-        told, default = action.help, action.default
-        if not told or told == SUPPRESS or not action.option_strings or default is False or default in (None, SUPPRESS, [], ()):
-            return told
-        text = " ".join(map(str, default)) if isinstance(default, list | tuple) else str(default)
-        text = f"{default:g}" if isinstance(default, float) else text
-        is_told = f"({text}" in told or f"default {text}" in told
-        return told if is_told else f"{told} ({text.replace('%', '%%')})"
+class CommandsFormatter(RawDescriptionHelpFormatter):
+    """Help formatter that keeps the lines of examples, and leaves room for the longest name of a command."""
 
     def add_argument(self, action: Action) -> None:
         """Add an argument, and count the indentation of commands, which the base class forgets, so that no line breaks."""
@@ -33,7 +24,7 @@ class CommandParser(ArgumentParser):
     """Parser whose errors name the nearest option or choice."""
 
     def __init__(self, *args: object, **options: object) -> None:
-        options.setdefault("formatter_class", DefaultsFormatter)
+        options.setdefault("formatter_class", CommandsFormatter)
         super().__init__(*args, **options)  # type: ignore[arg-type]
         self._negative_number_matcher = re.compile(r"-\.?\d")  # values, no options: also lists, as -5,-170
 

@@ -8,7 +8,6 @@ from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import UsageError
 from ..offline.progress import progress_of
 from .arguments import (
     SESSION,
@@ -20,6 +19,7 @@ from .arguments import (
     add_session_scene,
     add_window,
     files_of,
+    refuse_given,
     window_of,
 )
 from .output import open_session_scene, open_session_settings, print_result, tell, warn_incomplete
@@ -75,8 +75,8 @@ def run(args: Namespace) -> int:
     from ..report.quantities import section_heights
     from ..system.result_folder import REPLAY, result_folder
 
-    if args.fatigue is not None and not args.report:
-        raise UsageError(f"--fatigue {args.fatigue:g}: goes into the report. Give --report too.")
+    if not args.report:
+        refuse_given(args, "goes into the report. Give --report too.", "fatigue")
     scene = open_session_scene(args.bag, args.scene)
     heights = section_heights(args.section_height, scene.scene)
     settings = open_session_settings(args.bag, args.params, args.namespace)
@@ -87,9 +87,6 @@ def run(args: Namespace) -> int:
     tell("preparing the model (compiles for up to a minute the first time) ..")
     out, sources = Path(args.out), files_of(args, "bag", "scene", "params", "mapping", "baseline")
     with result_folder(out, REPLAY, sources) as building:
-        progress = partial(progress_of, unit="messages", name="replay")
-        asked = args.mapping, not args.no_changes, not args.no_health, args.baseline
-        options = settings, progress, *asked, window, args.namespace
         evaluator = Evaluator(scene.scene, settings, heights, args.fatigue)
         joints, name = len(scene.scene.joints), f"samples.{args.table}"
         table = SampleTable(table_file(building.folder / name, joints), joints) if args.table else None
@@ -99,7 +96,22 @@ def run(args: Namespace) -> int:
             if table is not None:
                 table.add(stretch)
 
-        result = replay_into(building, args.bag, scene, *options, take=take, with_bag=not args.no_bag, causes=args.causes)
+        result = replay_into(
+            building,
+            args.bag,
+            scene,
+            settings,
+            progress=partial(progress_of, unit="messages", name="replay"),
+            mapping=args.mapping,
+            changes=not args.no_changes,
+            health=not args.no_health,
+            baseline=args.baseline,
+            window=window,
+            namespace=args.namespace,
+            take=take,
+            with_bag=not args.no_bag,
+            causes=args.causes,
+        )
         found = evaluator.finish(result, building.folder)
         files = [path.name for path in _write(args, result, found, scene, building.folder)]
         if table is not None:

@@ -21,11 +21,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the bag and its truth, new or empty")
     parser.add_argument("--random", metavar="POSTURE", help="random moves from this posture instead of the bundled ones")
     parser.add_argument("--duration", type=positive, metavar="S", help="s (default 60)")
-    parser.add_argument("--seed", type=int, default=0, help="of random moves and of the sensors' noise")
+    parser.add_argument("--seed", type=int, default=0, help="of random moves and of the sensors' noise (0)")
     parser.add_argument("--clean", action="store_true", help="sensors without noise and rounding")
-    share = "every k, d, EI and mass of the simulated boom off by this share, at random: 0.02 is 2 %%"
+    share = "every k, d, EI and mass of the simulated boom off by this share, at random: 0.02 is 2 %% (0)"
     parser.add_argument("--wrong", type=float, default=0.0, metavar="SHARE", help=share)
-    parser.add_argument("--rig-seed", type=int, default=0, metavar="N", help="of --wrong: one boom for each")
+    parser.add_argument("--rig-seed", type=int, default=0, metavar="N", help="of --wrong: one boom for each (0)")
     fault = (
         "a fault, for instance cylinder_2.k:softer:0.3 or joint_3.sensor:bias:0.0035@20 (SI units); @20+5..40: from 20 s on, "
         "over 5 s, until 40 s; may be repeated"
