@@ -55,15 +55,18 @@ def table(scene: Scene, sensors: list[Stream]) -> tuple[dict[str, Any], list[str
     lines.append(f"  {'posture':12} {'sensors beside strokes':24} {titles}")
     for posture in scene.postures:
         for chosen in sets_of(sensors):
-            key = f"{posture}:{words(chosen)}"
             try:
                 found = accuracy_at(scene, strokes_of_posture(scene, posture), chosen)
             except BoomTwinError as error:
                 lines.append(f"  {posture:12} {words(chosen):24} {error}")
                 continue
-            values[key] = [*found.tip.tolist(), *found.acceleration.tolist(), *found.load.tolist()]
+            values[f"accuracy_{posture}:{words(chosen)}"] = [
+                *found.tip.tolist(),
+                *found.acceleration.tolist(),
+                *found.load.tolist(),
+            ]
             lines.append(f"  {posture:12} {words(chosen):24} {_row(found)}")
-    return {"accuracy": values}, lines
+    return values, lines
 
 
 def _row(found: TipAccuracy) -> str:
