@@ -73,10 +73,9 @@ def run(args: Namespace) -> int:
         except KeyboardInterrupt:
             if not args.loop:
                 raise
-        played = player.played
         player.close()
-    sent = ", ".join(f"{name} {count}" for name, count in played.sent.items())
-    tell(f"sent in {played.wall:.1f} s: {sent}; at worst {played.latest * 1e3:.1f} ms late")
+    sent = ", ".join(f"{name} {count}" for name, count in player.sent.items())
+    tell(f"sent in {player.wall:.1f} s: {sent}; at worst {player.latest * 1e3:.1f} ms late")
     return 0
 
 

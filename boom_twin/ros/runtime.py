@@ -205,3 +205,10 @@ def qos_profile(qos: Qos, depth: int | None = None) -> QoSProfile:
         reliability=ReliabilityPolicy[qos.reliability.upper()],
         durability=DurabilityPolicy[qos.durability.upper()],
     )
+
+
+def node_name(endpoint: Any) -> str:
+    """Return namespace and name of the node of a discovered publisher or subscriber."""
+    if "UNKNOWN" in endpoint.node_name:  # so rmw calls a node that it has not heard of
+        return "a node without a known name"
+    return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"

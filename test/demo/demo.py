@@ -226,7 +226,7 @@ def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str
         time.sleep(SETTLE)
         running.check()
         player.close()
-    return player.played.sent
+    return player.sent
 
 
 def _equal(live: DemoResult, again: Replay) -> int:

@@ -121,7 +121,7 @@ def refuse_foreign(topics: Topics) -> None:
 
 def _foreign(node: Any, topics: Topics) -> list[str]:
     """Return in words who publishes one of the topics, or listens to an input."""
-    from boom_twin.ros.node.diagnostics import node_name
+    from boom_twin.ros.runtime import node_name
 
     inputs, outputs = topics.inputs.values(), [*topics.outputs.values(), topics.events]
     of = {f"publishes {each.absolute}": node.get_publishers_info_by_topic(each.absolute) for each in [*inputs, *outputs]}

@@ -14,7 +14,8 @@ pytest.importorskip("rclpy")
 
 from boom_twin.diagnostics.levels import Level, Status
 from boom_twin.messages.topic_table import Output, load_topics
-from boom_twin.ros.node.diagnostics import ClockCheck, DiagnosticsPublisher
+from boom_twin.ros.diagnostics_publisher import DiagnosticsPublisher
+from boom_twin.ros.node.diagnostics import ClockCheck
 from boom_twin.ros.node.services import StartLog
 from boom_twin.scene.load import default_text
 from boom_twin.types import Change, Report
@@ -49,7 +50,7 @@ def test_a_state_with_a_foreign_name_is_escaped_in_log_and_diagnostics(bench: An
 def test_a_state_that_comes_and_goes_does_not_fill_the_log(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Four lines in ten minutes; then what is so now. An error is always told, and that it has ended."""
     now, lines = [1000.0], Lines()
-    monkeypatch.setattr("boom_twin.ros.node.diagnostics.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("boom_twin.ros.diagnostics_publisher.time.monotonic", lambda: now[0])
     board = DiagnosticsPublisher(bench.node, load_topics().outputs[Output.DIAGNOSTICS])
     board._logger = lines  # type: ignore[assignment]
 

@@ -23,7 +23,7 @@ from ...diagnostics.recorder_status import TopicCount, recording_status
 from ...errors import BagError, BoomTwinError
 from ...messages.topic_table import NODE, Output, load_topics
 from ...types import NANO
-from ..node.diagnostics import DiagnosticsPublisher
+from ..diagnostics_publisher import DiagnosticsPublisher
 from ..runtime import CallbackTurns, with_information
 from .subscriptions import RequestedTopic, subscription_of
 

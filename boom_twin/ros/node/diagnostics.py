@@ -3,110 +3,32 @@
 from __future__ import annotations
 
 import time
-from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import cycle
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
-from rclpy.duration import Duration, Infinite
+from rclpy.duration import Infinite
 from rclpy.node import Node
 from rclpy.qos import LivelinessPolicy, QoSCompatibility, QoSProfile, qos_check_compatible
 
 from ...bag.joint_names import extra_names_message, strange_names_message
 from ...config.settings import Thresholds
-from ...diagnostics.levels import Level, Status
+from ...diagnostics.levels import Level
 from ...diagnostics.model_status import stress_model
 from ...diagnostics.sensor_status import sensors_of
 from ...diagnostics.topic_status import Peers
 from ...diagnostics.twin_status import TwinWatch
 from ...messages.sample_decoder import ODDITIES, SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
-from ...system.terminal_text import printable
 from ...twin.events import EVENTS, TOLD_AT_ONCE
 from ...twin.load_shedding import LoadShedding
 from ...twin.twin import Twin
 from ...types import NANO, Stream
-from ..runtime import Log, qos_profile
+from ..diagnostics_publisher import DiagnosticsPublisher
+from ..runtime import Log, node_name, qos_profile
 from .receive_queue import LARGEST, ReceiveQueue
-
-MOST_LINES, LINES_SPAN = 4, 600.0
-"""Changes of a component to a warning and back that are logged within so many seconds: on a busy computer they come and go."""
-
-
-class DiagnosticsPublisher:
-    """Publisher of the states of one node.
-
-    Parameters
-    ----------
-    node : Node
-    topic : Topic
-        Where they are published.
-    hardware_id : str
-        What is diagnosed; empty: the node's name.
-    """
-
-    def __init__(self, node: Node, topic: Topic, hardware_id: str = "") -> None:
-        self._node, self._logger = node, Log(node)
-        self._name = node.get_fully_qualified_name().lstrip("/")
-        self._hardware_id = hardware_id or self._name
-        self._publisher = node.create_publisher(DiagnosticArray, topic.name, qos_profile(topic.qos))
-        self._levels: dict[str, Level] = {}
-        self._logged: dict[str, deque[float]] = {}
-
-    def show(self, statuses: Sequence[Status]) -> None:
-        """Publish all statuses; log in one line those whose level differs from the logged one, which is OK for a new status."""
-        before = {status.name: self._levels.get(status.name, Level.OK) for status in statuses}
-        changed = [status for status in statuses if before[status.name] != status.level and self._is_due(status)]
-        self._levels = before | {status.name: status.level for status in changed}
-        self._log(changed)
-        message = DiagnosticArray(status=[self._message(status) for status in statuses])
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        self._publisher.publish(message)
-
-    def settle(self) -> None:
-        """Wait until subscribers have received everything, at most a second."""
-        self._publisher.wait_for_all_acked(Duration(seconds=1))
-
-    def _is_due(self, status: Status) -> bool:
-        """Return True if a change of level is logged now.
-
-        An error and its end are always logged. Other changes of a component are limited in rate.
-        """
-        if max(status.level, self._levels.get(status.name, Level.OK)) > Level.WARN:
-            return True
-        now, times = time.monotonic(), self._logged.setdefault(status.name, deque(maxlen=MOST_LINES))
-        if len(times) == MOST_LINES and now - times[0] < LINES_SPAN:
-            return False
-        times.append(now)
-        return True
-
-    def _log(self, changed: Sequence[Status]) -> None:
-        """Log the changed statuses, those with one message together: the sensors of a topic fall silent as one."""
-        groups: dict[str, list[str]] = {}
-        for status in changed:
-            groups.setdefault(status.message, []).append(status.name)
-        text = "; ".join(f"{', '.join(names)}: {message}" for message, names in groups.items())
-        if any(status.level != Level.OK for status in changed):
-            self._logger.warning(text)
-        elif changed:
-            self._logger.info(text)
-
-    def _message(self, status: Status) -> DiagnosticStatus:
-        return DiagnosticStatus(
-            name=f"{self._name}: {status.name}",
-            level=bytes([status.level]),
-            message=_text(status.message),
-            hardware_id=self._hardware_id,
-            values=[KeyValue(key=key, value=_text(value)) for key, value in status.values.items()],
-        )
-
-
-def _text(value: str | int | float) -> str:
-    """Return a value as text for a program: a float with nine digits, a text with control characters escaped, as in the log."""
-    return f"{value:.9g}" if isinstance(value, float) else printable(str(value), keep="")
 
 
 class GraphPeers:
@@ -165,13 +87,6 @@ def _reason(offered: QoSProfile, asked: QoSProfile) -> str:
     """Return why the two are incompatible; empty if they are compatible."""
     verdict, reason = qos_check_compatible(offered, asked)
     return str(reason).removeprefix("ERROR: ").rstrip(";") if verdict == QoSCompatibility.ERROR else ""
-
-
-def node_name(endpoint: Any) -> str:
-    """Return namespace and name of the node of a discovered publisher or subscriber."""
-    if "UNKNOWN" in endpoint.node_name:  # so rmw calls a node that it has not heard of
-        return "a node without a known name"
-    return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
 
 
 class ClockCheck:
