@@ -4,24 +4,30 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..errors import Fault, SceneError
+from ..errors import BoomTwinError, Fault, SceneError, UsageError
 from ..scene import Scene
+from ..scene.kinematics import strokes_of_posture
 from ..scene.load import DEFAULT_NAME, examine
 from ..scene.oil_spring import STATIONS
 from ..scene.schema import Clearance
 from ..scene.segmentation import LEAST
 from ..scene.summary import UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from ..system.atomic_files import check_target
-from . import accuracy
+from ..types import Stream
 from . import reduce as need
 from .arguments import add_file, add_json, add_scene, files_of
 from .output import columns, open_scene, print_result, tell
 
+if TYPE_CHECKING:
+    from ..deviation.accuracy import TipAccuracy
+
 PNG = b"\x89PNG"
 """How a picture begins; one that is there is replaced."""
+SENSOR_NAMES = {"angles": Stream.ANGLES, "imu": Stream.IMU, "forces": Stream.FORCES}
 SIZE_A = "angle of the section, cylinder force"
 SIZE_B = "angles of section and two links, pin force (2), cylinder force"
 
@@ -33,7 +39,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--strict", action="store_true", help="warnings are errors: the exit code is 1 if there are any")
     add_file(parser, "--picture", "PNG file to draw: all pins, links and cylinders over the range of each joint")
     need.add_arguments(parser)
-    accuracy.add_arguments(parser)
+    parser.add_argument(
+        "--sensors",
+        metavar="NAME,..",
+        help=f"also tell how accurate the estimate of the tip is with these and with fewer, at every posture of the scene: "
+        f"{', '.join(SENSOR_NAMES)}; a name given twice is two such sensors (example: angles,imu,imu)",
+    )
 
 
 def run(args: Namespace) -> int:
@@ -41,7 +52,7 @@ def run(args: Namespace) -> int:
     need.refuse_misuse(args)
     if args.picture is not None:
         check_target(args.picture, files_of(args, "scene"), PNG)
-    sensors = None if args.sensors is None else accuracy.sensors_of(args.sensors)
+    sensors = None if args.sensors is None else _sensors_of(args.sensors)
     scene, oddities = examine(args.scene)
     name = args.scene or DEFAULT_NAME
     drawn = [] if args.picture is None else [f"Written: {_draw(args.picture, scene, name)}"]
@@ -59,7 +70,7 @@ def run(args: Namespace) -> int:
             need.write(args.scene, scene, found, args.need, args.out)
             lines.append(f"Written: {args.out}")
     if sensors is not None:
-        told, rows = accuracy.table(scene, sensors)
+        told, rows = _accuracy(scene, sensors)
         values |= told
         lines += rows
     print_result(args.json, values, lines + drawn)
@@ -247,3 +258,56 @@ def _unknowns(account: Account) -> list[str]:
 def _table(rows: list[list[str]], left: int = 1) -> list[str]:
     """Return aligned and indented columns, the first `left` of them to the left, the others to the right."""
     return [f"  {line}" for line in columns(rows, range(left))] if rows else []
+
+
+def _sensors_of(text: str) -> list[Stream]:
+    """Return the sensors named in `text`; raise UsageError for an unknown name."""
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    for name in names:
+        if name not in SENSOR_NAMES:
+            raise UsageError(f"--sensors: {name!r} is no sensor. Known: {', '.join(SENSOR_NAMES)}.")
+    return [SENSOR_NAMES[name] for name in names]
+
+
+def _sets_of(sensors: list[Stream]) -> list[tuple[Stream, ...]]:
+    """Return every selection of sensors once, fewest first, the empty one included."""
+    found = [chosen for count in range(len(sensors) + 1) for chosen in combinations(sensors, count)]
+    return list(dict.fromkeys(found))
+
+
+def _sensor_words(chosen: tuple[Stream, ...]) -> str:
+    """Return a selection as it is written on the command line."""
+    names = {stream: name for name, stream in SENSOR_NAMES.items()}
+    return ",".join(names[stream] for stream in chosen) or "strokes only"
+
+
+def _accuracy(scene: Scene, sensors: list[Stream]) -> tuple[dict[str, Any], list[str]]:
+    """Return the accuracy at every posture, as values for ``--json`` and as lines."""
+    from ..deviation.accuracy import accuracy_at
+
+    values: dict[str, Any] = {}
+    acting = "an unknown load of 0.25 % of the boom's weight comes and goes at the tip"
+    lines = ["", f"Accuracy of the estimate at rest, while {acting} (standard deviations)"]
+    titles = f"{'tip x, y mm':>16} {'pitch mrad':>11} {'acceleration':>13} {'load N':>14}"
+    lines.append(f"  {'posture':12} {'sensors beside strokes':24} {titles}")
+    for posture in scene.postures:
+        for chosen in _sets_of(sensors):
+            try:
+                found = accuracy_at(scene, strokes_of_posture(scene, posture), chosen)
+            except BoomTwinError as error:
+                lines.append(f"  {posture:12} {_sensor_words(chosen):24} {error}")
+                continue
+            values[f"accuracy_{posture}:{_sensor_words(chosen)}"] = [
+                *found.tip.tolist(),
+                *found.acceleration.tolist(),
+                *found.load.tolist(),
+            ]
+            lines.append(f"  {posture:12} {_sensor_words(chosen):24} {_accuracy_row(found)}")
+    return values, lines
+
+
+def _accuracy_row(found: TipAccuracy) -> str:
+    x, y, pitch = 1e3 * found.tip
+    acceleration = float((found.acceleration**2).sum() ** 0.5)
+    load = f"{found.load[0]:.0f}, {found.load[1]:.0f}"
+    return f"{f'{x:.2f}, {y:.2f}':>16} {pitch:11.2f} {acceleration:7.3f} m/s² {load:>14}"
