@@ -26,8 +26,8 @@ def add_scene(parser: ArgumentParser) -> None:
 
 def add_session_scene(parser: ArgumentParser) -> None:
     """Declare ``--scene`` of a command that reads a session; see `boom_twin.cli.output.open_session_scene`."""
-    told = "scene file (YAML); without it, the one that the session was made with, else the default scene"
-    parser.add_argument("--scene", metavar="SCENE", help=told)
+    purpose = "scene file (YAML); without it, the one that the session was made with, else the default scene"
+    parser.add_argument("--scene", metavar="SCENE", help=purpose)
 
 
 def add_place(parser: ArgumentParser) -> Any:
@@ -40,9 +40,9 @@ def add_place(parser: ArgumentParser) -> Any:
     return where
 
 
-def add_file(parser: ArgumentParser, option: str, told: str, metavar: str = "FILE") -> None:
+def add_file(parser: ArgumentParser, option: str, purpose: str, metavar: str = "FILE") -> None:
     """Declare an option whose value is a path."""
-    parser.add_argument(option, metavar=metavar, type=Path, help=told)
+    parser.add_argument(option, metavar=metavar, type=Path, help=purpose)
 
 
 def add_params(parser: ArgumentParser) -> None:
@@ -52,8 +52,8 @@ def add_params(parser: ArgumentParser) -> None:
 
 def add_mapping(parser: ArgumentParser) -> None:
     """Declare ``--mapping``, for `boom_twin.bag.session_model.mapping_of`."""
-    told = "topics and sensors; by default as the session was recorded, else what `boom_twin mapping` prints"
-    add_file(parser, "--mapping", told)
+    purpose = "topics and sensors; by default as the session was recorded, else what `boom_twin mapping` prints"
+    add_file(parser, "--mapping", purpose)
 
 
 def add_window(parser: ArgumentParser) -> None:
@@ -78,13 +78,13 @@ def add_json(parser: ArgumentParser) -> None:
 def add_ros_args(parser: ArgumentParser) -> None:
     """Declare ``--namespace`` and ``--ros-args``, for `ros_arguments`."""
     add_namespace(parser, "ROS namespace of the twin: --namespace front is short for --ros-args -r __ns:=/front")
-    told = "namespace, remappings and enclave, as for any node: -r cylinder_strokes:=/rig/strokes -e /boom_twin/recorder"
-    parser.add_argument("--ros-args", nargs=REMAINDER, default=[], help=told)
+    purpose = "namespace, remappings and enclave, as for any node: -r cylinder_strokes:=/rig/strokes -e /boom_twin/recorder"
+    parser.add_argument("--ros-args", nargs=REMAINDER, default=[], help=purpose)
 
 
-def add_namespace(parser: ArgumentParser, told: str) -> None:
+def add_namespace(parser: ArgumentParser, purpose: str) -> None:
     """Declare ``--namespace``."""
-    parser.add_argument("--namespace", metavar="NAME", default="", help=told)
+    parser.add_argument("--namespace", metavar="NAME", default="", help=purpose)
 
 
 def ros_arguments(args: Namespace) -> list[str]:
@@ -99,14 +99,14 @@ def files_of(args: Namespace, *names: str) -> list[Path]:
     return [Path(path) for value in values if value for path in (value if isinstance(value, list) else [value])]
 
 
-def refuse_given(args: Namespace, told: str, *names: str) -> None:
-    """Raise UsageError, with the remedy `told`, if one of these arguments is given."""
+def refuse_given(args: Namespace, remedy: str, *names: str) -> None:
+    """Raise UsageError, with the `remedy`, if one of these arguments is given."""
     for name in names:
         value = getattr(args, name)
         if value is not None and value is not False:
             first = value[0] if isinstance(value, list) else value
             shown = "" if value is True else f" {first:g}" if isinstance(first, float) else f" {first}"
-            raise UsageError(f"--{name.replace('_', '-')}{shown}: {told}")
+            raise UsageError(f"--{name.replace('_', '-')}{shown}: {remedy}")
 
 
 def positive(text: str) -> float:

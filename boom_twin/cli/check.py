@@ -63,15 +63,15 @@ def run(args: Namespace) -> int:
     account = explain(scene)
     values, lines = summary(name, account, oddities) | _restitutions(scene), report(name, scene, account, oddities)
     if args.need is not None:
-        found = need.search(scene, args.need, None if args.against is None else open_scene(args.against))
-        values |= need.summary(found, args.need)
-        lines += need.report(scene, found, args.need)
+        result = need.search(scene, args.need, None if args.against is None else open_scene(args.against))
+        values |= need.summary(result, args.need)
+        lines += need.report(scene, result, args.need)
         if args.out is not None:
-            need.write(args.scene, scene, found, args.need, args.out)
+            need.write(args.scene, scene, result, args.need, args.out)
             lines.append(f"Written: {args.out}")
     if sensors is not None:
-        told, rows = _accuracy(scene, sensors)
-        values |= told
+        accuracy, rows = _accuracy(scene, sensors)
+        values |= accuracy
         lines += rows
     print_result(args.json, values, lines + drawn)
     return 0
@@ -271,8 +271,8 @@ def _sensors_of(text: str) -> list[Stream]:
 
 def _sets_of(sensors: list[Stream]) -> list[tuple[Stream, ...]]:
     """Return every selection of sensors once, fewest first, the empty one included."""
-    found = [chosen for count in range(len(sensors) + 1) for chosen in combinations(sensors, count)]
-    return list(dict.fromkeys(found))
+    result = [chosen for count in range(len(sensors) + 1) for chosen in combinations(sensors, count)]
+    return list(dict.fromkeys(result))
 
 
 def _sensor_words(chosen: tuple[Stream, ...]) -> str:
@@ -293,21 +293,21 @@ def _accuracy(scene: Scene, sensors: list[Stream]) -> tuple[dict[str, Any], list
     for posture in scene.postures:
         for chosen in _sets_of(sensors):
             try:
-                found = accuracy_at(scene, strokes_of_posture(scene, posture), chosen)
+                result = accuracy_at(scene, strokes_of_posture(scene, posture), chosen)
             except BoomTwinError as error:
                 lines.append(f"  {posture:12} {_sensor_words(chosen):24} {error}")
                 continue
             values[f"accuracy_{posture}:{_sensor_words(chosen)}"] = [
-                *found.tip.tolist(),
-                *found.acceleration.tolist(),
-                *found.load.tolist(),
+                *result.tip.tolist(),
+                *result.acceleration.tolist(),
+                *result.load.tolist(),
             ]
-            lines.append(f"  {posture:12} {_sensor_words(chosen):24} {_accuracy_row(found)}")
+            lines.append(f"  {posture:12} {_sensor_words(chosen):24} {_accuracy_row(result)}")
     return values, lines
 
 
-def _accuracy_row(found: TipAccuracy) -> str:
-    x, y, pitch = 1e3 * found.tip
-    acceleration = float((found.acceleration**2).sum() ** 0.5)
-    load = f"{found.load[0]:.0f}, {found.load[1]:.0f}"
+def _accuracy_row(result: TipAccuracy) -> str:
+    x, y, pitch = 1e3 * result.tip
+    acceleration = float((result.acceleration**2).sum() ** 0.5)
+    load = f"{result.load[0]:.0f}, {result.load[1]:.0f}"
     return f"{f'{x:.2f}, {y:.2f}':>16} {pitch:11.2f} {acceleration:7.3f} m/s² {load:>14}"

@@ -1,4 +1,4 @@
-"""What commands open and print: results on stdout, what is told on the way on stderr."""
+"""Scenes and sessions that commands open, and what they print: results on stdout, news and warnings on stderr."""
 
 from __future__ import annotations
 

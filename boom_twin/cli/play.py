@@ -47,8 +47,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--wait", type=not_negative, default=10.0, metavar="S", help="wait so long for listeners (10; 0: do not)"
     )
-    told = "listeners to every topic to wait for: 2 where node and recorder listen (1)"
-    parser.add_argument("--listeners", type=int, choices=range(1, 100), default=1, metavar="N", help=told)
+    purpose = "listeners to every topic to wait for: 2 where node and recorder listen (1)"
+    parser.add_argument("--listeners", type=int, choices=range(1, 100), default=1, metavar="N", help=purpose)
     add_ros_args(parser)
 
 
@@ -68,8 +68,7 @@ def run(args: Namespace) -> int:
         try:
             _play(player, args, length)
             if late := player.deliver():
-                told = "some listener did not acknowledge all of"
-                warn(f"{told} {', '.join(late)}: a recording of it may lack its end")
+                warn(f"some listener did not acknowledge all of {', '.join(late)}: a recording of it may lack its end")
         except KeyboardInterrupt:
             if not args.loop:
                 raise
@@ -116,8 +115,8 @@ def _check_listeners(unmatched: list[str], unheard: list[str], topics: int, args
             f"nobody listened within {args.wait:g} s. Start twin_node, check ROS_DOMAIN_ID and namespace, or play anyway "
             "with --wait 0."
         )
-    told = "nobody listens" if args.listeners == 1 else f"fewer than {args.listeners} listen"
-    warn(f"{told} to {', '.join(unmatched)}")
+    listeners = "nobody listens" if args.listeners == 1 else f"fewer than {args.listeners} listen"
+    warn(f"{listeners} to {', '.join(unmatched)}")
 
 
 class Keys:

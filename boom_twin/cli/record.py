@@ -74,8 +74,8 @@ def run(args: Namespace) -> int:
     wanted, sheet = _wanted(args, known), _sheet(args)
     given = {"origin": args.origin, "note": args.note}
     check_lasting(args.out)
-    if args.out.is_dir() and (told := incompleteness(args.out)):
-        raise BoomTwinError(f"{args.out}: {told} Record into a new directory.")
+    if args.out.is_dir() and (reason := incompleteness(args.out)):
+        raise BoomTwinError(f"{args.out}: {reason} Record into a new directory.")
     with ros(ros_arguments(args)), recorder_node() as node:
         load_settings(args.params, node.get_namespace())  # raises if they cannot be used
         thresholds = load_thresholds(args.params or DEFAULT_PARAMETERS, node.get_namespace())
@@ -85,9 +85,9 @@ def run(args: Namespace) -> int:
         bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
         sheet.write(args.out)
 
-        def on_twin(told: Mapping[str, Any]) -> None:
+        def on_twin(answers: Mapping[str, Any]) -> None:
             nonlocal sheet
-            more = _with_twin_values(sheet, told, known.frame, str(args.mapping or ""))
+            more = _with_twin_values(sheet, answers, known.frame, str(args.mapping or ""))
             try:
                 more.write(args.out)
                 sheet = more
@@ -130,7 +130,7 @@ def _sheet(args: Namespace) -> SessionSheet:
     )
 
 
-def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any], frame: str, given_mapping: str) -> SessionSheet:
+def _with_twin_values(sheet: SessionSheet, answers: Mapping[str, Any], frame: str, given_mapping: str) -> SessionSheet:
     """Return the session metadata with what the running twin reports. Given texts stay, and a difference is reported.
 
     The prefix that the twin puts before the `frame` of the mapping becomes part of the mapping, so that a replay has it too.
@@ -138,18 +138,18 @@ def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any], frame: str, 
     from ..ros.bag.recorder import TEXTS
     from ..ros.bag.subscriptions import with_mapped
 
-    changes: dict[str, Any] = {"twin": told["parameters"]} if "parameters" in told else {}
-    if prefix := told.get("parameters", {}).get("frame_prefix"):
+    changes: dict[str, Any] = {"twin": answers["parameters"]} if "parameters" in answers else {}
+    if prefix := answers.get("parameters", {}).get("frame_prefix"):
         changes["mapping"] = with_mapped(sheet.mapping or "", ("frame",), prefix + frame)
-    own_mapping = told.get("parameters", {}).get("mapping")
+    own_mapping = answers.get("parameters", {}).get("mapping")
     if own_mapping and (not given_mapping or Path(own_mapping).resolve() != Path(given_mapping).resolve()):
         warn(
             f"the running twin has the mapping {own_mapping}, and session.yaml holds "
             f"{given_mapping or 'the default one'}: a replay would differ. Record with --mapping {own_mapping}"
         )
     for name in TEXTS:
-        if name in told:
-            given, own = getattr(sheet, name), told[name]
+        if name in answers:
+            given, own = getattr(sheet, name), answers[name]
             if given is None:
                 changes[name] = own
             elif given != own:

@@ -76,64 +76,65 @@ def search(scene: Scene, most: float, against: Scene | None) -> Proposal:
         if sys.stderr.isatty():
             print(f"\r{what:70s}\r", end="", file=sys.stderr, flush=True)
 
-    found = propose(against or scene, most, scene, show)
+    proposal = propose(against or scene, most, scene, show)
     show("")
-    return found
+    return proposal
 
 
-def summary(found: Proposal, most: float) -> dict[str, Any]:
+def summary(proposal: Proposal, most: float) -> dict[str, Any]:
     """Return the keys that ``--need`` adds to the flat object of ``check``."""
     return {
         "need_tip_m": most,
-        "lean_edits": [str(edit) for edit in found.edits],
-        "lean_tip_error_m": found.deviation.worst,
-        "lean_rest_error_m": found.deviation.rest,
-        "lean_rest_error_at": found.deviation.where,
-        "lean_move_error_rms_m": found.deviation.rms,
-        "lean_move_error_max_m": found.deviation.most,
-        "measured_at_rest_in": list(found.course.names),
-        "measured_in_move": found.course.motion.label,
+        "lean_edits": [str(edit) for edit in proposal.edits],
+        "lean_tip_error_m": proposal.deviation.worst,
+        "lean_rest_error_m": proposal.deviation.rest,
+        "lean_rest_error_at": proposal.deviation.where,
+        "lean_move_error_rms_m": proposal.deviation.rms,
+        "lean_move_error_max_m": proposal.deviation.most,
+        "measured_at_rest_in": list(proposal.course.names),
+        "measured_in_move": proposal.course.motion.label,
         "note": ANOTHER,
-        "step_s": found.course.step,
-        "full_step_time_s": found.seconds[0],
-        "lean_step_time_s": found.seconds[1],
-        "full_unknowns": found.unknowns[0],
-        "lean_unknowns": found.unknowns[1],
-        "next": None if found.next is None else found.next[0],
-        "next_tip_error_m": None if found.next is None else found.next[1],
+        "step_s": proposal.course.step,
+        "full_step_time_s": proposal.seconds[0],
+        "lean_step_time_s": proposal.seconds[1],
+        "full_unknowns": proposal.unknowns[0],
+        "lean_unknowns": proposal.unknowns[1],
+        "next": None if proposal.next is None else proposal.next[0],
+        "next_tip_error_m": None if proposal.next is None else proposal.next[1],
     }
 
 
-def report(scene: Scene, found: Proposal, most: float) -> list[str]:
+def report(scene: Scene, proposal: Proposal, most: float) -> list[str]:
     """Return lines of text for a reader."""
-    off, course, (full, lean) = found.deviation, found.course, found.seconds
+    off, course, (full, lean) = proposal.deviation, proposal.course, proposal.seconds
     lines = ["", f"Leanest model found that keeps the tip within {_length(most)}"]
-    width = max((len(str(edit)) for edit in found.edits), default=0)
-    lines += [f"  {edit!s:{width}}  {_meaning(scene, edit)}" for edit in found.edits] or ["  this one: nothing can be left out"]
-    if found.next is not None:
-        lines.append(f"  not: {found.next[0]}, the tip would be {_length(found.next[1])} off")
+    width = max((len(str(edit)) for edit in proposal.edits), default=0)
+    edits = [f"  {edit!s:{width}}  {_meaning(scene, edit)}" for edit in proposal.edits]
+    lines += edits or ["  this one: nothing can be left out"]
+    if proposal.next is not None:
+        lines.append(f"  not: {proposal.next[0]}, the tip would be {_length(proposal.next[1])} off")
     lines += [f"  {FREE}", "", "Its tip against the full model's"]
     lines.append(f"  at rest    {_length(off.rest)} at most, in {off.where} (of: {', '.join(course.names)})")
     lines.append(f"  in a move  {_length(off.rms)} rms, {_length(off.most)} at most; {course.motion.label}")
     lines += [f"  {ANOTHER}", "", f"Run time of a step of {1e3 * course.step:g} ms, least of interleaved runs"]
-    lines.append(f"  full  {1e6 * full:6.1f} us  {found.unknowns[0]:4d} unknowns")
-    lines.append(f"  lean  {1e6 * lean:6.1f} us  {found.unknowns[1]:4d} unknowns, {full / lean:.2f} times as fast")
+    lines.append(f"  full  {1e6 * full:6.1f} us  {proposal.unknowns[0]:4d} unknowns")
+    lines.append(f"  lean  {1e6 * lean:6.1f} us  {proposal.unknowns[1]:4d} unknowns, {full / lean:.2f} times as fast")
     return lines
 
 
-def write(source: str | None, scene: Scene, found: Proposal, most: float, out: Path) -> None:
+def write(source: str | None, scene: Scene, proposal: Proposal, most: float, out: Path) -> None:
     """Write the lean scene as a file: the text of `source` (None: the default scene) with the edits made."""
     from ..scene.edit import rewritten
 
     text = default_text() if source is None else read_text(Path(source))
     head = [
         f"# Lean model of {source or 'the default scene'}, by boom_twin check --need tip={most:g}:",
-        *(f"#   {edit}" for edit in found.edits),
-        f"# Tip at most {_length(found.deviation.worst)} from the full model's, at rest in the postures and in a move",
-        f"# ({found.course.motion.label}).",
+        *(f"#   {edit}" for edit in proposal.edits),
+        f"# Tip at most {_length(proposal.deviation.worst)} from the full model's, at rest in the postures and in a move",
+        f"# ({proposal.course.motion.label}).",
         f"# {ANOTHER}",
     ]
-    body = "\n".join(head) + "\n\n" + rewritten(text, scene, found.edits)
+    body = "\n".join(head) + "\n\n" + rewritten(text, scene, proposal.edits)
     write_atomic(out, with_end_mark(body))
 
 

@@ -46,13 +46,13 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     usual = "what is known of this rig while all is well; by default as the session was recorded, else the package's"
     add_file(parser, "--baseline", usual)
-    told = (
+    purpose = (
         "name what is wrong with the boom, if one cause explains the readings, by twins that have it; takes ten times as long"
     )
-    parser.add_argument("--causes", action="store_true", help=told)
+    parser.add_argument("--causes", action="store_true", help=purpose)
     parser.add_argument("--no-health", action="store_true", help="do not judge the rig's health")
-    told = "do not write the result bag; output_sha256 of the summary is null then, all else is the same"
-    parser.add_argument("--no-bag", action="store_true", help=told)
+    purpose = "do not write the result bag; output_sha256 of the summary is null then, all else is the same"
+    parser.add_argument("--no-bag", action="store_true", help=purpose)
     drawn = parser.add_mutually_exclusive_group()
     drawn.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
     drawn.add_argument("--report", action="store_true", help="write report.html too, to read or to print")
@@ -60,10 +60,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         "heights of the sections in m, for the stresses in the report; by default the scene's, else those of thin-walled boxes"
     )
     parser.add_argument("--section-height", metavar="H1,H2,..", help=heights)
-    told = "in the report, fatigue of all stations: detail category of EN 1993-1-9, MPa (default 71); extra fatigue"
-    parser.add_argument("--fatigue", nargs="?", type=float, const=71.0, metavar="CATEGORY", help=told)
-    told = "write samples.csv or samples.parquet (by pyarrow): predicted, measured, estimated, a row for every stroke stamp"
-    parser.add_argument("--table", choices=("csv", "parquet"), help=told)
+    purpose = "in the report, fatigue of all stations: detail category of EN 1993-1-9, MPa (default 71); extra fatigue"
+    parser.add_argument("--fatigue", nargs="?", type=float, const=71.0, metavar="CATEGORY", help=purpose)
+    purpose = "write samples.csv or samples.parquet (by pyarrow): predicted, measured, estimated, a row for every stroke stamp"
+    parser.add_argument("--table", choices=("csv", "parquet"), help=purpose)
     add_json(parser)
 
 

@@ -34,8 +34,8 @@ SPARSE = 1.0  # s from row to row
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    told = "the posture that the first row must be in: a name, or section angles, deg; else it may be any"
-    parser.add_argument("--posture", metavar="NAME", help=told)
+    purpose = "the posture that the first row must be in: a name, or section angles, deg; else it may be any"
+    parser.add_argument("--posture", metavar="NAME", help=purpose)
     followed = parser.add_mutually_exclusive_group(required=True)
     followed.add_argument("--drive", metavar="IN.csv", help="t_s,stroke_1_m,.. (absolute strokes of the drives)")
     lengths = "t_s,length_1_m,.. or, as in a session, stroke_1_m,..: cylinder lengths, as transducers read them"
@@ -152,10 +152,10 @@ def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles:
     write_atomic(table, columns_text(found.samples))
     spread = {name: np.quantile(values, (0.025, 0.5, 0.975)) for name, values in found.samples.items()}
     right = args.samples - len(found.failures)
-    told = {"out": args.out, "samples_out": str(table), "samples": right, "left_out": len(found.failures), "seed": args.seed}
+    figures = {"out": args.out, "samples_out": str(table), "samples": right, "left_out": len(found.failures), "seed": args.seed}
     lines = [f"{name:28s} {numbers(values)}" for name, values in spread.items()]
     head = f"{right} samples; 2.5 %, 50 %, 97.5 % of them, SI:"
-    print_result(args.json, told | spread, [head, *lines, args.out, str(table)])
+    print_result(args.json, figures | spread, [head, *lines, args.out, str(table)])
     return 0
 
 
@@ -189,7 +189,7 @@ def _start(args: Namespace, scene: Scene, first: Array, angles: Array | None) ->
 def as_json(result: Simulation, out: str, balances: Balances | None) -> dict[str, object]:
     """Return the figures of a simulation; with the balances of energy and momentum, if given."""
     x, y = result.tip[:, 0], result.tip[:, 1]
-    told: dict[str, object] = {
+    figures: dict[str, object] = {
         "out": out,
         "rows": len(result.times),
         "duration_s": float(result.times[-1] - result.times[0]),
@@ -205,23 +205,26 @@ def as_json(result: Simulation, out: str, balances: Balances | None) -> dict[str
     if balances is not None:
         energy, momentum = balances
         names = ("work", "change", "damping", "contact", "gap", "left")
-        told |= {f"energy_{name}_J": getattr(energy, name) for name in names} | {"energy_gap_share": energy.share}
-        told |= {"momentum_gap_N_s": momentum.linear_gap, "momentum_gap_share": momentum.linear_share}
-        told |= {"moment_of_momentum_gap_N_m_s": momentum.angular_gap, "moment_of_momentum_gap_share": momentum.angular_share}
-    return told
+        figures |= {f"energy_{name}_J": getattr(energy, name) for name in names} | {"energy_gap_share": energy.share}
+        figures |= {"momentum_gap_N_s": momentum.linear_gap, "momentum_gap_share": momentum.linear_share}
+        figures |= {
+            "moment_of_momentum_gap_N_m_s": momentum.angular_gap,
+            "moment_of_momentum_gap_share": momentum.angular_share,
+        }
+    return figures
 
 
 def as_text(result: Simulation, out: str, start: str, balances: Balances | None) -> list[str]:
     """Return the lines of text with the figures of a simulation."""
-    told = as_json(result, out, balances)
+    figures = as_json(result, out, balances)
     (x, y), (end_x, end_y) = result.tip[0, :2], result.tip[-1, :2]
     began = {"rest": "started at rest ", "undeflected": "undeflected     "}.get(start, "went on         ")
     lines = [
         f"{began}  strokes {numbers(result.strokes[0])} m, tip x {x:.4f} m, y {y:.4f} m",
-        f"followed          {told['rows']} rows, {told['duration_s']:g} s; the tip went {told['tip_travel_m']:.3f} m "
+        f"followed          {figures['rows']} rows, {figures['duration_s']:g} s; the tip went {figures['tip_travel_m']:.3f} m "
         f"to x {end_x:.4f} m, y {end_y:.4f} m",
-        f"tip acceleration  {told['tip_acceleration_max_m_s2']:.3g} m/s^2 at most",
-        f"cylinder forces   {numbers(told['cylinder_force_max_N'], 1e-3)} kN at most",
+        f"tip acceleration  {figures['tip_acceleration_max_m_s2']:.3g} m/s^2 at most",
+        f"cylinder forces   {numbers(figures['cylinder_force_max_N'], 1e-3)} kN at most",
     ]
     lines += [f"{name}: contact lost {lost} times" for name, lost in zip(result.pin_names, result.lost_contacts, strict=True)]
     return [*lines, *(f"{balance}." for balance in balances or ()), out]

@@ -25,38 +25,38 @@ def run(args: Namespace) -> int:
     from ..analysis.equilibrium import statics
 
     scene = open_scene(args.scene)
-    found = statics(scene, strokes=args.strokes, posture=args.posture, lengths=args.lengths)
-    for doubt in found.doubts:
+    result = statics(scene, strokes=args.strokes, posture=args.posture, lengths=args.lengths)
+    for doubt in result.doubts:
         warn(f"{doubt}.")
-    print_result(args.json, as_json(found), as_text(found))
+    print_result(args.json, as_json(result), as_text(result))
     return 0
 
 
-def as_json(found: Equilibrium) -> dict[str, object]:
+def as_json(result: Equilibrium) -> dict[str, object]:
     """Return the keys of a result; `warnings` only if there are any."""
-    told: dict[str, object] = {
-        "stroke_m": found.strokes,
-        "length_m": found.lengths,
-        "tip_rigid_m": found.tip_rigid,
-        "tip_m": found.tip,
-        "joint_rad": found.joints,
-        "cylinder_force_N": found.cylinder_forces,
-        "frequencies_Hz": found.frequencies,
+    values: dict[str, object] = {
+        "stroke_m": result.strokes,
+        "length_m": result.lengths,
+        "tip_rigid_m": result.tip_rigid,
+        "tip_m": result.tip,
+        "joint_rad": result.joints,
+        "cylinder_force_N": result.cylinder_forces,
+        "frequencies_Hz": result.frequencies,
     }
-    return told | {"warnings": found.doubts} if found.doubts else told
+    return values | {"warnings": result.doubts} if result.doubts else values
 
 
-def as_text(found: Equilibrium) -> list[str]:
+def as_text(result: Equilibrium) -> list[str]:
     """Return the lines of a short table, one joint a line."""
-    (x, y), (dx, dy) = found.tip, found.tip - found.tip_rigid
+    (x, y), (dx, dy) = result.tip, result.tip - result.tip_rigid
     lines = [
         f"tip            x {x:.4f} m, y {y:.4f} m",
         f"deflection     x {1e3 * dx:+.1f} mm, y {1e3 * dy:+.1f} mm against rigid sections and cylinders",
         "",
         "joint    drive m    length m   angle deg   cylinder force kN",
     ]
-    for i in range(len(found.strokes)):
-        angle, force = math.degrees(found.joints[i]), 1e-3 * found.cylinder_forces[i]
-        lines.append(f"{i + 1:5d} {found.strokes[i]:10.4f} {found.lengths[i]:11.4f} {angle:11.3f} {force:+19.3f}")
-    frequencies = ", ".join(f"{value:.3f}" for value in found.frequencies) or "none: nothing in this model can vibrate"
+    for i in range(len(result.strokes)):
+        angle, force = math.degrees(result.joints[i]), 1e-3 * result.cylinder_forces[i]
+        lines.append(f"{i + 1:5d} {result.strokes[i]:10.4f} {result.lengths[i]:11.4f} {angle:11.3f} {force:+19.3f}")
+    frequencies = ", ".join(f"{value:.3f}" for value in result.frequencies) or "none: nothing in this model can vibrate"
     return [*lines, "", f"natural frequencies Hz   {frequencies}"]
