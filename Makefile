@@ -42,11 +42,11 @@ warm: $(READY)
 	@$(BIN)/python -c 'from boom_twin import Twin, load_scene; Twin(load_scene()).warm_up()'
 
 demo: warm
-	$(BIN)/python -P -m boom_twin.ros.demo.demo --out out/demo $(if $(DOMAIN),--domain $(DOMAIN))
-	$(BIN)/python -P -m boom_twin.ros.demo.demo --bag bags/pump_session --out out/demo_pump $(if $(DOMAIN),--domain $(DOMAIN))
+	PYTHONPATH=test $(BIN)/python -P -m demo.demo --out out/demo $(if $(DOMAIN),--domain $(DOMAIN))
+	PYTHONPATH=test $(BIN)/python -P -m demo.demo --bag bags/pump_session --out out/demo_pump $(if $(DOMAIN),--domain $(DOMAIN))
 
 demo-live: warm
-	$(BIN)/python -P -m boom_twin.ros.demo.demo_live --out out/demo_live $(if $(DOMAIN),--domain $(DOMAIN))
+	PYTHONPATH=test $(BIN)/python -P -m demo.demo_live --out out/demo_live $(if $(DOMAIN),--domain $(DOMAIN))
 
 test: lint warm
 	$(BIN)/python -m pytest $(PARALLEL) -m "not slow"

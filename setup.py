@@ -27,7 +27,6 @@ setup(
             *(f"msg_config/*.{end}" for end in ("yaml", "rviz", "json", "xml")),
             "examples/*.yaml",
             "monitor/page/*",
-            "ros/*.xml",
         ]
     },
     data_files=[

@@ -12,7 +12,7 @@ from zlib import crc32
 import pytest
 
 if TYPE_CHECKING:
-    from boom_twin.ros.isolation import Isolation
+    from demo.isolation import Isolation
 
 sys.path.insert(0, str(Path(__file__).parent))
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # several processes share the tests: its threads only wait for one another
@@ -48,7 +48,7 @@ def isolation() -> Iterator[Isolation]:
     All that starts a ROS node in this process needs it: the middleware takes a process into a partition when its first node
     starts, and never again.
     """
-    from boom_twin.ros.isolation import isolated
+    from demo.isolation import isolated
 
     with isolated() as claimed:
         yield claimed

@@ -1,16 +1,112 @@
-"""Arguments that several commands have: numbers within bounds, and the window of a session."""
+"""Arguments that several commands have, and the parsing of their values."""
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import REMAINDER, SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Callable
+from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from ..errors import UsageError
 
 if TYPE_CHECKING:
     from ..bag.time_window import TimeWindow
 
 
 SESSION = "a rosbag2 directory, a directory of its files, or one file: .mcap, .db3, .bag of ROS 1, .csv"
+
+
+def add_scene(parser: ArgumentParser) -> None:
+    """Declare the scene file, as ``--scene`` or as a positional argument; without it, the default scene."""
+    either = parser.add_mutually_exclusive_group()
+    either.add_argument("--scene", metavar="SCENE", help="scene file (YAML); without it, the default scene")
+    either.add_argument("scene", nargs="?", default=SUPPRESS, metavar="SCENE", help="the same, without --scene before it")
+
+
+def add_session_scene(parser: ArgumentParser) -> None:
+    """Declare ``--scene`` of a command that reads a session; see `boom_twin.cli.output.open_session_scene`."""
+    purpose = "scene file (YAML); without it, the one that the session was made with, else the default scene"
+    parser.add_argument("--scene", metavar="SCENE", help=purpose)
+
+
+def add_place(parser: ArgumentParser) -> Any:
+    """Declare ``--posture``, ``--strokes`` and ``--lengths``, of which one is needed; return their group."""
+    where = parser.add_mutually_exclusive_group(required=True)
+    where.add_argument("--posture", metavar="P", help="a posture of the scene, or section angles, deg: 60,-20,-30")
+    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes of the drives, m")
+    read = "cylinder lengths less closed_length, m: what stroke transducers read of the boom at rest"
+    where.add_argument("--lengths", type=numbers, metavar="L1,..,LN", help=read)
+    return where
+
+
+def add_file(parser: ArgumentParser, option: str, purpose: str, metavar: str = "FILE") -> None:
+    """Declare an option whose value is a path."""
+    parser.add_argument(option, metavar=metavar, type=Path, help=purpose)
+
+
+def add_params(parser: ArgumentParser) -> None:
+    """Declare ``--params``, see `boom_twin.cli.output.open_session_settings`."""
+    add_file(parser, "--params", "ROS parameter file (as recorded, else the package's twin.yaml)")
+
+
+def add_mapping(parser: ArgumentParser) -> None:
+    """Declare ``--mapping``, for `boom_twin.bag.session_model.mapping_of`."""
+    purpose = "topics and sensors; by default as the session was recorded, else what `boom_twin mapping` prints"
+    add_file(parser, "--mapping", purpose)
+
+
+def add_window(parser: ArgumentParser) -> None:
+    """Declare ``--start`` and ``--duration``, for `window_of`."""
+    begin = "begin so many seconds after the first sample (0); the model then starts at rest there"
+    parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help=begin)
+    parser.add_argument("--duration", type=positive, metavar="S", help="read so many seconds (all)")
+
+
+def window_of(args: Namespace) -> TimeWindow:
+    """Return the part of a session that the arguments name."""
+    from ..bag.time_window import TimeWindow
+
+    return TimeWindow(args.start, args.duration)
+
+
+def add_json(parser: ArgumentParser) -> None:
+    """Declare ``--json``: stdout holds exactly one flat JSON object."""
+    parser.add_argument("--json", action="store_true", help="print one flat JSON object on stdout, nothing else there")
+
+
+def add_ros_args(parser: ArgumentParser) -> None:
+    """Declare ``--namespace`` and ``--ros-args``, for `ros_arguments`."""
+    add_namespace(parser, "ROS namespace of the twin: --namespace front is short for --ros-args -r __ns:=/front")
+    purpose = "namespace, remappings and enclave, as for any node: -r cylinder_strokes:=/rig/strokes -e /boom_twin/recorder"
+    parser.add_argument("--ros-args", nargs=REMAINDER, default=[], help=purpose)
+
+
+def add_namespace(parser: ArgumentParser, purpose: str) -> None:
+    """Declare ``--namespace``."""
+    parser.add_argument("--namespace", metavar="NAME", default="", help=purpose)
+
+
+def ros_arguments(args: Namespace) -> list[str]:
+    """Return the ROS arguments for rclpy, or for a further process of this package."""
+    namespace = args.namespace.strip("/")
+    return ["--ros-args", *(["-r", f"__ns:=/{namespace}"] if namespace else []), *args.ros_args]
+
+
+def files_of(args: Namespace, *names: str) -> list[Path]:
+    """Return the paths that these arguments name, one or several each, without those that are not given."""
+    values = [getattr(args, name) for name in names]
+    return [Path(path) for value in values if value for path in (value if isinstance(value, list) else [value])]
+
+
+def refuse_given(args: Namespace, remedy: str, *names: str) -> None:
+    """Raise UsageError, with the `remedy`, if one of these arguments is given."""
+    for name in names:
+        value = getattr(args, name)
+        if value is not None and value is not False:
+            first = value[0] if isinstance(value, list) else value
+            shown = "" if value is True else f" {first:g}" if isinstance(first, float) else f" {first}"
+            raise UsageError(f"--{name.replace('_', '-')}{shown}: {remedy}")
 
 
 def positive(text: str) -> float:
@@ -27,26 +123,25 @@ def not_negative(text: str) -> float:
         value = float(text)
     except ValueError:
         raise ArgumentTypeError(f"{text}: not a number") from None
-    if not 0.0 <= value < float("inf"):
+    if not 0.0 <= value < inf:
         raise ArgumentTypeError(f"{text}: must be >= 0 and finite")
     return value
 
 
-def add_mapping(parser: ArgumentParser) -> None:
-    """Declare ``--mapping``, for `boom_twin.bag.session_model.mapping_of`."""
-    told = "topics and sensors; by default as the session was recorded, else what `boom_twin mapping` prints"
-    parser.add_argument("--mapping", metavar="FILE", type=Path, help=told)
+def at_least(least: int) -> Callable[[str], int]:
+    """Return a parser of whole numbers of at least `least`."""
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or int(text) < least:
+            raise ArgumentTypeError(f"{text}: must be a whole number of at least {least}")
+        return int(text)
+
+    return read
 
 
-def add_window(parser: ArgumentParser) -> None:
-    """Declare ``--start`` and ``--duration``, for `window_of`."""
-    begin = "begin so many seconds after the first sample (0); the model then starts at rest there"
-    parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help=begin)
-    parser.add_argument("--duration", type=positive, metavar="S", help="read so many seconds (all)")
-
-
-def window_of(args: Namespace) -> TimeWindow:
-    """Return the part of a session that the arguments name."""
-    from ..bag.time_window import TimeWindow
-
-    return TimeWindow(args.start, args.duration)
+def numbers(text: str) -> list[float]:
+    """Parse numbers between commas."""
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ArgumentTypeError(f"{text!r} is not a list of numbers like 0.1,0.2") from None

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import sys
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Iterator, Sequence
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from contextlib import closing
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import BagError, UsageError
 from ..offline.progress import progress_of
-from .arguments import add_mapping, add_window, positive, window_of
-from .main import add_params
+from .arguments import add_file, add_mapping, add_params, add_window, at_least, positive, window_of
+from .output import tell, warn
 
 if TYPE_CHECKING:
     from ..batch.results import BatchFolder
@@ -34,10 +34,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--workers", metavar="N", type=at_least(1), help="sessions at once on this machine; by default as many as cores"
     )
     scene = "scene file (YAML) for all sessions; without it, the one that each was made with, else the default scene"
-    parser.add_argument("--scene", metavar="SCENE", type=Path, help=scene)
+    add_file(parser, "--scene", scene, "SCENE")
     add_params(parser)
     add_mapping(parser)
-    parser.add_argument("--baseline", metavar="FILE", type=Path, help="of all sessions; as for replay")
+    add_file(parser, "--baseline", "of all sessions; as for replay")
     add_window(parser)
     parser.add_argument("--report", action="store_true", help="write report.html with its pictures for every session")
     parser.add_argument("--calibrate", action="store_true", help="estimate the scene's parameters from every session as well")
@@ -46,17 +46,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--memory", metavar="MB", type=positive, default=2000.0, help="for one session, MB (2000)")
     parser.add_argument("--retries", metavar="N", type=at_least(0), default=1, help="of a session that fails (1)")
     parser.add_argument("--retry-failed", action="store_true", help="go on with those too that failed in an earlier call")
-
-
-def at_least(least: int) -> Callable[[str], int]:
-    """Return a parser of whole numbers of at least `least`."""
-
-    def read(text: str) -> int:
-        if not text.isdecimal() or int(text) < least:
-            raise ArgumentTypeError(f"{text}: must be a whole number of at least {least}")
-        return int(text)
-
-    return read
 
 
 def run(args: Namespace) -> int:
@@ -75,11 +64,13 @@ def run(args: Namespace) -> int:
         if waiting := [task for task in tasks if task.key not in done]:
             with connected(args.scheduler, args.workers) as workers:
                 dashboard = f"; dashboard: {workers.dashboard}" if workers.dashboard else ""
-                print(f"{len(done)} of {len(tasks)} sessions are done{dashboard}", file=sys.stderr)
+                tell(f"{len(done)} of {len(tasks)} sessions are done{dashboard}")
                 try:
-                    for row in _shown(rows_of(workers, waiting), len(done), len(tasks)):
-                        folder.keep(row)
-                        done[row["key"]] = row
+                    with closing(progress_of(len(tasks), "sessions", "batch", len(done))) as progress:
+                        for row in rows_of(workers, waiting):
+                            folder.keep(row)
+                            done[row["key"]] = row
+                            progress.update(1)
                 finally:
                     folder.mark(len(tasks), len(done))
         rows = [done[task.key] for task in tasks]
@@ -134,15 +125,6 @@ def _kept(args: Namespace, folder: BatchFolder, task: SessionTask) -> Row | None
     try:
         row = folder.kept(task.key, task.fingerprint)
     except BagError as error:
-        print(f"warning: {error}", file=sys.stderr)
+        warn(str(error))
         return None
     return None if row is not None and row["status"] != OK and args.retry_failed else row
-
-
-def _shown(rows: Iterator[Row], before: int, total: int) -> Iterator[Row]:
-    """Yield the rows and show their progress."""
-    progress = progress_of(total, "sessions", "batch", before)
-    for row in rows:
-        yield row
-        progress.update(1)
-    progress.close()

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..errors import UsageError
-from ..offline.progress import TenthLines
-from .arguments import add_window, window_of
-from .main import (
-    add_json,
-    add_params,
-    add_session_scene,
-    open_session_scene,
-    open_session_settings,
-    print_json,
-    warn_incomplete,
-)
+from ..offline.progress import progress_of
+from .arguments import add_json, add_mapping, add_params, add_session_scene, add_window, files_of, window_of
+from .output import open_session_scene, open_session_settings, print_result, warn, warn_incomplete
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
     from ..calibration.run import Calibration, Progress
+    from ..offline.replay import ProgressBar
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -41,7 +32,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     whose = "zeros of all sensors (default), of all but the stroke transducers, or none"
     parser.add_argument("--zeros", choices=("all", "angles", "none"), default="all", help=whose)
     add_params(parser)
-    parser.add_argument("--mapping", type=Path, metavar="FILE", help="topics and sensors; by default as recorded")
+    add_mapping(parser)
     add_window(parser)
     parser.add_argument("--date", metavar="DATE", help="for the provenance; today if not given")
     parser.add_argument("--force", action="store_true", help="replace files of the result that are there already")
@@ -52,11 +43,32 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Calibrate; write the scene and print the result."""
     from ..bag.reader import scan
+    from ..calibration.output import as_object, as_text, mapping_path, refuse_overwriting, write_mapping, write_scene
+    from ..calibration.run import Choice, calibrate
 
-    code = _calibrate(args)
+    sources = files_of(args, "bags", "scene", "params", "mapping")
+    refuse_overwriting(args.out, sources, args.force)
+    scene = _scene(args)
+    settings = open_session_settings(args.bags[0], args.params)
+    names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
+    choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
+    began = time.perf_counter()
+    with closing(progress_of(100, "%", "calibrate")) as bar:
+        found = calibrate(args.bags, scene.scene, choice, settings, args.mapping, _moving(bar), window_of(args))
+    wall = time.perf_counter() - began
+    credit = f"{args.date or time.strftime('%Y-%m-%d')} by boom_twin {__version__}"
+    refuse_overwriting(args.out, sources, args.force)  # again: somebody may have put something there meanwhile
+    # the scene last: without its zeros it would pass for the whole result
+    mapping = write_mapping(found, Path(args.bags[0]), args.mapping, args.out, credit, len(scene.scene.joints))
+    write_scene(found, scene.scene, scene.text, args.out, credit)
+    if mapping is None and (earlier := mapping_path(args.out)).exists():
+        warn(f"{earlier}: of an earlier calibration; {args.out} has no zeros of its own.")
+    files = [args.out, *([mapping] if mapping else []), *([] if args.no_pictures else _draw(found, args.out))]
+    written = [str(path) for path in files]
+    print_result(args.json, as_object(found) | {"wall_s": wall, "files": written}, [*as_text(found), f"{wall:.1f} s", *written])
     for bag in args.bags:
         warn_incomplete(scan(Path(bag)))
-    return code
+    return 0
 
 
 def _scene(args: Namespace) -> SessionScene:
@@ -70,66 +82,13 @@ def _scene(args: Namespace) -> SessionScene:
     return found
 
 
-def _sources(args: Namespace) -> list[Path]:
-    """Return the paths of all files that are read."""
-    return [Path(path) for path in (*args.bags, args.scene, args.params, args.mapping) if path is not None]
-
-
-def _credit(args: Namespace) -> str:
-    return f"{args.date or time.strftime('%Y-%m-%d')} by boom_twin {__version__}"
-
-
-def _calibrate(args: Namespace) -> int:
-    from ..calibration.output import as_object, as_text, mapping_path, refuse_overwriting, write_mapping, write_scene
-    from ..calibration.run import Choice, calibrate
-
-    refuse_overwriting(args.out, _sources(args), args.force)
-    scene = _scene(args)
-    settings = open_session_settings(args.bags[0], args.params)
-    names = tuple(name.strip() for name in (args.parameters or "").split(",") if name.strip())
-    choice = Choice(names, args.load, args.damping, args.stiffness, args.zeros)
-    began = time.perf_counter()
-    with _bar() as progress:
-        found = calibrate(args.bags, scene.scene, choice, settings, args.mapping, progress, window_of(args))
-    wall = time.perf_counter() - began
-    credit = _credit(args)
-    refuse_overwriting(args.out, _sources(args), args.force)  # again: somebody may have put something there meanwhile
-    # the scene last: without its zeros it would pass for the whole result
-    mapping = write_mapping(found, Path(args.bags[0]), args.mapping, args.out, credit, len(scene.scene.joints))
-    write_scene(found, scene.scene, scene.text, args.out, credit)
-    if mapping is None and (earlier := mapping_path(args.out)).exists():
-        print(f"warning: {earlier}: of an earlier calibration; {args.out} has no zeros of its own.", file=sys.stderr)
-    files = [args.out, *([mapping] if mapping else []), *([] if args.no_pictures else _draw(found, args.out))]
-    if args.json:
-        print_json(as_object(found) | {"wall_s": wall, "files": [str(path) for path in files]})
-        return 0
-    print("\n".join([*as_text(found), f"{wall:.1f} s", *map(str, files)]))
-    return 0
-
-
-@contextmanager
-def _bar() -> Iterator[Progress]:
-    from tqdm import tqdm
-
-    if not sys.stderr.isatty():
-        yield _tell_tenths(TenthLines(100, "%", "calibrate"))
-        return
-    form = "{l_bar}{bar}| {elapsed}"
-    with tqdm(total=100, desc="calibrate", bar_format=form, file=sys.stderr) as bar:
-
-        def progress(share: float, what: str) -> None:
-            bar.set_description_str(f"calibrate: {what}", refresh=False)
-            bar.update(100.0 * share - bar.n)
-
-        yield progress
-
-
-def _tell_tenths(lines: TenthLines) -> Progress:
+def _moving(bar: ProgressBar) -> Progress:
+    """Return a function that moves a bar of 100 % to a share of the whole."""
     done = 0.0
 
     def progress(share: float, what: str) -> None:
         nonlocal done
-        lines.update(100.0 * share - done)
+        bar.update(100.0 * share - done)
         done = 100.0 * share
 
     return progress

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..errors import Fault, SceneError
+from ..errors import BoomTwinError, Fault, SceneError, UsageError
 from ..scene import Scene
+from ..scene.kinematics import strokes_of_posture
 from ..scene.load import DEFAULT_NAME, examine
 from ..scene.oil_spring import STATIONS
 from ..scene.schema import Clearance
 from ..scene.segmentation import LEAST
 from ..scene.summary import UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from ..system.atomic_files import check_target
-from . import accuracy
+from ..types import Stream
 from . import reduce as need
-from .main import add_json, add_scene, open_scene, print_result
+from .arguments import add_file, add_json, add_scene, files_of
+from .output import columns, open_scene, print_result, tell
 
-"""Sample rates (Hz) of strokes."""
+if TYPE_CHECKING:
+    from ..deviation.accuracy import TipAccuracy
+
 PNG = b"\x89PNG"
 """How a picture begins; one that is there is replaced."""
+SENSOR_NAMES = {"angles": Stream.ANGLES, "imu": Stream.IMU, "forces": Stream.FORCES}
 SIZE_A = "angle of the section, cylinder force"
 SIZE_B = "angles of section and two links, pin force (2), cylinder force"
 
@@ -32,37 +37,41 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_scene(parser)
     add_json(parser)
     parser.add_argument("--strict", action="store_true", help="warnings are errors: the exit code is 1 if there are any")
-    told = "PNG file to draw: all pins, links and cylinders over the range of each joint"
-    parser.add_argument("--picture", metavar="FILE", type=Path, help=told)
+    add_file(parser, "--picture", "PNG file to draw: all pins, links and cylinders over the range of each joint")
     need.add_arguments(parser)
-    accuracy.add_arguments(parser)
+    parser.add_argument(
+        "--sensors",
+        metavar="NAME,..",
+        help=f"also tell how accurate the estimate of the tip is with these and with fewer, at every posture of the scene: "
+        f"{', '.join(SENSOR_NAMES)}; a name given twice is two such sensors (example: angles,imu,imu)",
+    )
 
 
 def run(args: Namespace) -> int:
     """Check and explain; a scene that cannot be used raises `SceneError`."""
     need.refuse_misuse(args)
     if args.picture is not None:
-        check_target(args.picture, [Path(args.scene)] if args.scene else [], PNG)
-    sensors = None if args.sensors is None else accuracy.sensors_of(args.sensors)
+        check_target(args.picture, files_of(args, "scene"), PNG)
+    sensors = None if args.sensors is None else _sensors_of(args.sensors)
     scene, oddities = examine(args.scene)
     name = args.scene or DEFAULT_NAME
     drawn = [] if args.picture is None else [f"Written: {_draw(args.picture, scene, name)}"]
     if args.strict and any(not oddity.is_note for oddity in oddities):
         for line in drawn:  # the picture shows what the warnings are about
-            print(line, file=sys.stderr)
+            tell(line)
         raise SceneError(name, tuple(oddity for oddity in oddities if not oddity.is_note))
     account = explain(scene)
     values, lines = summary(name, account, oddities) | _restitutions(scene), report(name, scene, account, oddities)
     if args.need is not None:
-        found = need.search(scene, args.need, None if args.against is None else open_scene(args.against))
-        values |= need.summary(found, args.need)
-        lines += need.report(scene, found, args.need)
+        result = need.search(scene, args.need, None if args.against is None else open_scene(args.against))
+        values |= need.summary(result, args.need)
+        lines += need.report(scene, result, args.need)
         if args.out is not None:
-            need.write(args.scene, scene, found, args.need, args.out)
+            need.write(args.scene, scene, result, args.need, args.out)
             lines.append(f"Written: {args.out}")
     if sensors is not None:
-        told, rows = accuracy.table(scene, sensors)
-        values |= told
+        accuracy, rows = _accuracy(scene, sensors)
+        values |= accuracy
         lines += rows
     print_result(args.json, values, lines + drawn)
     return 0
@@ -123,17 +132,17 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
     lines = [f"{name}: this scene can be used"]
     lines += [f"  {scene.description}"] if scene.description else []
     lines += [f"  {count} section{'s' * (count > 1)}, {kinds}, {account.length:.2f} m, {account.mass:.1f} kg"]
-    lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_indent(_masses(account))]
-    lines += ["", "Sections", *_indent(_sections(account))]
-    lines += ["", "Joints and cylinders", *_indent(_cylinders(account))]
+    lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_masses(account)]
+    lines += ["", "Sections", *_sections(account)]
+    lines += ["", "Joints and cylinders", *_cylinders(account)]
     lines += ["", "Joints over their range: lever of the cylinder, angle of the links, pins, what runs over the pivot"]
-    lines += _indent(_linkages(account))
+    lines += _linkages(account)
     if any(joint.k_over_stroke for joint in account.joints):
-        lines += ["", "Stiffness of the oil over the stroke, kN/mm", *_indent(_over_stroke(account))]
+        lines += ["", "Stiffness of the oil over the stroke, kN/mm", *_over_stroke(account)]
     if scene.clearance is not None and account.pins:
-        lines += ["", _clearance_title(scene.clearance), *_indent(_pins(account))]
-    lines += ["", "Left out of the model (absent from the scene, zero or false)", *_indent(_left_out(account))]
-    lines += ["", "Unknowns per step", *_indent(_unknowns(account))]
+        lines += ["", _clearance_title(scene.clearance), *_pins(account)]
+    lines += ["", "Left out of the model (absent from the scene, zero or false)", *_left_out(account)]
+    lines += ["", "Unknowns per step", *_unknowns(account)]
     warnings = [oddity for oddity in oddities if not oddity.is_note]
     lines += ["", *(f"Note: {oddity}" for oddity in oddities if oddity.is_note)]
     lines += [f"Warnings: {len(warnings) or 'none'}", *(f"  {warning}" for warning in warnings)]
@@ -247,15 +256,58 @@ def _unknowns(account: Account) -> list[str]:
 
 
 def _table(rows: list[list[str]], left: int = 1) -> list[str]:
-    """Return aligned columns, the first `left` of them to the left, the others to the right."""
-    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    lines = []
-    for row in rows:
-        cells = [cell.ljust(w) for cell, w in zip(row[:left], widths[:left], strict=True)]
-        cells += [cell.rjust(w) for cell, w in zip(row[left:], widths[left:], strict=True)]
-        lines.append("  ".join(cells).rstrip())
-    return lines
+    """Return aligned and indented columns, the first `left` of them to the left, the others to the right."""
+    return [f"  {line}" for line in columns(rows, range(left))] if rows else []
 
 
-def _indent(lines: list[str]) -> list[str]:
-    return [f"  {line}" for line in lines]
+def _sensors_of(text: str) -> list[Stream]:
+    """Return the sensors named in `text`; raise UsageError for an unknown name."""
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    for name in names:
+        if name not in SENSOR_NAMES:
+            raise UsageError(f"--sensors: {name!r} is no sensor. Known: {', '.join(SENSOR_NAMES)}.")
+    return [SENSOR_NAMES[name] for name in names]
+
+
+def _sets_of(sensors: list[Stream]) -> list[tuple[Stream, ...]]:
+    """Return every selection of sensors once, fewest first, the empty one included."""
+    result = [chosen for count in range(len(sensors) + 1) for chosen in combinations(sensors, count)]
+    return list(dict.fromkeys(result))
+
+
+def _sensor_words(chosen: tuple[Stream, ...]) -> str:
+    """Return a selection as it is written on the command line."""
+    names = {stream: name for name, stream in SENSOR_NAMES.items()}
+    return ",".join(names[stream] for stream in chosen) or "strokes only"
+
+
+def _accuracy(scene: Scene, sensors: list[Stream]) -> tuple[dict[str, Any], list[str]]:
+    """Return the accuracy at every posture, as values for ``--json`` and as lines."""
+    from ..deviation.accuracy import accuracy_at
+
+    values: dict[str, Any] = {}
+    acting = "an unknown load of 0.25 % of the boom's weight comes and goes at the tip"
+    lines = ["", f"Accuracy of the estimate at rest, while {acting} (standard deviations)"]
+    titles = f"{'tip x, y mm':>16} {'pitch mrad':>11} {'acceleration':>13} {'load N':>14}"
+    lines.append(f"  {'posture':12} {'sensors beside strokes':24} {titles}")
+    for posture in scene.postures:
+        for chosen in _sets_of(sensors):
+            try:
+                result = accuracy_at(scene, strokes_of_posture(scene, posture), chosen)
+            except BoomTwinError as error:
+                lines.append(f"  {posture:12} {_sensor_words(chosen):24} {error}")
+                continue
+            values[f"accuracy_{posture}:{_sensor_words(chosen)}"] = [
+                *result.tip.tolist(),
+                *result.acceleration.tolist(),
+                *result.load.tolist(),
+            ]
+            lines.append(f"  {posture:12} {_sensor_words(chosen):24} {_accuracy_row(result)}")
+    return values, lines
+
+
+def _accuracy_row(result: TipAccuracy) -> str:
+    x, y, pitch = 1e3 * result.tip
+    acceleration = float((result.acceleration**2).sum() ** 0.5)
+    load = f"{result.load[0]:.0f}, {result.load[1]:.0f}"
+    return f"{f'{x:.2f}, {y:.2f}':>16} {pitch:11.2f} {acceleration:7.3f} m/s² {load:>14}"

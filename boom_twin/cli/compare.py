@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from .arguments import add_window, window_of
-from .main import add_json, add_params, add_session_scene, open_session_scene, open_session_settings, print_result
+from .arguments import add_file, add_json, add_params, add_session_scene, add_window, files_of, window_of
+from .output import open_session_scene, open_session_settings, print_result, tell, warn
 
 if TYPE_CHECKING:
     from ..report.compare import ComparedSession, ComparisonRow
@@ -24,7 +23,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_session_scene(parser)
     add_params(parser)
     add_window(parser)
-    parser.add_argument("--baseline", metavar="FILE", type=Path, help="as for replay")
+    add_file(parser, "--baseline", "as for replay")
     kept = "folder for compare.png and the replays: new, empty, or of an earlier compare; without it nothing is kept"
     parser.add_argument("--out", metavar="DIR", help=kept)
     add_json(parser)
@@ -35,19 +34,18 @@ def run(args: Namespace) -> int:
     from ..report.compare import as_text, flat, rows_of
     from ..system.result_folder import COMPARE, result_folder
 
-    sources = [Path(each) for each in (args.A, args.B, args.scene, args.params, args.baseline) if each]
     with ExitStack() as stack:
         out = Path(args.out or stack.enter_context(TemporaryDirectory()) + "/compare")
-        building = stack.enter_context(result_folder(out, COMPARE, sources))
+        building = stack.enter_context(result_folder(out, COMPARE, files_of(args, "A", "B", "scene", "params", "baseline")))
         one, other = (_side(args, Path(getattr(args, name)), building, name) for name in ("A", "B"))
         rows = rows_of(one, other)
         if args.out:
             _draw(building.folder, one, other, rows)
     for side in (one, other):
         if side.incomplete:
-            print(f"warning: {side.name}: its session is {side.incomplete}", file=sys.stderr)
+            warn(f"{side.name}: its session is {side.incomplete}")
     if one.scene != other.scene:
-        print("warning: the two were replayed with different scenes; differences may be those of the scenes", file=sys.stderr)
+        warn("the two were replayed with different scenes; differences may be those of the scenes")
     print_result(args.json, flat(one, other, rows), as_text(one, other, rows))
     return 0
 
@@ -60,7 +58,7 @@ def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) ->
     window = window_of(args)
 
     def replayed(session: Path) -> Path:
-        print(f"replaying {session} ..", file=sys.stderr)
+        tell(f"replaying {session} ..")
         scene, settings = open_session_scene(session, args.scene), open_session_settings(session, args.params)
         inner = building.inner(name)
         evaluator = Evaluator(scene.scene, settings)

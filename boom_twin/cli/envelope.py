@@ -9,7 +9,8 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from .main import add_json, add_scene, open_scene, print_result
+from .arguments import add_file, add_json, add_scene, files_of
+from .output import columns, open_scene, plain_values, print_result
 
 if TYPE_CHECKING:
     from ..analysis.envelope import Envelope
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    parser.add_argument("--out", metavar="DIR", type=Path, help="folder for envelope.csv (a row a posture), .json and .png")
+    add_file(parser, "--out", "folder for envelope.csv (a row a posture), .json and .png", "DIR")
     add_json(parser)
 
 
@@ -43,7 +44,7 @@ def run(args: Namespace) -> int:
     if args.out is None:
         values, lines = _examined(scene, None)
     else:
-        with result_folder(args.out, ENVELOPE, [Path(args.scene)] if args.scene else []) as building:
+        with result_folder(args.out, ENVELOPE, files_of(args, "scene")) as building:
             values, lines = _examined(scene, building.folder)
         lines += ["", *(f"Written: {args.out / name}" for name in ("envelope.csv", "envelope.json", "envelope.png"))]
     print_result(args.json, values, lines)
@@ -64,76 +65,72 @@ def _examined(scene: Scene, folder: Path | None) -> tuple[dict[str, Any], list[s
         if done == total:
             bars[-1].close()
 
-    found = envelope(scene, progress)
-    quantities = quantities_of(found)
-    values = _summary(found, quantities)
+    result = envelope(scene, progress)
+    quantities = quantities_of(result)
+    values = _summary(result, quantities)
     if folder is not None:
-        _write(folder, found, quantities, values, scene)
-    return values, _report(found, quantities)
+        _write(folder, result, quantities, values, scene)
+    return values, _report(result, quantities)
 
 
-def quantities_of(found: Envelope) -> list[Quantity]:
+def quantities_of(result: Envelope) -> list[Quantity]:
     """Return all columns of numbers, in the order of the table; without stresses of sections that have no height."""
-    columns = [Quantity("deflection_m", "tip deflection", found.deflections, 1e3, "mm")]
+    found_columns = [Quantity("deflection_m", "tip deflection", result.deflections, 1e3, "mm")]
     for key, words, values, factor, unit in (
-        ("cylinder_{}_force_N", "cylinder {} force", found.forces, 1e-3, "kN"),
-        ("frequency_{}_Hz", "frequency {}", found.frequencies, 1.0, "Hz"),
-        ("section_{}_moment_N_m", "section {} bending moment", found.moments, 1e-3, "kN m"),
-        ("section_{}_stress_Pa", "section {} bending stress", found.stresses, 1e-6, "MPa"),
+        ("cylinder_{}_force_N", "cylinder {} force", result.forces, 1e-3, "kN"),
+        ("frequency_{}_Hz", "frequency {}", result.frequencies, 1.0, "Hz"),
+        ("section_{}_moment_N_m", "section {} bending moment", result.moments, 1e-3, "kN m"),
+        ("section_{}_stress_Pa", "section {} bending stress", result.stresses, 1e-6, "MPa"),
     ):
         for i, column in enumerate(values.T, 1):
             if not (column != column).any():
-                columns.append(Quantity(key.format(i), words.format(i), column, factor, unit))
-    return columns
+                found_columns.append(Quantity(key.format(i), words.format(i), column, factor, unit))
+    return found_columns
 
 
-def _summary(found: Envelope, quantities: list[Quantity]) -> dict[str, Any]:
-    values: dict[str, Any] = {"postures": len(found.names), "searched": found.searched}
-    values |= {f"skipped_{reason.replace(' ', '_')}": count for reason, count in found.skipped.items()}
+def _summary(result: Envelope, quantities: list[Quantity]) -> dict[str, Any]:
+    values: dict[str, Any] = {"postures": len(result.names), "searched": result.searched}
+    values |= {f"skipped_{reason.replace(' ', '_')}": count for reason, count in result.skipped.items()}
     for quantity in quantities:
         for name, row in (("least", quantity.values.argmin()), ("greatest", quantity.values.argmax())):
             values[f"{quantity.key}_{name}"] = float(quantity.values[row])
-            values[f"{quantity.key}_{name}_angles_deg"] = found.angles[row]
+            values[f"{quantity.key}_{name}_angles_deg"] = result.angles[row]
     return values
 
 
-def _report(found: Envelope, quantities: list[Quantity]) -> list[str]:
-    skipped = ", ".join(f"{count} {reason}" for reason, count in found.skipped.items() if count)
-    lines = [f"{len(found.names)} postures at rest{f'; left out: {skipped}' if skipped else ''}"]
-    lines += [f"{found.searched} of them were found by a search (L-BFGS-B) for each extreme, from the best of a grid"]
+def _report(result: Envelope, quantities: list[Quantity]) -> list[str]:
+    skipped = ", ".join(f"{count} {reason}" for reason, count in result.skipped.items() if count)
+    lines = [f"{len(result.names)} postures at rest{f'; left out: {skipped}' if skipped else ''}"]
+    lines += [f"{result.searched} of them were found by a search (L-BFGS-B) for each extreme, from the best of a grid"]
     lines += ["postures: by name, or section angles to the base in degrees, as --posture takes them", ""]
     rows = [["", "least", "in posture", "greatest", "in posture"]]
     for quantity in quantities:
         row = [f"{quantity.words}, {quantity.unit}"]
         for place in (int(quantity.values.argmin()), int(quantity.values.argmax())):
-            row += [f"{quantity.factor * quantity.values[place]:.4g}", found.posture(place)]
+            row += [f"{quantity.factor * quantity.values[place]:.4g}", result.posture(place)]
         rows.append(row)
-    widths = [max(len(row[i]) for row in rows) for i in range(5)]
-    for row in rows:
-        cells = [cell.rjust(w) if i in (1, 3) else cell.ljust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))]
-        lines.append("  ".join(cells).rstrip())
+    lines += columns(rows, left=(0, 2, 4))
     if not any(quantity.unit == "MPa" for quantity in quantities):
         lines += ["", "No stresses: give sections[i].height, the outer height of the box in m."]
     return lines
 
 
-def _write(folder: Path, found: Envelope, quantities: list[Quantity], values: dict[str, Any], scene: Scene) -> None:
+def _write(folder: Path, result: Envelope, quantities: list[Quantity], values: dict[str, Any], scene: Scene) -> None:
     from ..plots.envelope import envelope_picture
-    from .main import plain_values
 
-    (folder / "envelope.csv").write_text(_csv(found, quantities), encoding="utf-8")
+    (folder / "envelope.csv").write_text(_csv(result, quantities), encoding="utf-8")
     (folder / "envelope.json").write_text(json.dumps(plain_values(values)) + "\n", encoding="utf-8")
     bars = [(f"{q.words}, {q.unit}", q.factor * q.values) for q in quantities[1:]]
-    envelope_picture(folder / "envelope.png", scene, found, bars)
+    envelope_picture(folder / "envelope.png", scene, result, bars)
 
 
-def _csv(found: Envelope, quantities: list[Quantity]) -> str:
+def _csv(result: Envelope, quantities: list[Quantity]) -> str:
     """Return one row for each posture, SI units; angles in degrees."""
     stream = io.StringIO()
     table = csv.writer(stream, lineterminator="\n")
-    angles = [f"section_{i + 1}_deg" for i in range(found.angles.shape[1])]
+    angles = [f"section_{i + 1}_deg" for i in range(result.angles.shape[1])]
     table.writerow(["posture", *angles, "tip_x_m", "tip_y_m", *(quantity.key for quantity in quantities)])
-    for row, name in enumerate(found.names):
-        numbers = [*found.angles[row], *found.tips[row], *(quantity.values[row] for quantity in quantities)]
+    for row, name in enumerate(result.names):
+        numbers = [*result.angles[row], *result.tips[row], *(quantity.values[row] for quantity in quantities)]
         table.writerow([name, *(f"{float(number):.9g}" for number in numbers)])
     return stream.getvalue()

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..system.terminal_text import printable
 from ..types import NANO
-from .arguments import SESSION, add_mapping, add_window, window_of
-from .main import add_json, add_session_scene, open_session_scene, print_result
+from .arguments import SESSION, add_json, add_mapping, add_session_scene, add_window, window_of
+from .output import open_session_scene, print_result
 
 if TYPE_CHECKING:
     from ..bag.inspect import BagInfo, Tally
@@ -33,8 +33,8 @@ def run(args: Namespace) -> int:
     info = inspect(Path(args.bag), window_of(args))
     scene = open_session_scene(args.bag, args.scene)
     mapped = mapping_of(info.session.path, args.mapping)
-    told = as_json(info, scene, mapped, strokes_of(info.session.path, mapped))
-    print_result(args.json, told, as_text(info, scene, told))
+    values = as_json(info, scene, mapped, strokes_of(info.session.path, mapped))
+    print_result(args.json, values, as_text(info, scene, values))
     return 0
 
 
@@ -99,40 +99,40 @@ def _skew(tally: Tally, which: int) -> float | None:
     return tally.skews[which] * NANO / (tally.skewed if which == 2 else 1)
 
 
-def as_text(info: BagInfo, scene: SessionScene, told: dict[str, Any]) -> list[str]:
-    """Return the lines of text for `told`, the result of `as_json`. A line break in a name or note makes no line of its own."""
-    made = {True: "synthetic", False: "not said to be synthetic", None: "not noted"}[told["synthetic"]]
-    files = f"{len(told['files'])} {'file' if len(told['files']) == 1 else 'files'}"
-    distro = told["distro"] or "distribution not noted"
-    version = f"metadata version {told['metadata_version']}" if told["metadata_version"] else "no metadata.yaml"
-    profile = f"; profile {told['profile']}" if told["profile"] else ""
+def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[str]:
+    """Return the lines of text for `values` of `as_json`. A line break in a name or note makes no line of its own."""
+    made = {True: "synthetic", False: "not said to be synthetic", None: "not noted"}[values["synthetic"]]
+    files = f"{len(values['files'])} {'file' if len(values['files']) == 1 else 'files'}"
+    distro = values["distro"] or "distribution not noted"
+    version = f"metadata version {values['metadata_version']}" if values["metadata_version"] else "no metadata.yaml"
+    profile = f"; profile {values['profile']}" if values["profile"] else ""
     lines = [
-        f"session    {told['path']}",
-        f"stored     {told['storage']}, {files}, {told['bytes'] / 2**20:.2f} MiB, compression {told['compression']}, "
-        f"checksums {'present' if told['checksums'] else 'absent'}",
-        f"written    by {told['library'] or 'an unnamed program'}{profile}, {distro}, {version}",
-        f"made by    {told['origin'] or 'origin not noted'} ({made})",
-        f"scene      {told['scene']}, sha256 {told['scene_sha256'][:12]}.., {len(scene.scene.sections)} sections",
-        f"mapping    {told['mapping']}",
-        f"strokes    are {told['strokes']}s of the cylinders ({told['strokes_source']})",
-        f"lasts      {told['duration_s']:.3f} s, {told['messages']} messages{_part(info, told)}",
+        f"session    {values['path']}",
+        f"stored     {values['storage']}, {files}, {values['bytes'] / 2**20:.2f} MiB, compression {values['compression']}, "
+        f"checksums {'present' if values['checksums'] else 'absent'}",
+        f"written    by {values['library'] or 'an unnamed program'}{profile}, {distro}, {version}",
+        f"made by    {values['origin'] or 'origin not noted'} ({made})",
+        f"scene      {values['scene']}, sha256 {values['scene_sha256'][:12]}.., {len(scene.scene.sections)} sections",
+        f"mapping    {values['mapping']}",
+        f"strokes    are {values['strokes']}s of the cylinders ({values['strokes_source']})",
+        f"lasts      {values['duration_s']:.3f} s, {values['messages']} messages{_part(info, values)}",
         "",
         *_table(info),
         "",
     ]
-    lines += [f"state      {told['incomplete']}"] if told["incomplete"] else []
-    lines += [f"note       {note}" for note in told["notes"] if not note.startswith("origin: ")]
-    lines += [f"name       {sentence}" for sentence in told["names_extra"]]
-    lines += [f"remark     {remark}" for remark in told["remarks"]]
-    lines += [f"missing    {sentence}" for sentence in told["missing_for_replay"]]
-    lines += [] if told["missing_for_replay"] else ["replay     nothing is missing"]
+    lines += [f"state      {values['incomplete']}"] if values["incomplete"] else []
+    lines += [f"note       {note}" for note in values["notes"] if not note.startswith("origin: ")]
+    lines += [f"name       {sentence}" for sentence in values["names_extra"]]
+    lines += [f"remark     {remark}" for remark in values["remarks"]]
+    lines += [f"missing    {sentence}" for sentence in values["missing_for_replay"]]
+    lines += [] if values["missing_for_replay"] else ["replay     nothing is missing"]
     return [printable(line, keep="") for line in lines]
 
 
-def _part(info: BagInfo, told: dict[str, Any]) -> str:
+def _part(info: BagInfo, values: dict[str, Any]) -> str:
     """Return in words which part of the session is read; empty if it is all of it."""
-    whole = told["session_duration_s"] == told["duration_s"]
-    return "" if whole else f": the part from {info.window.start:g} s on, of {told['session_duration_s']:.3f} s"
+    whole = values["session_duration_s"] == values["duration_s"]
+    return "" if whole else f": the part from {info.window.start:g} s on, of {values['session_duration_s']:.3f} s"
 
 
 def _table(info: BagInfo) -> list[str]:

@@ -19,8 +19,17 @@ from ..scene.checks.values import NEEDED
 from ..scene.first_scene import first_scene
 from ..scene.yaml_reader import NUMBER, Document, Place, words
 from ..system.atomic_files import check_new, check_target, write_atomic
-from .main import tell
+from .output import tell_oddities
 
+QUESTIONS: tuple[tuple[Place, str | None], ...] = (
+    (("base", "pivot"), "0, 0"),
+    (("base", "cylinder_pin"), None),
+    (("pipe",), "0"),
+    (("payload",), "0"),
+    (("bulk_modulus",), "1.4 GPa"),
+    (("damping_ratio",), "0.01"),
+)
+"""Keys of the table that are no section's or joint's, with their defaults."""
 KEPT = ".table.yaml"
 """How the name of the file ends that keeps the answers, beside the scene."""
 
@@ -55,7 +64,7 @@ def run(args: Namespace) -> int:
         table, source = checked_table(document, str(kept)), str(kept)
     text, scene, oddities = first_scene(table, document, source)
     write_atomic(args.out, text)
-    tell(oddities, source)
+    tell_oddities(oddities, source)
     count = len(scene.sections)
     size = f"{count} section{'s' * (count > 1)}, {scene.reach:.2f} m"
     print(f"Written: {args.out}, {size}. {_next(args.out, source, len(oddities))}")
@@ -77,7 +86,7 @@ def _asked() -> dict[str, Any]:
     print("Dimensions as on the drawing: `8500 mm`, `8.5`, two numbers as `1320 mm, -264 mm`. An empty line takes [..].")
     values: dict[str, Any] = {"base": {}, "sections": [], "joints": []}
     values["description"] = _line("description [none]: ") or "Boom described by boom_twin init."
-    for place, default in _questions_of_all():
+    for place, default in QUESTIONS:
         _ask(values, place, default)
     count = 0
     while not 1 <= count <= 20:
@@ -89,15 +98,6 @@ def _asked() -> dict[str, Any]:
         for place, default in _questions_of_section(values, i):
             _ask(values, place, default)
     return values
-
-
-def _questions_of_all() -> Iterator[tuple[Place, str | None]]:
-    yield ("base", "pivot"), "0, 0"
-    yield ("base", "cylinder_pin"), None
-    yield ("pipe",), "0"
-    yield ("payload",), "0"
-    yield ("bulk_modulus",), "1.4 GPa"
-    yield ("damping_ratio",), "0.01"
 
 
 def _questions_of_section(values: dict[str, Any], i: int) -> Iterator[tuple[Place, str | None]]:

@@ -9,32 +9,23 @@ Exit codes: 0 done, 1 the input or the run failed (the reason is on stderr), 2 u
 from __future__ import annotations
 
 import gc
-import json
 import os
+import re
 import sys
-from argparse import REMAINDER, SUPPRESS, ArgumentParser, Namespace
-from collections.abc import Iterable, Mapping, Sequence
+from argparse import Action, ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout, suppress
+from difflib import get_close_matches
 from importlib import import_module
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TextIO, cast
+from typing import NoReturn, Protocol, TextIO, cast
 
 from .. import __version__
-from ..errors import BoomTwinError, Fault
+from ..errors import BoomTwinError
 from ..system.blas_threads import use_one_blas_thread
 from ..system.terminal_text import PrintableStream, open_closed_streams
-from .examples import epilog_of
-from .parser import CommandParser
-from .quiet import QuietStream
+from .output import QuietStream
 
 use_one_blas_thread()
-
-if TYPE_CHECKING:
-    from ..bag.reader import Session
-    from ..bag.session_model import SessionScene
-    from ..config.settings import Settings
-    from ..scene import Scene
-
 
 COMMANDS: dict[str, str] = {
     "check": "validate a scene and tell what its model consists of",
@@ -61,6 +52,38 @@ COMMANDS: dict[str, str] = {
 }
 """Purpose of each command. The command is the module of that name in `boom_twin.cli`, with the functions of `Command`."""
 
+EXAMPLES: dict[str, tuple[str, ...]] = {
+    "check": ("check my_boom.yaml", "check my_boom.yaml --need tip=1mm"),
+    "info": ("info bags/arch_session", "info session.csv --mapping rig.yaml"),
+    "monitor": ("monitor", "monitor --bag bags/arch_session --start 10"),
+    "play": ("play bags/arch_session --rate 2 --loop --clock 100",),
+    "record": ('record --out bags/today --note "wind 5 m/s"',),
+    "recover": ("recover bags/broken --out out/saved",),
+    "scene": ("scene", "scene --clearance"),
+    "mapping": ("mapping",),
+    "views": ("views --namespace front --out out/views",),
+    "urdf": ("urdf my_boom.yaml",),
+    "statics": ("statics my_boom.yaml --posture arch", "statics --strokes=0.63,0.165,0.235,0.187 --json"),
+    "response": ("response my_boom.yaml --posture arch", "response --posture arch --pump 0.4:130"),
+    "envelope": ("envelope my_boom.yaml --out out/envelope",),
+    "init": ("init --example-table > boom_table.yaml", "init --table boom_table.yaml --out my_boom.yaml"),
+    "simulate": (
+        "simulate my_boom.yaml --drive examples/strokes.csv --out motion.csv",
+        "simulate --drive examples/strokes.csv --out spread.csv --samples 100 --vary cylinder_2.k=0.1",
+    ),
+    "replay": (
+        "replay bags/arch_session --out out/replay --report",
+        "replay bags/arch_session --out out/numbers --no-bag --no-pictures --table csv",
+        "replay session.csv --scene my_boom.yaml --out out/replay --start 10 --duration 20 --table csv",
+    ),
+    "calibrate": ("calibrate bags/today bags/tomorrow --out calibrated.yaml",),
+    "batch": ("batch 'bags/*' --out out/batch",),
+    "compare": ("compare bags/before bags/after --out out/compare",),
+    "study": ("study error --out out/study/error",),
+    "rig": ("rig --out out/soft --fault cylinder_2.k:softer:0.3", "rig --list-faults"),
+}
+"""Examples that the help of each command ends with: arguments of `boom_twin`."""
+
 # New objects between two searches for garbage. Modules hold none, and looking through those of numba again and again takes
 # 0.05 s, once more at the exit 0.09 s: hence also gc.freeze().
 COLLECT_AFTER = 100_000
@@ -69,6 +92,46 @@ DESCRIPTION = "Digital twin of a concrete placing boom."
 EXIT_CODES = "exit codes: 0 done, 1 the input or the run failed (the reason is on stderr), 2 usage"
 COMPLETING = "_ARGCOMPLETE"
 """Set in the environment by a shell that asks for completions."""
+
+
+class CommandsFormatter(RawDescriptionHelpFormatter):
+    """Help formatter that keeps the lines of examples, and leaves room for the longest name of a command."""
+
+    def add_argument(self, action: Action) -> None:
+        """Add an argument, and count the indentation of commands, which the base class forgets, so that no line breaks."""
+        super().add_argument(action)
+        for command in self._iter_indented_subactions(action):
+            length = self._current_indent + len(self._format_action_invocation(command))
+            self._action_max_length = max(self._action_max_length, length)
+
+
+class CommandParser(ArgumentParser):
+    """Parser whose errors name the nearest option or choice."""
+
+    def __init__(self, *args: object, **options: object) -> None:
+        options.setdefault("formatter_class", CommandsFormatter)
+        super().__init__(*args, **options)  # type: ignore[arg-type]
+        self._negative_number_matcher = re.compile(r"-\.?\d")  # values, no options: also lists, as -5,-170
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: Namespace | None = None
+    ) -> tuple[Namespace, list[str]]:
+        """Parse arguments as `ArgumentParser` does; report unknown ones here, where the options of the command are known."""
+        found, extra = super().parse_known_args(args, namespace)
+        if extra:
+            self.error(f"unrecognized arguments: {' '.join(extra)}{self._near(extra[0], list(self._option_string_actions))}")
+        return found, extra
+
+    def error(self, message: str) -> NoReturn:
+        """Print usage and message, with the nearest choice if one was wrong, and exit with 2."""
+        wrong = message.partition("invalid choice: ")[2].split("'")[1:2]
+        known = [str(choice) for action in self._actions for choice in action.choices or ()]
+        super().error(message + (self._near(wrong[0], known) if wrong else ""))
+
+    @staticmethod
+    def _near(word: str, known: list[str]) -> str:
+        near = get_close_matches(word, known, n=1, cutoff=0.5)
+        return f". Did you mean {near[0]}?" if near else ""
 
 
 class Command(Protocol):
@@ -146,13 +209,19 @@ def _parser(arguments: Sequence[str]) -> ArgumentParser:
     is_completing = COMPLETING in os.environ
     for name, purpose in COMMANDS.items():
         about = purpose[0].upper() + purpose[1:] + "."
-        own = commands.add_parser(name, help=purpose, description=about, epilog=epilog_of(name))
+        own = commands.add_parser(name, help=purpose, description=about, epilog=_epilog(name))
         own.add_argument("--quiet", action="store_true", help="leave out what is told on the way, but for warnings")
         if is_completing or name in arguments:
             _command(name).add_arguments(own)
     if is_completing:
         _complete(parser)
     return parser
+
+
+def _epilog(command: str) -> str:
+    """Return the lines below the options; none for a command without examples."""
+    lines = [f"  boom_twin {example}" for example in EXAMPLES.get(command, ())]
+    return "\n".join(["examples:", *lines]) if lines else ""
 
 
 def _complete(parser: ArgumentParser) -> None:
@@ -162,131 +231,6 @@ def _complete(parser: ArgumentParser) -> None:
     except ImportError:
         sys.exit(1)
     autocomplete(parser)
-
-
-def add_scene(parser: ArgumentParser) -> None:
-    """Declare the scene file, as ``--scene`` or as a positional argument; without it, the default scene."""
-    either = parser.add_mutually_exclusive_group()
-    either.add_argument("--scene", metavar="SCENE", help="scene file (YAML); without it, the default scene")
-    either.add_argument("scene", nargs="?", default=SUPPRESS, metavar="SCENE", help="the same, without --scene before it")
-
-
-def add_session_scene(parser: ArgumentParser) -> None:
-    """Declare ``--scene`` of a command that reads a session; see `open_session_scene`."""
-    told = "scene file (YAML); without it, the one that the session was made with, else the default scene"
-    parser.add_argument("--scene", metavar="SCENE", help=told)
-
-
-def add_params(parser: ArgumentParser) -> None:
-    """Declare ``--params``, see `open_session_settings`."""
-    parser.add_argument(
-        "--params", metavar="FILE", type=Path, help="ROS parameter file (as recorded, else the package's twin.yaml)"
-    )
-
-
-def add_json(parser: ArgumentParser) -> None:
-    """Declare ``--json``: stdout holds exactly one flat JSON object."""
-    parser.add_argument("--json", action="store_true", help="print one flat JSON object on stdout, nothing else there")
-
-
-def add_ros_args(parser: ArgumentParser) -> None:
-    """Declare ``--namespace`` and ``--ros-args``, for `ros_arguments`."""
-    add_namespace(parser, "ROS namespace of the twin: --namespace front is short for --ros-args -r __ns:=/front")
-    told = "namespace, remappings and enclave, as for any node: -r cylinder_strokes:=/rig/strokes -e /boom_twin/recorder"
-    parser.add_argument("--ros-args", nargs=REMAINDER, default=[], help=told)
-
-
-def add_namespace(parser: ArgumentParser, told: str) -> None:
-    """Declare ``--namespace``."""
-    parser.add_argument("--namespace", metavar="NAME", default="", help=told)
-
-
-def ros_arguments(args: Namespace) -> list[str]:
-    """Return the ROS arguments for rclpy, or for a further process of this package."""
-    namespace = args.namespace.strip("/")
-    return ["--ros-args", *(["-r", f"__ns:=/{namespace}"] if namespace else []), *args.ros_args]
-
-
-def open_scene(source: str | None) -> Scene:
-    """Return the scene of an argument; its warnings go to stderr, one line each."""
-    from ..scene.load import examine
-
-    scene, oddities = examine(source)
-    if source is None:
-        print("scene: default scene, the package's own rig; give SCENE for another", file=sys.stderr)
-    tell(oddities, source)
-    return scene
-
-
-def open_session_scene(session: str | Path, source: str | None) -> SessionScene:
-    """Return the scene of a session, see `boom_twin.bag.session_model.scene_of`; its source and warnings go to stderr."""
-    from ..bag.session_model import scene_of
-
-    found = scene_of(Path(session), source)
-    print(f"scene: {found.source} (sha256 {found.sha256[:12]}..)", file=sys.stderr)
-    tell(found.oddities, found.source)
-    return found
-
-
-def open_session_settings(session: str | Path, params: Path | None, namespace: str = "") -> Settings:
-    """Return the settings of a session's twin, see `boom_twin.bag.session_model.settings_of`; unusual ones go to stderr."""
-    from ..bag.session_model import settings_of
-
-    found = settings_of(Path(session), params, namespace)
-    if found.others:
-        told = ", ".join(f"{name} {value:g}" for name, value in found.others.items())
-        print(f"parameters: {found.source}: {told}", file=sys.stderr)
-    return found.settings
-
-
-def tell(oddities: Iterable[Fault], source: str | None) -> None:
-    """Print warnings and notes on stderr, with the file that they are about."""
-    for oddity in oddities:
-        print(f"{oddity.kind}: {source}: {oddity}", file=sys.stderr)
-
-
-def warn_incomplete(session: Session) -> None:
-    """Warn on stderr if a session is incomplete, its recorder's clock was set back, or messages never reached the recorder."""
-    from ..bag.reader import clocks_set_back
-    from ..bag.session_sheet import missed_messages
-
-    if session.incomplete:
-        print(f"warning: {session.path}: {session.incomplete}", file=sys.stderr)
-    for told in clocks_set_back(session):
-        print(f"warning: {told}", file=sys.stderr)
-    if missed := missed_messages(session.path):
-        told = ", ".join(f"{count} of {topic}" for topic, count in missed.items()) + "; a node that got them told otherwise"
-        print(f"warning: {session.path}: never reached the recorder: {told}", file=sys.stderr)
-
-
-def print_result(is_json: bool, values: Mapping[str, Any], lines: Iterable[str]) -> None:
-    """Print a result: `values` as JSON, or `lines` for people."""
-    if is_json:
-        print_json(values)
-    else:
-        print("\n".join(lines))
-
-
-def print_json(values: Mapping[str, Any]) -> None:
-    """Print one flat JSON object; a number that is not finite becomes null."""
-    print(json.dumps(plain_values(values), allow_nan=False))
-
-
-def plain_values(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values as JSON has them; a number that is not finite becomes None."""
-    return {key: _plain(value) for key, value in values.items()}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        raise TypeError("the object must be flat")
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and value - value != 0.0:
-        return None
-    return value
 
 
 if __name__ == "__main__":

@@ -14,17 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
-from .arguments import add_mapping, add_window, window_of
-from .main import (
-    add_params,
-    add_ros_args,
-    add_session_scene,
-    open_scene,
-    open_session_scene,
-    open_session_settings,
-    ros_arguments,
-    warn_incomplete,
-)
+from .arguments import add_file, add_mapping, add_params, add_ros_args, add_session_scene, add_window, ros_arguments, window_of
+from .output import open_scene, open_session_scene, open_session_settings, tell, warn_incomplete
 
 if TYPE_CHECKING:
     from ..monitor.data.feed import Feed
@@ -51,7 +42,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_session_scene(parser)
     add_params(parser)
     usual = "what is known of this rig while all is well, for a session's twin (as recorded, else the package's)"
-    parser.add_argument("--baseline", metavar="FILE", type=Path, help=usual)
+    add_file(parser, "--baseline", usual)
     add_mapping(parser)
     add_window(parser)
     parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
@@ -120,7 +111,7 @@ def _sessions(args: Namespace) -> SessionList:
         scene, settings = open_session_scene(path, args.scene), open_session_settings(path, args.params, args.namespace)
         return bag_feed(path, scene, settings, args.mapping, args.baseline, window, args.namespace)
 
-    print("opening the session (compiles for up to a minute the first time) ..", file=sys.stderr)
+    tell("opening the session (compiles for up to a minute the first time) ..")
     return SessionList(sessions_in(args.bag), open_feed)
 
 
@@ -174,7 +165,7 @@ async def _run(args: Namespace, server: Any, token: str) -> None:
         listener = await _listen(Connections(runner.server), args.host, args.port)
         port = listener.sockets[0].getsockname()[1]
         address = f"http://{in_address(args.host)}:{port}/" + (f"?token={token}" if token else "")
-        print(f"open {address}   (Ctrl-C ends it)", file=sys.stderr, flush=True)
+        tell(f"open {address}   (Ctrl-C ends it)")
         await stopped.wait()
         listener.close()
     finally:

@@ -18,8 +18,8 @@ from ..bag.reader import scan
 from ..errors import BoomTwinError
 from ..ros.startup import require_rclpy
 from ..types import NANO
-from .arguments import not_negative, positive
-from .main import add_ros_args, ros_arguments
+from .arguments import add_ros_args, not_negative, positive, ros_arguments
+from .output import tell, warn
 
 if TYPE_CHECKING:
     from ..ros.bag.player import Player
@@ -47,8 +47,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--wait", type=not_negative, default=10.0, metavar="S", help="wait so long for listeners (10; 0: do not)"
     )
-    told = "listeners to every topic to wait for: 2 where node and recorder listen (1)"
-    parser.add_argument("--listeners", type=int, choices=range(1, 100), default=1, metavar="N", help=told)
+    purpose = "listeners to every topic to wait for: 2 where node and recorder listen (1)"
+    parser.add_argument("--listeners", type=int, choices=range(1, 100), default=1, metavar="N", help=purpose)
     add_ros_args(parser)
 
 
@@ -68,15 +68,13 @@ def run(args: Namespace) -> int:
         try:
             _play(player, args, length)
             if late := player.deliver():
-                told = "some listener did not acknowledge all of"
-                print(f"warning: {told} {', '.join(late)}: a recording of it may lack its end", file=sys.stderr)
+                warn(f"some listener did not acknowledge all of {', '.join(late)}: a recording of it may lack its end")
         except KeyboardInterrupt:
             if not args.loop:
                 raise
-        played = player.played
         player.close()
-    sent = ", ".join(f"{name} {count}" for name, count in played.sent.items())
-    print(f"sent in {played.wall:.1f} s: {sent}; at worst {played.latest * 1e3:.1f} ms late", file=sys.stderr)
+    sent = ", ".join(f"{name} {count}" for name, count in player.sent.items())
+    tell(f"sent in {player.wall:.1f} s: {sent}; at worst {player.latest * 1e3:.1f} ms late")
     return 0
 
 
@@ -88,20 +86,20 @@ def _play(player: Player, args: Namespace, length: float) -> None:
         nonlocal is_paused
         if keys.pressed().count(" ") % 2:
             is_paused = not is_paused
-            tell("paused" if is_paused else "playing")
+            show("paused" if is_paused else "playing")
         return is_paused
 
-    def tell(word: str) -> None:
+    def show(word: str) -> None:
         if bar.disable:  # no terminal
-            print(f"{word}, {bar.n:.1f} of {length:.1f} s", file=sys.stderr, flush=True)
+            tell(f"{word}, {bar.n:.1f} of {length:.1f} s")
         else:
             bar.set_description(word, refresh=True)
 
     with Keys() as keys:
         if keys.are_read:
-            print("space: pause and go on; Ctrl-C: end", file=sys.stderr)
+            tell("space: pause and go on; Ctrl-C: end")
         if not sys.stderr.isatty():
-            print(f"playing {length:.1f} s", file=sys.stderr, flush=True)
+            tell(f"playing {length:.1f} s")
         while True:
             with tqdm(total=length, disable=None, ncols=80, mininterval=0.5, bar_format=BAR, desc="playing") as bar:
                 for elapsed in player.play(args.rate, args.start, args.duration, is_held):
@@ -117,8 +115,8 @@ def _check_listeners(unmatched: list[str], unheard: list[str], topics: int, args
             f"nobody listened within {args.wait:g} s. Start twin_node, check ROS_DOMAIN_ID and namespace, or play anyway "
             "with --wait 0."
         )
-    told = "nobody listens" if args.listeners == 1 else f"fewer than {args.listeners} listen"
-    print(f"warning: {told} to {', '.join(unmatched)}", file=sys.stderr)
+    listeners = "nobody listens" if args.listeners == 1 else f"fewer than {args.listeners} listen"
+    warn(f"{listeners} to {', '.join(unmatched)}")
 
 
 class Keys:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Mapping
@@ -20,11 +19,11 @@ from ..errors import BagError, BoomTwinError
 from ..messages.mapping import load_mapping
 from ..messages.topic_table import DEFAULT_FILE, Topic, Topics
 from ..ros.startup import require_rclpy
-from .arguments import positive
-from .main import add_ros_args, ros_arguments, tell
+from .arguments import add_ros_args, positive, ros_arguments
+from .output import tell, tell_oddities, warn
 
 if TYPE_CHECKING:
-    from ..ros.bag.recorder import Count
+    from ..diagnostics.recorder_status import TopicCount
     from ..ros.bag.subscriptions import RequestedTopic
 
 
@@ -63,7 +62,7 @@ def run(args: Namespace) -> int:
     from ..bag.async_writer import FileSplit, Storage
     from ..bag.session_sheet import incompleteness
     from ..bag.writer import BagWriter
-    from ..ros.bag.recorder import record, recorder_node
+    from ..ros.bag.recorder import Recorder, recorder_node
     from ..ros.bag.subscriptions import resolved, resolved_mapping
     from ..ros.runtime import ros
     from ..ros.startup import on_stop_signal
@@ -75,8 +74,8 @@ def run(args: Namespace) -> int:
     wanted, sheet = _wanted(args, known), _sheet(args)
     given = {"origin": args.origin, "note": args.note}
     check_lasting(args.out)
-    if args.out.is_dir() and (told := incompleteness(args.out)):
-        raise BoomTwinError(f"{args.out}: {told} Record into a new directory.")
+    if args.out.is_dir() and (reason := incompleteness(args.out)):
+        raise BoomTwinError(f"{args.out}: {reason} Record into a new directory.")
     with ros(ros_arguments(args)), recorder_node() as node:
         load_settings(args.params, node.get_namespace())  # raises if they cannot be used
         thresholds = load_thresholds(args.params or DEFAULT_PARAMETERS, node.get_namespace())
@@ -86,22 +85,23 @@ def run(args: Namespace) -> int:
         bag = BagWriter(args.out, {key: text for key, text in given.items() if text})
         sheet.write(args.out)
 
-        def on_twin(told: Mapping[str, Any]) -> None:
+        def on_twin(answers: Mapping[str, Any]) -> None:
             nonlocal sheet
-            more = _with_twin_values(sheet, told, known.frame, str(args.mapping or ""))
+            more = _with_twin_values(sheet, answers, known.frame, str(args.mapping or ""))
             try:
                 more.write(args.out)
                 sheet = more
             except BagError as error:
-                _say(f"warning: what the running twin told is not kept: {error}")
+                warn(f"what the running twin told is not kept: {error}")
 
-        storage = Storage(bag, FileSplit(args.split_size, args.split_duration), _say)
+        storage = Storage(bag, FileSplit(args.split_size, args.split_duration), tell)
         end = float("inf") if args.duration is None else time.monotonic() + args.duration
-        counts = record(node, storage, wanted, thresholds, lambda: bool(signals) or time.monotonic() >= end, _say, on_twin)
-    _tell(counts)
+        recorder = Recorder(node, storage, wanted, thresholds, tell)
+        counts = recorder.run(lambda: bool(signals) or time.monotonic() >= end, on_twin)
+    _tell_counts(counts)
     sheet.write(args.out, [asdict(count) for count in counts])
     if sheet.scene is None:
-        _say("no scene is kept in session.yaml: none was given by --scene, and no twin told its own")
+        tell("no scene is kept in session.yaml: none was given by --scene, and no twin told its own")
     if not any(count.received for count in counts):
         remedy = "Check that the publishers run, as the same user, and ROS_DOMAIN_ID."
         raise BoomTwinError(f"{args.out}: nothing came. {remedy}")
@@ -115,7 +115,7 @@ def _sheet(args: Namespace) -> SessionSheet:
 
     scene = None if args.scene is None else scene_from(args.scene)
     if scene is not None:
-        tell(scene.oddities, scene.source)
+        tell_oddities(scene.oddities, scene.source)
     if args.baseline:
         load_baseline(args.baseline)
     return SessionSheet(
@@ -130,7 +130,7 @@ def _sheet(args: Namespace) -> SessionSheet:
     )
 
 
-def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any], frame: str, given_mapping: str) -> SessionSheet:
+def _with_twin_values(sheet: SessionSheet, answers: Mapping[str, Any], frame: str, given_mapping: str) -> SessionSheet:
     """Return the session metadata with what the running twin reports. Given texts stay, and a difference is reported.
 
     The prefix that the twin puts before the `frame` of the mapping becomes part of the mapping, so that a replay has it too.
@@ -138,35 +138,31 @@ def _with_twin_values(sheet: SessionSheet, told: Mapping[str, Any], frame: str, 
     from ..ros.bag.recorder import TEXTS
     from ..ros.bag.subscriptions import with_mapped
 
-    changes: dict[str, Any] = {"twin": told["parameters"]} if "parameters" in told else {}
-    if prefix := told.get("parameters", {}).get("frame_prefix"):
+    changes: dict[str, Any] = {"twin": answers["parameters"]} if "parameters" in answers else {}
+    if prefix := answers.get("parameters", {}).get("frame_prefix"):
         changes["mapping"] = with_mapped(sheet.mapping or "", ("frame",), prefix + frame)
-    own_mapping = told.get("parameters", {}).get("mapping")
+    own_mapping = answers.get("parameters", {}).get("mapping")
     if own_mapping and (not given_mapping or Path(own_mapping).resolve() != Path(given_mapping).resolve()):
-        _say(
-            f"warning: the running twin has the mapping {own_mapping}, and session.yaml holds "
+        warn(
+            f"the running twin has the mapping {own_mapping}, and session.yaml holds "
             f"{given_mapping or 'the default one'}: a replay would differ. Record with --mapping {own_mapping}"
         )
     for name in TEXTS:
-        if name in told:
-            given, own = getattr(sheet, name), told[name]
+        if name in answers:
+            given, own = getattr(sheet, name), answers[name]
             if given is None:
                 changes[name] = own
             elif given != own:
-                _say(f"warning: the running twin has another {name} than --{name} gives; session.yaml holds the one given")
+                warn(f"the running twin has another {name} than --{name} gives; session.yaml holds the one given")
     return replace(sheet, **changes)
 
 
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
-
-
-def _tell(counts: list[Count]) -> None:
+def _tell_counts(counts: list[TopicCount]) -> None:
     """Print one line for each topic."""
-    _say(" received   written  never arrived")
+    tell(" received   written  never arrived")
     for count in counts:
         missed = "unknown" if count.missed is None else str(count.missed)
-        _say(f"{count.received:9d} {count.written:9d} {missed:>14}  {count.topic}")
+        tell(f"{count.received:9d} {count.written:9d} {missed:>14}  {count.topic}")
 
 
 def _wanted(args: Namespace, known: Topics) -> list[RequestedTopic]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..system.terminal_text import printable
-from .main import add_json, print_result
+from .arguments import add_json
+from .output import print_result, tell
 
 if TYPE_CHECKING:
     from ..bag.recovery.recover import Recovery
@@ -37,11 +37,11 @@ def run(args: Namespace) -> int:
 
     outcome = recover(Path(args.bag), Path(args.out), args.unverified)
     for path, fault in outcome.faults[:SHOWN]:
-        print(f"{path}: bytes {fault.offset} to {fault.offset + fault.length}: {fault.reason}", file=sys.stderr)
+        tell(f"{path}: bytes {fault.offset} to {fault.offset + fault.length}: {fault.reason}")
     if outcome.fault_count > SHOWN:
-        print(f"and {outcome.fault_count - SHOWN} faults more", file=sys.stderr)
-    told = as_json(outcome, args.out)
-    print_result(args.json, told, as_text(outcome, told))
+        tell(f"and {outcome.fault_count - SHOWN} faults more")
+    values = as_json(outcome, args.out)
+    print_result(args.json, values, as_text(outcome, values))
     return 0
 
 
@@ -61,19 +61,19 @@ def as_json(outcome: Recovery, out: str) -> dict[str, Any]:
     }
 
 
-def as_text(outcome: Recovery, told: dict[str, Any]) -> list[str]:
-    """Return the lines of text for `told`, the result of `as_json`."""
-    wide = max(len(topic) for topic in told["topics"])
+def as_text(outcome: Recovery, values: dict[str, Any]) -> list[str]:
+    """Return the lines of text for `values`, the result of `as_json`."""
+    wide = max(len(topic) for topic in values["topics"])
     lines = [f"{'topic':{wide}}  {'saved':>9}  {'no checksum':>11}  {'lost':>9}"]
-    for row, topic in enumerate(told["topics"]):
-        lost = "unknown" if told["lost"][row] is None else str(told["lost"][row])
-        lines.append(f"{topic:{wide}}  {told['saved'][row]:9d}  {told['saved_without_checksum'][row]:11d}  {lost:>9}")
+    for row, topic in enumerate(values["topics"]):
+        lost = "unknown" if values["lost"][row] is None else str(values["lost"][row])
+        lines.append(f"{topic:{wide}}  {values['saved'][row]:9d}  {values['saved_without_checksum'][row]:11d}  {lost:>9}")
     if outcome.nameless:
         lines.append(f"{outcome.nameless} sound messages were left out: the definitions of their topics are lost")
     if outcome.copies:
         lines.append(f"{outcome.copies} messages were left out: they stand in copies of chunks that were saved")
-    if any(told["saved_without_checksum"]):
+    if any(values["saved_without_checksum"]):
         lines.append("'no checksum': saved as they stood; nothing vouches for their values")
     if outcome.lost is None:
         lines.append("'unknown': no sound count is left in the source that says how many there were")
-    return [printable(line, keep="") for line in [*lines, told["path"]]]
+    return [printable(line, keep="") for line in [*lines, values["path"]]]

@@ -9,11 +9,11 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import UsageError
 from ..scene import Scene
 from ..scene.load import default_text
 from ..scene.yaml_reader import read_text, with_end_mark
 from ..system.atomic_files import check_new, write_atomic
+from .arguments import add_file, files_of, refuse_given
 
 if TYPE_CHECKING:
     from ..reduction.search import Proposal
@@ -40,18 +40,17 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare ``--need``, and the options that go with it."""
     purpose = "propose the leanest model whose tip stays so near to this scene's (mm, cm, m)"
     parser.add_argument("--need", type=tip_error, metavar="tip=1mm", help=purpose)
-    parser.add_argument("--out", type=Path, metavar="LEAN", help="with --need: write the lean scene file here")
+    add_file(parser, "--out", "with --need: write the lean scene file here", "LEAN")
     purpose = "with --need: measure against this scene of the same boom, not against SCENE itself"
     parser.add_argument("--against", metavar="FULL", help=purpose)
 
 
 def refuse_misuse(args: Namespace) -> None:
     """Raise UsageError for an option that needs ``--need``, without it, and for writing over a file."""
-    for option in ("out", "against"):
-        if args.need is None and getattr(args, option) is not None:
-            raise UsageError(f"--{option} {getattr(args, option)}: goes with --need only. Add --need tip=1mm.")
-    if args.out is not None:
-        check_new(args.out, [Path(source) for source in (args.scene, args.against) if source])
+    if args.need is None:
+        refuse_given(args, "goes with --need only. Add --need tip=1mm.", "out", "against")
+    elif args.out is not None:
+        check_new(args.out, files_of(args, "scene", "against"))
 
 
 def tip_error(text: str) -> float:
@@ -73,72 +72,69 @@ def search(scene: Scene, most: float, against: Scene | None) -> Proposal:
     """Search for the leanest model, with progress on stderr."""
     from ..reduction.search import propose
 
-    shown = sys.stderr.isatty()
+    def show(what: str) -> None:
+        if sys.stderr.isatty():
+            print(f"\r{what:70s}\r", end="", file=sys.stderr, flush=True)
 
-    def tell(what: str) -> None:
-        if shown:
-            print(f"\r{what:70s}", end="", file=sys.stderr, flush=True)
-
-    found = propose(against or scene, most, scene, tell)
-    tell("")
-    if shown:
-        print("\r", end="", file=sys.stderr)
-    return found
+    proposal = propose(against or scene, most, scene, show)
+    show("")
+    return proposal
 
 
-def summary(found: Proposal, most: float) -> dict[str, Any]:
+def summary(proposal: Proposal, most: float) -> dict[str, Any]:
     """Return the keys that ``--need`` adds to the flat object of ``check``."""
     return {
         "need_tip_m": most,
-        "lean_edits": [str(edit) for edit in found.edits],
-        "lean_tip_error_m": found.deviation.worst,
-        "lean_rest_error_m": found.deviation.rest,
-        "lean_rest_error_at": found.deviation.where,
-        "lean_move_error_rms_m": found.deviation.rms,
-        "lean_move_error_max_m": found.deviation.most,
-        "measured_at_rest_in": list(found.course.names),
-        "measured_in_move": found.course.motion.label,
+        "lean_edits": [str(edit) for edit in proposal.edits],
+        "lean_tip_error_m": proposal.deviation.worst,
+        "lean_rest_error_m": proposal.deviation.rest,
+        "lean_rest_error_at": proposal.deviation.where,
+        "lean_move_error_rms_m": proposal.deviation.rms,
+        "lean_move_error_max_m": proposal.deviation.most,
+        "measured_at_rest_in": list(proposal.course.names),
+        "measured_in_move": proposal.course.motion.label,
         "note": ANOTHER,
-        "step_s": found.course.step,
-        "full_step_time_s": found.seconds[0],
-        "lean_step_time_s": found.seconds[1],
-        "full_unknowns": found.unknowns[0],
-        "lean_unknowns": found.unknowns[1],
-        "next": None if found.next is None else found.next[0],
-        "next_tip_error_m": None if found.next is None else found.next[1],
+        "step_s": proposal.course.step,
+        "full_step_time_s": proposal.seconds[0],
+        "lean_step_time_s": proposal.seconds[1],
+        "full_unknowns": proposal.unknowns[0],
+        "lean_unknowns": proposal.unknowns[1],
+        "next": None if proposal.next is None else proposal.next[0],
+        "next_tip_error_m": None if proposal.next is None else proposal.next[1],
     }
 
 
-def report(scene: Scene, found: Proposal, most: float) -> list[str]:
+def report(scene: Scene, proposal: Proposal, most: float) -> list[str]:
     """Return lines of text for a reader."""
-    off, course, (full, lean) = found.deviation, found.course, found.seconds
+    off, course, (full, lean) = proposal.deviation, proposal.course, proposal.seconds
     lines = ["", f"Leanest model found that keeps the tip within {_length(most)}"]
-    width = max((len(str(edit)) for edit in found.edits), default=0)
-    lines += [f"  {edit!s:{width}}  {_meaning(scene, edit)}" for edit in found.edits] or ["  this one: nothing can be left out"]
-    if found.next is not None:
-        lines.append(f"  not: {found.next[0]}, the tip would be {_length(found.next[1])} off")
+    width = max((len(str(edit)) for edit in proposal.edits), default=0)
+    edits = [f"  {edit!s:{width}}  {_meaning(scene, edit)}" for edit in proposal.edits]
+    lines += edits or ["  this one: nothing can be left out"]
+    if proposal.next is not None:
+        lines.append(f"  not: {proposal.next[0]}, the tip would be {_length(proposal.next[1])} off")
     lines += [f"  {FREE}", "", "Its tip against the full model's"]
     lines.append(f"  at rest    {_length(off.rest)} at most, in {off.where} (of: {', '.join(course.names)})")
     lines.append(f"  in a move  {_length(off.rms)} rms, {_length(off.most)} at most; {course.motion.label}")
     lines += [f"  {ANOTHER}", "", f"Run time of a step of {1e3 * course.step:g} ms, least of interleaved runs"]
-    lines.append(f"  full  {1e6 * full:6.1f} us  {found.unknowns[0]:4d} unknowns")
-    lines.append(f"  lean  {1e6 * lean:6.1f} us  {found.unknowns[1]:4d} unknowns, {full / lean:.2f} times as fast")
+    lines.append(f"  full  {1e6 * full:6.1f} us  {proposal.unknowns[0]:4d} unknowns")
+    lines.append(f"  lean  {1e6 * lean:6.1f} us  {proposal.unknowns[1]:4d} unknowns, {full / lean:.2f} times as fast")
     return lines
 
 
-def write(source: str | None, scene: Scene, found: Proposal, most: float, out: Path) -> None:
+def write(source: str | None, scene: Scene, proposal: Proposal, most: float, out: Path) -> None:
     """Write the lean scene as a file: the text of `source` (None: the default scene) with the edits made."""
     from ..scene.edit import rewritten
 
     text = default_text() if source is None else read_text(Path(source))
     head = [
         f"# Lean model of {source or 'the default scene'}, by boom_twin check --need tip={most:g}:",
-        *(f"#   {edit}" for edit in found.edits),
-        f"# Tip at most {_length(found.deviation.worst)} from the full model's, at rest in the postures and in a move",
-        f"# ({found.course.motion.label}).",
+        *(f"#   {edit}" for edit in proposal.edits),
+        f"# Tip at most {_length(proposal.deviation.worst)} from the full model's, at rest in the postures and in a move",
+        f"# ({proposal.course.motion.label}).",
         f"# {ANOTHER}",
     ]
-    body = "\n".join(head) + "\n\n" + rewritten(text, scene, found.edits)
+    body = "\n".join(head) + "\n\n" + rewritten(text, scene, proposal.edits)
     write_atomic(out, with_end_mark(body))
 
 

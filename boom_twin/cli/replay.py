@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, Namespace
 from functools import partial
 from math import hypot
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import UsageError
 from ..offline.progress import progress_of
-from .arguments import SESSION, add_mapping, add_window, window_of
-from .main import (
+from .arguments import (
+    SESSION,
+    add_file,
     add_json,
+    add_mapping,
     add_namespace,
     add_params,
     add_session_scene,
-    open_session_scene,
-    open_session_settings,
-    print_json,
-    warn_incomplete,
+    add_window,
+    files_of,
+    refuse_given,
+    window_of,
 )
+from .output import open_session_scene, open_session_settings, print_result, tell, warn_incomplete
 
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
@@ -44,14 +45,14 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
     )
     usual = "what is known of this rig while all is well; by default as the session was recorded, else the package's"
-    parser.add_argument("--baseline", metavar="FILE", type=Path, help=usual)
-    told = (
+    add_file(parser, "--baseline", usual)
+    purpose = (
         "name what is wrong with the boom, if one cause explains the readings, by twins that have it; takes ten times as long"
     )
-    parser.add_argument("--causes", action="store_true", help=told)
+    parser.add_argument("--causes", action="store_true", help=purpose)
     parser.add_argument("--no-health", action="store_true", help="do not judge the rig's health")
-    told = "do not write the result bag; output_sha256 of the summary is null then, all else is the same"
-    parser.add_argument("--no-bag", action="store_true", help=told)
+    purpose = "do not write the result bag; output_sha256 of the summary is null then, all else is the same"
+    parser.add_argument("--no-bag", action="store_true", help=purpose)
     drawn = parser.add_mutually_exclusive_group()
     drawn.add_argument("--no-pictures", action="store_true", help="leave the pictures out")
     drawn.add_argument("--report", action="store_true", help="write report.html too, to read or to print")
@@ -59,10 +60,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         "heights of the sections in m, for the stresses in the report; by default the scene's, else those of thin-walled boxes"
     )
     parser.add_argument("--section-height", metavar="H1,H2,..", help=heights)
-    told = "in the report, fatigue of all stations: detail category of EN 1993-1-9, MPa (default 71); extra fatigue"
-    parser.add_argument("--fatigue", nargs="?", type=float, const=71.0, metavar="CATEGORY", help=told)
-    told = "write samples.csv or samples.parquet (by pyarrow): predicted, measured, estimated, a row for every stroke stamp"
-    parser.add_argument("--table", choices=("csv", "parquet"), help=told)
+    purpose = "in the report, fatigue of all stations: detail category of EN 1993-1-9, MPa (default 71); extra fatigue"
+    parser.add_argument("--fatigue", nargs="?", type=float, const=71.0, metavar="CATEGORY", help=purpose)
+    purpose = "write samples.csv or samples.parquet (by pyarrow): predicted, measured, estimated, a row for every stroke stamp"
+    parser.add_argument("--table", choices=("csv", "parquet"), help=purpose)
     add_json(parser)
 
 
@@ -74,24 +75,18 @@ def run(args: Namespace) -> int:
     from ..report.quantities import section_heights
     from ..system.result_folder import REPLAY, result_folder
 
-    if args.fatigue is not None and not args.report:
-        raise UsageError(f"--fatigue {args.fatigue:g}: goes into the report. Give --report too.")
+    if not args.report:
+        refuse_given(args, "goes into the report. Give --report too.", "fatigue")
     scene = open_session_scene(args.bag, args.scene)
     heights = section_heights(args.section_height, scene.scene)
     settings = open_session_settings(args.bag, args.params, args.namespace)
     check_kind(args.table)
     window = window_of(args)
     if window.start:
-        print(
-            f"at {window.start:g} s the model starts at rest, whatever the boom did: its first seconds show that",
-            file=sys.stderr,
-        )
-    print("preparing the model (compiles for up to a minute the first time) ..", file=sys.stderr)
-    out, given = Path(args.out), (args.bag, args.scene, args.params, args.mapping, args.baseline)
-    with result_folder(out, REPLAY, [Path(each) for each in given if each]) as building:
-        progress = partial(progress_of, unit="messages", name="replay")
-        asked = args.mapping, not args.no_changes, not args.no_health, args.baseline
-        options = settings, progress, *asked, window, args.namespace
+        tell(f"at {window.start:g} s the model starts at rest, whatever the boom did: its first seconds show that")
+    tell("preparing the model (compiles for up to a minute the first time) ..")
+    out, sources = Path(args.out), files_of(args, "bag", "scene", "params", "mapping", "baseline")
+    with result_folder(out, REPLAY, sources) as building:
         evaluator = Evaluator(scene.scene, settings, heights, args.fatigue)
         joints, name = len(scene.scene.joints), f"samples.{args.table}"
         table = SampleTable(table_file(building.folder / name, joints), joints) if args.table else None
@@ -101,19 +96,30 @@ def run(args: Namespace) -> int:
             if table is not None:
                 table.add(stretch)
 
-        result = replay_into(building, args.bag, scene, *options, take=take, with_bag=not args.no_bag, causes=args.causes)
+        result = replay_into(
+            building,
+            args.bag,
+            scene,
+            settings,
+            progress=partial(progress_of, unit="messages", name="replay"),
+            mapping=args.mapping,
+            changes=not args.no_changes,
+            health=not args.no_health,
+            baseline=args.baseline,
+            window=window,
+            namespace=args.namespace,
+            take=take,
+            with_bag=not args.no_bag,
+            causes=args.causes,
+        )
         found = evaluator.finish(result, building.folder)
         files = [path.name for path in _write(args, result, found, scene, building.folder)]
         if table is not None:
             table.finish()
             files.append(name)
     warn_incomplete(result.session)
-    if args.json:
-        print_json(flat(result.summary))
-        return 0
-    print("\n".join(as_text(result.summary)))
-    for name in ["summary.json", *([] if args.no_bag else ["bag"]), *files]:
-        print(out / name)
+    written = ["summary.json", *([] if args.no_bag else ["bag"]), *files]
+    print_result(args.json, flat(result.summary), [*as_text(result.summary), *(str(out / name) for name in written)])
     return 0
 
 

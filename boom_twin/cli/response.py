@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,8 +16,8 @@ from ..errors import UsageError
 from ..scene import Scene
 from ..system.csv_table import columns_text, read_csv
 from ..types import Array
-from .main import add_json, add_scene, open_scene, print_result
-from .statics import numbers
+from .arguments import add_json, add_place, add_scene, files_of, numbers
+from .output import open_scene, print_result, warn
 
 if TYPE_CHECKING:
     from ..analysis.frequency_response import FrequencyResponse
@@ -45,12 +44,10 @@ class Answer:
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    where = parser.add_mutually_exclusive_group(required=True)
-    where.add_argument("--posture", metavar="P", help="a posture of the scene, or section angles, deg: 60,-20,-30")
-    where.add_argument("--strokes", type=numbers, metavar="S1,..,SN", help="absolute strokes of the drives, m")
-    where.add_argument("--lengths", type=numbers, metavar="L1,..,LN", help="cylinder lengths at rest less closed_length, m")
-    told = "resonance map over these postures (angles in brackets), or `all` of the scene's; needs --pump, whose rate it varies"
-    where.add_argument("--map", metavar="P1,P2,..", help=told)
+    swept = (
+        "resonance map over these postures (angles in brackets), or `all` of the scene's; needs --pump, whose rate it varies"
+    )
+    add_place(parser).add_argument("--map", metavar="P1,P2,..", help=swept)
     load = parser.add_mutually_exclusive_group()
     load.add_argument("--tip", type=numbers, metavar="FX,FY", help="harmonic force at the tip, N (default 0,1)")
     load.add_argument("--drive", type=int, metavar="CYLINDER", help="harmonic drive of this cylinder, from 1, amplitude 1 m")
@@ -61,39 +58,33 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--to", dest="high", type=float, default=HIGH, metavar="F", help="highest frequency, Hz (default 30)")
     parser.add_argument("--points", type=int, default=POINTS, metavar="N", help="frequencies, evenly in their logarithm (300)")
     parser.add_argument("--rates", type=_rates, default=RATES, metavar="F:F:N", help="of a map (default 0.2:1.2:201)")
-    parser.add_argument(
-        "--steps",
-        type=int,
-        default=STEPS,
-        metavar="N",
-        help="of a map, from each posture to the next (default 1)",
-    )
-    out = "folder for table and picture: new, empty, or of an earlier response"
-    parser.add_argument("--out", metavar="DIR", help=out)
+    steps = "of a map, from each posture to the next (default 1)"
+    parser.add_argument("--steps", type=int, default=STEPS, metavar="N", help=steps)
+    parser.add_argument("--out", metavar="DIR", help="folder for table and picture: new, empty, or of an earlier response")
     add_json(parser)
 
 
 def _pump(text: str) -> tuple[float, ...]:
     """Parse two or three numbers between colons."""
     try:
-        found = tuple(float(part) for part in text.split(":"))
+        result = tuple(float(part) for part in text.split(":"))
     except ValueError:
-        found = ()
-    if len(found) not in (2, 3):
+        result = ()
+    if len(result) not in (2, 3):
         raise ArgumentTypeError(f"{text!r} is not RATE:HEIGHT or RATE:HEIGHT:CHANGE_OVER, like 0.4:130")
-    return found
+    return result
 
 
 def _rates(text: str) -> tuple[float, float, int]:
     """Parse lowest rate, highest rate (Hz) and number of rates."""
     try:
         low, high, count = text.split(":")
-        found = float(low), float(high), int(count)
+        result = float(low), float(high), int(count)
     except ValueError:
         raise ArgumentTypeError(f"{text!r} is not LOWEST:HIGHEST:COUNT, like 0.2:1.2:201") from None
-    if not 0.0 < found[0] < found[1] < float("inf") or not 2 <= found[2] <= 10_000:
+    if not 0.0 < result[0] < result[1] < float("inf") or not 2 <= result[2] <= 10_000:
         raise ArgumentTypeError(f"{text!r}: give two ascending rates above 0 Hz, and 2 to 10000 of them")
-    return found
+    return result
 
 
 def run(args: Namespace) -> int:
@@ -112,10 +103,9 @@ def run(args: Namespace) -> int:
     else:
         answer = _response(scene, args)
     for doubt in answer.doubts:
-        print(f"boom_twin response: warning: {doubt}.", file=sys.stderr)
+        warn(f"{doubt}.")
     if args.out:
-        sources = [Path(path) for path in (args.scene, args.load) if path]
-        with result_folder(Path(args.out), RESPONSE, sources) as building:
+        with result_folder(Path(args.out), RESPONSE, files_of(args, "scene", "load")) as building:
             write_atomic(building.folder / f"{answer.name}.csv", columns_text(answer.columns))
             answer.draw(building.folder / f"{answer.name}.png")
         answer.lines.append(f"Written: {args.out}")
@@ -156,14 +146,14 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     at, beside = (frequency_response(scene, frequencies, *place).tip for frequencies in (natural, BESIDE * natural))
     bounded = np.linalg.norm(at, axis=1) < SHARP * np.linalg.norm(beside, axis=1)
     frequencies = np.unique(np.concatenate([np.geomspace(args.low, args.high, args.points), natural[bounded]]))
-    found = frequency_response(scene, frequencies, *place)
+    result = frequency_response(scene, frequencies, *place)
     static = frequency_response(scene, np.zeros(1), *place)
     if force is None:
         load, unit = f"drive of cylinder {args.drive}, 1 m", "m of stroke"
     else:
         load, unit = f"force at the tip ({force[0]:g}, {force[1]:g}) N", f"load of ({force[0]:g}, {force[1]:g}) N"
     title = f"Frequency response: {load}, {_place(args)}"
-    channels = found.channels()
+    channels = result.channels()
     values: dict[str, Any] = {"load": load, "frequency_Hz": frequencies, "natural_frequencies_Hz": natural}
     columns = {"frequency_Hz": frequencies}
     for name, column in channels.items():
@@ -171,18 +161,16 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     return Answer(
         "response",
         values | {name: column for name, column in columns.items() if name != "frequency_Hz"},
-        [title, "", *_resonances(found, static, natural, bounded)],
+        [title, "", *_resonances(result, static, natural, bounded)],
         columns,
-        lambda path: response_picture(path, title, unit, found, natural),
+        lambda path: response_picture(path, title, unit, result, natural),
         rest.doubts + _undamped(natural[~bounded]),
     )
 
 
 MODES = 40  # natural frequencies that are looked for within the band
-BESIDE, SHARP = (
-    1.0 + 1e-6,
-    3.0,
-)  # times a natural frequency; a peak that is so much higher than there is bounded by rounding alone
+BESIDE, SHARP = 1.0 + 1e-6, 3.0
+"""Times a natural frequency; a peak that is so much higher than there is bounded by rounding alone."""
 
 
 def _undamped(frequencies: Array) -> tuple[str, ...]:
@@ -194,10 +182,10 @@ def _undamped(frequencies: Array) -> tuple[str, ...]:
     )
 
 
-def _resonances(found: FrequencyResponse, static: FrequencyResponse, natural: Array, bounded: Flags) -> list[str]:
+def _resonances(result: FrequencyResponse, static: FrequencyResponse, natural: Array, bounded: Flags) -> list[str]:
     """Return a line for the static limit and for every natural frequency."""
     lines = ["frequency Hz   tip x m     tip y m     acceleration m/s2   largest cylinder force N   largest moment N m"]
-    rows = [(0.0, static, 0)] + [(f, found, int(np.searchsorted(found.frequencies, f))) for f in natural[bounded]]
+    rows = [(0.0, static, 0)] + [(f, result, int(np.searchsorted(result.frequencies, f))) for f in natural[bounded]]
     for frequency, response, k in rows:
         tip, acceleration = np.abs(response.tip[k]), np.linalg.norm(response.tip_acceleration[k])
         forces, moments = np.abs(response.cylinder_forces[k]), np.abs(response.moments[k])
@@ -225,31 +213,33 @@ def _steady(scene: Scene, args: Namespace) -> Answer:
         times, *components = (np.array(table.column(name)) for name in wanted)
         load = load_of_rows(times, np.column_stack(components))
         told = f"{Path(args.load).name}, {1.0 / load.period:.4g} Hz"
-    found = steady_state(scene, load, args.strokes, args.posture)
+    result = steady_state(scene, load, args.strokes, args.posture)
     title = f"Steady state: {told}, {_place(args)}"
-    acceleration = float(np.linalg.norm(found.tip_acceleration, axis=1).max())
-    forces = np.ptp(found.cylinder_forces, axis=0)
+    acceleration = float(np.linalg.norm(result.tip_acceleration, axis=1).max())
+    forces = np.ptp(result.cylinder_forces, axis=0)
     values = {
         "load": told,
         "rate_Hz": 1.0 / load.period,
-        "tip_peak_to_peak_m": np.ptp(found.tip, axis=0),
-        "tip_swing_m": found.swing,
-        "tip_mean_m": found.tip.mean(axis=0),
+        "tip_peak_to_peak_m": np.ptp(result.tip, axis=0),
+        "tip_swing_m": result.swing,
+        "tip_mean_m": result.tip.mean(axis=0),
         "tip_acceleration_max_m_s2": acceleration,
         "cylinder_force_peak_to_peak_N": forces,
-        "harmonics_m": found.harmonics[:25],
+        "harmonics_m": result.harmonics[:25],
     }
-    (x, y), (mean_x, mean_y) = 1e3 * np.ptp(found.tip, axis=0), 1e3 * found.tip.mean(axis=0)
+    (x, y), (mean_x, mean_y) = 1e3 * np.ptp(result.tip, axis=0), 1e3 * result.tip.mean(axis=0)
     lines = [
         title,
         "",
-        f"tip peak to peak    x {x:.1f} mm, y {y:.1f} mm, {1e3 * found.swing:.1f} mm in the direction in which it is largest",
+        f"tip peak to peak    x {x:.1f} mm, y {y:.1f} mm, {1e3 * result.swing:.1f} mm in the direction in which it is largest",
         f"tip mean            x {mean_x:+.1f} mm, y {mean_y:+.1f} mm from its place at rest",
         f"tip acceleration    {acceleration:.3f} m/s2 at most",
         "cylinder forces     " + ", ".join(f"{force:.0f}" for force in forces) + " N peak to peak",
     ]
-    doubts = _large(scene, found.swing)
-    return Answer("steady_state", values, lines, found.columns(), lambda path: steady_state_picture(path, title, found), doubts)
+    doubts = _large(scene, result.swing)
+    return Answer(
+        "steady_state", values, lines, result.columns(), lambda path: steady_state_picture(path, title, result), doubts
+    )
 
 
 def _map(scene: Scene, args: Namespace) -> Answer:
@@ -265,13 +255,13 @@ def _map(scene: Scene, args: Namespace) -> Answer:
     if not names:
         raise UsageError("--map all: the scene names no posture. Add `postures` to it.")
     postures = postures_along(scene, names, args.steps)
-    found = resonance_map(scene, postures, np.linspace(*args.rates), lambda rate: pump_load(scene, rate, *args.pump[1:]))
+    result = resonance_map(scene, postures, np.linspace(*args.rates), lambda rate: pump_load(scene, rate, *args.pump[1:]))
     title = f"Resonance map: pump pulses of {args.pump[1]:g} N"
-    bands = found.to_avoid()
+    bands = result.to_avoid()
     values = {
-        "postures": found.postures,
-        "rates_Hz": found.rates,
-        "swing_m": found.swing,
+        "postures": result.postures,
+        "rates_Hz": result.rates,
+        "swing_m": result.swing,
         "avoid_posture": [band.posture for band in bands],
         "avoid_from_Hz": [band.low for band in bands],
         "avoid_to_Hz": [band.high for band in bands],
@@ -279,9 +269,9 @@ def _map(scene: Scene, args: Namespace) -> Answer:
         "avoid_swing_m": [band.swing for band in bands],
         "avoid_harmonic": [band.harmonic for band in bands],
     }
-    width = max(len(name) for name in found.postures)
+    width = max(len(name) for name in result.postures)
     lines = [title, "", f"{'posture':{width}}   median mm   avoid Hz      worst Hz   swing mm   by harmonic"]
-    for name, swing in zip(found.postures, found.swing, strict=True):
+    for name, swing in zip(result.postures, result.swing, strict=True):
         own = [band for band in bands if band.posture == name]
         lines.append(f"{name:{width}} {1e3 * np.median(swing):11.1f}" + ("" if own else "   none"))
         lines += [
@@ -289,10 +279,10 @@ def _map(scene: Scene, args: Namespace) -> Answer:
             f"{band.harmonic}, at {band.harmonic * band.rate:.2f} Hz"
             for band in own
         ]
-    columns = {"rate_Hz": found.rates}
-    columns |= {f"swing_m_{name.replace(',', ' ')}": row for name, row in zip(found.postures, found.swing, strict=True)}
-    doubts = _large(scene, float(found.swing.max()))
-    return Answer("resonance_map", values, lines, columns, lambda path: resonance_picture(path, title, found), doubts)
+    columns = {"rate_Hz": result.rates}
+    columns |= {f"swing_m_{name.replace(',', ' ')}": row for name, row in zip(result.postures, result.swing, strict=True)}
+    doubts = _large(scene, float(result.swing.max()))
+    return Answer("resonance_map", values, lines, columns, lambda path: resonance_picture(path, title, result), doubts)
 
 
 def _large(scene: Scene, swing: float) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import Action, ArgumentParser, Namespace
 from pathlib import Path
 from typing import NoReturn
@@ -10,8 +9,8 @@ from typing import NoReturn
 from .. import __version__
 from ..errors import UsageError
 from ..types import StrokeReading
-from .arguments import positive
-from .main import add_scene, tell
+from .arguments import add_scene, files_of, positive
+from .output import tell, tell_oddities
 
 SENSORS = ("angles", "imu", "forces")
 
@@ -22,11 +21,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the bag and its truth, new or empty")
     parser.add_argument("--random", metavar="POSTURE", help="random moves from this posture instead of the bundled ones")
     parser.add_argument("--duration", type=positive, metavar="S", help="s (default 60)")
-    parser.add_argument("--seed", type=int, default=0, help="of random moves and of the sensors' noise")
+    parser.add_argument("--seed", type=int, default=0, help="of random moves and of the sensors' noise (0)")
     parser.add_argument("--clean", action="store_true", help="sensors without noise and rounding")
-    share = "every k, d, EI and mass of the simulated boom off by this share, at random: 0.02 is 2 %%"
+    share = "every k, d, EI and mass of the simulated boom off by this share, at random: 0.02 is 2 %% (0)"
     parser.add_argument("--wrong", type=float, default=0.0, metavar="SHARE", help=share)
-    parser.add_argument("--rig-seed", type=int, default=0, metavar="N", help="of --wrong: one boom for each")
+    parser.add_argument("--rig-seed", type=int, default=0, metavar="N", help="of --wrong: one boom for each (0)")
     fault = (
         "a fault, for instance cylinder_2.k:softer:0.3 or joint_3.sensor:bias:0.0035@20 (SI units); @20+5..40: from 20 s on, "
         "over 5 s, until 40 s; may be repeated"
@@ -83,7 +82,7 @@ def run(args: Namespace) -> int:
     from ..validation.rig.sensors import RATE
 
     assumed, out = scene_from(args.scene), Path(args.out)
-    tell(assumed.oddities, assumed.source)
+    tell_oddities(assumed.oddities, assumed.source)
     scene = assumed.scene
     duration = BUNDLED_DURATION if args.duration is None else args.duration
     recorded = _recorded(args.sensors)
@@ -109,8 +108,8 @@ def run(args: Namespace) -> int:
         notes["rate"] = f"{args.rate:g} Hz"
     if "forces" in recorded and not args.clean:
         notes["forces"] = f"noise {sensors.force_sigma:g} N, resolution {sensors.force_resolution:g} N"
-    with result_folder(out, RIG, [Path(args.scene)] if args.scene else []) as building:
-        print(f"simulating {duration:g} s, about as long as that ..", file=sys.stderr)
+    with result_folder(out, RIG, files_of(args, "scene")) as building:
+        tell(f"simulating {duration:g} s, about as long as that ..")
         session = record_session(boom, drive, duration, sensors, args.seed, load=load, changes=changes)
         session = faults.spoil(session, wrong, args.seed)
         readings = {"angles": session.joints, "imu": session.imu, "forces": session.forces}

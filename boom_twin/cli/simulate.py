@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,8 +15,8 @@ from ..system.atomic_files import check_new, check_target, write_atomic
 from ..system.csv_table import columns_text, read_csv
 from ..system.summary_display import numbers
 from ..types import Array
-from .arguments import not_negative
-from .main import add_json, add_scene, open_scene, print_result
+from .arguments import add_json, add_scene, files_of, not_negative, refuse_given
+from .output import open_scene, print_result, warn
 
 if TYPE_CHECKING:
     from ..analysis.energy_balance import EnergyBalance
@@ -35,8 +34,8 @@ SPARSE = 1.0  # s from row to row
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
-    told = "the posture that the first row must be in: a name, or section angles, deg; else it may be any"
-    parser.add_argument("--posture", metavar="NAME", help=told)
+    purpose = "the posture that the first row must be in: a name, or section angles, deg; else it may be any"
+    parser.add_argument("--posture", metavar="NAME", help=purpose)
     followed = parser.add_mutually_exclusive_group(required=True)
     followed.add_argument("--drive", metavar="IN.csv", help="t_s,stroke_1_m,.. (absolute strokes of the drives)")
     lengths = "t_s,length_1_m,.. or, as in a session, stroke_1_m,..: cylinder lengths, as transducers read them"
@@ -82,14 +81,14 @@ def run(args: Namespace) -> int:
     _check_sampling(args)
     if args.orbits and not compile_scene(scene).pins:
         raise UsageError("--orbits: the scene has no pin with clearance. `boom_twin scene --clearance` prints one that has.")
-    sources = _sources(args)
+    sources = files_of(args, "drive", "lengths", "scene")
     check_target(Path(args.out), sources, _is_earlier)
     for picture_or_state in filter(None, (args.orbits, args.save_state)):
         check_new(Path(picture_or_state), sources)
     _check_targets({"--out": args.out, "--orbits": args.orbits, "--save-state": args.save_state})
     times, strokes, stem = read_history(sources[0], len(scene.joints), ("length", "stroke") if args.lengths else ("stroke",))
     for oddity in odd_in_drive(times, strokes, stem):
-        print(f"boom_twin simulate: warning: {sources[0]}: {oddity}", file=sys.stderr)
+        warn(f"{sources[0]}: {oddity}")
     angles = None if args.posture is None else _angles_near(scene, args.posture, strokes[0], bool(args.lengths))
     if args.samples is not None:
         return _sample(args, scene, times, strokes, angles)
@@ -101,7 +100,7 @@ def run(args: Namespace) -> int:
         scene, times, dt=args.dt, angles=angles, rho=rho, estimate_errors=not args.no_error_estimate, start=start, **followed
     )
     for doubt in result.doubts:
-        print(f"boom_twin simulate: warning: {doubt}.", file=sys.stderr)
+        warn(f"{doubt}.")
     write_atomic(Path(args.out), columns_text(result.columns()))
     if args.save_state:
         write_state(Path(args.save_state), result.end)
@@ -115,11 +114,6 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _sources(args: Namespace) -> list[Path]:
-    """Return the files that are read: the history first, then the scene if one is given."""
-    return [Path(path) for path in (args.drive, args.lengths, args.scene) if path is not None]
-
-
 def _check_targets(targets: dict[str, str | None]) -> None:
     """Raise UsageError if two options would write the same file."""
     seen: dict[Path, str] = {}
@@ -131,16 +125,11 @@ def _check_targets(targets: dict[str, str | None]) -> None:
 def _check_sampling(args: Namespace) -> None:
     """Raise UsageError for options that do not go with ``--samples``, or only with it."""
     if args.samples is None:
-        if args.vary:
-            raise UsageError(f"--vary {args.vary[0]}: goes with --samples N. Add it, or leave --vary out.")
+        refuse_given(args, "goes with --samples N. Add it, or leave --vary out.", "vary")
         return
-    single = {"--check": args.check, "--start": args.start != "rest", "--save-state": args.save_state, "--orbits": args.orbits}
-    single["--rho"] = args.rho is not None
-    for option, is_given in single.items():
-        if is_given:
-            raise UsageError(f"{option}: is of one motion, --samples of many. Leave one of them out.")
-    if args.lengths:
-        raise UsageError(f"--lengths {args.lengths}: --samples draws booms that follow drives. Give --drive instead.")
+    single = ["check", "save_state", "orbits", "rho", *(["start"] if args.start != "rest" else [])]
+    refuse_given(args, "is of one motion, --samples of many. Leave one of them out.", *single)
+    refuse_given(args, "--samples draws booms that follow drives. Give --drive instead.", "lengths")
 
 
 def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles: Array | None) -> int:
@@ -150,23 +139,23 @@ def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles:
 
     out = Path(args.out)
     table = out.with_name(f"{out.stem}_samples.csv")
-    check_new(table, _sources(args))
+    check_new(table, files_of(args, "drive", "lengths", "scene"))
     progress = progress_of(args.samples, "samples", "simulate")
     deviations = dict(map(_deviation, args.vary or ()))
     found = simulate_samples(scene, times, strokes, deviations, args.samples, args.seed, args.dt, angles, progress.update)
     progress.close()
     for failure in found.failures:
-        print(f"boom_twin simulate: warning: left out: {failure}", file=sys.stderr)
+        warn(f"left out: {failure}")
     if found.doubtful:
-        print(f"boom_twin simulate: warning: {found.doubtful} samples move in a way that simulate doubts.", file=sys.stderr)
+        warn(f"{found.doubtful} samples move in a way that simulate doubts.")
     write_atomic(out, columns_text(found.columns()))
     write_atomic(table, columns_text(found.samples))
     spread = {name: np.quantile(values, (0.025, 0.5, 0.975)) for name, values in found.samples.items()}
     right = args.samples - len(found.failures)
-    told = {"out": args.out, "samples_out": str(table), "samples": right, "left_out": len(found.failures), "seed": args.seed}
+    figures = {"out": args.out, "samples_out": str(table), "samples": right, "left_out": len(found.failures), "seed": args.seed}
     lines = [f"{name:28s} {numbers(values)}" for name, values in spread.items()]
     head = f"{right} samples; 2.5 %, 50 %, 97.5 % of them, SI:"
-    print_result(args.json, told | spread, [head, *lines, args.out, str(table)])
+    print_result(args.json, figures | spread, [head, *lines, args.out, str(table)])
     return 0
 
 
@@ -200,7 +189,7 @@ def _start(args: Namespace, scene: Scene, first: Array, angles: Array | None) ->
 def as_json(result: Simulation, out: str, balances: Balances | None) -> dict[str, object]:
     """Return the figures of a simulation; with the balances of energy and momentum, if given."""
     x, y = result.tip[:, 0], result.tip[:, 1]
-    told: dict[str, object] = {
+    figures: dict[str, object] = {
         "out": out,
         "rows": len(result.times),
         "duration_s": float(result.times[-1] - result.times[0]),
@@ -216,23 +205,26 @@ def as_json(result: Simulation, out: str, balances: Balances | None) -> dict[str
     if balances is not None:
         energy, momentum = balances
         names = ("work", "change", "damping", "contact", "gap", "left")
-        told |= {f"energy_{name}_J": getattr(energy, name) for name in names} | {"energy_gap_share": energy.share}
-        told |= {"momentum_gap_N_s": momentum.linear_gap, "momentum_gap_share": momentum.linear_share}
-        told |= {"moment_of_momentum_gap_N_m_s": momentum.angular_gap, "moment_of_momentum_gap_share": momentum.angular_share}
-    return told
+        figures |= {f"energy_{name}_J": getattr(energy, name) for name in names} | {"energy_gap_share": energy.share}
+        figures |= {"momentum_gap_N_s": momentum.linear_gap, "momentum_gap_share": momentum.linear_share}
+        figures |= {
+            "moment_of_momentum_gap_N_m_s": momentum.angular_gap,
+            "moment_of_momentum_gap_share": momentum.angular_share,
+        }
+    return figures
 
 
 def as_text(result: Simulation, out: str, start: str, balances: Balances | None) -> list[str]:
     """Return the lines of text with the figures of a simulation."""
-    told = as_json(result, out, balances)
+    figures = as_json(result, out, balances)
     (x, y), (end_x, end_y) = result.tip[0, :2], result.tip[-1, :2]
     began = {"rest": "started at rest ", "undeflected": "undeflected     "}.get(start, "went on         ")
     lines = [
         f"{began}  strokes {numbers(result.strokes[0])} m, tip x {x:.4f} m, y {y:.4f} m",
-        f"followed          {told['rows']} rows, {told['duration_s']:g} s; the tip went {told['tip_travel_m']:.3f} m "
+        f"followed          {figures['rows']} rows, {figures['duration_s']:g} s; the tip went {figures['tip_travel_m']:.3f} m "
         f"to x {end_x:.4f} m, y {end_y:.4f} m",
-        f"tip acceleration  {told['tip_acceleration_max_m_s2']:.3g} m/s^2 at most",
-        f"cylinder forces   {numbers(told['cylinder_force_max_N'], 1e-3)} kN at most",
+        f"tip acceleration  {figures['tip_acceleration_max_m_s2']:.3g} m/s^2 at most",
+        f"cylinder forces   {numbers(figures['cylinder_force_max_N'], 1e-3)} kN at most",
     ]
     lines += [f"{name}: contact lost {lost} times" for name, lost in zip(result.pin_names, result.lost_contacts, strict=True)]
     return [*lines, *(f"{balance}." for balance in balances or ()), out]
@@ -245,7 +237,7 @@ def _draw_orbits(args: Namespace, scene: Scene, result: Simulation) -> None:
 
     gaps = compile_scene(scene).tables.clearances.gap
     orbits = Orbits(result.times, result.pin_names, gaps, result.pins, result.lost_contacts)
-    orbits_picture(Path(args.orbits), f"{_sources(args)[0].name}: journals in their bushes", orbits)
+    orbits_picture(Path(args.orbits), f"{Path(args.drive or args.lengths).name}: journals in their bushes", orbits)
 
 
 def _is_earlier(start: bytes) -> bool:

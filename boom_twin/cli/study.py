@@ -7,6 +7,9 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
+from .arguments import add_scene, files_of
+from .output import open_scene
+
 # kind: (module in boom_twin.validation.study with write(scene, out, quick, posture) -> paths, what it does)
 KINDS: dict[str, tuple[str, str]] = {
     "error": ("error.report", "error against run time of all methods, beside Exudyn"),
@@ -17,8 +20,6 @@ KINDS: dict[str, tuple[str, str]] = {
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare a parser for every kind."""
-    from .main import add_scene
-
     kinds = parser.add_subparsers(dest="kind", metavar="KIND", required=True)
     for name, (_, purpose) in KINDS.items():
         own = kinds.add_parser(name, help=purpose, description=purpose[0].upper() + purpose[1:] + ".")
@@ -34,12 +35,11 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Compute and write the report; print its files."""
     from ..system.result_folder import result_folder, study
-    from .main import open_scene
 
     write: Callable[..., list[Path]] = import_module(f"boom_twin.validation.study.{KINDS[args.kind][0]}").write
     options = {"soak": True} if getattr(args, "soak", False) else {}
     scene, out = open_scene(args.scene), Path(args.out)
-    with result_folder(out, study(args.kind), [Path(args.scene)] if args.scene else []) as building:
+    with result_folder(out, study(args.kind), files_of(args, "scene")) as building:
         written = write(scene, building.folder, quick=args.quick, posture=args.posture, **options)
     for path in written:
         print(out / path.name)

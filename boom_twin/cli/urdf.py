@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 
-from .main import add_scene, open_scene
+from .arguments import add_scene
+from .output import open_scene
 
 
 def add_arguments(parser: ArgumentParser) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..errors import BoomTwinError
 from ..system.atomic_files import write_atomic
-from .main import add_namespace
+from .arguments import add_namespace
 
 
 def add_arguments(parser: ArgumentParser) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from math import isfinite, nan
+from typing import Self
 
 from ..config.settings import Thresholds
 
@@ -20,25 +21,17 @@ class Level(IntEnum):
     STALE = 3
 
 
+Value = str | int | float
+
+
 @dataclass(frozen=True, slots=True)
 class Status:
-    """Status of one component.
-
-    Attributes
-    ----------
-    name : str
-        Without the node's.
-    level : Level
-    message : str
-        One line.
-    values : dict of str to str, int or float
-        Units are at the end of the keys.
-    """
+    """Status of one component, without the node's name. Units are at the end of the keys of `values`."""
 
     name: str
     level: Level
     message: str
-    values: Mapping[str, str | int | float] = field(default_factory=dict)
+    values: Mapping[str, Value] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,14 +71,7 @@ class Hysteresis:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """Time and thresholds of an evaluation of components.
-
-    Attributes
-    ----------
-    thresholds : Thresholds
-    now, clock : float
-        Time (s) of a clock that only goes forward, and of the one that people know.
-    """
+    """Thresholds and time of an evaluation: `now` (s) of a clock that only goes forward, `clock` (s) of the one people know."""
 
     thresholds: Thresholds
     now: float
@@ -93,35 +79,31 @@ class Evaluation:
 
 
 class ComponentJudge:
-    """Judge of one component, used again and again: `begin`, any number of `check` and `note`, `finish`.
+    """Judge of one component, used again and again: `begin`, any number of `check`, `note` and `fault`, `finish`.
 
-    Parameters
+    Attributes
     ----------
-    name : str
-        Of the component.
+    level : Level or None
+        Reported last; None before the first report.
+    at : Evaluation
+        The one that was begun last.
     """
 
     def __init__(self, name: str) -> None:
-        self.name = name
+        self._name = name
         self._hysteresis: defaultdict[str, Hysteresis] = defaultdict(Hysteresis)
         self._words: dict[str, str] = {}
-        self._level: Level | None = None
+        self.level: Level | None = None
         self._since = 0.0
 
-    @property
-    def level(self) -> Level | None:
-        """Level that was reported last; None before the first report."""
-        return self._level
+    def begin(self, at: Evaluation) -> Self:
+        """Begin a new evaluation; return this judge."""
+        self.at, self._faults, self._values = at, list[tuple[Level, str]](), dict[str, Value]()
+        return self
 
-    def begin(self, at: Evaluation) -> None:
-        """Begin a new evaluation."""
-        self._at = at
-        self._faults: list[tuple[Level, str]] = []
-        self._values: dict[str, str | int | float] = {}
-
-    def note(self, key: str, value: str | int | float) -> None:
-        """Report a value that is not judged."""
-        self._values[key] = value
+    def note(self, values: Mapping[str, Value]) -> None:
+        """Report values that are not judged."""
+        self._values |= values
 
     def check(self, key: str, value: float, bounds: Bounds, words: str, at_once: bool = False) -> None:
         """Judge a value, and report it with its bounds.
@@ -136,17 +118,16 @@ class ComponentJudge:
         at_once : bool
             A worse level counts at once.
         """
-        self._values[key] = value
-        for name, limit in (("warn", bounds.warn), ("error", bounds.error)):
-            if isfinite(limit):
-                self._values[f"{key}_{name}"] = limit
+        limits = {f"{key}_warn": bounds.warn, f"{key}_error": bounds.error}
+        self._values |= {key: value} | {name: limit for name, limit in limits.items() if isfinite(limit)}
         if bounds.level(value, Level.OK, 1.0) != Level.OK:
             self._words[key] = words
-        level = self._hysteresis[key].update(value, bounds, self._at.thresholds, self._at.now, at_once)
+        level = self._hysteresis[key].update(value, bounds, self.at.thresholds, self.at.now, at_once)
         self.fault(level, self._words.get(key, words))
 
-    def check_age(self, age: float, limit: float, words: str) -> None:
-        """Set the level STALE if nothing came for longer than `limit`, s. It ends with the next message."""
+    def check_age(self, age: float, words: str) -> None:
+        """Set the level STALE if nothing came for longer than `stale_after`. It ends with the next message."""
+        limit = self.at.thresholds.stale_after
         self._values |= {"age_s": age, "age_s_stale": limit}
         if age > limit:
             self.fault(Level.STALE, words)
@@ -160,7 +141,7 @@ class ComponentJudge:
         """Return the status with the worst level of this evaluation; `message` if all is well."""
         faults = sorted(self._faults, key=lambda fault: -fault[0])
         level = faults[0][0] if faults else Level.OK
-        if level != self._level:
-            self._level, self._since = level, self._at.clock
+        if level != self.level:
+            self.level, self._since = level, self.at.clock
         told = "; ".join(words for _, words in faults) or message
-        return Status(self.name, level, told, {**self._values, "since_s": f"{self._since:.3f}"})
+        return Status(self._name, level, told, {**self._values, "since_s": f"{self._since:.3f}"})

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .levels import Bounds, ComponentJudge, Evaluation, Level, Status
+from .levels import Bounds, ComponentJudge, Level, Status
 
 ENDED = "ended"
 """Key of a status that says of itself, by 1, that it is the last one: silence after it is no news."""
@@ -19,12 +19,8 @@ class DiskState:
     ----------
     lag : float
         Age of the oldest message that a loss of power would cost, s.
-    waiting : int
-        Bytes of messages in memory.
-    written : int
-        Bytes of all files.
-    free : int
-        Bytes left on the disk.
+    waiting, written, free : int
+        Bytes of messages in memory, of all files, and left on the disk.
     left : float
         Time until the disk is full at the pace of this recording so far, s.
     """
@@ -37,46 +33,36 @@ class DiskState:
 
 
 @dataclass(frozen=True, slots=True)
-class TopicState:
-    """Message counts of one topic: received, and published but never received (None: not known)."""
+class TopicCount:
+    """Message counts of one topic.
 
+    Attributes
+    ----------
+    topic : str
+    received, written : int
+    missed : int or None
+        Published but never received, by the publisher's numbers, or left out; None where there were several publishers or none.
+    """
+
+    topic: str
     received: int
+    written: int
     missed: int | None
 
 
-class RecordingJudge:
-    """Judge of one recording."""
-
-    def __init__(self) -> None:
-        self._judge = ComponentJudge("recording")
-
-    def status(self, topics: Mapping[str, TopicState], disk: DiskState, end: str | None, at: Evaluation) -> Status:
-        """Return the status of the recording.
-
-        Parameters
-        ----------
-        topics : dict of str to TopicState
-        disk : DiskState
-        end : str or None
-            Why it ended too early; empty if it ended in order, None while it runs.
-        at : Evaluation
-        """
-        judge, thresholds = self._judge, at.thresholds
-        missed = sum(topic.missed or 0 for topic in topics.values())
-        judge.begin(at)
-        if end:
-            judge.fault(Level.ERROR, end)
-        judge.check("never_arrived", missed, Bounds(warn=0), f"{missed} messages were published and never arrived")
-        told = f"messages of the last {disk.lag:.1f} s are not on the disk yet"
-        judge.check("lag_s", disk.lag, Bounds(thresholds.lag_warn, thresholds.lag_error), told)
-        room = Bounds(thresholds.disk_warn, thresholds.disk_error, low=True)
-        judge.check("disk_left_s", disk.left, room, f"the disk is full in {disk.left:.0f} s")
-        if end is not None:
-            judge.note(ENDED, 1)
-        judge.note("disk_free_bytes", disk.free)
-        judge.note("waiting_bytes", disk.waiting)
-        judge.note("written_bytes", disk.written)
-        for name, topic in topics.items():
-            judge.note(f"received {name}", topic.received)
-            judge.note(f"never_arrived {name}", "nan" if topic.missed is None else topic.missed)
-        return judge.finish("running" if end is None else "ended")
+def recording_status(judge: ComponentJudge, counts: Sequence[TopicCount], disk: DiskState, end: str | None) -> Status:
+    """Return the status of a recording; `end`: why it ended too early, empty if in order, None while it runs."""
+    thresholds, missed = judge.at.thresholds, sum(count.missed or 0 for count in counts)
+    if end:
+        judge.fault(Level.ERROR, end)
+    judge.check("never_arrived", missed, Bounds(warn=0), f"{missed} messages were published and never arrived")
+    told = f"messages of the last {disk.lag:.1f} s are not on the disk yet"
+    judge.check("lag_s", disk.lag, Bounds(thresholds.lag_warn, thresholds.lag_error), told)
+    room = Bounds(thresholds.disk_warn, thresholds.disk_error, low=True)
+    judge.check("disk_left_s", disk.left, room, f"the disk is full in {disk.left:.0f} s")
+    judge.note({} if end is None else {ENDED: 1})
+    judge.note({"disk_free_bytes": disk.free, "waiting_bytes": disk.waiting, "written_bytes": disk.written})
+    for count in counts:
+        missing = "nan" if count.missed is None else count.missed
+        judge.note({f"received {count.topic}": count.received, f"never_arrived {count.topic}": missing})
+    return judge.finish("running" if end is None else "ended")

@@ -6,12 +6,15 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isnan
 
-from ..config.settings import Settings, Thresholds
+from ..config.settings import Settings
 from ..health.sensor_check import readings_of_frozen, sensor_ranges
 from ..scene.schema import Scene
 from ..types import SENSORS, Mount, Stream
-from .levels import Bounds, ComponentJudge, Evaluation, Status
+from .levels import Bounds, ComponentJudge, Status
 from .stream_stats import ChannelStats
+
+SLACK = 5.0
+"""Deviations of its noise by which a sensor may read beyond the range of what it measures."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,59 +31,6 @@ class SensorSpec:
     sigma: float
     resolution: float
     required: bool = True
-
-
-class SensorJudge:
-    """Judge of one sensor by its statistics."""
-
-    def __init__(self, sensor: SensorSpec) -> None:
-        self._sensor, self._judge = sensor, ComponentJudge(f"sensor {sensor.name}")
-
-    def status(self, figures: ChannelStats, age: float, at: Evaluation) -> Status:
-        """Return the status of the sensor.
-
-        Parameters
-        ----------
-        figures : ChannelStats
-        age : float
-            Since its last reading, s.
-        at : Evaluation
-        """
-        judge, sensor, thresholds = self._judge, self._sensor, at.thresholds
-        judge.begin(at)
-        if not figures.stamp and not sensor.required:
-            return judge.finish("not there; optional")
-        judge.note(f"value_{sensor.unit}", figures.value)
-        judge.note("rate_Hz", figures.rate)
-        told = f"no reading for {age:.1f} s" if figures.stamp else "no reading yet"
-        judge.check_age(age, thresholds.stale_after, told)
-        judge.check("gap_s", figures.gap, Bounds(thresholds.gap_warn), f"gap of {figures.gap:.3f} s", at_once=True)
-        judge.note("gaps", figures.gaps)
-        share = Bounds(thresholds.unusable_warn, thresholds.unusable_error)
-        judge.check("missing_share", figures.missing, share, f"{figures.missing:.1%} of the messages without a value")
-        self._check_range(figures, share)
-        self._check_frozen(figures, thresholds)
-        return judge.finish("measuring" if figures.stamp else "waiting for a reading")
-
-    def _check_range(self, figures: ChannelStats, share: Bounds) -> None:
-        if self._sensor.high < inf:
-            low, high, unit = self._sensor.low, self._sensor.high, self._sensor.unit
-            told = f"{figures.outside:.1%} of the readings out of {low:.6g} to {high:.6g} {unit}, newest {figures.value:.6g}"
-            self._judge.note(f"low_{unit}", low)
-            self._judge.note(f"high_{unit}", high)
-            self._judge.check("outside_share", figures.outside, share, told)
-
-    def _check_frozen(self, figures: ChannelStats, thresholds: Thresholds) -> None:
-        """Judge for how long the reading has not changed, against what noise explains."""
-        known = 0.0 if isnan(figures.rate) else 1.0 / figures.rate
-        needed = readings_of_frozen(self._sensor.sigma, self._sensor.resolution, thresholds.frozen_false_alarm)
-        limit, unchanged = max(thresholds.frozen_after, needed * known), figures.unchanged * known
-        told = f"the reading has not changed for {unchanged:.1f} s: frozen"
-        self._judge.check("unchanged_s", unchanged, Bounds(error=limit), told)
-
-
-SLACK = 5.0
-"""Deviations of its noise by which a sensor may read beyond the range of what it measures."""
 
 
 def sensors_of(
@@ -116,3 +66,26 @@ def sensors_of(
             for name, low, high in bounds
         ]
     return found
+
+
+def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats, age: float) -> Status:
+    """Return the status of a sensor by its statistics; `age` (s): since its last reading."""
+    thresholds, unit = judge.at.thresholds, sensor.unit
+    if not stats.stamp and not sensor.required:
+        return judge.finish("not there; optional")
+    judge.note({f"value_{unit}": stats.value, "rate_Hz": stats.rate})
+    judge.check_age(age, f"no reading for {age:.1f} s" if stats.stamp else "no reading yet")
+    judge.check("gap_s", stats.gap, Bounds(thresholds.gap_warn), f"gap of {stats.gap:.3f} s", at_once=True)
+    judge.note({"gaps": stats.gaps})
+    share = Bounds(thresholds.unusable_warn, thresholds.unusable_error)
+    judge.check("missing_share", stats.missing, share, f"{stats.missing:.1%} of the messages without a value")
+    if sensor.high < inf:
+        judge.note({f"low_{unit}": sensor.low, f"high_{unit}": sensor.high})
+        span = f"{sensor.low:.6g} to {sensor.high:.6g} {unit}"
+        told = f"{stats.outside:.1%} of the readings out of {span}, newest {stats.value:.6g}"
+        judge.check("outside_share", stats.outside, share, told)
+    period = 0.0 if isnan(stats.rate) else 1.0 / stats.rate
+    needed = readings_of_frozen(sensor.sigma, sensor.resolution, thresholds.frozen_false_alarm)
+    frozen, unchanged = Bounds(error=max(thresholds.frozen_after, needed * period)), stats.unchanged * period
+    judge.check("unchanged_s", unchanged, frozen, f"the reading has not changed for {unchanged:.1f} s: frozen")
+    return judge.finish("measuring" if stats.stamp else "waiting for a reading")

@@ -50,20 +50,10 @@ class ChannelStats:
 
 
 class Channel:
-    """Computation of the statistics of one sensor.
-
-    Parameters
-    ----------
-    low, high : float
-        Its range, in its unit.
-    """
+    """Computation of the statistics of one sensor; `low` and `high` are its range, in its unit."""
 
     def __init__(self, low: float = -inf, high: float = inf) -> None:
         self._low, self._high = low, high
-        self.forget()
-
-    def forget(self) -> None:
-        """Forget all readings and counts."""
         self._value, self._stamp, self._unchanged, self._gaps = nan, 0, 0, 0
 
     def look(self, stamps: NDArray[np.int64], values: Array, refused: int, longest: float) -> ChannelStats:
@@ -81,9 +71,14 @@ class Channel:
             Step between stamps that is allowed, s.
         """
         messages, usable = len(values) + refused, np.isfinite(values)
-        stamps, values = stamps[usable], values[usable]
+        stamps, values, steps = stamps[usable], values[usable], np.zeros(0)
+        if len(values):
+            steps = np.diff(stamps, prepend=self._stamp or stamps[0]) * NANO
+            steps = steps[(steps > 0.0) & (steps <= LONGEST)]
+            changes = np.flatnonzero(np.diff(values, prepend=self._value) != 0.0)  # also the first reading ever
+            self._unchanged = len(values) - 1 - int(changes[-1]) if len(changes) else self._unchanged + len(values)
+            self._value, self._stamp = float(values[-1]), int(stamps[-1])
         outside = np.count_nonzero((values < self._low) | (values > self._high))
-        steps = self._take(stamps, values)
         total = float(steps.sum())
         self._gaps += int(np.count_nonzero(steps > longest))
         return ChannelStats(
@@ -97,25 +92,9 @@ class Channel:
             unchanged=self._unchanged,
         )
 
-    def _take(self, stamps: NDArray[np.int64], values: Array) -> Array:
-        """Keep the newest reading; return the steps between the stamps, s, without those that are no pause."""
-        if not len(values):
-            return np.zeros(0)
-        steps = np.diff(stamps, prepend=self._stamp or stamps[0]) * NANO
-        changes = np.flatnonzero(np.diff(values, prepend=self._value) != 0.0)  # also the first reading ever
-        self._unchanged = len(values) - 1 - int(changes[-1]) if len(changes) else self._unchanged + len(values)
-        self._value, self._stamp = float(values[-1]), int(stamps[-1])
-        return steps[(steps > 0.0) & (steps <= LONGEST)]
-
 
 class Rows:
-    """Rows of numbers in plain memory, in which Python's garbage collector has nothing to search.
-
-    Parameters
-    ----------
-    width : int
-        Numbers in a row.
-    """
+    """Rows of `width` numbers in plain memory, in which Python's garbage collector has nothing to search."""
 
     def __init__(self, width: int) -> None:
         self._width, self._numbers = width, array("d")
@@ -134,8 +113,8 @@ class StreamWatch:
 
     Parameters
     ----------
-    low, high : ndarray, shape (n,)
-        Range of each channel, in the sensor's unit.
+    ranges : ndarray, shape (n, 2)
+        Least and greatest reading of each channel, in the sensor's unit.
     monotonic : callable
         The time, s, of a clock that only goes forward.
 
@@ -150,19 +129,18 @@ class StreamWatch:
         messages. Differences of two streams' lags tell how their clocks are apart.
     """
 
-    def __init__(self, low: Array, high: Array, monotonic: Callable[[], float] = time.monotonic) -> None:
-        self._monotonic = monotonic
-        self._channels = [Channel(*bounds) for bounds in zip(low.tolist(), high.tolist(), strict=True)]
+    def __init__(self, ranges: Array, monotonic: Callable[[], float] = time.monotonic) -> None:
+        self._ranges, self._monotonic = ranges.tolist(), monotonic
         self.count = 0
-        self.begin(monotonic())
+        self.begin()
 
-    def begin(self, now: float) -> None:
+    def begin(self) -> None:
         """Start listening; everything but the count is forgotten."""
         self.newest: int | None = None
-        self._heard, self._told, self._least, self.lag = now, self.count, nan, nan
+        self._heard, self._told, self._least, self.lag = self._monotonic(), self.count, nan, nan
+        self._counted = nan, 0
+        self._channels = [Channel(*bounds) for bounds in self._ranges]
         self._stamps, self._values = array("q"), Rows(len(self._channels))  # of samples
-        for channel in self._channels:
-            channel.forget()
 
     def seen(self, stamp: int) -> None:
         """Count a message."""
@@ -182,18 +160,22 @@ class StreamWatch:
         """Return the time since the last message, or since listening began."""
         return now - self._heard
 
-    def age_of(self, figures: ChannelStats, now: float) -> float:
+    def age_of(self, stats: ChannelStats, now: float) -> float:
         """Return the time since the last reading of a channel, or since listening began; by stamps beyond the last message."""
-        if self.newest is None or not figures.stamp:
+        if self.newest is None or not stats.stamp:
             return self.age(now)
-        return self.age(now) + max(0, self.newest - figures.stamp) * NANO
+        return self.age(now) + max(0, self.newest - stats.stamp) * NANO
+
+    def arrival_rate(self, now: float) -> float:
+        """Return the messages a second since the last call; NaN at the first."""
+        (time, count), self._counted = self._counted, (now, self.count)
+        return (self.count - count) / (now - time) if now > time else nan
 
     def look(self, longest: float) -> list[ChannelStats]:
         """Return the statistics of every channel since the last look; `longest` (s) is the largest permitted step of stamps."""
-        taken, values = self._stamps, self._values
+        stamps, table = np.frombuffer(self._stamps, np.int64), self._values.table()
         self._stamps, self._values = array("q"), Rows(len(self._channels))
-        refused = max(0, self.count - self._told - len(taken))
+        refused = max(0, self.count - self._told - len(stamps))
         self._told = self.count
         self.lag, self._least = self._least, nan
-        stamps, table = np.frombuffer(taken, np.int64), values.table()
         return [channel.look(stamps, table[:, i], refused, longest) for i, channel in enumerate(self._channels)]

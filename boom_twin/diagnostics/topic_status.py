@@ -1,13 +1,13 @@
-"""Status of input and output topics: rates, gaps, publishers and subscribers at the other end."""
+"""Status of the topics: publishers and subscribers at the other ends, rates, ages, clocks, messages lost or left waiting."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
 
-from ..types import NANO, SECOND
-from .levels import Bounds, ComponentJudge, Evaluation, Level, Status
+from ..types import NANO, SECOND, Stream
+from .levels import Bounds, ComponentJudge, Level, Status
 from .stream_stats import StreamWatch
 
 OTHER_USER = (
@@ -15,6 +15,7 @@ OTHER_USER = (
     "FASTDDS_BUILTIN_TRANSPORTS=UDPv4 for it and leave ROS_AUTOMATIC_DISCOVERY_RANGE unset"
 )
 """Why endpoints of Fast DDS match and nothing arrives; measured with rmw_fastrtps 8.4.3."""
+FOLLOWED = "Followed is the one whose stamps go on, and which of them that is ROS does not tell. End all but one"
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +26,10 @@ class Peers:
     ----------
     address : str
         Name of the topic as it is resolved.
-    names : sequence of str
-        Their nodes.
+    names, ids : sequence of str
+        Their nodes, and their hexadecimal GIDs in the same order.
     incompatible : sequence of str
         Those of them that cannot hear or be heard for their quality of service, and why, in words.
-    ids : sequence of str
-        GIDs, hexadecimal, in the order of `names`.
     rivals : int
         Publishers of an output beside the node's own.
     mistyped : sequence of str
@@ -44,75 +43,11 @@ class Peers:
     rivals: int = 0
     mistyped: Sequence[str] = ()
 
-
-class TopicJudge:
-    """Judge of one input topic.
-
-    Parameters
-    ----------
-    name : str
-        As in ``topics.yaml``.
-    required : bool
-        Whether the twin needs it.
-    """
-
-    def __init__(self, name: str, required: bool) -> None:
-        self._judge, self._required = ComponentJudge(name), required
-        self._counted = (nan, 0)
-
-    def status(
-        self,
-        stream: StreamWatch,
-        publishers: Peers,
-        offset: float,
-        at: Evaluation,
-        wrong_names: tuple[Level, str] | None = None,
-    ) -> Status:
-        """Return the status of the topic.
-
-        Parameters
-        ----------
-        stream : StreamWatch
-            After its look.
-        publishers : Peers
-        offset : float
-            By how much the stamps are behind those of the strokes, s; NaN where it is not known.
-        at : Evaluation
-        wrong_names : tuple of Level and str, optional
-            What is wrong with the names in its messages, in words.
-        """
-        judge, age = self._judge, stream.age(at.now)
-        judge.begin(at)
-        judge.note("topic", publishers.address)
-        self._count(stream, at.now)
-        if wrong_names is not None:
-            judge.fault(*wrong_names)
-        judge.note("publishers", len(publishers.names))
-        judge.note("publisher_names", ", ".join(publishers.names))
-        if publishers.incompatible:
-            judge.fault(Level.WARN, "incompatible QoS: " + "; ".join(publishers.incompatible))
-        if publishers.mistyped:
-            judge.fault(Level.WARN, "another type of message: " + "; ".join(publishers.mistyped))
-        if stream.newest is None and not self._required:
-            return judge.finish("not there; optional")
-        told = f"silent for {age:.1f} s" if stream.newest is not None else "nothing received yet"
-        if stream.newest is None and len(publishers.names) > len(publishers.incompatible):
-            told += f", though a publisher is there. {OTHER_USER}"
-        judge.check_age(age, at.thresholds.stale_after, told)
-        if stream.newest is not None:
-            judge.note("newest_stamp_s", seconds(stream.newest))
-            judge.note("clock_minus_stamp_s", at.clock - stream.newest * NANO)
-        where = "behind" if offset > 0.0 else "ahead of"
-        told = f"stamped {abs(offset):.3f} s {where} the strokes: synchronise the sensors' clocks"
-        judge.check("clock_offset_s", abs(offset), Bounds(at.thresholds.clock_offset), told)
-        return judge.finish("listened to" if stream.newest is not None else "waiting for a message")
-
-    def _count(self, stream: StreamWatch, now: float) -> None:
-        """Report the number of messages, and their rate since the last look."""
-        time, count = self._counted
-        self._counted = (now, stream.count)
-        self._judge.note("messages", stream.count)
-        self._judge.note("rate_Hz", (stream.count - count) / (now - time) if now > time else nan)
+    def warn(self, judge: ComponentJudge, prefix: str = "") -> None:
+        """Warn of those that cannot be connected."""
+        for fault, found in (("incompatible QoS", self.incompatible), ("another type of message", self.mistyped)):
+            if found:
+                judge.fault(Level.WARN, f"{prefix}{fault}: {'; '.join(found)}")
 
 
 def seconds(stamp: int | None) -> str:
@@ -120,24 +55,139 @@ def seconds(stamp: int | None) -> str:
     return "nan" if stamp is None else f"{stamp // SECOND}.{stamp % SECOND:09d}"
 
 
-class OutputsJudge:
-    """Judge of all output topics together."""
+def topic_status(
+    judge: ComponentJudge,
+    stream: StreamWatch,
+    is_required: bool,
+    publishers: Peers,
+    offset: float,
+    wrong_names: tuple[Level, str] | None = None,
+) -> Status:
+    """Return the status of one input topic.
+
+    Parameters
+    ----------
+    judge : ComponentJudge
+    stream : StreamWatch
+        After its look.
+    is_required : bool
+        Whether the twin needs it.
+    publishers : Peers
+    offset : float
+        By how much the stamps are behind those of the strokes, s; NaN where it is not known.
+    wrong_names : tuple of Level and str, optional
+        What is wrong with the names in its messages, in words.
+    """
+    at, age = judge.at, stream.age(judge.at.now)
+    judge.note({"topic": publishers.address, "messages": stream.count, "rate_Hz": stream.arrival_rate(at.now)})
+    if wrong_names is not None:
+        judge.fault(*wrong_names)
+    judge.note({"publishers": len(publishers.names), "publisher_names": ", ".join(publishers.names)})
+    publishers.warn(judge)
+    if stream.newest is None and not is_required:
+        return judge.finish("not there; optional")
+    told = f"silent for {age:.1f} s" if stream.newest is not None else "nothing received yet"
+    if stream.newest is None and len(publishers.names) > len(publishers.incompatible):
+        told += f", though a publisher is there. {OTHER_USER}"
+    judge.check_age(age, told)
+    if stream.newest is not None:
+        judge.note({"newest_stamp_s": seconds(stream.newest), "clock_minus_stamp_s": at.clock - stream.newest * NANO})
+    where = "behind" if offset > 0.0 else "ahead of"
+    told = f"stamped {abs(offset):.3f} s {where} the strokes: synchronise the sensors' clocks"
+    judge.check("clock_offset_s", abs(offset), Bounds(at.thresholds.clock_offset), told)
+    return judge.finish("listened to" if stream.newest is not None else "waiting for a message")
+
+
+def outputs_status(judge: ComponentJudge, subscribers: Iterable[Peers]) -> Status:
+    """Return the status of all output topics together."""
+    shared = 0
+    for each in subscribers:
+        shared += each.rivals > 0
+        judge.note({f"subscribers {each.address}": len(each.names)})
+        each.warn(judge, f"{each.address}: ")
+    if shared:
+        told = f"{shared} of them are published by another node too: give each node a namespace of its own, or end one"
+        judge.fault(Level.ERROR, told)
+    return judge.finish("offered")
+
+
+def publishers_status(judge: ComponentJudge, publishers: Mapping[Stream, Peers], followed: Mapping[Stream, str]) -> Status:
+    """Return the status of the sources. A second one makes all predictions doubtful, so it is reported first.
+
+    Streams that come by one topic may have a publisher each. `followed` has the stamp (s) of the newest sample of each.
+    """
+    streams: dict[str, list[Stream]] = {}
+    for stream, peers in publishers.items():
+        streams.setdefault(peers.address, []).append(stream)
+    for address, sharing in streams.items():
+        peers, names = publishers[sharing[0]], ", ".join(publishers[sharing[0]].names)
+        judge.note({f"{address} publishers": names, f"{address} gids": ", ".join(peers.ids)})
+        told = f"{len(peers.names)} publishers of {address}: {names}. {FOLLOWED}"
+        surplus = max(0, len(peers.names) - len(sharing))
+        judge.check(f"{address} surplus", surplus, Bounds(error=0.0), told, at_once=True)
+        judge.note({f"{address} newest_stamp_s": followed[sharing[0]]})
+    return judge.finish("one source for every topic")
+
+
+@dataclass(frozen=True, slots=True)
+class Reception:
+    """Reception of one topic; counts since the node was activated.
+
+    Attributes
+    ----------
+    received : int
+        Messages that arrived.
+    lost : int
+        That never arrived, by the publisher's numbers, as far as one publisher can be told: see `is_numbered`.
+    dropped : int
+        That arrived and gave way to newer ones before they were read.
+    waiting : int
+        That wait now.
+    wait, latency : float
+        Longest time (s) from arrival to being read, and to being answered, since the last look; NaN without any.
+    is_numbered : bool
+        Whether the numbers since the last look were those of one publisher.
+    """
+
+    received: int = 0
+    lost: int = 0
+    dropped: int = 0
+    waiting: int = 0
+    wait: float = nan
+    latency: float = nan
+    is_numbered: bool = True
+
+
+class ReceptionWatch:
+    """Judge of the reception of all input topics by what changed since the last look."""
 
     def __init__(self) -> None:
-        self._judge = ComponentJudge("outputs")
+        self._before: dict[str, Reception] = {}
+        self._left_out: dict[str, int] = {}
 
-    def status(self, peers: Iterable[Peers], at: Evaluation) -> Status:
-        """Return the status of the outputs; `peers` are their subscribers."""
-        judge, shared = self._judge, 0
-        judge.begin(at)
-        for each in peers:
-            shared += each.rivals > 0
-            judge.note(f"subscribers {each.address}", len(each.names))
-            if each.incompatible:
-                judge.fault(Level.WARN, f"{each.address}: incompatible QoS: {'; '.join(each.incompatible)}")
-            if each.mistyped:
-                judge.fault(Level.WARN, f"{each.address}: another type of message: {'; '.join(each.mistyped)}")
-        if shared:
-            told = f"{shared} of them are published by another node too: give each node a namespace of its own, or end one"
-            judge.fault(Level.ERROR, told)
-        return judge.finish("offered")
+    def status(self, judge: ComponentJudge, topics: Mapping[str, Reception], left_out: Mapping[str, int]) -> Status:
+        """Return the status; `left_out` counts, by kind and in all, what was left out for lack of time."""
+        for name, each in topics.items():
+            self._check(judge, name, each)
+        for name, count in left_out.items():
+            new = count - self._left_out.get(name, 0)
+            told = f"too many messages for the time there is: {new} {name} left out, no prediction"
+            judge.check(f"{name} left_out", new, Bounds(warn=0), told, at_once=True)
+        self._before, self._left_out = dict(topics), dict(left_out)
+        return judge.finish("all that arrives is read at once")
+
+    def _check(self, judge: ComponentJudge, name: str, each: Reception) -> None:
+        before, thresholds = self._before.get(name, Reception()), judge.at.thresholds
+        if each.received < before.received:  # counted anew
+            before = Reception()
+        lost, dropped = each.lost - before.lost, each.dropped - before.dropped
+        published = each.received - before.received + lost
+        share = (lost + dropped) / published if published else nan
+        judge.note({f"{name} {key}": getattr(each, key) for key in ("received", "lost", "dropped", "waiting")})
+        told = f"{name}: {share:.0%} of the messages were not read ({lost} never arrived, {dropped} gave way to newer ones)"
+        judge.check(f"{name} unread_share", share, Bounds(thresholds.unread_warn, thresholds.unread_error), told)
+        judge.note({f"{name} latency_s": each.latency})
+        told = f"{name}: messages wait {each.wait:.3f} s for their turn: too many come, or the model is too slow"
+        judge.check(f"{name} wait_s", each.wait, Bounds(thresholds.wait_warn, thresholds.wait_error), told)
+        if not each.is_numbered:
+            judge.note({f"{name} lost": "unknown: numbers of several publishers, or of one that started anew"})

@@ -7,15 +7,14 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 
 import numpy as np
 
+from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Thresholds
 from ..types import Array, Health, Report, Sample, Stream
-from .levels import Evaluation, Level, Status
-from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualJudge, level_of
-from .sensor_status import SensorJudge, SensorSpec
-from .source_status import PublishersJudge, Reception, ReceptionJudge
+from .levels import ComponentJudge, Evaluation, Level, Status
+from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, stress_status
+from .sensor_status import SensorSpec, sensor_status
 from .stream_stats import Rows, StreamWatch
-from .stress_status import StressWatch
-from .topic_status import OutputsJudge, Peers, TopicJudge, seconds
+from .topic_status import Peers, Reception, ReceptionWatch, outputs_status, publishers_status, seconds, topic_status
 
 
 def all_pieces(look: Generator[None, None, list[Status]]) -> list[Status]:
@@ -40,8 +39,13 @@ class TwinWatch:
         May be replaced while it runs.
     monotonic : callable
         The time, s, of a clock that only goes forward.
-    stress : StressWatch, optional
+    stress : BendingStressModel, optional
         Of the boom, if its sections bend.
+
+    Attributes
+    ----------
+    health : HealthWatch or None
+        None until the rig's health was judged.
     """
 
     def __init__(
@@ -50,31 +54,26 @@ class TwinWatch:
         names: Mapping[Stream, str],
         thresholds: Thresholds,
         monotonic: Callable[[], float] = time.monotonic,
-        stress: StressWatch | None = None,
+        stress: BendingStressModel | None = None,
     ) -> None:
-        self._monotonic, self._stress = monotonic, stress
-        self.thresholds = thresholds
-        self._sensors = {stream: [SensorJudge(sensor) for sensor in each] for stream, each in sensors.items()}
-        self._topics = {stream: TopicJudge(names[stream], each[0].required) for stream, each in sensors.items()}
-        ranges = {stream: np.array([(sensor.low, sensor.high) for sensor in each]).T for stream, each in sensors.items()}
-        self._streams = {stream: StreamWatch(low, high, monotonic) for stream, (low, high) in ranges.items()}
-        self._model, self._outputs = ModelWatch(), OutputsJudge()
-        self._publishers, self._reception = PublishersJudge(), ReceptionJudge()
+        self._monotonic, self._stress, self.thresholds = monotonic, stress, thresholds
+        self._sensors, self._names, self._reception = sensors, names, ReceptionWatch()
+        ranges = {stream: np.array([(sensor.low, sensor.high) for sensor in each]) for stream, each in sensors.items()}
+        self._streams = {stream: StreamWatch(each, monotonic) for stream, each in ranges.items()}
         self.begin()
 
     def begin(self) -> None:
-        """Start listening and reset all that is counted."""
-        now = self._monotonic()
+        """Start listening and reset all that is counted and judged."""
         for stream in self._streams.values():
-            stream.begin(now)
-        self._model.begin(now)
-        self._looked = now
-        self._residuals: dict[tuple[str, ...], tuple[Rows, Rows]] = {}  # and their deviations, by channels
+            stream.begin()
+        self._looked = self._monotonic()
+        self._judges: dict[str, ComponentJudge] = {}
+        self._model, self._load = ModelWatch(self._looked), LoadWatch()
+        self._rows: dict[tuple[str, ...], tuple[Rows, Rows]] = {}  # residuals and their deviations, by channels
+        self._residuals: dict[str, ResidualWindow] = {}
         self._newest: Report | None = None  # that has a prediction
-        self._judges: dict[str, ResidualJudge] = {}
         self._silent: set[Stream] = set()
         self.health: HealthWatch | None = None
-        self._load = LoadWatch()
 
     # -- one message --------------------------------------------------------------------------------------------------
 
@@ -107,9 +106,9 @@ class TwinWatch:
 
     def _keep(self, names: tuple[str, ...], values: Array, sigmas: Array) -> None:
         """Append a row of values and standard deviations of these channels."""
-        kept = self._residuals.get(names)
+        kept = self._rows.get(names)
         if kept is None:
-            kept = self._residuals[names] = Rows(len(names)), Rows(len(names))
+            kept = self._rows[names] = Rows(len(names)), Rows(len(names))
         kept[0].append(values)
         kept[1].append(sigmas)
 
@@ -119,6 +118,10 @@ class TwinWatch:
         if health is not None:
             self.health = self.health or HealthWatch()
             self.health.took(health)
+
+    def acknowledge(self) -> str:
+        """Acknowledge the alarms of the rig's health; return in words which of them have ended and are released."""
+        return "health is not judged" if self.health is None else self.health.acknowledge()
 
     def broken(self, reason: str) -> None:
         """Count a message that could not be handled at all."""
@@ -138,7 +141,9 @@ class TwinWatch:
         """
         now = self._monotonic()
         before, self._silent = self._silent, {s for s, each in self._streams.items() if self._is_silent(each, now)}
-        return self._model.has_failed or before != self._silent or (self.health is not None and self.health.has_news)
+        judge = self._judges.get("model")
+        has_failed = self._model.has_news and (judge is None or judge.level != Level.ERROR)
+        return has_failed or before != self._silent or (self.health is not None and self.health.has_news)
 
     def look(
         self,
@@ -187,69 +192,59 @@ class TwinWatch:
         -------
         list of Status
         """
+        at = Evaluation(self.thresholds, self._monotonic(), clock)
 
-        def now() -> Evaluation:
-            return Evaluation(self.thresholds, self._monotonic(), clock)
+        def judge(name: str, key: str = "") -> ComponentJudge:
+            return self._judges.setdefault(key or name, ComponentJudge(name)).begin(at)
 
-        at, wrong, sensors = now(), wrong_names or {}, list[Status]()
         is_fed = is_active and not self._is_silent(self._streams[Stream.STROKES], at.now)
-        found = [self._model.status(counts, is_active, is_fed, at, words or {})]
+        found = [self._model.status(judge("model"), counts, is_active, is_fed, words or {})]
         if not is_active:
             return found
-        for stream in self._streams:
+        sensors, longest = list[Status](), self.thresholds.gap_warn
+        for stream, watch in self._streams.items():
             yield
-            sensors += self._look_at(stream, now())
+            at = Evaluation(self.thresholds, self._monotonic(), clock)
+            for sensor, stats in zip(self._sensors[stream], watch.look(longest), strict=True):
+                sensors.append(sensor_status(judge(f"sensor {sensor.name}"), sensor, stats, watch.age_of(stats, at.now)))
         yield
-        at = now()
-        found += [self._topic(stream, publishers[stream], at, wrong.get(stream)) for stream in self._streams]
+        at = Evaluation(self.thresholds, self._monotonic(), clock)
+        strokes = self._streams[Stream.STROKES].lag
+        for stream, watch in self._streams.items():
+            topic, wrong = judge(self._names[stream], f"topic {stream.value}"), (wrong_names or {}).get(stream)
+            is_required = self._sensors[stream][0].required
+            found.append(topic_status(topic, watch, is_required, publishers[stream], watch.lag - strokes, wrong))
         if reception is not None:
             followed = {stream: seconds(each.newest) for stream, each in self._streams.items()}
-            found.insert(0, self._publishers.status(publishers, followed, at))
-            found.append(self._reception.status(reception, left_out or {}, at))
-        found.append(self._outputs.status(subscribers, at))
+            found.insert(0, publishers_status(judge("publishers"), publishers, followed))
+            found.append(self._reception.status(judge("reception"), reception, left_out or {}))
+        found.append(outputs_status(judge("outputs"), subscribers))
         if self.health is not None:
-            found.append(self.health.status(at))
-        if (load := self._load.status(at)) is not None:
+            found.append(self.health.status(judge("health")))
+        if (load := self._load.status(judge("tip load"))) is not None:
             found.append(load)
         yield
         if self._stress is not None and self._newest is not None and self._newest.prediction is not None:
-            found.append(self._stress.status(self._newest.prediction, self._newest.estimate, at))
-        return found + sensors + (yield from self._look_at_residuals(now))
+            bending = judge("bending")
+            found.append(stress_status(bending, self._stress, self._newest.prediction, self._newest.estimate))
+        rows, self._rows = self._rows, {}
+        for names, kept in rows.items():
+            yield
+            values, sigmas = (each.table() for each in kept)
+            for name, column in zip(names, (values / sigmas).T, strict=True):
+                window = self._residuals.setdefault(name, ResidualWindow(self._looked))
+                window.take(column, self._monotonic())
+        at = Evaluation(self.thresholds, self._monotonic(), clock)
+        self._looked = at.now
+        return found + sensors + [self._residual(judge(f"residual {name}"), name) for name in self._residuals]
 
     def _is_silent(self, stream: StreamWatch, now: float) -> bool:
         return stream.newest is None or stream.age(now) > self.thresholds.stale_after
 
-    def _topic(self, stream: Stream, peers: Peers, at: Evaluation, wrong_names: tuple[Level, str] | None) -> Status:
-        watch = self._streams[stream]
-        offset = watch.lag - self._streams[Stream.STROKES].lag
-        return self._topics[stream].status(watch, peers, offset, at, wrong_names)
-
-    def _look_at(self, stream: Stream, at: Evaluation) -> list[Status]:
-        """Return the statuses of the sensors of one stream."""
-        watch = self._streams[stream]
-        return [
-            judge.status(figures, watch.age_of(figures, at.now), at)
-            for judge, figures in zip(self._sensors[stream], watch.look(self.thresholds.gap_warn), strict=True)
-        ]
-
-    def _look_at_residuals(self, now: Callable[[], Evaluation]) -> Generator[None, None, list[Status]]:
-        """Return the statuses of every channel that ever had a residual, one stream after the other."""
-        taken, self._residuals = self._residuals, {}
-        for names, those in taken.items():
-            yield
-            at = now()
-            values, sigmas = (each.table() for each in those)
-            for name, column in zip(names, (values / sigmas).T, strict=True):
-                self._judges.setdefault(name, ResidualJudge(name, self._looked)).take(column, at.now)
-        at = now()
-        self._looked = at.now
-        is_judged = self.health is not None
-        explained = "" if self.health is None else self.health.explained
-        if self.health is not None and not self.health.is_alarmed:
-            explained = self._load.explanation
-        return [judge.status(self._alarm_of(name), at, explained, is_judged) for name, judge in self._judges.items()]
-
-    def _alarm_of(self, channel: str) -> tuple[Level, str] | None:
-        """Return level and words of the active alarm of a channel."""
-        alarm = None if self.health is None else self.health.of(channel)
-        return None if alarm is None else (level_of(alarm), alarm.told)
+    def _residual(self, judge: ComponentJudge, channel: str) -> Status:
+        """Return the status of a channel that ever had a residual."""
+        window, health = self._residuals[channel], self.health
+        if health is None:
+            return window.status(judge, None)
+        explained = health.explained if health.is_alarmed else self._load.explanation
+        return window.status(judge, health.of(channel), explained, is_judged=True)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
-from typing import Any
+from inspect import Parameter, Signature
+from typing import Any, Self
 
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -22,8 +23,7 @@ from rclpy.task import Future
 
 from ..errors import UsageError
 from ..messages.topic_table import Qos
-from .log import Log
-from .node.receive_queue import ReceiveQueue
+from ..system.terminal_text import printable
 
 STOPPED = (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException)
 """Exceptions that end a spinning process in order."""
@@ -73,149 +73,121 @@ WAKE = 0.2
 """Time (s) between looks at whether it is over."""
 TURN = 10.0
 """Time (s) of a turn of the events executor: each leaves 32 bytes behind in rclpy 7.1, half a megabyte in an hour of `WAKE`."""
-BUDGET = 0.01
-"""Time (s) for messages that wait, between two turns of services and timers."""
-INTAKE = 0.2
-"""Most time (s) for taking messages over from the executor, before some of them are read."""
 
 
-def spin(node: Node, queue: ReceiveQueue, is_over: Callable[[], bool]) -> None:
-    """Do the node's work until `is_over`, in this one thread: messages are read in the order of their arrival.
+class CallbackTurns:
+    """Turns in which the callbacks of `node` run: until `is_due`, which is asked every `WAKE` s, or until `end`.
 
     The events executor takes half the processor time, but it is experimental. Its ``spin`` does not return, with a finite wait
-    neither as long as messages come, so every turn of it is ended from here; and where it is missing or fails, the
-    single-threaded executor goes on.
+    neither as long as messages come, so a timer ends every turn. Where it is missing or fails, the single-threaded executor
+    goes on, whose turns are at most one callback long.
     """
-    turns = _EventTurns(queue, is_over)
-    timer = node.create_timer(WAKE, turns.look, clock=Clock(clock_type=ClockType.STEADY_TIME))
-    try:
-        _drive(_events_executor(), node, queue, is_over, turns.serve)
-    except STOPPED:
-        raise
-    except Exception as error:
-        _warn_of_events_executor(node, error)
-        _drive(SingleThreadedExecutor(), node, queue, is_over, _call_back_once)
-    finally:
-        node.destroy_timer(timer)
 
+    def __init__(self, node: Node, is_due: Callable[[], bool]) -> None:
+        self._node, self._is_due = node, is_due
+        self._turn, self._last = Future(), 0.0
+        self._executors = [events_executor, SingleThreadedExecutor]
+        self._executor: Any = None
 
-@contextmanager
-def callback_turns(node: Node, is_due: Callable[[], bool]) -> Iterator[Callable[[], None]]:
-    """Provide a function that lets the callbacks of `node` run until `is_due`, which is asked every `WAKE` s, or sooner.
+    def __enter__(self) -> Self:
+        self._timer = self._node.create_timer(WAKE, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        return self
 
-    The events executor runs them, whose turns a timer ends, see `spin`; the single-threaded one where that one is missing
-    or fails.
-    """
-    turn, executors = Future(), [_events_executor, SingleThreadedExecutor]
-    executor: Any = None
+    def __exit__(self, *_: object) -> None:
+        if self._executor is not None:
+            self._executor.remove_node(self._node)
+        self._node.destroy_timer(self._timer)
 
-    def look() -> None:
-        if is_due() and not turn.done():
-            turn.set_result(None)
+    def run(self) -> None:
+        """Run one turn, of `TURN` s at most."""
+        self._turn, self._last = Future(), time.monotonic() + TURN
+        self._call_back(is_whole=True)
 
-    def call_back() -> None:
-        nonlocal turn, executor
-        turn = Future()
+    def poll(self) -> None:
+        """Run the next callback that waits, if one does."""
+        self._call_back(is_whole=False)
+
+    def end(self) -> None:
+        """End the turn that runs."""
+        if not self._turn.done():
+            self._turn.set_result(None)
+
+    def _look(self) -> None:
+        if self._is_due() or time.monotonic() >= self._last:
+            self.end()
+
+    def _call_back(self, is_whole: bool) -> None:
         try:
-            if executor is None:
-                executor = executors[0]()
-                executor.add_node(node)
-            if len(executors) > 1:
-                executor.spin_until_future_complete(turn, timeout_sec=TURN)
+            if self._executor is None:
+                self._executor = self._executors[0]()
+                self._executor.add_node(self._node)
+            if is_whole and len(self._executors) > 1:
+                self._executor.spin_until_future_complete(self._turn, timeout_sec=TURN)
             else:
-                executor.spin_once(timeout_sec=WAKE)
+                self._executor.spin_once(timeout_sec=WAKE if is_whole else 0.0)
         except STOPPED:
             raise
         except Exception as error:
-            if len(executors) == 1:
+            if len(self._executors) == 1:
                 raise
-            _warn_of_events_executor(node, error)
-            if executor is not None:
-                executor.remove_node(node)
-            executor = None
-            del executors[0]
-
-    timer = node.create_timer(WAKE, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
-    try:
-        yield call_back
-    finally:
-        if executor is not None:
-            executor.remove_node(node)
-        node.destroy_timer(timer)
+            told = f"events executor: {one_line(error)}; the single-threaded executor goes on, at twice the processor time"
+            Log(self._node).warning(told)
+            if self._executor is not None:
+                self._executor.remove_node(self._node)
+            self._executor = None
+            del self._executors[0]
 
 
-def _warn_of_events_executor(node: Node, error: Exception) -> None:
-    told = "events executor: %s; the single-threaded executor goes on, at twice the processor time"
-    Log(node).warning(told % one_line(error))
-
-
-def _events_executor() -> Any:
+def events_executor() -> Any:
+    """Return the events executor of rclpy; ImportError where it is missing."""
     from rclpy.experimental import EventsExecutor
 
     return EventsExecutor()
 
 
-Serve = Callable[[Any, ReceiveQueue], None]
+_BOTH = Signature([Parameter(name, Parameter.POSITIONAL_ONLY) for name in ("data", "info")])
 
 
-def _drive(executor: Any, node: Node, queue: ReceiveQueue, is_over: Callable[[], bool], serve: Serve) -> None:
-    executor.add_node(node)
-    try:
-        while not is_over():
-            serve(executor, queue)
-            _take_over(executor, queue)
-            queue.work(BUDGET)
-    finally:
-        executor.remove_node(node)
+def with_information(take: Callable[[bytes, Mapping[str, Any]], None]) -> Callable[..., None]:
+    """Wrap `take` for ``create_subscription(.., raw=True)``, so that it gets a message's information too.
 
+    rclpy tells by the signature that the information is wanted; its events executor (7.1) then gives the two as one argument.
 
-def _call_back_once(executor: Any, queue: ReceiveQueue) -> None:
-    executor.spin_once(timeout_sec=0.0 if queue else WAKE)
-
-
-class _EventTurns:
-    """Turns of the events executor, in which it waits and calls back; messages are read as they come.
-
-    One ends as soon as a message cannot be read at once: then more are to be taken over first. `look`, which a timer calls,
-    ends it when it is over, or has lasted for `TURN`.
+    Parameters
+    ----------
+    take : callable
+        Is given the encoded message and its information: ``received_timestamp``, ``source_timestamp`` (ns) and
+        ``publication_sequence_number``.
     """
 
-    def __init__(self, queue: ReceiveQueue, is_over: Callable[[], bool]) -> None:
-        self._queue, self._is_over = queue, is_over
-        self._turn, self._end = Future(), 0.0
+    def put(*received: Any) -> None:
+        data, info = received if len(received) == 2 else received[0]
+        take(data, info)
 
-    def serve(self, executor: Any, queue: ReceiveQueue) -> None:
-        """Run one turn."""
-        if queue:
-            _call_back_once(executor, queue)
-            return
-        self._turn, self._end = Future(), time.monotonic() + TURN
-        queue.on_put = self._read
-        try:
-            executor.spin_until_future_complete(self._turn, timeout_sec=TURN)
-        finally:
-            queue.on_put = None
-
-    def look(self) -> None:
-        """End the turn, if it is time."""
-        if not self._turn.done() and (self._is_over() or time.monotonic() >= self._end):
-            self._turn.set_result(None)
-
-    def _read(self) -> None:
-        if self._turn.done():
-            return
-        if not self._queue.is_behind:
-            self._queue.work(BUDGET)
-        if self._queue:
-            self._turn.set_result(None)
+    put.__signature__ = _BOTH  # type: ignore[attr-defined]
+    return put
 
 
-def _take_over(executor: Any, queue: ReceiveQueue) -> None:
-    """Let the executor queue the messages that have waited in its own row, if there are any."""
-    end, before = time.monotonic() + INTAKE, -1
-    while queue.is_behind and queue.received != before and time.monotonic() < end:
-        before = queue.received
-        executor.spin_once(timeout_sec=0.0)
+class Log:
+    """Log of `node`. Names and texts in it come from files, messages and other nodes.
+
+    All is escaped here, so that they neither steer a terminal nor make lines of their own.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._logger = node.get_logger()
+
+    def info(self, line: str) -> None:
+        """Write a line on what goes as it should."""
+        self._logger.info(printable(line, keep=""))
+
+    def warning(self, line: str) -> None:
+        """Write a line on what is not as it should be."""
+        self._logger.warning(printable(line, keep=""))
+
+    def fatal(self, text: str) -> None:
+        """Write why the node cannot go on; line breaks stay."""
+        self._logger.fatal(printable(text))
 
 
 @cache
@@ -233,3 +205,10 @@ def qos_profile(qos: Qos, depth: int | None = None) -> QoSProfile:
         reliability=ReliabilityPolicy[qos.reliability.upper()],
         durability=DurabilityPolicy[qos.durability.upper()],
     )
+
+
+def node_name(endpoint: Any) -> str:
+    """Return namespace and name of the node of a discovered publisher or subscriber."""
+    if "UNKNOWN" in endpoint.node_name:  # so rmw calls a node that it has not heard of
+        return "a node without a known name"
+    return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"

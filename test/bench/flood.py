@@ -22,7 +22,9 @@ from geometry_msgs.msg import PointStamped
 from lifecycle_msgs.srv import GetState
 from rcl_interfaces.srv import GetParameters
 
-from boom_twin.ros.isolation import isolated
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from demo.isolation import isolated
 
 SOURCE = [sys.executable, str(Path(__file__).with_name("live.py")), "source"]
 CASES = {

@@ -411,7 +411,8 @@ def main() -> int:
     names = args.commands.split(",")
     if "record" not in names:
         return _run(names, args.count, args.seed)
-    from boom_twin.ros.isolation import isolated
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+    from demo.isolation import isolated
 
     with isolated():
         return _run(names, args.count, args.seed)

@@ -40,9 +40,12 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from demo.isolation import isolated
+
 from boom_twin import statics
 from boom_twin.messages.cdr_decoder import stamp_in
-from boom_twin.ros.isolation import isolated
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 

@@ -27,7 +27,9 @@ import numpy as np
 from aiohttp import ClientSession
 from live import cpu
 
-from boom_twin.ros.isolation import isolated
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from demo.isolation import isolated
 
 LIVE = [sys.executable, str(Path(__file__).with_name("live.py"))]
 SETTLING = 3.0

@@ -23,7 +23,9 @@ from typing import TextIO
 import numpy as np
 from live import memory
 
-from boom_twin.ros.isolation import isolated
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from demo.isolation import isolated
 
 SETTLING = 100.0
 """Time (s) before memory is looked at: windows of residuals, loads and alarms fill up to a minute and a half from the start."""

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from boom_twin.cli.examples import EXAMPLES
-from boom_twin.cli.main import COMMANDS, main
+from boom_twin.cli.main import COMMANDS, EXAMPLES, main
 from boom_twin.cli.replay import flat
 from boom_twin.offline.progress import TenthLines
 from boom_twin.scene.load import default_text

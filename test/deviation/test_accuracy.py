@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
+import re
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from boom_twin import Sample, Stream, Twin, load_scene, statics
-from boom_twin.cli.accuracy import sensors_of, sets_of
+from boom_twin.cli.main import main
 from boom_twin.deviation.accuracy import TipAccuracy, accuracy_at
-from boom_twin.errors import UsageError
 from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.scene.load import default_text
 
 SCENE = load_scene()
 ARCH = strokes_of_posture(SCENE, "arch")
@@ -43,8 +46,12 @@ def test_it_is_what_a_twin_comes_to() -> None:
     assert np.sqrt(np.mean(estimates[2000:], axis=0)) == pytest.approx(stated.tip, rel=0.15)  # learnt noise adds to it
 
 
-def test_names_of_sensors() -> None:
-    assert sensors_of("angles, imu,imu") == [Stream.ANGLES, Stream.IMU, Stream.IMU]
-    assert len(sets_of([Stream.ANGLES, Stream.IMU, Stream.IMU])) == 6
-    with pytest.raises(UsageError, match="'radar' is no sensor"):
-        sensors_of("angles,radar")
+def test_the_command_states_every_selection_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene = tmp_path / "one_posture.yaml"
+    scene.write_text(re.sub(r"  (horizontal|high|low): .*\n", "", default_text()))
+    assert main(["check", str(scene), "--sensors", "angles, imu,imu", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    keys = [key.removeprefix("accuracy_arch:") for key in found if key.startswith("accuracy_arch:")]
+    assert keys == ["strokes only", "angles", "imu", "angles,imu", "imu,imu", "angles,imu,imu"]
+    assert main(["check", "--sensors", "angles,radar"]) == 1
+    assert "'radar' is no sensor" in capsys.readouterr().err

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from boom_twin.config.settings import Thresholds
-from boom_twin.diagnostics.levels import Evaluation, Level, Status
-from boom_twin.diagnostics.model_status import HealthWatch, ResidualJudge
+from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
+from boom_twin.diagnostics.model_status import HealthWatch, ResidualWindow
 from boom_twin.types import Alarm, Health, Ranked
 
 SECOND = 1_000_000_000
@@ -21,7 +21,7 @@ def health(second: int, *alarms: Alarm) -> Health:
 
 
 def status(watch: HealthWatch) -> Status:
-    return watch.status(Evaluation(Thresholds(), 0.0, 100.0))
+    return watch.status(ComponentJudge("health").begin(Evaluation(Thresholds(), 0.0, 100.0)))
 
 
 def test_without_alarms() -> None:
@@ -50,7 +50,7 @@ def test_the_worst_is_told_first() -> None:
     assert found.level == Level.ERROR and found.message == f"joint_3: {BIAS.told}; joint_1: {OPEN.told}"
     assert (found.values["alarms"], found.values["2 cause"], found.values["1 cause"]) == (2, "joint_3.sensor", "")
     assert found.values["2 from_s"] == "15.000" and not watch.has_news
-    assert watch.of("joint_3") == BIAS and watch.of("joint_2") is None
+    assert watch.of("joint_3") == (Level.ERROR, BIAS.told) and watch.of("joint_2") is None
 
 
 def test_an_alarm_that_ended_stays_until_it_is_acknowledged() -> None:
@@ -101,11 +101,12 @@ def test_residuals_are_left_to_an_alarm_that_was_inferred_from_them() -> None:
     inferred = replace(OPEN, ranked=(Ranked("cylinder_1.k", 0.6, ()), Ranked("joint_1.sensor", 0.4, ())))
     watch.took(health(18, BIAS, inferred))
     assert watch.explained == "judged by health: alarm of joint_1"
-    judge = ResidualJudge("joint_2", 0.0)
+    window, judge = ResidualWindow(0.0), ComponentJudge("residual joint_2")
     told = []
     for second in range(1, 30):
-        judge.take(np.full(100, 6.0), float(second))
-        told.append(judge.status(None, Evaluation(Thresholds(), float(second), 0.0), watch.explained if second < 15 else ""))
+        window.take(np.full(100, 6.0), float(second))
+        judge.begin(Evaluation(Thresholds(), float(second), 0.0))
+        told.append(window.status(judge, None, watch.explained if second < 15 else ""))
     assert {(each.level, each.message) for each in told[:14]} == {(Level.OK, "judged by health: alarm of joint_1")}
     assert told[0].values["rms_normalised"] == 6.0
     assert told[-1].level == Level.ERROR and "6.00 times as large as noise explains" in told[-1].message
@@ -113,12 +114,12 @@ def test_residuals_are_left_to_an_alarm_that_was_inferred_from_them() -> None:
 
 def test_a_residual_that_health_finds_no_fault_in_is_a_warning_at_most() -> None:
     """What is a fault, health says; a model that is a little off, or a load it does not know, is none."""
-    judge, told = ResidualJudge("cylinder_force_2", 0.0), []
+    window, judge, told = ResidualWindow(0.0), ComponentJudge("residual cylinder_force_2"), []
     load = "a load at the tip moves the boom: pulses of 128 N at 0.430 Hz (+- 0.001)"
     for second in range(1, 30):
-        judge.take(np.full(100, 6.0), float(second))
-        at = Evaluation(Thresholds(), float(second), 0.0)
-        told.append(judge.status(None, at, load if second < 15 else "", is_judged=True))
+        window.take(np.full(100, 6.0), float(second))
+        judge.begin(Evaluation(Thresholds(), float(second), 0.0))
+        told.append(window.status(judge, None, load if second < 15 else "", is_judged=True))
     assert {(each.level, each.message) for each in told[:14]} == {(Level.OK, load)}
     assert told[-1].level == Level.WARN
     assert told[-1].message == "6.00 times as large as noise explains, for 10 s; health finds no fault in that"

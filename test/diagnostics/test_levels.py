@@ -54,7 +54,7 @@ def test_a_status_tells_value_limit_and_since_when() -> None:
     def look(now: float, value: float) -> tuple[Level, str, dict[str, object]]:
         judge.begin(Evaluation(thresholds, now, 1000.0 + now))
         judge.check("heat_K", value, Bounds(300.0, 400.0), f"{value:g} K is hot")
-        judge.note("colour", "red")
+        judge.note({"colour": "red"})
         status = judge.finish("cool")
         return status.level, status.message, dict(status.values)
 
@@ -69,11 +69,11 @@ def test_the_worst_fault_is_told_first() -> None:
     judge = ComponentJudge("pump")
     judge.begin(Evaluation(Thresholds(), 0.0, 0.0))
     judge.check("a", 5.0, Bounds(warn=1.0), "first", at_once=True)
-    judge.check_age(5.0, 1.0, "second")
+    judge.check_age(5.0, "second")
     status = judge.finish("well")
     assert (status.level, status.message) == (Level.STALE, "second; first")
     judge.begin(Evaluation(Thresholds(), 1.0, 1.0))
     judge.check("a", 0.5, Bounds(warn=1.0), "not true any more", at_once=True)
-    judge.check_age(0.5, 1.0, "not true any more")
+    judge.check_age(0.5, "not true any more")
     status = judge.finish("well")
     assert (status.level, status.message) == (Level.WARN, "first")

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from boom_twin.config.settings import Thresholds
-from boom_twin.diagnostics.levels import Evaluation, Level, Status
-from boom_twin.diagnostics.source_status import PublishersJudge, Reception, ReceptionJudge
-from boom_twin.diagnostics.topic_status import Peers
+from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
+from boom_twin.diagnostics.topic_status import Peers, Reception, ReceptionWatch, publishers_status
 from boom_twin.types import Stream
 
 T = Thresholds()
@@ -13,9 +12,9 @@ T = Thresholds()
 
 def received(*looks: Reception) -> Status:
     """The state after looks that are two seconds apart."""
-    judge = ReceptionJudge()
+    watch, judge = ReceptionWatch(), ComponentJudge("reception")
     for second, each in enumerate(looks):
-        status = judge.status({"cylinder_strokes": each}, {}, Evaluation(T, 2.0 * second, 0.0))
+        status = watch.status(judge.begin(Evaluation(T, 2.0 * second, 0.0)), {"cylinder_strokes": each}, {})
     return status
 
 
@@ -46,10 +45,14 @@ def test_numbers_of_several_publishers_are_said_to_tell_nothing() -> None:
     assert "unknown" in str(received(Reception(10, is_numbered=False)).values["cylinder_strokes lost"])
 
 
+def judge(now: float = 0.0) -> ComponentJudge:
+    return ComponentJudge("component").begin(Evaluation(T, now, 0.0))
+
+
 def publishers(**names: tuple[str, ...]) -> Status:
     peers = {stream: Peers(f"/{stream.value}", names.get(stream.value, ("/driver",))) for stream in Stream}
     followed = dict.fromkeys(Stream, "12.500000000")
-    return PublishersJudge().status(peers, followed, Evaluation(T, 0.0, 0.0))
+    return publishers_status(judge(), peers, followed)
 
 
 def test_one_source_for_each_topic() -> None:
@@ -66,15 +69,16 @@ def test_a_second_source_is_an_error_at_once() -> None:
 def test_streams_that_share_a_topic_may_have_a_publisher_each() -> None:
     def status(names: tuple[str, ...]) -> Status:
         peers = dict.fromkeys((Stream.STROKES, Stream.ANGLES), Peers("/joint_states", names))
-        return PublishersJudge().status(peers, dict.fromkeys(Stream, "1.0"), Evaluation(T, 0.0, 0.0))
+        return publishers_status(judge(), peers, dict.fromkeys(Stream, "1.0"))
 
     assert status(("/cylinders", "/encoders")).level == Level.OK
     assert status(("/cylinders", "/encoders", "/other")).level == Level.ERROR
 
 
 def test_what_is_left_out_is_told_at_once_and_only_what_is_new() -> None:
-    judge, counts = ReceptionJudge(), ({"shapes": 0}, {"shapes": 7}, {"shapes": 7}, {"shapes": 7})
-    found = [judge.status({}, each, Evaluation(T, 10.0 * k, 0.0)) for k, each in enumerate(counts)]
+    watch, counts = ReceptionWatch(), ({"shapes": 0}, {"shapes": 7}, {"shapes": 7}, {"shapes": 7})
+    reception = ComponentJudge("reception")
+    found = [watch.status(reception.begin(Evaluation(T, 10.0 * k, 0.0)), {}, each) for k, each in enumerate(counts)]
     assert [status.level for status in found] == [Level.OK, Level.WARN, Level.OK, Level.OK]
     assert found[1].message == "too many messages for the time there is: 7 shapes left out, no prediction"
     assert [status.values["shapes left_out"] for status in found] == [0, 7, 0, 0]

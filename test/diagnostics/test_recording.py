@@ -8,18 +8,18 @@ from typing import Any
 import pytest
 
 from boom_twin.config.settings import Thresholds
-from boom_twin.diagnostics.levels import Evaluation, Level, Status
-from boom_twin.diagnostics.recorder_status import DiskState, RecordingJudge, TopicState
+from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
+from boom_twin.diagnostics.recorder_status import DiskState, TopicCount, recording_status
 
-TOPICS = {"/a": TopicState(500, 0), "/b": TopicState(30, None)}
+TOPICS = [TopicCount("/a", 500, 0, 0), TopicCount("/b", 30, 0, None)]
 DISK = {"lag": 0.3, "waiting": 0, "written": 1000, "free": 10**9, "left": inf}
 
 
-def judged(topics: dict[str, TopicState] = TOPICS, end: str | None = None, **disk: Any) -> Status:
+def judged(topics: list[TopicCount] = TOPICS, end: str | None = None, **disk: Any) -> Status:
     """After ten seconds of it."""
-    judge, state = RecordingJudge(), DiskState(**(DISK | disk))
+    judge, state = ComponentJudge("recording"), DiskState(**(DISK | disk))
     for now in range(10):
-        status = judge.status(topics, state, end, Evaluation(Thresholds(), float(now), 1e9))
+        status = recording_status(judge.begin(Evaluation(Thresholds(), float(now), 1e9)), topics, state, end)
     return status
 
 
@@ -35,7 +35,7 @@ def test_a_healthy_recording() -> None:
 @pytest.mark.parametrize(
     ("changes", "level", "words"),
     [
-        ({"topics": {"/a": TopicState(500, 3)}}, Level.WARN, "3 messages were published and never arrived"),
+        ({"topics": [TopicCount("/a", 500, 0, 3)]}, Level.WARN, "3 messages were published and never arrived"),
         ({"lag": 3.0}, Level.WARN, "messages of the last 3.0 s are not on the disk yet"),
         ({"lag": 6.0}, Level.ERROR, "messages of the last 6.0 s are not on the disk yet"),
         ({"left": 2000.0}, Level.OK, "running"),

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from boom_twin.config.settings import Settings, Thresholds
-from boom_twin.diagnostics.levels import Evaluation, Level
-from boom_twin.diagnostics.sensor_status import SensorJudge, SensorSpec, sensors_of
+from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level
+from boom_twin.diagnostics.sensor_status import SensorSpec, sensor_status, sensors_of
 from boom_twin.diagnostics.stream_stats import Channel, ChannelStats, StreamWatch
 from boom_twin.scene import load_scene
 from boom_twin.types import Sample, Stream
@@ -70,7 +70,7 @@ def test_steps_of_a_clock_that_was_set_are_no_gaps() -> None:
 
 
 def test_a_stream_gives_each_channel_its_own() -> None:
-    watch = StreamWatch(np.array([-inf, -inf]), np.array([inf, 1.0]))
+    watch = StreamWatch(np.array([[-inf, inf], [-inf, 1.0]]))
     for k in range(10):
         watch.seen(SECOND + k * 10_000_000)
         if k != 4:
@@ -83,7 +83,7 @@ def test_a_stream_gives_each_channel_its_own() -> None:
 
 
 def test_lags_tell_how_clocks_are_apart() -> None:
-    streams = [StreamWatch(np.zeros(1), np.ones(1)) for _ in range(2)]
+    streams = [StreamWatch(np.array([[0.0, 1.0]])) for _ in range(2)]
     for k in range(5):
         for stream, behind in zip(streams, (0, 70_000_000), strict=True):
             stream.seen(SECOND + k * 5_000_000 - behind)
@@ -98,10 +98,10 @@ GOOD = ChannelStats(value=0.1, stamp=1, rate=200.0, gap=0.005, gaps=0, missing=0
 
 def judged(changes: dict[str, float], age: float = 0.0, sensor: SensorSpec = SENSOR) -> tuple[Level, str]:
     """Level and message after ten seconds of it."""
-    judge = SensorJudge(sensor)
+    judge = ComponentJudge("sensor joint_1")
     figures = ChannelStats(**{name: changes.get(name, getattr(GOOD, name)) for name in ChannelStats.__dataclass_fields__})
     for now in range(10):
-        status = judge.status(figures, age, Evaluation(Thresholds(), float(now), 1e9 + now))
+        status = sensor_status(judge.begin(Evaluation(Thresholds(), float(now), 1e9 + now)), sensor, figures, age)
     return status.level, status.message
 
 

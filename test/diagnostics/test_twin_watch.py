@@ -11,10 +11,9 @@ from drive_twin import drive_twin
 
 from boom_twin.config.settings import Settings, Thresholds
 from boom_twin.deviation.estimate_row import WIDTH
-from boom_twin.diagnostics import twin_status as module
-from boom_twin.diagnostics.levels import Evaluation, Level, Status
+from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
+from boom_twin.diagnostics.model_status import stress_model, stress_status
 from boom_twin.diagnostics.sensor_status import sensors_of
-from boom_twin.diagnostics.stress_status import stress_watch
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
 from boom_twin.scene import load_scene
@@ -234,26 +233,27 @@ def test_other_ends(rig: Rig) -> None:
 def test_an_idle_node_tells_of_its_model_only(rig: Rig) -> None:
     (status,) = all_pieces(rig.watch.look({}, False, {}, [], 0.0))
     assert (status.level, status.message) == (Level.WARN, "not active")
-    (status,) = all_pieces(module.TwinWatch({}, {}, Thresholds()).look({}, False, {}, [], 0.0))
+    (status,) = all_pieces(TwinWatch({}, {}, Thresholds()).look({}, False, {}, [], 0.0))
     assert status.message == "not active"
 
 
 def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() -> None:
     scene, strokes = load_scene(), strokes_of_posture(load_scene(), "horizontal")
     prediction = drive_twin(scene).update(Sample(Stream.STROKES, 10**18, strokes)).prediction
-    watch, at = stress_watch(scene), Evaluation(Thresholds(), 0.0, 0.0)
-    assert watch is not None and prediction is not None
+    model, judge = stress_model(scene), ComponentJudge("bending")
+    assert model is not None and prediction is not None
     for load, told in (
         (np.zeros(2), "-94.4 MPa in section 1 at 0.60 m"),
         (np.array([0.0, -100.0]), "-98.1 ± 0.73 MPa in section 1"),
     ):
         variance = np.full(2, 400.0)
         estimate = replace(estimate_of(10**18, np.zeros(WIDTH)), load=load, load_variance=variance)
-        status = watch.status(prediction, estimate, at)
+        judge.begin(Evaluation(Thresholds(), 0.0, 0.0))
+        status = stress_status(judge, model, prediction, estimate)
         assert status.level == Level.OK and status.message.startswith(told), status.message
     assert status.values["section_1_at_0.60_m_sigma_MPa"] == pytest.approx(0.73, rel=0.02)
     rigid = scene.model_copy(update={"modes": 0})
-    assert stress_watch(rigid) is None
+    assert stress_model(rigid) is None
 
 
 def test_the_load_at_the_tip_is_told_once_anything_was_measured() -> None:
@@ -277,7 +277,7 @@ def test_reports_of_rows_are_judged_as_those_that_were_made_at_once() -> None:
     watches = []
     for _ in range(2):
         sensors = sensors_of(scene, Settings(), REQUIRED, [None] * 4)
-        watches.append(TwinWatch(sensors, NAMES, Thresholds(), lambda: 100.0, stress_watch(scene)))
+        watches.append(TwinWatch(sensors, NAMES, Thresholds(), lambda: 100.0, stress_model(scene)))
     for k in range(100):
         stamp = 10**18 + k * 5_000_000
         early = [Sample(stream, stamp + 1000, random.normal(size=4)) for stream in (Stream.ANGLES, Stream.FORCES)]

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from boom_twin.cli.examples import EXAMPLES
-from boom_twin.cli.main import COMMANDS, main
+from boom_twin.cli.main import COMMANDS, EXAMPLES, main
 from boom_twin.messages.mapping import load_mapping
 
 ROOT = Path(__file__).parents[2]

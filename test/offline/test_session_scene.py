@@ -17,7 +17,8 @@ from boom_twin.bag.reader import scan
 from boom_twin.bag.session_model import baseline_of, scene_of, settings_of
 from boom_twin.bag.session_sheet import FILE_NAME, SessionSheet, kept, sha256
 from boom_twin.bag.writer import SessionWriter
-from boom_twin.cli.main import main, open_session_settings, warn_incomplete
+from boom_twin.cli.main import main
+from boom_twin.cli.output import open_session_settings, warn_incomplete
 from boom_twin.config.settings import Settings, Thresholds, load_thresholds
 from boom_twin.diagnostics.boom_mismatch import FAR, WINDOW, OtherBoom
 from boom_twin.errors import BagError, UsageError

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from demo.isolation import Isolation
 from made_once import MadeOnce
 
 from boom_twin.analysis.equilibrium import statics
 from boom_twin.bag.session_files import write_session
 from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.ros.isolation import Isolation
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
@@ -116,6 +116,12 @@ def domain(isolation: Isolation) -> Iterator[None]:
     rclpy.init(args=[])
     yield
     rclpy.try_shutdown()
+
+
+@pytest.fixture
+def demo_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The demonstration, which is no part of the package, can be imported by children."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[1]), prepend=os.pathsep)
 
 
 @pytest.fixture(scope="module")

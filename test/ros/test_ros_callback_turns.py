@@ -14,7 +14,6 @@ import rclpy
 from std_msgs.msg import String
 
 from boom_twin.ros import runtime
-from boom_twin.ros.subscription_callback import with_information
 
 
 class _Worn:
@@ -35,26 +34,24 @@ def _missing() -> Any:
 
 @pytest.mark.parametrize("executor, warnings", [(None, 0), (_Worn, 1), (_missing, 1)], ids=["events", "fails", "missing"])
 def test_messages_come_with_their_information_and_turns_end_when_due(
-    domain: None, monkeypatch: pytest.MonkeyPatch, executor: Any, warnings: int
+    domain: None, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], executor: Any, warnings: int
 ) -> None:
     if executor is not None:
-        monkeypatch.setattr(runtime, "_events_executor", executor)
-    told: list[object] = []
-    monkeypatch.setattr(runtime, "_warn_of_events_executor", lambda node, error: told.append(error))
+        monkeypatch.setattr(runtime, "events_executor", executor)
     node, came = rclpy.create_node("turns"), list[Mapping[str, Any]]()
-    node.create_subscription(String, "text", with_information(lambda data, info: came.append(info)), 10, raw=True)
+    node.create_subscription(String, "text", runtime.with_information(lambda data, info: came.append(info)), 10, raw=True)
     publisher, due = node.create_publisher(String, "text", 10), time.monotonic() + 1.0
     turns, sent = 0, 0
-    with runtime.callback_turns(node, lambda: time.monotonic() >= due) as call_back:
+    with runtime.CallbackTurns(node, lambda: time.monotonic() >= due) as running:
         while len(came) < 3 and time.monotonic() < due + 30.0:
             if publisher.get_subscription_count() and sent < 3:
                 publisher.publish(String(data="x" * 100))
                 sent += 1
             began = time.monotonic()
-            call_back()
+            running.run()
             turns += 1
             assert time.monotonic() - began < runtime.TURN, "a turn ends when it is due, though nothing more comes"
             due = time.monotonic() + 0.3
     assert [info["publication_sequence_number"] for info in came] == [1, 2, 3]
-    assert len(told) == warnings and not list(node.timers)
+    assert capfd.readouterr().err.count("events executor: ") == warnings and not list(node.timers)
     node.destroy_node()

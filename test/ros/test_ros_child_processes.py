@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,7 @@ def loud(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "import os, sys, runpy\nos.environ.pop('PYTHONSAFEPATH')\n"
         "sys.argv = sys.argv[1:]\nrunpy.run_module(sys.argv[0], run_name='__main__', alter_sys=True)\n"
     )
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
 
 
 def test_the_page_of_the_node(spawn: Callable[..., Any], trap: Trap, loud: None, tmp_path: Path) -> None:
@@ -53,8 +54,8 @@ def test_the_page_of_the_node(spawn: Callable[..., Any], trap: Trap, loud: None,
     assert not (tmp_path / "overwritten").exists()
 
 
-def test_the_demonstration(spawn: Callable[..., Any], trap: Trap, loud: None, tmp_path: Path) -> None:
-    demo = spawn("start", "boom_twin.ros.demo.demo", "--bag", "bag", "--duration", "1", "--out", "out")
+def test_the_demonstration(spawn: Callable[..., Any], trap: Trap, demo_path: None, loud: None, tmp_path: Path) -> None:
+    demo = spawn("start", "demo.demo", "--bag", "bag", "--duration", "1", "--out", "out")
     assert demo.end() == 0 and trap.sprung() == "", demo.said()
     assert (tmp_path / "received" / "out" / "recorded" / "metadata.yaml").is_file()
     assert not (tmp_path / "overwritten").exists()

@@ -15,18 +15,21 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from demo.processes import DemoProcesses
+
 from boom_twin.bag.reader import scan
 from boom_twin.bag.session_files import write_session
 from boom_twin.errors import BoomTwinError
-from boom_twin.ros.demo.processes import DemoProcesses
 from boom_twin.scene.load import default_text
 
 PUMP = Path(__file__).parents[2] / "bags" / "pump_session"
 
+pytestmark = pytest.mark.usefixtures("demo_path")
+
 
 def test_a_short_demonstration(spawn: Callable[..., Any], tmp_path: Path) -> None:
     """Of the session that has every sensor."""
-    demo = spawn("boom_twin.ros.demo.demo", "--bag", str(PUMP), "--duration", "2", "--out", str(tmp_path / "out"))
+    demo = spawn("demo.demo", "--bag", str(PUMP), "--duration", "2", "--out", str(tmp_path / "out"))
     assert demo.end() == 0, demo.said()
     rows = dict(line.split("  ", 1) for line in demo.said().splitlines() if "  " in line)
     position, acceleration = re.findall(r"[\d.]+(?= mm| m/s)", rows["tip error, prediction"])
@@ -44,19 +47,19 @@ def test_no_output_is_a_failure(spawn: Callable[..., Any], motion: dict[str, Any
     """Strokes that no cylinder has give no prediction."""
     far = {**motion, "strokes": np.full_like(motion["strokes"], 50.0)}
     write_session(tmp_path / "far", **far, description={})
-    demo = spawn("boom_twin.ros.demo.demo", "--bag", str(tmp_path / "far"), "--duration", "1", "--out", str(tmp_path / "out"))
+    demo = spawn("demo.demo", "--bag", str(tmp_path / "far"), "--duration", "1", "--out", str(tmp_path / "out"))
     assert demo.end() == 1
     assert "the node published no prediction" in demo.said() and "Traceback" not in demo.said()
 
 
 def test_no_session_is_a_failure(spawn: Callable[..., Any], tmp_path: Path) -> None:
-    demo = spawn("boom_twin.ros.demo.demo", "--bag", str(tmp_path / "absent"), "--out", str(tmp_path / "out"))
+    demo = spawn("demo.demo", "--bag", str(tmp_path / "absent"), "--out", str(tmp_path / "out"))
     assert demo.end() == 1
     assert "absent" in demo.said() and "Traceback" not in demo.said()
 
 
 def test_the_live_demonstration_shows_its_page_and_ends_in_order(spawn: Callable[..., Any], bag: Path, tmp_path: Path) -> None:
-    demo = spawn("boom_twin.ros.demo.demo_live", "--bag", str(bag), "--port", "0", "--out", str(tmp_path))
+    demo = spawn("demo.demo_live", "--bag", str(bag), "--port", "0", "--out", str(tmp_path))
     demo.wait_for("in a browser")
     url = demo.said().split("open ")[1].split()[0]
     assert b"boom twin" in urlopen(url).read()
@@ -68,7 +71,7 @@ def test_the_live_demonstration_shows_its_page_and_ends_in_order(spawn: Callable
 
 
 def test_a_child_that_dies_ends_the_live_demonstration_at_once(spawn: Callable[..., Any], bag: Path, tmp_path: Path) -> None:
-    demo = spawn("boom_twin.ros.demo.demo_live", "--bag", str(bag), "--port", "0", "--out", str(tmp_path))
+    demo = spawn("demo.demo_live", "--bag", str(bag), "--port", "0", "--out", str(tmp_path))
     demo.wait_for("in a browser")
     children = Path(f"/proc/{demo.pid}/task/{demo.pid}/children").read_text().split()
     monitor = next(int(pid) for pid in children if "monitor" in Path(f"/proc/{pid}/cmdline").read_text().split("\0"))
@@ -107,6 +110,6 @@ def test_the_second_of_two_that_start_at_once_is_told_so(tmp_path: Path) -> None
 
 
 def test_a_duration_that_is_no_number_is_refused(spawn: Callable[..., Any], tmp_path: Path) -> None:
-    demo = spawn("boom_twin.ros.demo.demo", "--duration", "nan", "--out", str(tmp_path))
+    demo = spawn("demo.demo", "--duration", "nan", "--out", str(tmp_path))
     assert demo.end() == 2
     assert "must be > 0 and finite" in demo.said() and "Traceback" not in demo.said()

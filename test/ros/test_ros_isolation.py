@@ -16,11 +16,11 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
+from demo import isolation as module
+from demo.isolation import Isolation, isolated
 from sensor_msgs.msg import JointState
 
 from boom_twin.errors import BoomTwinError
-from boom_twin.ros import isolation as module
-from boom_twin.ros.isolation import Isolation, isolated
 
 TOPIC = "cylinder_strokes"
 RIG = f"""
@@ -143,10 +143,10 @@ def test_a_rig_in_the_same_domain_neither_feeds_nor_is_fed(isolation: Isolation,
 
 @pytest.mark.parametrize("demo", ["demo", "demo_live"])
 def test_a_demonstration_refuses_a_domain_in_use(
-    demo: str, isolation: Isolation, bag: Path, spawn: Callable[..., Any], tmp_path: Path
+    demo: str, isolation: Isolation, bag: Path, spawn: Callable[..., Any], demo_path: None, tmp_path: Path
 ) -> None:
     with rig_in(free := unclaimed(), tmp_path / "rig"):
-        process = spawn(f"boom_twin.ros.demo.{demo}", "--bag", str(bag), "--out", str(tmp_path / "out"), "--domain", str(free))
+        process = spawn(f"demo.{demo}", "--bag", str(bag), "--out", str(tmp_path / "out"), "--domain", str(free))
         assert process.end() == 1
     assert f"ROS domain {free} is in use" in process.said() and "Traceback" not in process.said()
     assert "/some_rig" in process.said() or "a node without a known name" in process.said()

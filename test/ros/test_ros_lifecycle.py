@@ -26,7 +26,6 @@ from boom_twin.config.settings import Settings
 from boom_twin.messages.topic_table import Output
 from boom_twin.ros import runtime
 from boom_twin.ros.node.node import TwinNode
-from boom_twin.ros.node.receive_queue import ReceiveQueue
 from boom_twin.scene.load import default_text
 
 
@@ -274,9 +273,10 @@ def test_turns_of_the_events_executor_are_long_and_end_in_time(domain: None, mon
             turns.append(time.monotonic())
             self._executor.spin_until_future_complete(turn, timeout_sec=timeout_sec)
 
-    monkeypatch.setattr(runtime, "_events_executor", Counted)
+    monkeypatch.setattr(runtime, "events_executor", Counted)
     node, begun = rclpy.create_node("turns"), time.monotonic()
-    runtime.spin(node, ReceiveQueue(), lambda: time.monotonic() > begun + 2.0)
+    with runtime.CallbackTurns(node, lambda: time.monotonic() > begun + 2.0) as running:
+        running.run()
     assert len(turns) == 1  # each leaves something behind in rclpy 7.1: ten of them at the former 0.2 s
     assert not list(node.timers)
     node.destroy_node()

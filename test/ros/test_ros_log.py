@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,7 +14,8 @@ pytest.importorskip("rclpy")
 
 from boom_twin.diagnostics.levels import Level, Status
 from boom_twin.messages.topic_table import Output, load_topics
-from boom_twin.ros.node.diagnostics import Diagnostics, DiagnosticsPublisher
+from boom_twin.ros.diagnostics_publisher import DiagnosticsPublisher
+from boom_twin.ros.node.diagnostics import ClockCheck
 from boom_twin.ros.node.services import StartLog
 from boom_twin.scene.load import default_text
 from boom_twin.types import Change, Report
@@ -50,7 +50,7 @@ def test_a_state_with_a_foreign_name_is_escaped_in_log_and_diagnostics(bench: An
 def test_a_state_that_comes_and_goes_does_not_fill_the_log(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Four lines in ten minutes; then what is so now. An error is always told, and that it has ended."""
     now, lines = [1000.0], Lines()
-    monkeypatch.setattr("boom_twin.ros.node.diagnostics.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("boom_twin.ros.diagnostics_publisher.time.monotonic", lambda: now[0])
     board = DiagnosticsPublisher(bench.node, load_topics().outputs[Output.DIAGNOSTICS])
     board._logger = lines  # type: ignore[assignment]
 
@@ -95,33 +95,14 @@ def test_a_change_to_what_was_so_before_is_not_an_empty_line() -> None:
     assert lines == ["at 1000000000.000000000: started from rest (first strokes)", "at 1000000000.005000000: payload 41"]
 
 
-@pytest.mark.parametrize(
-    ("waits", "is_simulated", "told"), [([0.0], False, 0), ([0.0, 1.5], False, 0), ([0.0, 0.0], False, 1), ([0.0] * 3, True, 1)]
-)
-def test_another_clock_is_told_if_it_lasts_and_messages_did_not_wait(waits: list[float], is_simulated: bool, told: int) -> None:
+def test_another_clock_is_told_if_it_lasts() -> None:
     """A bag that begins again is a jump of stamps and of clock, one after the other."""
-    lines: list[str] = []
-    diagnostics: Any = object.__new__(Diagnostics)
-    diagnostics._active, diagnostics._told = True, set()
-    diagnostics._was_apart, diagnostics._newest = False, (0, 0.0)
-    diagnostics._watch = SimpleNamespace(newest=10**18, thresholds=SimpleNamespace(stamp_offset=1.0))
-    diagnostics._logger = SimpleNamespace(warning=lines.append)
-    diagnostics._node = SimpleNamespace(get_parameter=lambda name: SimpleNamespace(value=is_simulated))
-    for wait in waits:
-        diagnostics._tell_clock(1e9 + 2.0, wait)
-    assert len(lines) == told
-    assert all(("set use_sim_time" in line) is not is_simulated for line in lines)
+    check = ClockCheck()
+    found = [check.apart(1e9 + 2.0, 10**18, tolerance, 0.0) for tolerance in (1.0, 2.5, 1.0, 1.0)]
+    assert found == pytest.approx([0.0, 0.0, 0.0, 2.0])
 
 
-def test_a_session_that_ended_is_not_stamped_by_another_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_session_that_ended_is_not_stamped_by_another_clock() -> None:
     """The newest stamp grows old while nothing comes."""
-    lines: list[str] = []
-    diagnostics: Any = object.__new__(Diagnostics)
-    diagnostics._active, diagnostics._told = True, set()
-    diagnostics._was_apart, diagnostics._newest = False, (0, 0.0)
-    diagnostics._watch = SimpleNamespace(newest=10**18, thresholds=SimpleNamespace(stamp_offset=1.0))
-    diagnostics._logger = SimpleNamespace(warning=lines.append)
-    for silent in range(5):
-        monkeypatch.setattr("boom_twin.ros.node.diagnostics.time.monotonic", lambda now=float(silent): now)
-        diagnostics._tell_clock(1e9 + silent, 0.0)
-    assert not lines
+    check = ClockCheck()
+    assert not any(check.apart(1e9 + silent, 10**18, 1.0, float(silent)) for silent in range(5))

@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from boom_twin.ros.node.receive_queue import LARGEST, ReceiveQueue
-from boom_twin.ros.runtime import _EventTurns
 
 MS = 1_000_000
 
@@ -77,18 +76,27 @@ def test_work_ends_when_its_time_is_over_and_goes_on_later() -> None:
 
 
 def test_messages_are_read_as_they_come_until_one_had_to_wait(bus: Bus) -> None:
-    class Executor:
-        """Has three messages in one turn."""
+    class Turns:
+        """Have three messages in one turn."""
 
-        def spin_until_future_complete(self, turn: Any, timeout_sec: float) -> None:
+        has_ended = False
+
+        def end(self) -> None:
+            self.has_ended = True
+
+        def poll(self) -> None:
+            """No more wait."""
+
+        def run(self) -> None:
             bus.send("b", b"1")
-            assert bus.read == [b"1"] and not turn.done()
+            assert bus.read == [b"1"] and not self.has_ended
             bus.send("b", b"2", age=30 * MS)
             bus.send("b", b"3")
-            assert bus.read == [b"1"] and turn.done()
+            assert bus.read == [b"1"] and self.has_ended
 
-    _EventTurns(bus.queue, lambda: False).serve(Executor(), bus.queue)
-    bus.queue.work(1.0)
+    turns: Any = Turns()
+    bus.queue.serve(turns)
+    assert bus.read == [b"1", b"2", b"3"]
     bus.send("b", b"4")
     assert bus.read == [b"1", b"2", b"3"] and bus.queue
 

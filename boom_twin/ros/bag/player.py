@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import rclpy
@@ -18,8 +17,7 @@ from ...bag.advice import publishable
 from ...bag.reader import Session, read_both
 from ...errors import BagError, BoomTwinError
 from ...types import NANO, SECOND
-from ..node.diagnostics import node_name
-from ..runtime import qos_profile
+from ..runtime import node_name, qos_profile
 from .subscriptions import installed_class
 
 CLOCK = "/clock"
@@ -37,15 +35,6 @@ All at once would be lost on best-effort listeners: in shared memory Fast DDS ho
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Played:
-    """Result of playing: messages sent by topic, wall time (s), and largest delay of a message (s)."""
-
-    sent: dict[str, int]
-    wall: float
-    latest: float
-
-
 class Player:
     """Player of one session. It needs an initialised rclpy.
 
@@ -56,6 +45,13 @@ class Player:
         Topics; by default the inputs of the twin. Their quality of service is that of the session.
     clock_rate : float, optional
         Publish the log times on ``/clock`` too, so many times in a second.
+
+    Attributes
+    ----------
+    sent : Counter of str
+        Messages sent by topic, in all calls of `play` so far.
+    wall, latest : float
+        Wall time, and largest delay of a message, s.
 
     Raises
     ------
@@ -77,8 +73,8 @@ class Player:
         self._clock: Publisher[Any] | None = None
         if clock_rate is not None:
             self._clock = self._node.create_publisher(Clock, CLOCK, 10)
-        self._sent: Counter[str] = Counter()
-        self._latest = self._wall = self._ask = 0.0
+        self.sent: Counter[str] = Counter()
+        self.latest = self.wall = self._ask = 0.0
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -124,7 +120,7 @@ class Player:
         duration: float | None = None,
         is_held: Callable[[], bool] = lambda: False,
     ) -> Iterator[int]:
-        """Publish, one message for every step of the iterator; `played` tells afterwards what was sent.
+        """Publish, one message for every step of the iterator; the attributes tell what was sent.
 
         Parameters
         ----------
@@ -154,11 +150,11 @@ class Player:
                 due = (stamp - first) * NANO / rate
                 began += self._wait(max(began + due, sent + (due - previous) / CATCH_UP), stamp, is_held)
                 sent, previous = time.monotonic(), due
-                self._latest = max(self._latest, sent - began - due)
+                self.latest = max(self.latest, sent - began - due)
                 self._publish(name, data)
                 yield stamp - first
         finally:
-            self._wall += time.monotonic() - entered
+            self.wall += time.monotonic() - entered
 
     def _wait(self, due: float, stamp: int, is_held: Callable[[], bool]) -> float:
         """Wait until `due`; return the seconds for which the play was held."""
@@ -182,11 +178,6 @@ class Player:
             time.sleep(LOOK if self._clock_rate is None else min(LOOK, 1.0 / self._clock_rate))
         return time.monotonic() - began if was_held else 0.0
 
-    @property
-    def played(self) -> Played:
-        """Result of all calls of `play` so far."""
-        return Played(dict(self._sent), self._wall, self._latest)
-
     def deliver(self, timeout: float = DELIVERY) -> list[str]:
         """Wait until all reliable listeners have received everything; return the topics of which some have not.
 
@@ -209,7 +200,7 @@ class Player:
             self._clock.publish(data)
             return
         self._publishers[name].publish(data)
-        self._sent[name] += 1
+        self.sent[name] += 1
 
     def _schedule(self, first: int, end: int, rate: float) -> Iterator[tuple[int, str, bytes | Clock]]:
         """Yield log time (ns), topic and message (in CDR, or a Clock) of all that is published in that span, in order."""

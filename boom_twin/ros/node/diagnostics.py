@@ -3,111 +3,32 @@
 from __future__ import annotations
 
 import time
-from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import cycle
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
-from rclpy.duration import Duration, Infinite
+from rclpy.duration import Infinite
 from rclpy.node import Node
 from rclpy.qos import LivelinessPolicy, QoSCompatibility, QoSProfile, qos_check_compatible
 
 from ...bag.joint_names import extra_names_message, strange_names_message
 from ...config.settings import Thresholds
-from ...diagnostics.levels import Level, Status
+from ...diagnostics.levels import Level
+from ...diagnostics.model_status import stress_model
 from ...diagnostics.sensor_status import sensors_of
-from ...diagnostics.stress_status import stress_watch
 from ...diagnostics.topic_status import Peers
 from ...diagnostics.twin_status import TwinWatch
 from ...messages.sample_decoder import ODDITIES, SampleDecoder
 from ...messages.topic_table import Output, Topic, Topics
-from ...system.terminal_text import printable
 from ...twin.events import EVENTS, TOLD_AT_ONCE
 from ...twin.load_shedding import LoadShedding
 from ...twin.twin import Twin
-from ...types import NANO, Health, Report, Sample, Stream
-from ..log import Log
-from ..runtime import qos_profile
+from ...types import NANO, Stream
+from ..diagnostics_publisher import DiagnosticsPublisher
+from ..runtime import Log, node_name, qos_profile
 from .receive_queue import LARGEST, ReceiveQueue
-
-MOST_LINES, LINES_SPAN = 4, 600.0
-"""Changes of a component to a warning and back that are logged within so many seconds: on a busy computer they come and go."""
-
-
-class DiagnosticsPublisher:
-    """Publisher of the states of one node.
-
-    Parameters
-    ----------
-    node : Node
-    topic : Topic
-        Where they are published.
-    hardware_id : str
-        What is diagnosed; empty: the node's name.
-    """
-
-    def __init__(self, node: Node, topic: Topic, hardware_id: str = "") -> None:
-        self._node, self._logger = node, Log(node)
-        self._name = node.get_fully_qualified_name().lstrip("/")
-        self._hardware_id = hardware_id or self._name
-        self._publisher = node.create_publisher(DiagnosticArray, topic.name, qos_profile(topic.qos))
-        self._levels: dict[str, Level] = {}
-        self._logged: dict[str, deque[float]] = {}
-
-    def show(self, statuses: Sequence[Status]) -> None:
-        """Publish all statuses; log in one line those whose level differs from the logged one, which is OK for a new status."""
-        before = {status.name: self._levels.get(status.name, Level.OK) for status in statuses}
-        changed = [status for status in statuses if before[status.name] != status.level and self._is_due(status)]
-        self._levels = before | {status.name: status.level for status in changed}
-        self._log(changed)
-        message = DiagnosticArray(status=[self._message(status) for status in statuses])
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        self._publisher.publish(message)
-
-    def settle(self) -> None:
-        """Wait until subscribers have received everything, at most a second."""
-        self._publisher.wait_for_all_acked(Duration(seconds=1))
-
-    def _is_due(self, status: Status) -> bool:
-        """Return True if a change of level is logged now.
-
-        An error and its end are always logged. Other changes of a component are limited in rate.
-        """
-        if max(status.level, self._levels.get(status.name, Level.OK)) > Level.WARN:
-            return True
-        now, times = time.monotonic(), self._logged.setdefault(status.name, deque(maxlen=MOST_LINES))
-        if len(times) == MOST_LINES and now - times[0] < LINES_SPAN:
-            return False
-        times.append(now)
-        return True
-
-    def _log(self, changed: Sequence[Status]) -> None:
-        """Log the changed statuses, those with one message together: the sensors of a topic fall silent as one."""
-        groups: dict[str, list[str]] = {}
-        for status in changed:
-            groups.setdefault(status.message, []).append(status.name)
-        text = "; ".join(f"{', '.join(names)}: {message}" for message, names in groups.items())
-        if any(status.level != Level.OK for status in changed):
-            self._logger.warning(text)
-        elif changed:
-            self._logger.info(text)
-
-    def _message(self, status: Status) -> DiagnosticStatus:
-        return DiagnosticStatus(
-            name=f"{self._name}: {status.name}",
-            level=bytes([status.level]),
-            message=_text(status.message),
-            hardware_id=self._hardware_id,
-            values=[KeyValue(key=key, value=_text(value)) for key, value in status.values.items()],
-        )
-
-
-def _text(value: str | int | float) -> str:
-    """Return a value as text for a program: a float with nine digits, a text with control characters escaped, as in the log."""
-    return f"{value:.9g}" if isinstance(value, float) else printable(str(value), keep="")
 
 
 class GraphPeers:
@@ -168,11 +89,23 @@ def _reason(offered: QoSProfile, asked: QoSProfile) -> str:
     return str(reason).removeprefix("ERROR: ").rstrip(";") if verdict == QoSCompatibility.ERROR else ""
 
 
-def node_name(endpoint: Any) -> str:
-    """Return namespace and name of the node of a discovered publisher or subscriber."""
-    if "UNKNOWN" in endpoint.node_name:  # so rmw calls a node that it has not heard of
-        return "a node without a known name"
-    return f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
+class ClockCheck:
+    """Comparison of the newest stamp with a clock."""
+
+    def __init__(self) -> None:
+        self._was_apart, self._newest, self._since = False, 0, 0.0
+
+    def apart(self, clock: float, newest: int, tolerance: float, now: float) -> float:
+        """Return by how much `clock` (s) is ahead of the `newest` stamp (ns), if it is for two looks; else 0.
+
+        A bag that begins again steps at another moment than its clock. While nothing comes, the newest stamp grows old: that
+        is time of the clock `now` (s), which only goes forward.
+        """
+        if newest != self._newest:
+            self._newest, self._since = newest, now
+        apart, before = clock - newest * NANO, self._was_apart
+        self._was_apart = abs(apart) > tolerance + now - self._since
+        return apart if self._was_apart and before else 0.0
 
 
 WORDS = {**EVENTS, **ODDITIES, "too large": f"a message of more than {LARGEST >> 10} KiB, which is left out"}
@@ -192,6 +125,11 @@ class Diagnostics:
     topics : Topics
     queue : ReceiveQueue
         Of the inputs.
+
+    Attributes
+    ----------
+    watch : TwinWatch
+        Takes what happens; another one from each `configure` on.
     """
 
     def __init__(self, node: Node, topics: Topics, queue: ReceiveQueue) -> None:
@@ -207,32 +145,27 @@ class Diagnostics:
         self._work: Iterator[None] | None = None
         self._newest_piece, self._is_peers_turn = 0.0, False
         self._due, self._active = time.monotonic() + PERIOD, False
-        self._watch = TwinWatch({}, {}, Thresholds())
+        self.watch = TwinWatch({}, {}, Thresholds())
         self._counts: dict[str, Mapping[str, int]] = {}
         self._shedding: LoadShedding | None = None
-        self._scene, self._joints = "", 0
         self._decoder: SampleDecoder | None = None
+        self._scene, self._joints = "", 0
         self._told: set[str] = set()
-        self._was_apart, self._newest = False, (0, 0.0)  # newest stamp (ns), and when it was first seen
+        self._clock = ClockCheck()
 
-    def watch(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
+    def configure(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
         """Watch the twin that the node is configured with."""
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts, twin.absent)
-        stress = stress_watch(twin.scene, twin.reads)
-        self._watch = TwinWatch(sensors, self._inputs, self._watch.thresholds, stress=stress)
-        self._counts, self._shedding = {"samples": twin.counts, "messages": decoder.oddities}, twin.shedding
+        stress = stress_model(twin.scene, twin.reads)
+        self.watch = TwinWatch(sensors, self._inputs, self.watch.thresholds, stress=stress)
         self._queue.oddities.clear()
-        self._counts["received"] = self._queue.oddities
-        self._scene, self._joints, self._decoder = scene, twin.plan.joints, decoder
+        self._counts = {"samples": twin.counts, "messages": decoder.oddities, "received": self._queue.oddities}
+        self._scene, self._joints, self._decoder, self._shedding = scene, twin.plan.joints, decoder, twin.shedding
         self._told.clear()
-
-    def tune(self, thresholds: Thresholds) -> None:
-        """Set the thresholds from now on."""
-        self._watch.thresholds = thresholds
 
     def start(self) -> None:
         """Start watching, because the node is active: from now on an input that is silent is stale."""
-        self._watch.begin()
+        self.watch.begin()
         self._drop_work()
         self._active = True
 
@@ -241,34 +174,13 @@ class Diagnostics:
         self._drop_work()
         self._active = False
 
-    def seen(self, stream: Stream, stamp: int) -> None:
-        """Count a message."""
-        self._watch.seen(stream, stamp)
-
-    def took(self, sample: Sample, report: Report, duration: float) -> None:
-        """Take the `report` that the twin made of `sample` in `duration` seconds."""
-        self._watch.took(sample, report, duration)
-
-    def judged(self, health: Health | None, duration: float) -> None:
-        """Take the result of a look at the rig's health, which took `duration` seconds; None if there is no news."""
-        self._watch.judged(health, duration)
-
-    def acknowledge(self) -> str:
-        """Acknowledge the alarms of the rig's health; return in words which of them have ended and are released."""
-        health = self._watch.health
-        return "health is not judged" if health is None else health.acknowledge()
-
-    def broken(self, stream: Stream, error: Exception) -> None:
-        """Count a message that could not be handled at all."""
-        self._watch.broken(f"a message of {stream.value} could not be handled: {type(error).__name__}: {error}")
-
     def _tick(self) -> None:
         """Look up one topic's other ends at every second call; begin a look at everything, if it is due."""
         self._is_peers_turn = not self._is_peers_turn
         if self._is_peers_turn:
             self._peers.look()
         now = time.monotonic()
-        if self._work is None and (now >= self._due - 0.5 * TICK or (self._active and self._watch.is_urgent())):
+        if self._work is None and (now >= self._due - 0.5 * TICK or (self._active and self.watch.is_urgent())):
             self._due = now + PERIOD
             self._work, self._newest_piece = self._look(), now
             self._pieces.reset()
@@ -294,7 +206,7 @@ class Diagnostics:
         ends = peers.publishers, peers.subscribers.values()
         shed = self._shedding
         left_out = {} if shed is None else {"shapes": shed.shapes, "looks at health": shed.health}
-        found = yield from self._watch.look(told, self._active, *ends, clock, received, wrong, left_out, WORDS)
+        found = yield from self.watch.look(told, self._active, *ends, clock, received, wrong, left_out, WORDS)
         yield
         self._publisher.show(found)
         self._tell_oddities()
@@ -328,26 +240,16 @@ class Diagnostics:
 
     def _tell_clock(self, clock: float, wait: float) -> None:
         """Warn if the stamps of strokes are not of the node's clock; messages waited at most `wait` seconds."""
-        newest = self._watch.newest if self._active else None
-        if newest is not None and clock == 0.0:
-            self._tell(
-                "no clock", "use_sim_time is set and no /clock came yet: play with --clock, or set use_sim_time to false"
-            )
-            return
+        newest, is_simulated = self.watch.newest if self._active else None, self._node.get_parameter("use_sim_time").value
         if newest is None:
             return
-        if newest != self._newest[0]:
-            self._newest = newest, time.monotonic()
-        silent = time.monotonic() - self._newest[1]
-        apart, before = clock - newest * NANO, self._was_apart
-        self._was_apart = abs(apart) > self._watch.thresholds.stamp_offset + wait + silent
-        if self._was_apart and before:  # a bag that begins again steps at another moment than its clock
-            self._tell("clock", f"newest stamp is {apart:.1f} s from {self._clock_in_words()}")
-
-    def _clock_in_words(self) -> str:
-        if self._node.get_parameter("use_sim_time").value:
-            return "/clock: is this the clock of what is played?"
-        return "the node's clock: set use_sim_time or play with --clock"
+        if clock == 0.0:
+            told = "use_sim_time is set and no /clock came yet: play with --clock, or set use_sim_time to false"
+            self._tell("no clock", told)
+        elif apart := self._clock.apart(clock, newest, self.watch.thresholds.stamp_offset + wait, time.monotonic()):
+            own = "the node's clock: set use_sim_time or play with --clock"
+            own = "/clock: is this the clock of what is played?" if is_simulated else own
+            self._tell("clock", f"newest stamp is {apart:.1f} s from {own}")
 
     def _tell(self, name: str, text: str) -> None:
         """Log a warning once."""

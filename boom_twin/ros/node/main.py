@@ -64,12 +64,17 @@ def _run(arguments: list[str], stop: StopSignal) -> int:
 
 def _live(node: TwinNode, stop: StopSignal) -> int:
     """Start, spin, stop in order."""
-    from ..runtime import STOPPED, spin
+    from ..runtime import STOPPED, CallbackTurns
+
+    def is_over() -> bool:
+        return node.finished or stop.asked
 
     try:
         if node.autostart and not node.start():
             return 1
-        spin(node, node.queue, lambda: node.finished or stop.asked)
+        with CallbackTurns(node, is_over) as turns:
+            while not is_over():
+                node.queue.serve(turns)
     except STOPPED:
         pass
     stop.over()

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Sequence
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from ...messages.topic_table import NODE, Topic, Topics
+from ...messages.topic_table import NODE, Topics
 from ...system.child_process import end_process, python_command
 from ..bag.recorder import TEXTS
 
@@ -39,7 +38,8 @@ class MonitorProcess:
         self._node = node
         namespace = node.get_namespace()
         there = topics.in_namespace(namespace)
-        pairs = zip(_all(there), _all(topics), strict=True)
+        own_names, names_there = ([*each.inputs.values(), *each.outputs.values(), each.events] for each in (topics, there))
+        pairs = zip(names_there, own_names, strict=True)
         names = {one.name: node.resolve_topic_name(other.name) for one, other in pairs}
         own = f"{namespace.rstrip('/')}/{NODE}"
         names |= {f"{own}/{name}": node.resolve_service_name(f"~/{name}") for name in SERVICES}
@@ -49,7 +49,8 @@ class MonitorProcess:
         arguments += ["--ros-args", "-r", f"__ns:={namespace}"]
         for name, resolved in names.items():
             arguments += ["-r", f"{name}:={resolved}"] if resolved != name else []
-        self._process = _start(arguments)
+        command = python_command("boom_twin.cli.main", "monitor", *arguments)
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE)
         self._timer = node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def close(self) -> None:
@@ -62,11 +63,3 @@ class MonitorProcess:
         if code is not None:
             self._timer.cancel()
             self._node.get_logger().warning(f"the monitor ended with {code}; `boom_twin monitor` starts another one")
-
-
-def _all(topics: Topics) -> list[Topic]:
-    return [*topics.inputs.values(), *topics.outputs.values(), topics.events]
-
-
-def _start(arguments: Sequence[str]) -> subprocess.Popen[bytes]:
-    return subprocess.Popen(python_command("boom_twin.cli.main", "monitor", *arguments), stdin=subprocess.PIPE)

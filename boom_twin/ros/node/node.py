@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from time import perf_counter
@@ -27,8 +28,7 @@ from ...twin.driver import drive_one
 from ...twin.loaded_model import ModelPreparation
 from ...twin.twin import Twin
 from ...types import SENSORS, Report, Sample, Stream
-from ..log import Log
-from ..runtime import message_class, one_line, qos_profile
+from ..runtime import Log, message_class, one_line, qos_profile
 from .diagnostics import Diagnostics
 from .monitor_process import MonitorProcess
 from .parameters import baseline_of, baseline_text, current, declare, frame_of, guard, path_of, refusal
@@ -65,7 +65,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._topics = load_mapping(path_of(self, "mapping"))
         self.queue = ReceiveQueue()
         self._diagnostics = Diagnostics(self, self._topics, self.queue)
-        self._diagnostics.tune(current(self, Thresholds))
+        self._diagnostics.watch.thresholds = current(self, Thresholds)
         guard(self, lambda: self._twin is not None, self._tune)
 
     @property
@@ -164,7 +164,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
     def leave(self) -> None:
         """Shut down from whatever state; leave an interrupted transition as it is."""
-        if self._state_machine.current_state[1] in ("unconfigured", "inactive", "active"):
+        with suppress(RuntimeError):  # RCLError: no transition goes on from here
             self.trigger_shutdown()
 
     def _build(self) -> None:
@@ -184,15 +184,15 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._encoder = ReportEncoder(scene, settings, frame_of(self, topics))
         self._encoder.warm_up()
         texts = {"scene": found.text} | baseline_text(self)
-        acknowledge, is_active = self._diagnostics.acknowledge, lambda: bool(self._subscriptions_in)
+        self._diagnostics.configure(twin, self._decoder, name)
+        acknowledge, is_active = self._diagnostics.watch.acknowledge, lambda: bool(self._subscriptions_in)
         self._twin_services = Services(self, twin, acknowledge, is_active, self.queue.catch_up, texts)
         self._start_log = StartLog(self._log)
-        self._diagnostics.watch(twin, self._decoder, name)
         self._log.info("model ready")
 
     def _tune(self, live: dict[str, float]) -> None:
         """Apply the live parameters that were set."""
-        self._diagnostics.tune(current(self, Thresholds))
+        self._diagnostics.watch.thresholds = current(self, Thresholds)
         asked = {name: value for name, value in live.items() if name in Settings.live_names()}
         if asked and self._twin is not None:
             self.queue.catch_up()
@@ -226,19 +226,20 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             (stamp, msg), refused = decoder.read(data), self._decoder.refused
             samples = self._decoder.samples(streams, stamp, msg)
             for stream in streams if self._decoder.refused > refused else ():
-                self._diagnostics.seen(stream, stamp - self._decoder.delays[stream])
+                self._diagnostics.watch.seen(stream, stamp - self._decoder.delays[stream])
             for sample in samples:
                 self._take(sample)
         except Exception as error:  # the last resort, such as a message that is not whole
-            self._diagnostics.broken(streams[0], error)
+            told = f"a message of {streams[0].value} could not be handled: {type(error).__name__}: {error}"
+            self._diagnostics.watch.broken(told)
 
     def _take(self, sample: Sample) -> None:
         assert self._twin is not None
-        self._diagnostics.seen(sample.stream, sample.stamp)
+        self._diagnostics.watch.seen(sample.stream, sample.stamp)
         self._preparation.take_in()
         self._twin.shedding.filled(self.queue.share)
         step = drive_one(self._twin, sample, judged=False)
-        self._diagnostics.took(*step)
+        self._diagnostics.watch.took(*step)
         for each in step.report.all:
             if each.change is not None:
                 self._start_log.tell(each, each.change)
@@ -252,7 +253,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         health = twin.judge_health()
         if health is not None:
             self._publish(Report(stamp, True, health=health))
-        self._diagnostics.judged(health, perf_counter() - began)
+        self._diagnostics.watch.judged(health, perf_counter() - began)
 
     def _publish(self, report: Report) -> None:
         """Publish the outputs that somebody listens to, or may ask for later.

@@ -10,12 +10,13 @@ from __future__ import annotations
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
+from functools import partial
 from math import nan
 from typing import Any
 
-from ...diagnostics.source_status import Reception
+from ...diagnostics.topic_status import Reception
 from ...types import NANO
-from ..subscription_callback import with_information
+from ..runtime import CallbackTurns, with_information
 
 FRESH = 0.005
 """Age (s) of a message, at its receipt from the executor, above which more are taken to stand in the executor's own row."""
@@ -23,6 +24,10 @@ LARGEST = 1 << 18
 """Bytes of a message that is put: a thousand names, which are as many as are looked at, take a part of that."""
 CATCH_UP = 0.5
 """Most time (s) for reading what arrived before a request, where the answer depends on it."""
+BUDGET = 0.01
+"""Time (s) for messages that wait, between two turns of services and timers."""
+INTAKE = 0.2
+"""Most time (s) for taking messages over from the executor, before some of them are read."""
 
 
 class _Topic:
@@ -76,8 +81,6 @@ class ReceiveQueue:
         Messages that wait behind the one that is being read, or was last, of its topic; as a share of what may.
     is_behind : bool
         Whether the newest message had waited for the executor, so that there may be more.
-    on_put : callable, optional
-        Is called with every message that was put, and may read it at once.
     """
 
     def __init__(self, clock: Callable[[], int] = time.time_ns) -> None:
@@ -86,7 +89,7 @@ class ReceiveQueue:
         self._turns: deque[_Topic] = deque()  # of the topics, for each message that waits, and for those that gave way
         self.received, self.is_behind, self.share = 0, False, 0.0
         self.oddities: Counter[str] = Counter()
-        self.on_put: Callable[[], None] | None = None
+        self._on_put: Callable[[], None] | None = None
 
     def __bool__(self) -> bool:
         """Return True if a message waits."""
@@ -123,8 +126,8 @@ class ReceiveQueue:
                 topic.gone += 1
             self.received += 1
             self.is_behind = (now - arrival) * NANO > FRESH
-            if self.on_put is not None:
-                self.on_put()
+            if self._on_put is not None:
+                self._on_put()
 
         return with_information(put)
 
@@ -152,6 +155,32 @@ class ReceiveQueue:
                 topic.latency = latency
             if time.monotonic() >= end:
                 return
+
+    def serve(self, turns: CallbackTurns) -> None:
+        """Let callbacks run for a turn and read messages as they come, in this one thread and in the order of arrival.
+
+        The turn ends as soon as a message cannot be read at once: then more are to be taken over first.
+        """
+        if self:
+            turns.poll()
+        else:
+            self._on_put = partial(self._read_at_once, turns)
+            try:
+                turns.run()
+            finally:
+                self._on_put = None
+        end, before = time.monotonic() + INTAKE, -1
+        while self.is_behind and self.received != before and time.monotonic() < end:
+            before = self.received
+            turns.poll()
+        self.work(BUDGET)
+
+    def _read_at_once(self, turns: CallbackTurns) -> None:
+        if not self.is_behind:
+            self.work(BUDGET)
+        if self:
+            self._on_put = None
+            turns.end()
 
     def _since(self, arrival: int) -> float:
         return max(0, self._clock() - arrival) * NANO

@@ -16,7 +16,7 @@ from ...errors import UsageError
 from ...twin.adjustments import WHOLE
 from ...twin.twin import Twin
 from ...types import SENSORS, Change, Report
-from ..log import Log
+from ..runtime import Log
 
 PAUSE = 1.0
 """Time (s) between two calls of a service that starts the model from rest, which takes as long as hundreds of steps."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from .main import add_json, add_scene, open_scene, print_json
+from .arguments import add_json, add_scene
+from .output import open_scene, print_result
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -16,8 +17,5 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Print the distance from the base pivot to the tip of the straight boom."""
     reach = open_scene(args.scene).reach
-    if args.json:
-        print_json({"reach_m": reach})
-    else:
-        print(f"{reach:.3f} m")
+    print_result(args.json, {"reach_m": reach}, [f"{reach:.3f} m"])
     return 0

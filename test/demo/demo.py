@@ -19,22 +19,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bag.reader import Session, read, scan
-from ...bag.session_model import scene_of
-from ...errors import BagError, BoomTwinError
-from ...messages.sample_decoder import stamp_of
-from ...messages.topic_table import Output, Topic, load_topics
-from ...offline.ground_truth import FILE_NAME as TRUTH
-from ...offline.ground_truth import TipTruth, load_truth
-from ...offline.history import draw, history_of
-from ...offline.progress import progress_of
-from ...offline.replay import Replay, replay_into
-from ...system.atomic_files import write_atomic
-from ...system.received_files import holds_file, open_received
-from ...system.result_folder import REPLAY, result_folder
-from ...types import NANO, Array, Stream, sensor_kind
-from ..isolation import add_domain
-from ..startup import require_rclpy
+from boom_twin.bag.reader import Session, read, scan
+from boom_twin.bag.session_model import scene_of
+from boom_twin.errors import BagError, BoomTwinError
+from boom_twin.messages.sample_decoder import stamp_of
+from boom_twin.messages.topic_table import Output, Topic, load_topics
+from boom_twin.offline.ground_truth import FILE_NAME as TRUTH
+from boom_twin.offline.ground_truth import TipTruth, load_truth
+from boom_twin.offline.history import draw, history_of
+from boom_twin.offline.progress import progress_of
+from boom_twin.offline.replay import Replay, replay_into
+from boom_twin.ros.startup import require_rclpy
+from boom_twin.system.atomic_files import write_atomic
+from boom_twin.system.received_files import holds_file, open_received
+from boom_twin.system.result_folder import REPLAY, result_folder
+from boom_twin.types import NANO, Array, Stream, sensor_kind
+
+from .isolation import add_domain
 from .processes import DemoProcesses, demo_processes
 
 Positions = dict[int, tuple[float, float]]
@@ -196,7 +197,7 @@ def main() -> int:
 
 
 def _arguments() -> Namespace:
-    parser = ArgumentParser(prog="python -m boom_twin.ros.demo.demo", description="Play a session into the live twin.")
+    parser = ArgumentParser(prog="python -m demo.demo", description="Play a session into the live twin.")
     parser.add_argument("--bag", type=Path, default=Path("bags/arch_session"), help="session (bags/arch_session)")
     parser.add_argument("--duration", type=float, default=30.0, help="seconds of it (30)")
     parser.add_argument("--out", type=Path, default=Path("out/demo"), help="folder for the results (out/demo)")
@@ -209,8 +210,8 @@ def _arguments() -> Namespace:
 
 def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str, int]:
     """Play, once all have found each other; return the number of messages sent by topic."""
-    from ..bag.player import Player
-    from ..runtime import ros
+    from boom_twin.ros.bag.player import Player
+    from boom_twin.ros.runtime import ros
 
     with ros([]):
         player = Player(session)
@@ -225,7 +226,7 @@ def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str
         time.sleep(SETTLE)
         running.check()
         player.close()
-    return player.played.sent
+    return player.sent
 
 
 def _equal(live: DemoResult, again: Replay) -> int:

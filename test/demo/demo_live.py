@@ -12,11 +12,12 @@ import time
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from ...bag.reader import scan
-from ...bag.session_model import scene_of
-from ...errors import BoomTwinError
-from ..isolation import add_domain
-from ..startup import require_rclpy
+from boom_twin.bag.reader import scan
+from boom_twin.bag.session_model import scene_of
+from boom_twin.errors import BoomTwinError
+from boom_twin.ros.startup import require_rclpy
+
+from .isolation import add_domain
 from .processes import LOOK, DemoProcesses, demo_processes
 
 
@@ -36,7 +37,7 @@ def main() -> int:
 
 
 def _arguments() -> Namespace:
-    parser = ArgumentParser(prog="python -m boom_twin.ros.demo.demo_live", description="Watch a played session live.")
+    parser = ArgumentParser(prog="python -m demo.demo_live", description="Watch a played session live.")
     parser.add_argument("--bag", type=Path, default=Path("bags/arch_session"), help="session (bags/arch_session)")
     parser.add_argument("--out", type=Path, default=Path("out/demo_live"), help="folder for recording and logs")
     parser.add_argument("--port", help="of the page (8420, or any that is free if that is taken)")
@@ -46,8 +47,8 @@ def _arguments() -> Namespace:
 
 def _play(args: Namespace, running: DemoProcesses) -> None:
     """Wait until all are there, tell where the page is, and play again and again; BoomTwinError as soon as one has ended."""
-    from ..bag.player import Player
-    from ..runtime import ros
+    from boom_twin.ros.bag.player import Player
+    from boom_twin.ros.runtime import ros
 
     command = ["boom_twin.cli.main", "monitor", *(["--port", args.port] if args.port else [])]
     monitor = running.start("monitor", command, signal.SIGTERM)

@@ -22,9 +22,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import BoomTwinError
-from ..messages.topic_table import Topics, load_topics
-from .startup import require_rclpy
+from boom_twin.errors import BoomTwinError
+from boom_twin.messages.topic_table import Topics, load_topics
+from boom_twin.ros.startup import require_rclpy
 
 USUAL, LARGEST = 101, 232
 """The last domain that people use, as the ROS 2 documentation has it, and the last one whose ports exist."""
@@ -104,7 +104,7 @@ def refuse_foreign(topics: Topics) -> None:
     """
     import rclpy
 
-    from .runtime import ros
+    from boom_twin.ros.runtime import ros
 
     with ros([]):
         node = rclpy.create_node("boom_twin_isolation")
@@ -121,7 +121,7 @@ def refuse_foreign(topics: Topics) -> None:
 
 def _foreign(node: Any, topics: Topics) -> list[str]:
     """Return in words who publishes one of the topics, or listens to an input."""
-    from .node.diagnostics import node_name
+    from boom_twin.ros.runtime import node_name
 
     inputs, outputs = topics.inputs.values(), [*topics.outputs.values(), topics.events]
     of = {f"publishes {each.absolute}": node.get_publishers_info_by_topic(each.absolute) for each in [*inputs, *outputs]}

@@ -12,14 +12,15 @@ from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from ...bag.async_writer import PATIENCE as DISK_PATIENCE
-from ...errors import BoomTwinError
-from ...system.child_process import end_process, python_command
-from ..isolation import isolated
-from ..startup import STOPS, on_stop_signal
+from boom_twin.bag.async_writer import PATIENCE as DISK_PATIENCE
+from boom_twin.errors import BoomTwinError
+from boom_twin.ros.startup import STOPS, on_stop_signal
+from boom_twin.system.child_process import end_process, python_command
+
+from .isolation import isolated
 
 if TYPE_CHECKING:
-    from ..bag.player import Player
+    from boom_twin.ros.bag.player import Player
 
 
 PATIENCE = 300.0
@@ -44,7 +45,7 @@ class DemoProcess:
     end_signal : Signals
         What ends it in order.
     lock : int
-        Of the domain, see `boom_twin.ros.isolation.Isolation`: held as long as this runs, even if its parent is killed.
+        Of the domain, see `demo.isolation.Isolation`: held as long as this runs, even if its parent is killed.
     """
 
     def __init__(self, arguments: list[str], log: Path, end_signal: signal.Signals, lock: int) -> None:
@@ -131,7 +132,7 @@ class DemoProcesses:
 
     def wait_for_discovery(self, player: Player) -> None:
         """Wait until node, recorder and `player` have found each other; BoomTwinError if they do not."""
-        from ..bag.recorder import COMPLETE
+        from boom_twin.ros.bag.recorder import COMPLETE
 
         print("starting the node; the first time it compiles for up to a minute ..", file=sys.stderr)
         end = time.monotonic() + PATIENCE
@@ -182,7 +183,7 @@ def demo_processes(out: Path, origin: str, scene: str, domain: int | None = None
     scene : str
         Text of the scene that the node is given.
     domain : int, optional
-        As for `boom_twin.ros.isolation.isolated`.
+        As for `demo.isolation.isolated`.
     """
     with isolated(domain) as isolation:
         print(isolation, file=sys.stderr)
