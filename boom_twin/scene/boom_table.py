@@ -5,109 +5,80 @@ from __future__ import annotations
 import csv
 import re
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 from pydantic import BaseModel, Field
 
 from ..errors import ABSENT, Fault, SceneError
-from .block_reader import validated
-from .format import Format
-from .glossary import MEANING
-from .schema import Base, Bore, BulkModulus, Finite, Joint, Material, NotNegative, Part, Point, Positive, Section
+from .block_reader import meaning_of, validated
+from .schema import (
+    CAP_LINE,
+    ROD_LINE,
+    Base,
+    Bore,
+    BulkModulus,
+    Cylinder,
+    Finite,
+    JointGeometry,
+    Material,
+    NotNegative,
+    Part,
+    Point,
+    Positive,
+    Rod,
+    Scene,
+    Section,
+)  # fmt: skip
 from .yaml_reader import NUMBER, Document, Kind, Place, parse, read_text
 
 STEEL = Material(E=2.1e11, rho=7850.0)
 
 
+PIPE = "what rides on a metre of the box beside it: pipe line, hoses, clamps, kg/m"
+
+
 class BoxSection(Part):
-    """One section whose beam is a box: outer height and width, wall, m; what else its metre weighs, kg/m."""
+    """One section whose beam is a box."""
 
-    length: Positive
-    beam: Point
-    height: Positive
-    width: Positive
-    wall: Positive
-    pipe: NotNegative | None = None
-    rod_pin: Point | None = None
+    length: Positive = Field(description=meaning_of(Section, "length"))
+    beam: Point = Field(description=meaning_of(Section, "beam"))
+    height: Positive = Field(description=meaning_of(Section, "height"))
+    width: Positive = Field(description="the outer width of the box, m")
+    wall: Positive = Field(description="the thickness of its walls, m")
+    pipe: NotNegative | None = Field(default=None, description=PIPE)
+    rod_pin: Point | None = Field(default=None, description=meaning_of(Section, "rod_pin"))
 
 
-class DrawnJoint(Part):
-    """One joint as in a scene, with bore and rod of its cylinder, m, and the oil in its lines, m^3."""
+class DrawnJoint(JointGeometry):
+    """One joint as in a scene, with bore and rod of its cylinder."""
 
-    kind: Literal["A", "B1", "B2", "B3"]
-    range_deg: tuple[Finite, Finite]
     bore: Bore
-    rod: Positive
-    C: Point | None = None
-    D: Point | None = None
-    E: Point | None = None
-    lL: Positive | None = None
-    lR: Positive | None = None
-    side: Literal["left", "right"] | None = None
-    R: Point | None = None
-    mL: NotNegative | None = None
-    mR: NotNegative | None = None
-    closed_length: Positive | None = None
-    max_stroke: Positive | None = None
-    cap_line: NotNegative = 5e-4
-    rod_line: NotNegative = 5e-4
+    rod: Rod
+    closed_length: Positive | None = Field(
+        default=None, description=f"{meaning_of(Cylinder, 'closed_length')}; without it, worked out from the pins"
+    )
+    max_stroke: Positive | None = Field(
+        default=None, description=f"{meaning_of(Cylinder, 'max_stroke')}; without it, worked out from the pins"
+    )
+    cap_line: NotNegative = Field(default=5e-4, description=CAP_LINE)
+    rod_line: NotNegative = Field(default=5e-4, description=ROD_LINE)
 
 
 class BoomTable(Part):
     """A boom as its drawing shows it; SI units, ranges and postures in degrees, the base's inclination with its unit."""
 
-    description: str = ""
-    material: Material = STEEL
-    base: Base
-    pipe: NotNegative = 0.0
+    description: str = Field(default="", description="text")
+    material: Material = Field(default=STEEL, description="a block with E (Pa) and rho (kg/m^3); steel if it is not there")
+    base: Base = Field(description=meaning_of(Scene, "base"))
+    pipe: NotNegative = Field(default=0.0, description=PIPE)
     bulk_modulus: BulkModulus = 1.4e9
-    damping_ratio: Annotated[float, Field(gt=0, lt=1)] = 0.01
-    payload: NotNegative | None = None
-    line_fill: NotNegative | None = None
-    sections: Annotated[tuple[BoxSection, ...], Field(min_length=1)]
-    joints: Annotated[tuple[DrawnJoint, ...], Field(min_length=1)]
-    postures: dict[str, tuple[Finite, ...]] = Field(default_factory=dict)
+    damping_ratio: float = Field(default=0.01, gt=0, lt=1, description="the damping ratio of the first mode, 0.005 to 0.03")
+    payload: NotNegative | None = Field(default=None, description="the point mass at the tip, for example an end hose, kg")
+    line_fill: NotNegative | None = Field(default=None, description=meaning_of(Scene, "line_fill"))
+    sections: tuple[BoxSection, ...] = Field(min_length=1, description=meaning_of(Scene, "sections"))
+    joints: tuple[DrawnJoint, ...] = Field(min_length=1, description=meaning_of(Scene, "joints"))
+    postures: dict[str, tuple[Finite, ...]] = Field(default={}, description=meaning_of(Scene, "postures"))
 
-
-_PIPE = "what rides on a metre of the box beside it: pipe line, hoses, clamps, kg/m"
-TABLE = Format(
-    BoomTable,
-    {
-        BoomTable: {
-            "description": "text",
-            "material": "a block with E (Pa) and rho (kg/m^3); steel if it is not there",
-            "base": "a block with pivot and cylinder_pin",
-            "pipe": _PIPE,
-            "bulk_modulus": "the bulk modulus of the oil in Pa, 1.4e9 to 1.7e9; less with air in it",
-            "damping_ratio": "the damping ratio of the first mode, 0.005 to 0.03",
-            "payload": "the point mass at the tip, for example an end hose, kg",
-            "line_fill": "the concrete in the pipe line, kg/m",
-            "sections": "a list with one block per section",
-            "joints": "a list with one block per joint",
-            "postures": "a block of names, each with a list of section angles in degrees",
-        },
-        Material: MEANING[Material],
-        Base: MEANING[Base],
-        BoxSection: {
-            **{key: MEANING[Section][key] for key in ("length", "beam", "height", "rod_pin")},
-            "width": "the outer width of the box, m",
-            "wall": "the thickness of its walls, m",
-            "pipe": _PIPE,
-        },
-        DrawnJoint: {
-            **{key: MEANING[Joint][key] for key in ("kind", "range_deg", "C", "D", "E", "lL", "lR", "side", "R", "mL", "mR")},
-            "bore": "the diameter of the piston, m",
-            "rod": "the diameter of the rod, m",
-            "closed_length": "the length from pin to pin at stroke 0, m; without it, worked out from the pins",
-            "max_stroke": "the largest stroke, m; without it, worked out from the pins",
-            "cap_line": "the oil between piston and valve on the cap side at stroke 0, m^3",
-            "rod_line": "the oil between piston and valve on the rod side at max_stroke, m^3",
-        },
-    },
-    {BoomTable: "the top level", Material: "material", Base: "base", BoxSection: "sections[i]", DrawnJoint: "joints[i]"},
-    {BoomTable: {"material": Material, "base": Base, "sections": BoxSection, "joints": DrawnJoint}},
-)
-"""What a table may hold."""
 
 PAIRS = {"x": 0, "y": 1, "start": 0, "end": 1, "low": 0, "high": 1, "along": 0, "left": 1}
 """Ending of the name of a column that holds one of two numbers, as in C_x, beam_end, range_deg_low."""
@@ -135,7 +106,7 @@ def checked_table(document: Document, source: str) -> BoomTable:
     if isinstance(document.values, dict) and "gravity" in document.values:
         bound, remedy = "only a scene has it, and this is to be a table of dimensions", "`boom_twin check` takes a scene."
         raise SceneError(source, (document.fault(("gravity",), document.values["gravity"], bound, remedy),))
-    read = validated(document, TABLE)
+    read = validated(document, BoomTable)
     faults = [*read.faults, *document.faults]
     if read.block is not None:
         faults += _faults(document, read.block)
@@ -156,7 +127,7 @@ def _faults(document: Document, table: BoomTable) -> list[Fault]:
             bound = f"the rod must be thinner than the bore, {joint.bore:g} m"
             found.append(document.fault(("joints", i, "rod"), joint.rod, bound, "Give both as diameters."))
     if table.material.rho is None:
-        remedy = f"Give {MEANING[Material]['rho']}."
+        remedy = f"Give {meaning_of(Material, 'rho')}."
         found.append(document.fault(("material", "rho"), ABSENT, "masses are worked out with it", remedy))
     if len(table.joints) != len(table.sections):
         bound = f"there are {len(table.sections)} sections, and every section has one joint"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import Fault, SceneError, SceneWarning
-from .block_reader import validated
+from .block_reader import inner_block, validated
 from .checks import (
     clearance,
     cross_sections,
@@ -24,15 +24,13 @@ from .checks import (
     values,
 )
 from .checks.findings import Draft, Finding
-from .format import SCENE
-from .glossary import BLOCKS
 from .schema import Scene
 from .yaml_reader import Document, Place, missing_end_mark, parse, read_text
 
 
 def structure(document: Document) -> tuple[Scene | None, Draft, list[Fault]]:
     """The scene if every value is good by itself, else None; what is usable of it; and all faults of single values."""
-    read = validated(document, SCENE)
+    read = validated(document, Scene)
     deep = (("sections",), ("joints",), ("postures",))
     broken = {place[:2] if place[:1] in deep else place[:1] for place in read.broken}
     return read.block, _draft(document, read.known, broken), list(read.faults)
@@ -45,7 +43,7 @@ def _draft(document: Document, known: Any, broken: set[Place]) -> Draft:
     usable = {key: value for key, value in known.items() if (key,) not in broken}
     blocks: dict[str, Any] = {}
     for key, value in usable.items():
-        model = BLOCKS[Scene].get(key)
+        model = inner_block(Scene, key)
         if key in ("sections", "joints") and model is not None:
             items = enumerate(value)
             blocks[key] = tuple(None if (key, i) in broken else model.model_validate(v, strict=True) for i, v in items)

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from ...errors import ABSENT
-from ..glossary import MEANING
+from ..block_reader import meaning_of
 from ..schema import Cylinder, Joint, Oil, Point, Section
 from ..yaml_reader import Place
 from .findings import Draft, Finding, fault, warning
@@ -49,7 +49,7 @@ def _flexible(draft: Draft, i: int, section: Section, beam: Point) -> Iterator[F
     place = ("sections", i)
     for key in BEAM_NEEDS:
         if getattr(section, key) is None:
-            remedy = f"Give {key}, {MEANING[Section][key]}, or leave out `beam` for a rigid section."
+            remedy = f"Give {key}, {meaning_of(Section, key)}, or leave out `beam` for a rigid section."
             yield fault(draft, (*place, key), ABSENT, "a section with a beam needs it", remedy)
     x0, x1 = beam
     if not 0 <= x0 < x1 <= section.length:
@@ -78,7 +78,7 @@ def _rod_pin(draft: Draft, i: int, section: Section) -> Iterator[Finding]:
     place = ("sections", i, "rod_pin")
     if i == 0 and section.rod_pin is None:
         bound = "cylinder 1 pushes on the first section and needs a pin there"
-        yield fault(draft, place, ABSENT, bound, f"Give {MEANING[Section]['rod_pin']}.")
+        yield fault(draft, place, ABSENT, bound, f"Give {meaning_of(Section, 'rod_pin')}.")
     if i > 0 and section.rod_pin is not None:
         bound = "only the first section has a rod pin; the later cylinders push on links"
         yield fault(draft, place, section.rod_pin, bound, f"Remove it; R in joints[{i}] places the pin on a link.")
@@ -125,7 +125,7 @@ def _keys_of_kind(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
     refused = {"A": SIX_BAR_ONLY, "B1": ("R",)}.get(joint.kind, ())
     for key in NEEDED[joint.kind]:
         if getattr(joint, key) is None:
-            remedy = f"Give {key}, {MEANING[Joint][key]}."
+            remedy = f"Give {key}, {meaning_of(Joint, key)}."
             yield fault(draft, (*place, key), ABSENT, f"a joint of kind {joint.kind} needs it", remedy)
     for key in refused:
         value = getattr(joint, key)
@@ -156,7 +156,7 @@ def _oil_spring(draft: Draft, i: int, cylinder: Cylinder) -> Iterator[Finding]:
     for key, end in (("cap_line", "stroke 0"), ("rod_line", f"its full stroke, {cylinder.max_stroke:g} m")):
         if getattr(oil, key) == 0.0:
             bound = f"no oil is left there at {end}, and the cylinder is incompressible"
-            yield warning(draft, (*place, "oil", key), 0.0, bound, f"Give {MEANING[Oil][key]}: hoses and dead space.")
+            yield warning(draft, (*place, "oil", key), 0.0, bound, f"Give {meaning_of(Oil, key)}: hoses and dead space.")
 
 
 def _range(draft: Draft, i: int, joint: Joint) -> Iterator[Finding]:
