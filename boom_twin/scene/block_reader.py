@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from ..config.yaml_text import Document, Place, words
 from ..errors import ABSENT, Fault
 from .units import converted, misfit, unit_of
-from .yaml_reader import NUMBER, Document, Place, words
+from .yaml_reader import NUMBER
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails

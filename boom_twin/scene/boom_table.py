@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
+from ..config.yaml_text import Document, Place
 from ..errors import ABSENT, Fault, SceneError
 from .block_reader import meaning_of, validated
 from .schema import (
@@ -29,7 +30,7 @@ from .schema import (
     Scene,
     Section,
 )  # fmt: skip
-from .yaml_reader import NUMBER, Document, Kind, Place, parse, read_text
+from .yaml_reader import NUMBER, Kind, parse, read_text
 
 STEEL = Material(E=2.1e11, rho=7850.0)
 

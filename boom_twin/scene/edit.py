@@ -19,12 +19,12 @@ from typing import Any, TypeVar, cast
 from pydantic import BaseModel
 from ruamel.yaml.error import YAMLError
 
-from ..config.yaml_text import whole_text, with_value, yaml_text
+from ..config.yaml_text import Place, whole_text, with_value, words, yaml_text
 from ..errors import SceneError, UsageError
 from .load import examine_text, structure
 from .oil_spring import middle_stiffness
 from .schema import Cylinder, CylinderPart, RigidPart, Scene, Section, Tip
-from .yaml_reader import Place, parse, with_end_mark, words
+from .yaml_reader import parse, with_end_mark
 
 Body = TypeVar("Body", RigidPart, CylinderPart)
 _NAME = re.compile(r"(cylinder|section)_([1-9]\d*)\.(k|d|EI|beta|mass)")

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from ..config.yaml_text import yaml_text
+from ..config.yaml_text import Document, yaml_text
 from ..errors import Fault, SceneError
 from ..kernels.elements.linkage import cylinder_length
 from ..types import Array
@@ -25,7 +25,7 @@ from .oil_spring import middle_stiffness, stiffness
 from .schema import Cylinder, Joint, Oil, Scene, Section
 from .straight_boom import straight_boom
 from .table_faults import in_table
-from .yaml_reader import Document, with_end_mark
+from .yaml_reader import with_end_mark
 
 ENDS = 1.2  # mass per metre of a rigid end against the beam's
 TUBE = 0.12  # wall of a barrel over its bore

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..config.yaml_text import Document, Place
 from ..errors import Fault, SceneError, SceneWarning
 from .block_reader import inner_block, validated
 from .checks import (
@@ -25,7 +26,7 @@ from .checks import (
 )
 from .checks.findings import Draft, Finding
 from .schema import Scene
-from .yaml_reader import Document, Place, missing_end_mark, parse, read_text
+from .yaml_reader import missing_end_mark, parse, read_text
 
 
 def structure(document: Document) -> tuple[Scene | None, Draft, list[Fault]]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from ..config.yaml_text import Document, Place
 from ..errors import ABSENT, Fault
-from .yaml_reader import Document, Place
 
 ORIGINS: tuple[tuple[str, tuple[str, ...]], ...] = (
     (r"(sections\[\d+\])\.(A|I|rho_I)", (r"\1.wall",)),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from ...config.yaml_text import Place
 from ..schema import Point, Scene, Section
-from ..yaml_reader import Place
 from .findings import Draft, Finding, warning
 
 GYRATION_BY_HEIGHT = (0.28, 0.5)  # a solid block has 0.289, two thin flanges 0.5

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...config.yaml_text import Place
 from ...types import Array
 from ..linkage_range import PIN, distances_to, joint_pins, rod_pin_of
 from ..schema import Cylinder, Oil, Scene
-from ..yaml_reader import Place
 from .findings import Draft, Finding, warning
 from .joint_range import Mask, grid_of, usable
 

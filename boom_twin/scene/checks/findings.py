@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from ...config.yaml_text import Document, Place
 from ...errors import Fault
 from ..schema import Base, Clearance, Joint, Material, Modes, Point, Section, Tip
-from ..yaml_reader import Document, Place
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ...config.yaml_text import Place
 from ..schema import Joint, Point, Section
-from ..yaml_reader import Place
 from .findings import Draft, Finding, fault, warning
 
 TOLERANCE = 1e-9

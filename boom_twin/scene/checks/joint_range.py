@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ...config.yaml_text import Place
 from ...kernels.elements.linkage import cylinder_length
 from ...types import Array
 from ..kinematics import linkage_of, transmission_angles
 from ..schema import Joint
-from ..yaml_reader import Place
 from .findings import Draft, Finding, fault, warning
 from .geometry import TOLERANCE
 from .values import NEEDED

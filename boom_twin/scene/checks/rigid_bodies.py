@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from ...config.yaml_text import Place
 from ..schema import Cylinder, CylinderPart, Joint, RigidPart, Scene, Section, section_depth
-from ..yaml_reader import Place
 from .cross_sections import density
 from .findings import Draft, Finding, warning
 

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ...config.yaml_text import Place
 from ..oil_spring import middle_stiffness
 from ..schema import Scene, section_depth
 from ..straight_boom import StraightBoom, straight_boom
 from ..worst_load import worst_loads
-from ..yaml_reader import Place
 from .findings import Draft, Finding, warning
 
 FREQUENCY = (4.0, 70.0)  # first one times the length of the boom, m/s

@@ -8,10 +8,10 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from ...config.yaml_text import Place
 from ...errors import ABSENT
 from ..block_reader import meaning_of
 from ..schema import Cylinder, Joint, Oil, Point, Section
-from ..yaml_reader import Place
 from .findings import Draft, Finding, fault, warning
 
 BEAM_NEEDS = ("A", "I", "rho_A")
