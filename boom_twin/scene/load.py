@@ -16,15 +16,15 @@ from .block_reader import inner_block, validated
 from .checks import (
     clearance,
     cross_sections,
-    cylinder_clearance,
-    geometry,
+    joint_clearance,
     joint_range,
     pin_spacing,
+    pins,
     rigid_bodies,
     stretched_boom,
     values,
 )
-from .checks.findings import Draft, Finding
+from .checks.draft import Draft, Finding
 from .schema import Scene
 from .yaml_reader import missing_end_mark, parse, read_text
 
@@ -60,9 +60,9 @@ CHECKS: tuple[Callable[[Draft], Iterator[Finding]], ...] = (
     values.sections,
     values.modes,
     values.joints,
-    geometry.pins,
-    geometry.thin_parts,
-    geometry.centres,
+    pins.pins,
+    pins.thin_parts,
+    pins.centres,
     clearance.pins,
     joint_range.joints,
     values.suspects,
@@ -74,7 +74,7 @@ PLAUSIBILITY: tuple[Callable[[Draft, Scene], Iterator[Finding]], ...] = (
     cross_sections.beams,
     rigid_bodies.rigid_parts,
     rigid_bodies.moving_parts,
-    cylinder_clearance.clear_cylinders,
+    joint_clearance.clear_cylinders,
     pin_spacing.spaced_pins,
 )
 """Of a scene without faults: parts against each other."""

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 
 from ..schema import ContactLaw, Joint
-from .findings import Draft, Finding, fault, warning
+from .draft import Draft, Finding, fault, warning
 
 PLACES = {"cylinder": ("rod", "barrel"), "joint": ("pivot", "link_L", "link_R", "Q")}
 NEAR_ENOUGH = 0.02  # between the restitution that is asked for and the one that a law gives

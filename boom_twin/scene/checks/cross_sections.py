@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from ...config.yaml_text import Place
 from ..schema import Point, Scene, Section
-from .findings import Draft, Finding, warning
+from .draft import Draft, Finding, warning
 
 GYRATION_BY_HEIGHT = (0.28, 0.5)  # a solid block has 0.289, two thin flanges 0.5
 GYRATION_BY_LENGTH = (0.004, 0.05)

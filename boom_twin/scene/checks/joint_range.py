@@ -14,8 +14,8 @@ from ...kernels.elements.linkage import cylinder_length
 from ...types import Array
 from ..kinematics import linkage_of, transmission_angles
 from ..schema import Joint
-from .findings import Draft, Finding, fault, warning
-from .geometry import TOLERANCE
+from .draft import Draft, Finding, fault, warning
+from .pins import TOLERANCE
 from .values import NEEDED
 
 STEP_DEG = 0.1

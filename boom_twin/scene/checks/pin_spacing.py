@@ -12,7 +12,7 @@ import numpy as np
 
 from ..linkage_range import BORE, PIN, joint_pins, nearest_pins, pin_diameter
 from ..schema import Scene
-from .findings import Draft, Finding, warning
+from .draft import Draft, Finding, warning
 from .joint_range import grid_of, usable
 
 ROOM = 1.25  # between the centres of two pins, over the diameter: a quarter of it is left for the eyes around them

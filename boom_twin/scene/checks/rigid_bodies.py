@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from ...config.yaml_text import Place
 from ..schema import Cylinder, CylinderPart, Joint, RigidPart, Scene, Section, section_depth
 from .cross_sections import density
-from .findings import Draft, Finding, warning
+from .draft import Draft, Finding, warning
 
 OVERHANG = 0.05  # of the section's length, that a rigid part may reach beyond the pivots
 BESIDE = 2.0  # depths of the section, that a centre may lie beside its axis

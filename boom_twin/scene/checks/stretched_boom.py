@@ -12,7 +12,7 @@ from ..oil_spring import middle_stiffness
 from ..schema import Scene, section_depth
 from ..straight_boom import StraightBoom, straight_boom
 from ..worst_load import worst_loads
-from .findings import Draft, Finding, warning
+from .draft import Draft, Finding, warning
 
 FREQUENCY = (4.0, 70.0)  # first one times the length of the boom, m/s
 DAMPING = (1e-3, 0.2)  # ratio of the first mode

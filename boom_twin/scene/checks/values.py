@@ -12,7 +12,7 @@ from ...config.yaml_text import Place
 from ...errors import ABSENT
 from ..block_reader import meaning_of
 from ..schema import Cylinder, Joint, Oil, Point, Section
-from .findings import Draft, Finding, fault, warning
+from .draft import Draft, Finding, fault, warning
 
 BEAM_NEEDS = ("A", "I", "rho_A")
 BEAM_ONLY = ("A", "I", "rho_A", "rho_I", "beta", "height", "modes", "axial", "geometric", "head")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ...config.yaml_text import Place
 from ..schema import Joint, Point, Section
-from .findings import Draft, Finding, fault, warning
+from .draft import Draft, Finding, fault, warning
 
 TOLERANCE = 1e-9
 

@@ -15,7 +15,7 @@ from ...config.yaml_text import Place
 from ...types import Array
 from ..linkage_range import PIN, distances_to, joint_pins, rod_pin_of
 from ..schema import Cylinder, Oil, Scene
-from .findings import Draft, Finding, warning
+from .draft import Draft, Finding, warning
 from .joint_range import Mask, grid_of, usable
 
 WALL = 0.12  # of a barrel, over its bore
