@@ -16,7 +16,7 @@ Kernels never raise: they return a status (see `boom_twin.kernels.tables`), and 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from .system.terminal_text import printable
 
@@ -52,6 +52,7 @@ class _Absent:
 
 
 ABSENT = _Absent()
+FaultKind = Literal["fault", "warning", "note"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +71,8 @@ class Fault:
         What to do about it.
     line : int, optional
         Line of the file, from 1.
-    is_note : bool
-        Told, but no warning: ``check --strict`` lets it pass.
+    kind : str
+        ``fault``; ``warning`` if the scene can be used; ``note`` if ``check --strict`` lets it pass, too.
     """
 
     path: str
@@ -79,7 +80,7 @@ class Fault:
     bound: str
     remedy: str
     line: int | None = None
-    is_note: bool = False
+    kind: FaultKind = "fault"
 
     def __str__(self) -> str:
         where = self.path if self.line is None else f"line {self.line}: {self.path}"
@@ -88,9 +89,9 @@ class Fault:
         return printable(f"{where} {state}: {self.bound}{stop} {self.remedy}")
 
     @property
-    def kind(self) -> str:
-        """Name of a fault that does not stop a scene: ``note`` or ``warning``."""
-        return "note" if self.is_note else "warning"
+    def is_note(self) -> bool:
+        """Return True for a note."""
+        return self.kind == "note"
 
 
 def _shortened(value: Any, width: int = 60) -> str:

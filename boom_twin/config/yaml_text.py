@@ -13,7 +13,7 @@ from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 
-from ..errors import BoomTwinError, Fault
+from ..errors import BoomTwinError, Fault, FaultKind
 from ..system.received_files import open_received
 from ..system.terminal_text import printable
 
@@ -99,9 +99,9 @@ class Document:
                 return None
         return value
 
-    def fault(self, place: Place, value: Any, bound: str, remedy: str) -> Fault:
-        """Return a fault at a place of this text."""
-        return Fault(words(place) + self._cells_at(place), value, bound, remedy, self.line(place))
+    def fault(self, place: Place, value: Any, bound: str, remedy: str, kind: FaultKind = "fault") -> Fault:
+        """Return a fault or a warning at a place of this text."""
+        return Fault(words(place) + self._cells_at(place), value, bound, remedy, self.line(place), kind)
 
     def _cells_at(self, place: Place) -> str:
         """Return `` (cell C3)`` for a place, or the cells of both its numbers; nothing for a block."""

@@ -172,10 +172,10 @@ def odd_boxes(table: BoomTable, document: Document) -> list[Fault]:
                 f"{softer:.3g} times as much in the plane as one of {b:g} by {h:g} m"
             )
             remedy = f"Give height: {b:g} and width: {h:g}, if they are swapped."
-            found.append(document.fault((*place, "height"), h, bound, remedy))
+            found.append(document.fault((*place, "height"), h, bound, remedy, "warning"))
         elif b < SLIMMEST * h:
             bound = f"expected at least {SLIMMEST * h:.3g} m for a box {h:g} m high"
-            found.append(document.fault((*place, "width"), b, bound, "Give the outer width, and check its unit."))
+            found.append(document.fault((*place, "width"), b, bound, "Give the outer width, and check its unit.", "warning"))
     return found
 
 

@@ -19,12 +19,12 @@ from typing import Any, TypeVar, cast
 from pydantic import BaseModel
 from ruamel.yaml.error import YAMLError
 
-from ..config.yaml_text import Place, whole_text, with_value, words, yaml_text
+from ..config.yaml_text import Place, with_value, words, yaml_text
 from ..errors import SceneError, UsageError
 from .load import examine_text, structure
 from .oil_spring import middle_stiffness
 from .schema import Cylinder, CylinderPart, RigidPart, Scene, Section, Tip
-from .yaml_reader import parse, with_end_mark
+from .yaml_reader import parse, text_of
 
 Body = TypeVar("Body", RigidPart, CylinderPart)
 _NAME = re.compile(r"(cylinder|section)_([1-9]\d*)\.(k|d|EI|beta|mass)")
@@ -216,23 +216,6 @@ def rewritten(text: str, scene: Scene, edits: Iterable[Edit]) -> str:
 def anew(scene: Scene) -> str:
     """A scene as a file without comments."""
     return text_of(scene.model_dump(mode="json", exclude_none=True))
-
-
-def text_of(document: Mapping[str, Any]) -> str:
-    """A scene file with these keys; UsageError if a value is none that YAML has."""
-    try:
-        return with_end_mark(whole_text(_plain(document)))
-    except YAMLError as error:
-        raise UsageError(f"scene: {str(error).splitlines()[0]}. Give texts, numbers, lists and dicts only.") from None
-
-
-def _plain(value: Any) -> Any:
-    """Values of NumPy as Python's, tuples as lists."""
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return _plain(value.tolist()) if hasattr(value, "tolist") else value
 
 
 def changed(scene: Scene, changes: Mapping[str, Any]) -> Scene:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from ..config.yaml_text import Document, yaml_text
-from ..errors import Fault, SceneError
+from ..config.yaml_text import Document, Place, yaml_text
+from ..errors import ABSENT, Fault, SceneError
 from ..kernels.elements.linkage import cylinder_length
 from ..types import Array
 from .boom_table import BoomTable, BoxSection, DrawnJoint, odd_boxes, second_moment
@@ -24,7 +24,6 @@ from .load import examine_text
 from .oil_spring import middle_stiffness, stiffness
 from .schema import Cylinder, Joint, Oil, Scene, Section
 from .straight_boom import straight_boom
-from .table_faults import in_table
 from .yaml_reader import with_end_mark
 
 ENDS = 1.2  # mass per metre of a rigid end against the beam's
@@ -241,3 +240,58 @@ def _list(values: Iterable[float]) -> str:
 def _number(value: float | None) -> str:
     """Six digits; what is not a whole number in them has a point, as YAML wants it."""
     return f"{value or 0.0:.6g}"
+
+
+# -- faults of the scene, reported at the keys and lines of the table ----------------------------------------------------
+
+ORIGINS: tuple[tuple[str, tuple[str, ...]], ...] = (
+    (r"(sections\[\d+\])\.(A|I|rho_I)", (r"\1.wall",)),
+    (r"(sections\[\d+\])\.rho_A", (r"\1.pipe", "pipe", r"\1.wall")),
+    (r"(sections\[\d+\])\.(root|head)\b.*", (r"\1.beam",)),
+    (r"sections\[\d+\]\.beta", ("damping_ratio",)),
+    (r"joints\[\d+\]\.cylinder\.d", ("damping_ratio",)),
+    (r"joints\[\d+\]\.cylinder\.oil\.bulk_modulus", ("bulk_modulus",)),
+    (r"(joints\[\d+\])\.cylinder\.oil\.(\w+)", (r"\1.\2",)),
+    (r"(joints\[\d+\])\.cylinder\.(closed_length|max_stroke)", (r"\1.\2", r"\1.range_deg")),
+    (r"(joints\[\d+\])\.cylinder\.rod\b.*", (r"\1.rod",)),
+    (r"(joints\[\d+\])\.cylinder\..*", (r"\1.bore",)),
+    (r"tip\.payload", ("payload",)),
+)
+"""Paths of a scene, and the keys of a table that they come from, of which the first that is there is told."""
+
+
+def in_table(faults: Sequence[Fault], table: Document) -> list[Fault]:
+    """The faults with paths, values and lines of the table, in the order of these; one of each value that others come from."""
+    told = [
+        table.fault(place_of(each.path), each.value, each.bound, each.remedy, each.kind)
+        for each in faults
+        if not _origins(each.path)
+    ]
+    blocks = {place_of(each.path)[:2] for each in told}
+    of_origins: dict[str, Fault] = {}
+    for fault in faults:
+        if (places := _origins(fault.path)) and place_of(fault.path)[:2] not in blocks:  # else it follows from what is told
+            moved = _at_origin(fault, places, table)
+            of_origins.setdefault(moved.path, moved)
+    return sorted([*told, *of_origins.values()], key=lambda fault: fault.line or 0)
+
+
+def _at_origin(fault: Fault, places: list[Place], table: Document) -> Fault:
+    """The fault at the first of `places` that is in the table, else at the first."""
+    place = next((place for place in places if table.written(place) is not None), places[0])
+    written = table.written(place)
+    value = f" = {fault.value:.4g}" if isinstance(fault.value, float) else ""
+    bound = f"it gives the scene {fault.path}{value}: {fault.bound}"
+    return table.fault(place, ABSENT if written is None else written, bound, fault.remedy, fault.kind)
+
+
+def _origins(path: str) -> list[Place]:
+    for pattern, keys in ORIGINS:
+        if found := re.fullmatch(pattern, path):
+            return [place_of(found.expand(key)) for key in keys]
+    return []
+
+
+def place_of(path: str) -> Place:
+    """The place that `boom_twin.scene.yaml_reader.words` writes so: ``sections[1].root.mass``."""
+    return tuple(int(index) if index else key for key, index in re.findall(r"(\w+)|\[(\d+)\]", path))

@@ -8,14 +8,15 @@ used, with a warning.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import ScalarNode
 
-from ..config.yaml_text import Document, Place, YamlReader
-from ..errors import Fault, SceneError
+from ..config.yaml_text import Document, Place, YamlReader, whole_text
+from ..errors import Fault, SceneError, UsageError
 
 MAX_BYTES = 4_000_000
 SURROGATE = re.compile("[\ud800-\udfff]")
@@ -132,8 +133,25 @@ def with_end_mark(text: str) -> str:
     return "\n".join([*head, *kept]).rstrip() + f"\n\n{MARK}\n"
 
 
-def missing_end_mark(text: str) -> tuple[Fault | None, Fault | None]:
-    """Return a fault if the end of a scene file is cut off, and a warning if it may be; None for either that does not apply.
+def text_of(document: Mapping[str, Any]) -> str:
+    """Return a scene file with these keys; UsageError if a value is none that YAML has."""
+    try:
+        return with_end_mark(whole_text(_plain(document)))
+    except YAMLError as error:
+        raise UsageError(f"scene: {str(error).splitlines()[0]}. Give texts, numbers, lists and dicts only.") from None
+
+
+def _plain(value: Any) -> Any:
+    """Return values of NumPy as Python's, tuples as lists."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return _plain(value.tolist()) if hasattr(value, "tolist") else value
+
+
+def missing_end_mark(text: str) -> Fault | None:
+    """Return a fault if the end of a scene file is cut off, a warning or a note if it may be; None if it is whole.
 
     Many files that were written by hand have no mark. That is a note, and a warning where not even the last line ends.
     """
@@ -141,13 +159,13 @@ def missing_end_mark(text: str) -> tuple[Fault | None, Fault | None]:
     number = max((i for i, line in enumerate(lines, 1) if line.strip()), default=0)
     last = lines[number - 1].strip() if number else ""
     if last == MARK:
-        return None, None
+        return None
     if PROMISE in lines and MARK not in lines:
         bound = f"the first lines say that the file ends with `{MARK}`, and it does not: it was cut off"
         remedy = "Fetch the whole file; or, if nothing is missing, add that line."
-        return Fault("end of the file", last, bound, remedy, number), None
+        return Fault("end of the file", last, bound, remedy, number)
+    kind: Literal["warning", "note"] = "note"
     bound = f"no line `{MARK}`, so one cannot tell whether the rest of the file was cut off"
-    is_note = text.endswith("\n")
-    if not is_note:
-        bound = f"no line `{MARK}`, and not even an end of line: it may have been cut off"
-    return None, Fault("end of the file", last, bound, "If nothing is missing, add that line at the end.", number, is_note)
+    if not text.endswith("\n"):
+        bound, kind = f"no line `{MARK}`, and not even an end of line: it may have been cut off", "warning"
+    return Fault("end of the file", last, bound, "If nothing is missing, add that line at the end.", number, kind)

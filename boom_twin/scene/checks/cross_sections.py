@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 from ...config.yaml_text import Place
 from ..schema import Point, Scene, Section
-from .draft import Draft, Finding, warning
+from .draft import Draft, Findings
 
 GYRATION_BY_HEIGHT = (0.28, 0.5)  # a solid block has 0.289, two thin flanges 0.5
 GYRATION_BY_LENGTH = (0.004, 0.05)
@@ -39,19 +38,19 @@ def gyration(section: Section) -> float | None:
     return None if section.A is None or section.I is None else math.sqrt(section.I / section.A)
 
 
-def material(draft: Draft, scene: Scene) -> Iterator[Finding]:
+def material(draft: Draft, scene: Scene) -> Findings:
     """Check Young's modulus against the density."""
     rho = scene.material.rho
     if rho is not None and not _between(scene.material.E, SPECIFIC_STIFFNESS, rho):
         low, high = (limit * rho for limit in SPECIFIC_STIFFNESS)
         bound = f"expected from {low:.2g} to {high:.2g} Pa with a density of {rho:g} kg/m^3"
-        yield warning(draft, ("material", "E"), scene.material.E, bound, "Steel has 2.06e11 Pa and 7850 kg/m^3.")
+        yield draft.warning(("material", "E"), scene.material.E, bound, "Steel has 2.06e11 Pa and 7850 kg/m^3.")
     elif rho is not None and _between(rho, STEEL_RHO, 1.0) and not _between(scene.material.E, OF_STEEL, 1.0):
         bound = f"expected from {OF_STEEL[0]:.2g} to {OF_STEEL[1]:.2g} Pa with the density of steel, {rho:g} kg/m^3"
-        yield warning(draft, ("material", "E"), scene.material.E, bound, "Check E, or give the density of this material.")
+        yield draft.warning(("material", "E"), scene.material.E, bound, "Check E, or give the density of this material.")
 
 
-def beams(draft: Draft, scene: Scene) -> Iterator[Finding]:
+def beams(draft: Draft, scene: Scene) -> Findings:
     """All sections that have a beam."""
     for i, section in enumerate(scene.sections):
         if section.beam is not None and section.A is not None and section.I is not None:
@@ -61,15 +60,15 @@ def beams(draft: Draft, scene: Scene) -> Iterator[Finding]:
             yield from _taper(draft, scene, i, section.I)
 
 
-def _box(draft: Draft, i: int, section: Section, area: float, inertia: float) -> Iterator[Finding]:
+def _box(draft: Draft, i: int, section: Section, area: float, inertia: float) -> Findings:
     place, radius = ("sections", i), math.sqrt(inertia / area)
     says = f"its radius of gyration, sqrt(I/A), is {radius:.3g} m"
     if section.height is not None and not _between(radius, GYRATION_BY_HEIGHT, section.height):
         bound = f"{says}; expected {_range(GYRATION_BY_HEIGHT, section.height)} for a box {section.height:g} m high"
-        yield warning(draft, (*place, "I"), inertia, bound, "Check I (m^4), A (m^2) and height (m).")
+        yield draft.warning((*place, "I"), inertia, bound, "Check I (m^4), A (m^2) and height (m).")
     elif not _between(radius, GYRATION_BY_LENGTH, section.length):
         bound = f"{says}; expected {_range(GYRATION_BY_LENGTH, section.length)} for a section of {section.length:g} m"
-        yield warning(draft, (*place, "I"), inertia, bound, "Check I (m^4), A (m^2) and length (m), decimals and units.")
+        yield draft.warning((*place, "I"), inertia, bound, "Check I (m^4), A (m^2) and length (m), decimals and units.")
     elif not _between(area**2, COMPACTNESS, inertia):
         depth = DEEP * radius
         walls = [f"{1e3 * depth * share / WALL:.2g}" for share in (area**2 / inertia, *COMPACTNESS)]
@@ -77,10 +76,10 @@ def _box(draft: Draft, i: int, section: Section, area: float, inertia: float) ->
             f"with A = {area:g} m^2 this is a box about {depth:.2g} m high with walls of {walls[0]} mm; "
             f"expected {walls[1]} to {walls[2]} mm"
         )
-        yield warning(draft, (*place, "I"), inertia, bound, "Check the decimals of I (m^4) and A (m^2).")
+        yield draft.warning((*place, "I"), inertia, bound, "Check the decimals of I (m^4) and A (m^2).")
 
 
-def _per_metre(draft: Draft, i: int, section: Section, rho: float | None) -> Iterator[Finding]:
+def _per_metre(draft: Draft, i: int, section: Section, rho: float | None) -> Findings:
     assert section.A is not None and section.I is not None and section.rho_A is not None
     if rho is None:
         return
@@ -88,31 +87,31 @@ def _per_metre(draft: Draft, i: int, section: Section, rho: float | None) -> Ite
     if not _between(section.rho_A * (1.0 + SLACK), MASS_BY_STEEL, steel):
         bound = f"expected {_range(MASS_BY_STEEL, steel)} kg/m: the box alone, rho A, has {steel:.3g}"
         remedy = "Give the mass of one metre of beam: box, pipe line, hoses, without concrete (line_fill)."
-        yield warning(draft, (*place, "rho_A"), section.rho_A, bound, remedy)
+        yield draft.warning((*place, "rho_A"), section.rho_A, bound, remedy)
     rotary = rho * section.I
     if section.rho_I and not _between(section.rho_I, ROTARY_BY_STEEL, rotary):
         bound = f"expected {_range(ROTARY_BY_STEEL, rotary)} kg m: the box alone, rho I, has {rotary:.3g}"
-        yield warning(draft, (*place, "rho_I"), section.rho_I, bound, "Give rho I, or leave it out.")
+        yield draft.warning((*place, "rho_I"), section.rho_I, bound, "Give rho I, or leave it out.")
 
 
-def _ends(draft: Draft, i: int, section: Section, beam: Point) -> Iterator[Finding]:
+def _ends(draft: Draft, i: int, section: Section, beam: Point) -> Findings:
     place: Place = ("sections", i, "beam")
     (x0, x1), length = beam, section.length
     head = length - x1
     if x0 > 0.0 and x0 + x1 <= length * (1.0 + 1e-6) and head > LONGEST_HEAD * length:
         bound = f"[x0, x1] leave a rigid head of {head:.3g} m; expected at most {LONGEST_HEAD * length:.3g} m"
         remedy = f"x1 is measured from the inboard pivot; if {x1:g} m is the length of the beam, then x1 = {x0 + x1:g}."
-        yield warning(draft, place, beam, bound, remedy)
+        yield draft.warning(place, beam, bound, remedy)
     elif x1 - x0 < LEAST_BEAM * length:
         bound = f"{x1 - x0:.3g} m bend of {length:g} m; expected at least {LEAST_BEAM * length:.3g} m"
-        yield warning(draft, place, beam, bound, "Give [x0, x1] from the inboard pivot: where the box begins and ends.")
+        yield draft.warning(place, beam, bound, "Give [x0, x1] from the inboard pivot: where the box begins and ends.")
 
 
-def _taper(draft: Draft, scene: Scene, i: int, inertia: float) -> Iterator[Finding]:
+def _taper(draft: Draft, scene: Scene, i: int, inertia: float) -> Findings:
     before = scene.sections[i - 1].I if i > 0 else None
     if before is not None and not _between(inertia, TAPER, before):
         bound = f"expected {_range(TAPER, before)} m^4 after sections[{i - 1}] with I = {before:g}"
-        yield warning(draft, ("sections", i, "I"), inertia, bound, "Booms taper outwards: check the decimals of both.")
+        yield draft.warning(("sections", i, "I"), inertia, bound, "Booms taper outwards: check the decimals of both.")
 
 
 def _between(value: float, limits: tuple[float, float], unit: float) -> bool:

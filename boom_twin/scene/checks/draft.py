@@ -1,13 +1,17 @@
-"""Findings of the scene checks: faults, warnings, the partly validated scene they look at."""
+"""The partly validated scene that checks look at, and what they find."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 from ...config.yaml_text import Document, Place
 from ...errors import Fault
 from ..schema import Base, Clearance, Joint, Material, Modes, Point, Section, Tip
+
+Findings = Iterator[Fault]
+"""Faults and warnings, as a check yields them."""
 
 
 @dataclass(frozen=True)
@@ -39,20 +43,10 @@ class Draft:
         """Bending coordinates per flexible part of a section of this draft."""
         return self.modes if section.modes is None else section.modes
 
+    def fault(self, place: Place, value: Any, bound: str, remedy: str) -> Fault:
+        """Return a fault: the scene cannot be used."""
+        return self.document.fault(place, value, bound, remedy)
 
-@dataclass(frozen=True)
-class Finding:
-    """A `Fault` and whether the scene can be used all the same (`odd`)."""
-
-    fault: Fault
-    odd: bool
-
-
-def fault(draft: Draft, place: Place, value: Any, bound: str, remedy: str) -> Finding:
-    """The scene cannot be used."""
-    return Finding(draft.document.fault(place, value, bound, remedy), odd=False)
-
-
-def warning(draft: Draft, place: Place, value: Any, bound: str, remedy: str) -> Finding:
-    """The scene can be used, but this is probably not meant."""
-    return Finding(draft.document.fault(place, value, bound, remedy), odd=True)
+    def warning(self, place: Place, value: Any, bound: str, remedy: str) -> Fault:
+        """Return a warning: the scene can be used, but this is probably not meant."""
+        return self.document.fault(place, value, bound, remedy, "warning")

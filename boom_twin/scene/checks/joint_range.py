@@ -14,7 +14,7 @@ from ...kernels.elements.linkage import cylinder_length
 from ...types import Array
 from ..kinematics import linkage_of, transmission_angles
 from ..schema import Joint
-from .draft import Draft, Finding, fault, warning
+from .draft import Draft, Findings
 from .pins import TOLERANCE
 from .values import NEEDED
 
@@ -28,7 +28,7 @@ NEXT_TO = "next to a dead centre"
 Mask = NDArray[np.bool_]
 
 
-def joints(draft: Draft) -> Iterator[Finding]:
+def joints(draft: Draft) -> Findings:
     """Every joint with its range_deg: closing, reach and uniqueness over it, and the named postures in it."""
     for i, joint in enumerate(draft.joints):
         if joint is None or not -360 <= joint.range_deg[0] < joint.range_deg[1] <= 360:
@@ -36,33 +36,33 @@ def joints(draft: Draft) -> Iterator[Finding]:
         row = geometry_of(draft, i)
         findings = [] if row is None else list(_curve(draft, i, joint, row))
         yield from findings
-        blocked = row is None or any(not finding.odd for finding in findings)
+        blocked = row is None or any(finding.kind == "fault" for finding in findings)
         for name, degrees in _postures(draft, i):
             yield from _posture(draft, (name, i), joint, degrees, None if blocked else row)
 
 
-def _curve(draft: Draft, i: int, joint: Joint, row: np.record) -> Iterator[Finding]:
+def _curve(draft: Draft, i: int, joint: Joint, row: np.record) -> Findings:
     """The cylinder's length over range_deg: faults where there is no use of the joint at all, else one warning."""
     place: Place = ("joints", i, "range_deg")
     degrees, lengths = lengths_over(joint, row)
     if not np.isfinite(lengths).any():
         bound = f"{UNMET} any angle of it"
         remedy = f"Check D, E, lL and lR, their signs and their units: {_sizes_to_meet(row, degrees)}."
-        yield fault(draft, place, joint.range_deg, bound, remedy)
+        yield draft.fault(place, joint.range_deg, bound, remedy)
         return
     shortest, longest = float(np.nanmin(lengths)), float(np.nanmax(lengths))
     if longest - shortest < 1e-6:
         bound = f"over it the cylinder stays {longest:.4g} m long, so it cannot turn the joint"
         remedy = "Check the pins: one of them lies on an axis of rotation."
-        yield fault(draft, place, joint.range_deg, bound, remedy)
+        yield draft.fault(place, joint.range_deg, bound, remedy)
     elif not _reached(joint, lengths).any() and not np.isfinite(lengths).all():
         met = np.isfinite(lengths)
         bound = f"{UNMET} {intervals(degrees, ~met)}; where they do, at {intervals(degrees, met)}, the cylinder is not as long"
-        yield fault(draft, place, joint.range_deg, bound, f"Change links or pins: {_sizes_to_meet(row, degrees)}.")
+        yield draft.fault(place, joint.range_deg, bound, f"Change links or pins: {_sizes_to_meet(row, degrees)}.")
     elif not _reached(joint, lengths).any():
         remedy = "Give closed_length and max_stroke that cover this, or check the pins."
         place = ("joints", i, "cylinder", "closed_length")
-        yield fault(draft, place, joint.cylinder.closed_length, _reach_words(joint, shortest, longest), remedy)
+        yield draft.fault(place, joint.cylinder.closed_length, _reach_words(joint, shortest, longest), remedy)
     else:
         yield from _narrower(draft, i, joint, row, degrees, lengths)
 
@@ -80,7 +80,7 @@ def lengths_over(joint: Joint, row: np.record) -> tuple[Array, Array]:
         return degrees, cylinder_length(row, np.radians(degrees))[0]
 
 
-def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array, lengths: Array) -> Iterator[Finding]:
+def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array, lengths: Array) -> Findings:
     """Yield one warning of all that a part of the range is not good for, with the part that is."""
     closed, reached = np.isfinite(lengths), _reached(joint, lengths)
     shortest, longest = float(np.nanmin(lengths)), float(np.nanmax(lengths))
@@ -104,7 +104,7 @@ def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array
     reasons = reasons or tight_words
     if reasons:
         remedy = ", or ".join([_narrow_words(joint, degrees, within, tight), *remedies])
-        yield warning(draft, ("joints", i, "range_deg"), joint.range_deg, "; ".join(reasons), f"{remedy}.")
+        yield draft.warning(("joints", i, "range_deg"), joint.range_deg, "; ".join(reasons), f"{remedy}.")
 
 
 def _dead_centres(joint: Joint, row: np.record, degrees: Array, reached: Mask) -> tuple[Mask, list[str]]:
@@ -226,7 +226,7 @@ def _postures(draft: Draft, i: int) -> Iterator[tuple[str, float]]:
             yield name, angles[i] - (angles[i - 1] if i > 0 else 0.0)
 
 
-def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, row: np.record | None) -> Iterator[Finding]:
+def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, row: np.record | None) -> Findings:
     """Joint `who[1]` in posture `who[0]`: its angle in range_deg and, where its geometry is known, its stroke."""
     name, i = who
     place, value = ("postures", name, i), draft.postures[name][i]
@@ -235,16 +235,16 @@ def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, r
     if not low - TOLERANCE <= degrees <= high + TOLERANCE:
         bound = f"{says}, outside its range_deg [{low:g}, {high:g}]"
         remedy = "Change the posture or the range; a joint angle is the difference of neighbouring section angles."
-        yield fault(draft, place, value, bound, remedy)
+        yield draft.fault(place, value, bound, remedy)
     elif row is not None:
         most = joint.cylinder.max_stroke
         with np.errstate(invalid="ignore"):
             stroke = float(cylinder_length(row, math.radians(degrees))[0]) - joint.cylinder.closed_length
         if math.isnan(stroke):
-            yield fault(draft, place, value, f"{says}, where its links do not meet", "Change the posture or the links.")
+            yield draft.fault(place, value, f"{says}, where its links do not meet", "Change the posture or the links.")
         elif not -TOLERANCE <= stroke <= most + TOLERANCE:
             bound = f"{says}, a stroke of {stroke:.4g} m; cylinder {i + 1} has 0 to {most:g} m"
-            yield fault(draft, place, value, bound, "Change the posture, closed_length or max_stroke.")
+            yield draft.fault(place, value, bound, "Change the posture, closed_length or max_stroke.")
 
 
 def intervals(degrees: Array, mask: Mask) -> str:

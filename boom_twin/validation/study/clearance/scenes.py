@@ -7,7 +7,7 @@ from typing import Literal
 
 from ruamel.yaml import YAML
 
-from ....scene.checks.clearance import names_of
+from ....scene.checks.pins import names_of
 from ....scene.load import clearance_text
 from ....scene.schema import Clearance, Pin, Scene
 
