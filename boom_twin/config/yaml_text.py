@@ -258,6 +258,8 @@ def yaml_text(value: Any) -> str:
     """Return a value as YAML with six digits. A text of several lines becomes a block for the outermost mapping."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key}: {yaml_text(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(yaml_text, value)) + "]"
     if isinstance(value, str) and "\n" in value:
         return "|2-\n" + "\n".join(f"  {line}".rstrip() for line in value.split("\n"))
     if isinstance(value, bool | str):

@@ -9,7 +9,6 @@ stroke.
 from __future__ import annotations
 
 import math
-import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,7 +26,6 @@ from .schema import Cylinder, CylinderPart, RigidPart, Scene, Section, Tip
 from .yaml_reader import parse, text_of
 
 Body = TypeVar("Body", RigidPart, CylinderPart)
-_NAME = re.compile(r"(cylinder|section)_([1-9]\d*)\.(k|d|EI|beta|mass)")
 
 
 def parameter_names(scene: Scene) -> tuple[str, ...]:
@@ -51,21 +49,12 @@ def parameter(scene: Scene, name: str) -> float:
     UsageError
         The scene has no parameter of that name.
     """
-    owner, index, key = _parsed(scene, name)
-    if owner == "tip":
-        return 0.0 if scene.tip is None or scene.tip.payload is None else scene.tip.payload
-    if owner == "line_fill":
-        return scene.line_fill or 0.0
-    if owner == "base":
-        return scene.base.inclination
-    if owner == "cylinder":
-        cylinder = scene.joints[index].cylinder
-        return middle_stiffness(cylinder) if key == "k" else float(cylinder.d or 0.0)
-    section = scene.sections[index]
-    if key == "EI":
-        assert section.I is not None
-        return scene.material.E * section.I
-    return section_mass(section) if key == "mass" else float(section.beta or 0.0)
+    part, key = _owner(scene, name)
+    if isinstance(part, Cylinder) and key == "k":
+        return middle_stiffness(part)
+    if isinstance(part, Section) and key == "EI":
+        return scene.material.E * (part.I or 0.0)
+    return section_mass(part) if isinstance(part, Section) and key == "mass" else float(getattr(part, key) or 0.0)
 
 
 def with_parameters(scene: Scene, values: Mapping[str, float]) -> Scene:
@@ -95,44 +84,22 @@ def section_mass(section: Section) -> float:
 
 
 def _with_one(scene: Scene, name: str, value: float) -> Scene:
-    owner, index, key = _parsed(scene, name)
-    least_is_open = key in ("k", "EI", "mass")
-    bound = "" if owner == "base" else " and above 0" if least_is_open else " and at least 0"
-    if not math.isfinite(value) or (bound and not (value > 0.0 if least_is_open else value >= 0.0)):
+    part, key = _owner(scene, name)
+    is_positive = key in ("k", "EI", "mass")
+    bound = "" if key == "inclination" else " and above 0" if is_positive else " and at least 0"
+    if not math.isfinite(value) or (bound and not (value > 0.0 if is_positive else value >= 0.0)):
         raise UsageError(f"{name} = {value:g}: must be finite{bound}.")
-    if owner == "base":
-        return cast(Scene, _with(scene, ("base", "inclination"), value))
-    place, part = cast(Place, (owner,)), cast(Any, value)
-    if owner == "cylinder":
-        place, part = ("joints", index, "cylinder"), _cylinder(scene.joints[index].cylinder, key, value)
-    elif owner == "section":
-        place, part = ("sections", index), _section(scene, scene.sections[index], key, value)
-    elif owner == "tip":
-        part = (scene.tip or Tip()).model_copy(update={"payload": value})
-    return cast(Scene, _with(scene, place, part))
-
-
-def _cylinder(cylinder: Cylinder, key: str, value: float) -> Cylinder:
-    if key == "k" and (oil := cylinder.oil) is not None:
-        modulus = oil.bulk_modulus * value / middle_stiffness(cylinder)
-        return cylinder.model_copy(update={"oil": oil.model_copy(update={"bulk_modulus": modulus})})
-    return cylinder.model_copy(update={key: value})
-
-
-def _section(scene: Scene, section: Section, key: str, value: float) -> Section:
-    if key == "EI":
-        return section.model_copy(update={"I": value / scene.material.E})
-    if key == "beta":
-        return section.model_copy(update={"beta": value})
-    factor = value / section_mass(section)
-    changes: dict[str, object] = {
-        name: scaled(part, factor) for name in ("root", "head") if (part := getattr(section, name)) is not None
-    }
-    if section.rho_A is not None:
-        changes["rho_A"] = factor * section.rho_A
-    if section.rho_I is not None:
-        changes["rho_I"] = factor * section.rho_I
-    return section.model_copy(update=changes)
+    changes: dict[str, Any] = {key: value}
+    if isinstance(part, Cylinder) and key == "k" and (oil := part.oil) is not None:
+        modulus = oil.bulk_modulus * value / middle_stiffness(part)
+        changes = {"oil": oil.model_copy(update={"bulk_modulus": modulus})}
+    elif isinstance(part, Section) and key == "EI":
+        changes = {"I": value / scene.material.E}
+    elif isinstance(part, Section) and key == "mass":
+        factor = value / section_mass(part)
+        changes = {end: scaled(body, factor) for end in ("root", "head") if (body := getattr(part, end)) is not None}
+        changes |= {each: factor * own for each in ("rho_A", "rho_I") if (own := getattr(part, each)) is not None}
+    return cast(Scene, _with(scene, _place(name), part.model_copy(update=changes)))
 
 
 def scaled(part: Body, factor: float) -> Body:
@@ -140,19 +107,25 @@ def scaled(part: Body, factor: float) -> Body:
     return part.model_copy(update={"mass": factor * part.mass, "inertia": factor * part.inertia})
 
 
-def _parsed(scene: Scene, name: str) -> tuple[str, int, str]:
-    """Owner, 0-based index and key of a name."""
-    if name == "tip.payload":
-        return "tip", 0, "payload"
-    if name == "line_fill":
-        return "line_fill", 0, "line_fill"
-    if name == "base.inclination":
-        return "base", 0, "inclination"
-    found = _NAME.fullmatch(name)
-    if found is None or name not in parameter_names(scene):
-        known = ", ".join(parameter_names(scene))
-        raise UsageError(f"{name}: the scene has no such parameter. It has {known}.")
-    return found[1], int(found[2]) - 1, found[3]
+def _place(name: str) -> Place:
+    """Return the place of the block that has a parameter."""
+    owner, dot, _ = name.partition(".")
+    kind, _, number = owner.partition("_")
+    if kind == "cylinder":
+        return ("joints", int(number) - 1, "cylinder")
+    if kind == "section":
+        return ("sections", int(number) - 1)
+    return (owner,) if dot else ()
+
+
+def _owner(scene: Scene, name: str) -> tuple[Any, str]:
+    """Return the block that has a parameter, and the key. UsageError if the scene has no such parameter."""
+    if name not in parameter_names(scene):
+        raise UsageError(f"{name}: the scene has no such parameter. It has {', '.join(parameter_names(scene))}.")
+    part: Any = scene
+    for step in _place(name):
+        part = part[step] if isinstance(step, int) else getattr(part, step)
+    return Tip() if name == "tip.payload" and part is None else part, name.rpartition(".")[2]
 
 
 Value = bool | int

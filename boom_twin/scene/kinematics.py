@@ -17,7 +17,7 @@ from ..errors import UsageError
 from ..kernels.elements.linkage import DIRECT, LINK_L, LINK_R, LINKAGE, angles_of_lengths, cylinder_length, link_angles
 from ..kernels.plane_algebra import turned
 from ..types import Array
-from .schema import Base, Joint, Scene, Section
+from .schema import Base, JointGeometry, Scene, Section
 
 MARGIN = math.radians(1.0)  # beyond range_deg: strokes at the ends, with their sensors' noise, still have an angle
 
@@ -27,7 +27,7 @@ def linkage(scene: Scene, index: int) -> np.record:
     return linkage_of(scene.joints[index], scene.base, scene.sections[0])
 
 
-def linkage_of(joint: Joint, base: Base | None, first: Section | None) -> np.record:
+def linkage_of(joint: JointGeometry, base: Base | None, first: Section | None) -> np.record:
     """Geometry of a joint from its parts; kind A needs the base and the first section, the others neither."""
     row = np.zeros(1, LINKAGE).view(np.recarray)
     if joint.kind == "A":

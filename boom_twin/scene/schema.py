@@ -178,16 +178,16 @@ class JointGeometry(Part):
     mL: NotNegative | None = Field(default=None, description="the mass of link L, kg")
     mR: NotNegative | None = Field(default=None, description="the mass of link R, kg")
 
+    @property
+    def side_sign(self) -> float:
+        """Side of D->E on which the links meet: 1 left, -1 right."""
+        return -1.0 if self.side == "right" else 1.0
+
 
 class Joint(JointGeometry):
     """Joint with its cylinder."""
 
     cylinder: Cylinder = Field(description="a block with closed_length and max_stroke")
-
-    @property
-    def side_sign(self) -> float:
-        """Side of D->E on which the links meet: 1 left, -1 right."""
-        return -1.0 if self.side == "right" else 1.0
 
 
 class ContactLaw(Part):
