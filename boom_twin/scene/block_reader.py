@@ -25,24 +25,16 @@ LONGEST = 40  # characters of a text that is taken for a number
 
 @dataclass(frozen=True)
 class Validated(Generic[Root]):
-    """Content of a document, with the faults of its values.
-
-    Attributes
-    ----------
-    block : BaseModel or None
-        The whole, if every value is good by itself.
-    known : object
-        The plain values without unknown keys.
-    broken : frozenset of Place
-        Where values are not good.
-    faults : tuple of Fault
-        Of single values and unknown keys.
-    """
+    """Content of a document, with the faults of its values."""
 
     block: Root | None
+    """The whole, if every value is good by itself."""
     known: Any
+    """The plain values without unknown keys."""
     broken: frozenset[Place]
+    """Places of values that are not good."""
     faults: tuple[Fault, ...]
+    """Faults of single values and unknown keys."""
 
 
 def validated(document: Document, root: type[Root]) -> Validated[Root]:

@@ -241,19 +241,12 @@ class JointPins:
 
 @dataclass(frozen=True)
 class Skeleton:
-    """An undeformed boom of n sections.
-
-    Attributes
-    ----------
-    headings : ndarray, shape (n,)
-        Orientation of every section, rad.
-    pivots : ndarray, shape (n + 1, 2)
-        Inboard pivots, then the tip, m.
-    joints : tuple of JointPins
-    """
+    """An undeformed boom of n sections."""
 
     headings: Array
+    """Orientation of every section, rad, shape (n,)."""
     pivots: Array
+    """Inboard pivots, then the tip, m, shape (n + 1, 2)."""
     joints: tuple[JointPins, ...]
 
     def point(self, section: int, x: float, y: float = 0.0) -> Array:

@@ -30,24 +30,16 @@ class Nearest:
 
 @dataclass(frozen=True)
 class LinkageAccount:
-    """A joint over its range.
-
-    Attributes
-    ----------
-    lever : tuple of float
-        Least and greatest ds/dphi, m.
-    transmission_deg : float or None
-        Least angle between the links; None for kind A.
-    nearest : Nearest or None
-        Of the pins that move against each other; None for kind A.
-    over_pivot : tuple of str
-        What runs over the pivot's pin, with the angle where it is in the middle of it: ``link L at -142 deg``.
-    """
+    """A joint over its range."""
 
     lever: tuple[float, float]
+    """Least and greatest ds/dphi, m."""
     transmission_deg: float | None
+    """Least angle between the links; None for kind A."""
     nearest: Nearest | None
+    """Nearest of the pins that move against each other; None for kind A."""
     over_pivot: tuple[str, ...]
+    """What runs over the pivot's pin, with the angle where it is in the middle of it: ``link L at -142 deg``."""
 
 
 def linkage_account(scene: Scene, i: int) -> LinkageAccount:

@@ -24,28 +24,19 @@ CELLS = 12  # of a beam
 
 @dataclass(frozen=True)
 class StraightBoom:
-    """A stretched-out boom of n sections with k modes.
-
-    Attributes
-    ----------
-    frequencies : ndarray, shape (k,)
-        Hz, ascending, at most n + 2 of them.
-    sections, joints : ndarray, shape (k, n)
-        Shares of strain energy: of bending by section, of oil by joint.
-    levers : ndarray, shape (n,)
-        Change of stroke by angle, m/rad.
-    moments : ndarray, shape (n,)
-        Of the weight of all that lies outboard about the pivots, N m.
-    mass : float
-        Of all that moves, kg.
-    """
+    """A stretched-out boom of n sections with k modes."""
 
     frequencies: Array
+    """Natural frequencies, Hz, ascending, at most n + 2 of them, shape (k,)."""
     sections: Array
     joints: Array
+    """Shares of strain energy: of bending by section, of oil by joint, shape (k, n)."""
     levers: Array
+    """Change of stroke by angle, m/rad, shape (n,)."""
     moments: Array
+    """Moments about the pivots of the weight of all that lies outboard, N m, shape (n,)."""
     mass: float
+    """Mass of all that moves, kg."""
 
     def damping_ratios(self, betas: Array, delays: Array) -> Array:
         """Damping ratio of each mode, shape (k,), by `betas` of the sections and d/k of the cylinders, both (n,), in s."""
