@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 
 from ..config.yaml_text import Document, Place, words
 from ..errors import ABSENT, Fault
-from .units import converted, misfit, unit_of
+from .units import converted, quantity, unit_of
 from .yaml_reader import NUMBER
 
 if TYPE_CHECKING:
@@ -170,8 +170,8 @@ def _value_fault(document: Document, root: type[BaseModel], detail: ErrorDetails
         return _length_fault(document, detail, place, give)
     if kind in ("float_type", "int_type", "int_from_float", "float_parsing", "int_parsing"):
         whole = "a whole number" if kind.startswith("int") else "a number"
-        unfit = misfit(value, unit_of(meaning)) if isinstance(value, str) else None
-        if unfit is not None:
+        unfit = quantity(value, unit_of(meaning)) if isinstance(value, str) else None
+        if isinstance(unfit, str):
             return document.fault(place, value, unfit, give)
         bound = f"{whole} is needed, not {_what(value)}"
         return document.fault(place, value, bound, _number_remedy(value, give))

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from ..config.yaml_text import Document, Place
 from ..errors import ABSENT, Fault, SceneError
@@ -185,7 +185,7 @@ def second_moment(height: float, width: float, wall: float) -> float:
 
 
 def csv_document(text: str, source: str) -> Document:
-    """A CSV text as the values of a table: a header, then a row for every section with its joint.
+    """Return a CSV text as the values of a table: a header, then a row for every section with its joint.
 
     A column is named as the key in the YAML table, with ``_x``, ``_y`` and the like (`PAIRS`) for one of two numbers, and may
     name a unit: ``length [mm]``. Columns of the base and of the whole boom have one value, in the first row or the same in all;
@@ -199,40 +199,50 @@ def csv_document(text: str, source: str) -> Document:
         raise SceneError(source, (Fault("table", source, f"not a readable CSV file ({error})", "Export it again."),)) from None
     if len(rows) < 2:
         raise SceneError(source, (Fault("table", source, "no row under the header", "Give a row for every section."),))
-    columns = [_HEADER.fullmatch(name.strip()) for name in rows[0]]
-    _refuse_twins(rows[0], columns, source)
+    columns = [_column(rows[0], number, source) for number in range(len(rows[0]))]
     filled = [(line, row) for line, row in enumerate(rows[1:], 2) if any(cell.strip() for cell in row)]
     for i, (line, row) in enumerate(filled):
         document.values["sections"].append({})
         document.values["joints"].append({})
-        for number, (column, cell) in enumerate(zip(columns, row, strict=False)):
-            if column is None or (place := _place(column, i)) is None:
-                name, known = rows[0][number], ", ".join(_columns())
-                raise SceneError(source, (Fault("header", name, "no such column", f"Known are {known}.", 1),))
-            if place[-1] == "pipe" and not any(cell.strip() for _, other in filled[1:] for cell in other[number : number + 1]):
-                place = ("pipe",)  # in the first row alone: of the whole boom
-            is_of_all = place[0] not in ("sections", "joints")
-            if is_of_all and i > 0:
-                first = "".join(filled[0][1][number : number + 1]).strip()
-                if cell.strip() not in ("", first):
-                    where, bound = f"{rows[0][number]}, {_letters(number)}{line}", f"the first row has {first or 'none'}"
+        for number, ((key, end, unit), cell) in enumerate(zip(columns, map(str.strip, row), strict=False)):
+            others = [other[number].strip() for _, other in filled if number < len(other)]
+            home = "" if key == "pipe" and not any(others[1:]) else HOMES[key]
+            if home in ("", "base") and i > 0:
+                if cell not in ("", others[0]):
+                    where, bound = f"{rows[0][number]}, {_letters(number)}{line}", f"the first row has {others[0] or 'none'}"
                     remedy = "It belongs to the whole boom: give it in the first row only, or the same in all."
-                    raise SceneError(source, (Fault(where, cell.strip(), bound, remedy, line),))
-            elif cell.strip():
-                _put(document, place, _value(cell.strip(), column[3]), line)
+                    raise SceneError(source, (Fault(where, cell, bound, remedy, line),))
+            elif cell:
+                place: Place = () if not home else ("base",) if home == "base" else (home, i)
+                place = (*place, key) if end is None else (*place, key, PAIRS[end])
+                _put(document, place, _value(cell, unit), line)
                 document.cells[place] = f"{_letters(number)}{line}"
     document.values["base"].setdefault("pivot", [0.0, 0.0])  # without such columns, the origin is there
     document.values = frozen(document.values)
     return document
 
 
-def _refuse_twins(names: list[str], columns: list[re.Match[str] | None], source: str) -> None:
-    """Raise SceneError if two columns are of the same key: the second would overwrite the first."""
-    seen: dict[tuple[str, str | None], int] = {}
-    for number, column in enumerate(columns):
-        if column is not None and (before := seen.setdefault((column[1], column[2]), number)) != number:
-            bound = f"columns {_letters(before)} and {_letters(number)} have the same name"
-            raise SceneError(source, (Fault("header", names[number].strip(), bound, "Correct one, or remove it.", 1),))
+HOMES = {
+    **dict.fromkeys(Base.model_fields, "base"),
+    **dict.fromkeys(DrawnJoint.model_fields, "joints"),
+    **dict.fromkeys(BoxSection.model_fields, "sections"),
+    **dict.fromkeys(("description", "bulk_modulus", "damping_ratio", "payload", "line_fill"), ""),
+}
+"""Keys that a column may be named after, with the block that has them."""
+
+
+def _column(names: list[str], number: int, source: str) -> tuple[str, str | None, str | None]:
+    """Return key, ending and unit of a column. Raise SceneError if there is no such key, or an earlier column has the name."""
+    columns = [_HEADER.fullmatch(name.strip()) for name in names[: number + 1]]
+    column, name = columns[-1], names[number].strip()
+    if column is None or column[1] not in HOMES:
+        known = f"Known are {', '.join(sorted(HOMES))}."
+        raise SceneError(source, (Fault("header", name, "no such column", known, 1),))
+    before = next(i for i, other in enumerate(columns) if other and other.group(1, 2) == column.group(1, 2))
+    if before < number:
+        bound = f"columns {_letters(before)} and {_letters(number)} have the same name"
+        raise SceneError(source, (Fault("header", name, bound, "Correct one, or remove it.", 1),))
+    return column[1], column[2], column[3]
 
 
 def _letters(column: int) -> str:
@@ -240,44 +250,22 @@ def _letters(column: int) -> str:
     return (_letters(column // 26 - 1) if column > 25 else "") + chr(ord("A") + column % 26)
 
 
-def _columns() -> list[str]:
-    """Keys that a column may be named after."""
-    return sorted({key for model in (BoxSection, DrawnJoint, Base) for key in model.model_fields} | {*_OF_ALL})
-
-
-_OF_ALL = ("description", "bulk_modulus", "damping_ratio", "payload", "line_fill")
-
-
-def _place(column: re.Match[str], row: int) -> Place | None:
-    key, end = column[1], column[2]
-    homes: list[tuple[type[BaseModel], Place]] = [
-        (BoxSection, ("sections", row)),
-        (DrawnJoint, ("joints", row)),
-        (Base, ("base",)),
-    ]
-    for model, home in homes:
-        if key in model.model_fields:
-            return (*home, key) if end is None else (*home, key, PAIRS[end])
-    return (key,) if key in _OF_ALL else None
-
-
 def _value(cell: str, unit: str | None) -> Any:
-    if unit is not None and NUMBER.fullmatch(cell):
-        return f"{cell} {unit}"
-    return float(cell) if NUMBER.fullmatch(cell) else cell
+    if NUMBER.fullmatch(cell):
+        return float(cell) if unit is None else f"{cell} {unit}"
+    return cell
 
 
 def _put(document: Document, place: Place, value: Any, line: int) -> None:
     block: Any = document.values
-    keys = place[:-1] if isinstance(place[-1], str) else place[:-2]
-    for step in keys:
+    is_half = isinstance(place[-1], int)
+    for step in place[:-2] if is_half else place[:-1]:
         block = block[step]
-    if isinstance(place[-1], int):
+    if is_half:
         if not isinstance(block.get(place[-2]), list):
             block[place[-2]] = [None, None]
-        block[place[-2]][place[-1]] = value
-    else:
-        block[place[-1]] = value
+        block = block[place[-2]]
+    block[place[-1]] = value
     for depth in range(1, len(place) + 1):
         document.lines.setdefault(place[:depth], line)
 
