@@ -90,7 +90,7 @@ _HEADER = re.compile(r"(\w+?)(?:_(x|y|start|end|low|high|along|left))?\s*(?:[\[(
 
 
 def read_table(path: Path) -> tuple[BoomTable, Document]:
-    """The table in a file (.csv, .tsv, .txt, else YAML), and the document with the lines of its values.
+    """Return the table in a file (.csv, .tsv, .txt, else YAML), and the document with the lines of its values.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def read_table(path: Path) -> tuple[BoomTable, Document]:
 
 
 def checked_table(document: Document, source: str) -> BoomTable:
-    """The table that a document holds; SceneError with all its faults."""
+    """Return the table that a document holds; SceneError with all its faults."""
     if isinstance(document.values, dict) and "gravity" in document.values:
         bound, remedy = "only a scene has it, and this is to be a table of dimensions", "`boom_twin check` takes a scene."
         raise SceneError(source, (document.fault(("gravity",), document.values["gravity"], bound, remedy),))
@@ -148,7 +148,7 @@ def _pipes_of_some(document: Document, table: BoomTable) -> list[Fault]:
 
 
 def _angle_without_unit(document: Document) -> list[Fault]:
-    """An inclination as a bare number: a scene takes it for rad, beside ranges in degrees."""
+    """Return a fault of an inclination as a bare number: a scene takes it for rad, beside ranges in degrees."""
     base = document.values.get("base") if isinstance(document.values, dict) else None
     value = base.get("inclination") if isinstance(base, dict) else None
     if not isinstance(value, int | float) or value == 0:
@@ -161,7 +161,7 @@ SLIMMEST = 0.3  # width of a box over its height
 
 
 def odd_boxes(table: BoomTable, document: Document) -> list[Fault]:
-    """A warning of every box that is wider than high, for it would be stiffer the other way round, or much too slim."""
+    """Return a warning of every box that is wider than high, or much too slim."""
     found = []
     for i, section in enumerate(table.sections):
         h, b, place = section.height, section.width, ("sections", i)
@@ -180,7 +180,7 @@ def odd_boxes(table: BoomTable, document: Document) -> list[Fault]:
 
 
 def second_moment(height: float, width: float, wall: float) -> float:
-    """I (m^4) of a box about the axis across the plane of the boom."""
+    """Return I (m^4) of a box about the axis across the plane of the boom."""
     return (width * height**3 - (width - 2 * wall) * (height - 2 * wall) ** 3) / 12
 
 

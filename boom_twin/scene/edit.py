@@ -29,7 +29,7 @@ Body = TypeVar("Body", RigidPart, CylinderPart)
 
 
 def parameter_names(scene: Scene) -> tuple[str, ...]:
-    """Every parameter that `scene` has; payload, line fill and inclination always, for they may be nothing."""
+    """Return every parameter that `scene` has; payload, line fill and inclination always, for they may be nothing."""
     names = []
     for i, joint in enumerate(scene.joints):
         names += [f"cylinder_{i + 1}.k"] if joint.cylinder.is_compressible else []
@@ -42,7 +42,7 @@ def parameter_names(scene: Scene) -> tuple[str, ...]:
 
 
 def parameter(scene: Scene, name: str) -> float:
-    """Value of one parameter, SI.
+    """Return the value of one parameter, SI.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def parameter(scene: Scene, name: str) -> float:
 
 
 def with_parameters(scene: Scene, values: Mapping[str, float]) -> Scene:
-    """The scene with other values of some parameters, SI; what is not named stays.
+    """Return the scene with other values of some parameters, SI; what is not named stays.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def with_rigid_cylinders(scene: Scene) -> Scene:
 
 
 def section_mass(section: Section) -> float:
-    """Mass (kg) of root, beam and head."""
+    """Return the mass (kg) of root, beam and head."""
     beam = 0.0 if section.beam is None or section.rho_A is None else section.rho_A * (section.beam[1] - section.beam[0])
     return beam + sum(part.mass for part in (section.root, section.head) if part is not None)
 
@@ -103,7 +103,7 @@ def _with_one(scene: Scene, name: str, value: float) -> Scene:
 
 
 def scaled(part: Body, factor: float) -> Body:
-    """A part with `factor` times its mass and inertia."""
+    """Return a part with `factor` times its mass and inertia."""
     return part.model_copy(update={"mass": factor * part.mass, "inertia": factor * part.inertia})
 
 
@@ -145,7 +145,7 @@ class Edit:
 
 
 def edited(scene: Scene, edits: Iterable[Edit]) -> Scene:
-    """The scene that the file describes after all `edits`."""
+    """Return the scene that the file describes after all `edits`."""
     for edit in edits:
         scene = _with(scene, edit.place, edit.value)
     return scene
@@ -158,7 +158,7 @@ def merged(edits: Iterable[Edit]) -> tuple[Edit, ...]:
 
 
 def _with(part: Any, place: Sequence[str | int], value: Any) -> Any:
-    """`part` (a block, a list, or a value if `place` is empty) with the value at `place` exchanged."""
+    """Return `part` (a block, a list, or a value if `place` is empty) with the value at `place` exchanged."""
     if not place:
         return value
     step, rest = place[0], place[1:]
@@ -169,7 +169,7 @@ def _with(part: Any, place: Sequence[str | int], value: Any) -> Any:
 
 
 def rewritten(text: str, scene: Scene, edits: Iterable[Edit]) -> str:
-    """Text of a scene after `edits`; `scene` is what the text describes.
+    """Return the text of a scene after `edits`; `scene` is what the text describes.
 
     Where blocks share their text (YAML aliases) an edit of one would change the other too: then the result is written anew,
     without comments.
@@ -187,12 +187,12 @@ def rewritten(text: str, scene: Scene, edits: Iterable[Edit]) -> str:
 
 
 def anew(scene: Scene) -> str:
-    """A scene as a file without comments."""
+    """Return a scene as a file without comments."""
     return text_of(scene.model_dump(mode="json", exclude_none=True))
 
 
 def changed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
-    """The scene with other values, checked as a file is: parameters by name, ``payload``, keys at the top of a scene file.
+    """Return the scene with other values, checked as a file is: parameters, ``payload``, keys at the top of a scene file.
 
     Raises
     ------
@@ -218,6 +218,6 @@ def changed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
 
 
 def loaded(scene: Scene, payload: float, line_fill: float) -> Scene:
-    """The scene with that payload (kg) and line fill (kg/m); below 0 its own."""
+    """Return the scene with that payload (kg) and line fill (kg/m); below 0 its own."""
     loads = {"tip.payload": payload, "line_fill": line_fill}
     return with_parameters(scene, {name: value for name, value in loads.items() if value >= 0.0})

@@ -36,7 +36,7 @@ RANGE = re.compile(r"joints\[\d+\]\.range_deg")
 
 
 def first_scene(table: BoomTable, document: Document, source: str) -> tuple[str, Scene, list[Fault]]:
-    """Text of the scene, the scene, and what `boom_twin.scene.load.examine` warns of, told at the table's keys and lines.
+    """Return the scene's text, the scene, and its warnings at the table's keys and lines.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def first_scene(table: BoomTable, document: Document, source: str) -> tuple[str,
 
 
 def _examined(table: BoomTable, source: str) -> tuple[str, Scene | None, list[Fault], list[Fault]]:
-    """Text of the scene, the scene, None if it cannot be used, its faults and its warnings."""
+    """Return the scene's text, the scene (None if it cannot be used), its faults and its warnings."""
     try:
         scene, _ = examine_text(_text(table, source, None), source)
         found = straight_boom(scene, _straight_stiffnesses(scene))
@@ -72,14 +72,14 @@ def _examined(table: BoomTable, source: str) -> tuple[str, Scene | None, list[Fa
 
 
 def _straight_stiffnesses(scene: Scene) -> Array:
-    """Stiffness (N/m) of every cylinder, shape (n,), where its joint is straight, or next to it."""
+    """Return the stiffness (N/m) of every cylinder, shape (n,), where its joint is straight, or next to it."""
     angles = [np.radians([np.clip(0.0, *joint.range_deg)]) for joint in scene.joints]
     strokes = [float(stroke_curve(scene, i, angle)[0]) for i, angle in enumerate(angles)]
     return np.array([stiffness(joint.cylinder, stroke) for joint, stroke in zip(scene.joints, strokes, strict=True)])
 
 
 def _text(table: BoomTable, source: str, first: float | None) -> str:
-    """The scene; without damping where the `first` natural frequency (Hz) is not known yet."""
+    """Return the text of the scene; without damping if the `first` natural frequency (Hz) is not known yet."""
     lines = [f"# Worked out by `boom_twin init` from {source}. SI units: m, kg, s, N, Pa; range_deg and postures in degrees."]
     lines += ["# [estimate]: a guess where the drawing tells nothing. Weigh, measure or test, and write what you find."]
     lines += [f"description: {yaml_text(table.description)}"] if table.description else []
@@ -167,7 +167,7 @@ def _cylinder(table: BoomTable, i: int, joint: DrawnJoint, first: float | None) 
 
 
 def _stroke(table: BoomTable, i: int, joint: DrawnJoint) -> tuple[float, float, str]:
-    """Closed length, stroke (m), and where they come from."""
+    """Return closed length and stroke (m), and where they come from."""
     if joint.closed_length is not None and joint.max_stroke is not None:
         return joint.closed_length, joint.max_stroke, "from the table"
     least, most = _lengths(table, i, joint)
@@ -178,7 +178,7 @@ def _stroke(table: BoomTable, i: int, joint: DrawnJoint) -> tuple[float, float, 
 
 
 def _lengths(table: BoomTable, i: int, joint: DrawnJoint) -> tuple[float, float]:
-    """Least and greatest distance (m) of the pins over the range; 1 and 2 where they are not complete or do not meet at all."""
+    """Return the least and greatest distance (m) of the pins over the range; 1 and 2 if they are incomplete or never meet."""
     first = Section(length=table.sections[0].length, rod_pin=table.sections[0].rod_pin)
     try:
         row = linkage_of(joint, table.base, first)
@@ -195,7 +195,6 @@ def _rod(mass: float, length: float) -> dict[str, float]:
 
 
 def _delay(table: BoomTable, first: float) -> float:
-    """Time constant (s) of damping that grows with stiffness, for the damping ratio at the `first` frequency (Hz)."""
     return table.damping_ratio / (math.pi * first)
 
 
@@ -238,7 +237,7 @@ ORIGINS: tuple[tuple[str, tuple[str, ...]], ...] = (
 
 
 def in_table(faults: Sequence[Fault], table: Document) -> list[Fault]:
-    """The faults with paths, values and lines of the table, in the order of these; one of each value that others come from."""
+    """Return the faults with paths, values and lines of the table, in its order; one of each value that others come from."""
     told = [
         table.fault(place_of(each.path), each.value, each.bound, each.remedy, each.kind)
         for each in faults
@@ -254,7 +253,7 @@ def in_table(faults: Sequence[Fault], table: Document) -> list[Fault]:
 
 
 def _at_origin(fault: Fault, places: list[Place], table: Document) -> Fault:
-    """The fault at the first of `places` that is in the table, else at the first."""
+    """Return the fault at the first of `places` that is in the table, else at the first."""
     place = next((place for place in places if table.written(place) is not None), places[0])
     written = table.written(place)
     value = f" = {fault.value:.4g}" if isinstance(fault.value, float) else ""
@@ -270,5 +269,5 @@ def _origins(path: str) -> list[Place]:
 
 
 def place_of(path: str) -> Place:
-    """The place that `boom_twin.scene.yaml_reader.words` writes so: ``sections[1].root.mass``."""
+    """Return the place that `boom_twin.config.yaml_text.words` writes so: ``sections[1].root.mass``."""
     return tuple(int(index) if index else key for key, index in re.findall(r"(\w+)|\[(\d+)\]", path))

@@ -43,7 +43,7 @@ class LinkageAccount:
 
 
 def linkage_account(scene: Scene, i: int) -> LinkageAccount:
-    """Joint `i` (0-based) of a scene over its range."""
+    """Return what joint `i` (0-based) of a scene does over its range."""
     least, greatest, between = levers_and_transmission(scene, i, STEPS)
     degrees = np.linspace(*scene.joints[i].range_deg, STEPS)
     pins = joint_pins(scene, i, np.radians(degrees))
@@ -52,13 +52,13 @@ def linkage_account(scene: Scene, i: int) -> LinkageAccount:
 
 
 def pin_diameter(scene: Scene, i: int) -> float:
-    """Diameter (m) that the pins of joint `i` (0-based) are taken to have: half the bore, which without `oil` is guessed."""
+    """Return the assumed diameter (m) of the pins of joint `i` (0-based): half the bore, which is guessed without `oil`."""
     oil = scene.joints[i].cylinder.oil
     return PIN * (BORE * section_depth(scene, i) if oil is None else oil.bore)
 
 
 def joint_pins(scene: Scene, i: int, phi: Array) -> dict[str, Array]:
-    """Pins of joint `i` (0-based) by name at angles `phi` (rad), in the axes of its carrier from the pivot, as x + iy, m.
+    """Return the pins of joint `i` (0-based) by name at angles `phi` (rad), as x + iy (m) from the pivot in its carrier's axes.
 
     The rod pin is ``Q`` in kind B1, ``R`` in the other six-bars, ``rod_pin`` in kind A. NaN where the links do not meet.
     """
@@ -83,7 +83,7 @@ def rod_pin_of(pins: dict[str, Array]) -> str:
 
 
 def nearest_pins(pins: dict[str, Array], degrees: Array) -> Nearest | None:
-    """The two pins of a six-bar that come closest; None for kind A, whose pins are its measures."""
+    """Return the two pins of a six-bar that come closest; None for kind A, whose pins are its measures."""
     if "Q" not in pins:
         return None
     found = []
@@ -95,7 +95,7 @@ def nearest_pins(pins: dict[str, Array], degrees: Array) -> Nearest | None:
 
 
 def distances_to(point: Array, start: Array, end: Array) -> tuple[Array, Array]:
-    """Distance (m) of points from the line between two others, and where on it (0 to 1) that is; all x + iy, shape (m,)."""
+    """Return the distance (m) of points from the line between two others, and where on it (0 to 1) that is; all x + iy."""
     along = end - start
     place = np.clip(((point - start) * along.conj()).real / np.abs(along) ** 2, 0.0, 1.0)
     return np.abs(point - start - place * along), place

@@ -28,7 +28,7 @@ from .yaml_reader import missing_end_mark, parse, read_text, text_of
 
 
 def structure(document: Document) -> tuple[Scene | None, Draft, list[Fault]]:
-    """The scene if every value is good by itself, else None; what is usable of it; and all faults of single values."""
+    """Return the scene (None if a value is not good by itself), what is usable of it, and all faults of single values."""
     read = validated(document, Scene)
     deep = (("sections",), ("joints",), ("postures",))
     broken = {place[:2] if place[:1] in deep else place[:1] for place in read.broken}
@@ -36,7 +36,7 @@ def structure(document: Document) -> tuple[Scene | None, Draft, list[Fault]]:
 
 
 def _draft(document: Document, known: Any, broken: set[Place]) -> Draft:
-    """The usable parts of `known`: everything that is neither in `broken` nor inside it."""
+    """Return the usable parts of `known`: everything that is neither in `broken` nor inside it."""
     if not isinstance(known, dict):
         return Draft(document)
     usable = {key: value for key, value in known.items() if (key,) not in broken}
@@ -82,22 +82,22 @@ DEFAULT_NAME = "default scene"
 
 
 def default_text() -> str:
-    """Text of the package's default scene."""
+    """Return the text of the package's default scene."""
     return _text("msg_config", "scene.yaml")
 
 
 def clearance_text() -> str:
-    """Text of the package's block `clearance`, which can follow the default scene."""
+    """Return the text of the package's block `clearance`, which can follow the default scene."""
     return _text("msg_config", "clearance.yaml")
 
 
 def example_names() -> tuple[str, ...]:
-    """Names of the package's example scenes."""
+    """Return the names of the package's example scenes."""
     return tuple(sorted(file.name.removesuffix(".yaml") for file in (files("boom_twin") / "examples").iterdir()))
 
 
 def example_text(name: str) -> str:
-    """Text of one of the package's example scenes."""
+    """Return the text of one of the package's example scenes."""
     return _text("examples", f"{name}.yaml")
 
 
@@ -106,7 +106,7 @@ def _text(folder: str, name: str) -> str:
 
 
 def load_scene(source: str | Path | Mapping[str, Any] | None = None) -> Scene:
-    """A boom as its scene file describes it.
+    """Load a boom as its scene file describes it.
 
     Parameters
     ----------

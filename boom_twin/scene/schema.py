@@ -258,7 +258,7 @@ class Scene(SummaryDisplay, Part):
     )
 
     def with_(self, changes: Mapping[str, Any] | None = None, /, **named: Any) -> Scene:
-        """The scene with other values, checked as a scene file is: ``scene.with_(payload=40)``.
+        """Return the scene with other values, checked as a scene file is: ``scene.with_(payload=40)``.
 
         Parameters
         ----------
@@ -300,12 +300,12 @@ class Scene(SummaryDisplay, Part):
         return sum(section.length for section in self.sections)
 
     def pins_of(self, owner: str) -> tuple[Pin, ...]:
-        """Pins with clearance of ``cylinder_i`` or ``joint_i``, in the order in which the scene lists them."""
+        """Return the pins with clearance of ``cylinder_i`` or ``joint_i``, in the order in which the scene lists them."""
         pins = () if self.clearance is None else self.clearance.pins
         return tuple(pin for pin in pins if pin.at.split(".")[0] == owner and pin.radial_clearance >= IDEAL_BELOW)
 
     def modes_of(self, index: int) -> int:
-        """Bending coordinates per flexible part of section `index` (0-based)."""
+        """Return the bending coordinates per flexible part of section `index` (0-based)."""
         own = self.sections[index].modes
         return self.modes if own is None else own
 
@@ -329,7 +329,7 @@ SHARE = 0.05  # of its length, where a section has no A and I
 
 
 def section_depth(scene: Scene, i: int) -> float:
-    """Depth (m) to draw section `i` (0-based) with: its height, that of a box with its A and I, or a share of its length."""
+    """Return the depth (m) to draw section `i` (0-based) with: its height, else that of a box with its A and I."""
     section = scene.sections[i]
     if section.height is not None:
         return section.height

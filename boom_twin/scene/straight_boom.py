@@ -39,12 +39,12 @@ class StraightBoom:
     """Mass of all that moves, kg."""
 
     def damping_ratios(self, betas: Array, delays: Array) -> Array:
-        """Damping ratio of each mode, shape (k,), by `betas` of the sections and d/k of the cylinders, both (n,), in s."""
+        """Return the damping ratio of each mode, shape (k,), from `betas` of the sections and d/k of the cylinders, (n,), s."""
         return np.asarray(np.pi * self.frequencies * (self.sections @ betas + self.joints @ delays))
 
 
 def straight_boom(scene: Scene, stiffnesses: Array) -> StraightBoom:
-    """Estimate of the stretched-out boom; `stiffnesses` (n,) of the oil springs in N/m, infinite where there is none."""
+    """Estimate the stretched-out boom; `stiffnesses` (n,) of the oil springs in N/m, infinite where there is none."""
     with np.errstate(all="ignore"):  # of absurd values
         return _estimate(scene, stiffnesses)
 
@@ -73,7 +73,7 @@ def _lever(scene: Scene, i: int) -> float:
 
 
 def _masses(scene: Scene, starts: Array) -> tuple[Array, Array]:
-    """Places (m from the base pivot) and masses (kg) along the line; links and cylinders hang in the pivots."""
+    """Return the places (m from the base pivot) and masses (kg) along the line; links and cylinders hang in the pivots."""
     points = [(float(starts[-1]), scene.tip.payload or 0.0 if scene.tip is not None else 0.0)]
     for start, section, joint in zip(starts, scene.sections, scene.joints, strict=False):
         cylinder = joint.cylinder
@@ -91,12 +91,11 @@ def _spread(start: float, ends: tuple[float, float], density: float) -> list[tup
 
 
 def _cells(ends: tuple[float, float]) -> Array:
-    """Middles of the cells between two ends."""
     return np.asarray(ends[0] + (ends[1] - ends[0]) * (np.arange(CELLS) + 0.5) / CELLS)
 
 
 def _springs(scene: Scene, starts: Array, levers: Array, stiffnesses: Array) -> tuple[Array, NDArray[np.int64], Array]:
-    """Places (m), owners (section i, or n + joint i) and compliances (rad/(N m)) of all that bends or gives way."""
+    """Return the places (m), owners (section i, or n + joint i) and compliances (rad/(N m)) of all that bends or gives way."""
     n, found = len(scene.sections), []
     for i, section in enumerate(scene.sections):
         if section.beam is not None and section.I is not None and scene.is_flexible(i):

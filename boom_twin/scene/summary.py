@@ -21,7 +21,7 @@ class LeftOut:
 
 
 def left_out(scene: Scene) -> tuple[LeftOut, ...]:
-    """One entry per key that is absent somewhere, in the order sections, joints, the rest."""
+    """Return one entry per key that is absent somewhere, in the order sections, joints, the rest."""
     found = _absent("sections", [_absent_in_section(scene, i) for i in range(len(scene.sections))])
     found += _absent("joints", [_absent_in_joint(joint) for joint in scene.joints])
     if scene.tip is None or not scene.tip.payload:
@@ -73,7 +73,7 @@ def _absent_in_joint(joint: Joint) -> dict[str, str]:
 
 
 def _absent(block: str, items: list[dict[str, str]]) -> list[LeftOut]:
-    """One entry per key, for all items of a list that lack it: ``sections[1, 3].beta``."""
+    """Return one entry per key, for all items of a list that lack it: ``sections[1, 3].beta``."""
     keys = dict.fromkeys((key, meaning) for item in items for key, meaning in item.items())
     found = []
     for key, meaning in keys:
@@ -177,12 +177,12 @@ class Account:
 
 
 def weight_of(scene: Scene) -> float:
-    """Weight of a boom with its load, N."""
+    """Return the weight of a boom with its load, N."""
     return explain(scene).mass * math.hypot(*scene.gravity)
 
 
 def explain(scene: Scene) -> Account:
-    """Bookkeeping of the model that a scene describes."""
+    """Return the bookkeeping of the model that a scene describes."""
     numbers = range(len(scene.sections))
     payload = scene.tip.payload if scene.tip is not None else None
     return Account(

@@ -24,7 +24,7 @@ _POWERS = str.maketrans({"²": "**2", "³": "**3", "⁴": "**4", "·": "*", "^":
 
 
 def unit_of(meaning: str) -> str | None:
-    """The unit that the meaning of a key states, for example ``kg m^2``; None for a pure number."""
+    """Return the unit that the meaning of a key states, for example ``kg m^2``; None for a pure number."""
     found = _STATED.search(meaning)
     return None if found is None else found[1]
 

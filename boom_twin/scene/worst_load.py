@@ -84,7 +84,7 @@ def _turning(scene: Scene) -> Array:
 
 
 def _outboard(turning: Array, reaches: list[_Reach]) -> tuple[Array, Angles]:
-    """The most that sections i, i + 1, .. turn pivot i with by heading of i, and the joint angles i + 1 for that; (n, 360)."""
+    """Return the largest moment of sections i, i + 1, .. about pivot i by heading of i, and joint angles i + 1; (n, 360)."""
     most, following = turning.copy(), np.zeros(turning.shape, dtype=np.int64)
     for i in range(len(reaches) - 2, -1, -1):
         angles = reaches[i + 1].angles
@@ -97,7 +97,7 @@ def _outboard(turning: Array, reaches: list[_Reach]) -> tuple[Array, Angles]:
 
 
 def _worst(i: int, sign: int, best: dict[int, tuple[Array, Angles]], reach: _Reach, behind: Angles) -> WorstLoad:
-    """The largest force of cylinder `i`, a pull if `sign` is 1, a push if it is -1: moment over lever, by virtual work."""
+    """Return largest force of cylinder `i`, a pull if `sign` is 1, a push if it is -1: moment over lever, by virtual work."""
     if not reach.angles.size or not behind.size:
         return WorstLoad(0.0, ())
     headings = (behind[:, -1:] + reach.angles) % 360
@@ -114,7 +114,7 @@ def _worst(i: int, sign: int, best: dict[int, tuple[Array, Angles]], reach: _Rea
 
 
 def _further(behind: Angles, angles: Angles) -> Angles:
-    """A row for every heading that one more section can have: the headings of the base, 0, and of all sections up to it."""
+    """Return a row for every heading that one more section can have: those of the base, 0, and of all sections up to it."""
     if not behind.size or not angles.size:
         return np.zeros((0, behind.shape[1] + 1), dtype=np.int64)
     headings, first = np.unique(behind[:, -1:] + angles, return_index=True)

@@ -34,7 +34,7 @@ SCENE = Kind("scene", "boom_twin scene")
 
 
 def read_text(path: Path, kind: Kind = SCENE) -> str:
-    """Text of a scene file, or of another of its kind.
+    """Return the text of a scene file, or of another of its kind.
 
     Raises
     ------
@@ -127,7 +127,7 @@ MARK = "# end of scene"
 
 
 def with_end_mark(text: str) -> str:
-    """The text with the mark in its last line, and in its first the promise of it, if that does not stand there already."""
+    """Return text with the mark in its last line, and in its first the promise of it, if that does not stand there already."""
     kept = [line for line in text.splitlines() if line != MARK]
     head = [] if PROMISE in kept else [PROMISE]
     return "\n".join([*head, *kept]).rstrip() + f"\n\n{MARK}\n"

@@ -34,7 +34,7 @@ def density(scene: Scene) -> float | None:
 
 
 def gyration(section: Section) -> float | None:
-    """Radius of gyration, m; None for a rigid section."""
+    """Return the radius of gyration, m; None for a rigid section."""
     return None if section.A is None or section.I is None else math.sqrt(section.I / section.A)
 
 
@@ -51,7 +51,7 @@ def material(draft: Draft, scene: Scene) -> Findings:
 
 
 def beams(draft: Draft, scene: Scene) -> Findings:
-    """All sections that have a beam."""
+    """Check all sections that have a beam."""
     for i, section in enumerate(scene.sections):
         if section.beam is not None and section.A is not None and section.I is not None:
             yield from _box(draft, i, section, section.A, section.I)

@@ -36,11 +36,11 @@ class Draft:
     postures: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
     def section(self, index: int) -> Section | None:
-        """Section `index` (0-based), None where there is no usable one."""
+        """Return the section `index` (0-based), None where there is no usable one."""
         return self.sections[index] if 0 <= index < len(self.sections) else None
 
     def modes_of(self, section: Section) -> int:
-        """Bending coordinates per flexible part of a section of this draft."""
+        """Return the bending coordinates per flexible part of a section of this draft."""
         return self.modes if section.modes is None else section.modes
 
     def fault(self, place: Place, value: Any, bound: str, remedy: str) -> Fault:

@@ -37,7 +37,7 @@ class Pass(NamedTuple):
 
 
 def clear_cylinders(draft: Draft, scene: Scene) -> Findings:
-    """All cylinders that have `oil`; of each the pin that is closest against what it needs."""
+    """Check all cylinders that have `oil`; of each the pin that is closest against what it needs."""
     for i, joint in enumerate(scene.joints):
         if joint.cylinder.oil is not None:
             degrees = grid_of(joint)
@@ -64,7 +64,7 @@ def _finding(draft: Draft, scene: Scene, i: int, worst: Pass, degrees: Array, cl
 
 
 def passes_of(scene: Scene, i: int, cylinder: Cylinder, oil: Oil, phi: Array) -> Iterator[Pass]:
-    """The pins beside the cylinder's own two, in the axes of its carrier, as complex numbers x + iy, m."""
+    """Return the pins beside the cylinder's own two, in the axes of its carrier, as complex numbers x + iy, m."""
     pins = joint_pins(scene, i, phi)
     foot, rod_pin = pins.pop("C" if i else "cylinder_pin"), pins.pop(rod_pin_of(pins))
     length = np.abs(rod_pin - foot)
@@ -76,7 +76,7 @@ def passes_of(scene: Scene, i: int, cylinder: Cylinder, oil: Oil, phi: Array) ->
 
 
 def _pins_before(scene: Scene, i: int, pivot: Array) -> dict[str, Array]:
-    """Pins at the inboard end of the carrier of joint `i`, each shape as `pivot`."""
+    """Return the pins at the inboard end of the carrier of joint `i`, each shape as `pivot`."""
     if i == 0:
         return {}
     carrier, before = scene.sections[i - 1], scene.joints[i - 1]

@@ -29,7 +29,7 @@ Mask = NDArray[np.bool_]
 
 
 def joints(draft: Draft) -> Findings:
-    """Every joint with its range_deg: closing, reach and uniqueness over it, and the named postures in it."""
+    """Check every joint over its range_deg: closing, reach, uniqueness, and the named postures in it."""
     for i, joint in enumerate(draft.joints):
         if joint is None or not -360 <= joint.range_deg[0] < joint.range_deg[1] <= 360:
             continue
@@ -42,7 +42,7 @@ def joints(draft: Draft) -> Findings:
 
 
 def _curve(draft: Draft, i: int, joint: Joint, row: np.record) -> Findings:
-    """The cylinder's length over range_deg: faults where there is no use of the joint at all, else one warning."""
+    """Check the cylinder's length over range_deg: faults if the joint is of no use at all, else one warning."""
     place: Place = ("joints", i, "range_deg")
     degrees, lengths = lengths_over(joint, row)
     if not np.isfinite(lengths).any():
@@ -68,13 +68,13 @@ def _curve(draft: Draft, i: int, joint: Joint, row: np.record) -> Findings:
 
 
 def grid_of(joint: Joint) -> Array:
-    """Angles (deg) over the range of a joint."""
+    """Return the angles (deg) over the range of a joint."""
     low, high = joint.range_deg
     return np.linspace(low, high, 1 + math.ceil((high - low) / STEP_DEG))
 
 
 def lengths_over(joint: Joint, row: np.record) -> tuple[Array, Array]:
-    """Angles (deg) over a joint's range, and the cylinder's lengths there (m), NaN where links do not meet."""
+    """Return the angles (deg) over a joint's range, and the cylinder's lengths there (m), NaN where links do not meet."""
     degrees = grid_of(joint)
     with np.errstate(invalid="ignore"):
         return degrees, cylinder_length(row, np.radians(degrees))[0]
@@ -130,7 +130,7 @@ def _dead_centres(joint: Joint, row: np.record, degrees: Array, reached: Mask) -
 
 
 def _narrow_words(joint: Joint, degrees: Array, within: Array, tight: Mask) -> str:
-    """The range that does, with what it keeps from dead centres where that is possible."""
+    """Return the range that does, with what it keeps from dead centres where that is possible."""
     low, high = usable(degrees, np.where(tight, np.nan, within))
     if low >= high:
         return "Narrow range_deg to [{:g}, {:g}]".format(*usable(degrees, within))
@@ -177,7 +177,7 @@ def _turns(lengths: Array) -> NDArray[np.int64]:
 
 
 def usable(degrees: Array, lengths: Array) -> tuple[float, float]:
-    """The longest part of the range (deg) in which lengths, NaN out of reach, grow or shrink; in whole degrees."""
+    """Return the longest part of the range (deg) in which lengths, NaN out of reach, grow or shrink; in whole degrees."""
     slope = np.nan_to_num(np.sign(np.diff(lengths)))
     edges = np.flatnonzero(np.diff(slope, prepend=2.0, append=2.0))
     first, last = max(
@@ -202,7 +202,7 @@ def _up(length: float) -> float:
 
 
 def geometry_of(draft: Draft, i: int) -> np.record | None:
-    """Geometry of joint `i`; None if it is not complete."""
+    """Return the geometry of joint `i`; None if it is not complete."""
     joint, first = draft.joints[i], draft.section(0)
     if joint is None or (i == 0) != (joint.kind == "A"):
         return None
@@ -220,14 +220,14 @@ def _reached(joint: Joint, lengths: Array) -> Mask:
 
 
 def _postures(draft: Draft, i: int) -> Iterator[tuple[str, float]]:
-    """Names of the complete postures, and the angle (deg) at which each holds joint `i`."""
+    """Return the names of the complete postures, and the angle (deg) at which each holds joint `i`."""
     for name, angles in draft.postures.items():
         if len(angles) == len(draft.joints):
             yield name, angles[i] - (angles[i - 1] if i > 0 else 0.0)
 
 
 def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, row: np.record | None) -> Findings:
-    """Joint `who[1]` in posture `who[0]`: its angle in range_deg and, where its geometry is known, its stroke."""
+    """Check joint `who[1]` in posture `who[0]`: its angle in range_deg and, if its geometry is known, its stroke."""
     name, i = who
     place, value = ("postures", name, i), draft.postures[name][i]
     low, high = joint.range_deg

@@ -27,7 +27,7 @@ def placed_pins(draft: Draft) -> Findings:
 
 
 def _bending(draft: Draft, section: Section) -> Point | None:
-    """Ends of the flexible part; None if the section is rigid, or the ends are wrong (another check says so)."""
+    """Return the ends of the flexible part; None if the section is rigid, or the ends are wrong (another check says so)."""
     if section.beam is None or draft.modes_of(section) == 0:
         return None
     return section.beam if 0 <= section.beam[0] < section.beam[1] <= section.length else None
@@ -108,7 +108,7 @@ def _far(length: float, point: tuple[float, float]) -> bool:
 
 
 def worn_pins(draft: Draft) -> Findings:
-    """Every pin of the block names a pin of the boom, and its clearance fits its radius."""
+    """Check that every pin of the block is a pin of the boom, named once, with a clearance that fits its radius."""
     if draft.clearance is None:
         return
     yield from _restitution(draft, draft.clearance.contact)
@@ -132,7 +132,7 @@ def worn_pins(draft: Draft) -> Findings:
 
 
 def _restitution(draft: Draft, law: ContactLaw) -> Findings:
-    """A law that does not keep the restitution it is given."""
+    """Yield a warning if a law does not keep the restitution it is given."""
     if "restitution" in law.model_fields_set and abs(law.given_restitution - law.restitution) > NEAR_ENOUGH:
         bound = f"the law {law.law} really gives {law.given_restitution:.3f}"
         remedy = "Take the law hunt-crossley-exact, which gives what is asked for."
@@ -140,7 +140,7 @@ def _restitution(draft: Draft, law: ContactLaw) -> Findings:
 
 
 def names_of(index: int, joint: Joint) -> list[str]:
-    """All pins of joint `index` (0-based) and of its cylinder that can have clearance."""
+    """Return all pins of joint `index` (0-based) and of its cylinder that can have clearance."""
     own = PLACES["joint"][:1] if joint.kind == "A" else PLACES["joint"]
     number = index + 1
     return [f"cylinder_{number}.{place}" for place in PLACES["cylinder"]] + [f"joint_{number}.{place}" for place in own]

@@ -103,7 +103,7 @@ def _cylinder(draft: Draft, i: int, joint: Joint, per_metre: float) -> Findings:
 
 
 def _cylinder_size(draft: Draft, i: int, cylinder: Cylinder, section: float) -> Findings:
-    """Closed length against the section that the cylinder lies along, oil in the lines against that in the chambers."""
+    """Check closed length against the section beside it, oil in the lines against that in the chambers."""
     place, closed = ("joints", i, "cylinder"), cylinder.closed_length
     if closed > LONGEST_CYLINDER * section:
         bound = f"expected at most {LONGEST_CYLINDER * section:.3g} m beside a section of {section:g} m"

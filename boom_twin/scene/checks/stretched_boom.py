@@ -140,7 +140,7 @@ def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
 
 
 def _stiff(draft: Draft, scene: Scene, _found: StraightBoom) -> Findings:
-    """A constant k against the cylinder that could have it: amid its stroke s, k = 4 B A / s."""
+    """Check a constant k against the cylinder that could have it: amid its stroke s, k = 4 B A / s."""
     for i, joint in enumerate(scene.joints):
         bore = math.sqrt((joint.cylinder.k or 0.0) * joint.cylinder.max_stroke / (math.pi * OIL))
         depth = section_depth(scene, max(0, i - 1))

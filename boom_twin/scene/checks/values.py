@@ -37,7 +37,7 @@ def counts(draft: Draft) -> Findings:
 
 
 def sections(draft: Draft) -> Findings:
-    """Flexible sections have their cross-section, rigid ones only a root; the rod pin is on the first section."""
+    """Check that flexible sections have their cross-section, rigid ones only a root, and the first one a rod pin."""
     for i, section in enumerate(draft.sections):
         if section is not None:
             yield from _rigid(draft, i, section) if section.beam is None else _flexible(draft, i, section, section.beam)
@@ -84,7 +84,7 @@ def _rod_pin(draft: Draft, i: int, section: Section) -> Findings:
 
 
 def modes(draft: Draft) -> Findings:
-    """A single bending coordinate, which is allowed, but bends as under a constant moment only."""
+    """Yield a warning of a single bending coordinate: a part then bends as under a constant moment only."""
     taking = [section for section in draft.sections if section is not None and section.beam is not None]
     places: list[Place] = [
         ("sections", i, "modes") for i, section in enumerate(draft.sections) if section in taking and section.modes == 1
@@ -100,7 +100,7 @@ def modes(draft: Draft) -> Findings:
 
 
 def joints(draft: Draft) -> Findings:
-    """Kinds in their order, with the keys of their kind and no others; angles and cylinders in themselves sound."""
+    """Check kinds in their order, with the keys of their kind and no others; angles and cylinders by themselves."""
     for i, joint in enumerate(draft.joints):
         if joint is not None:
             yield from _kind(draft, i, joint)
