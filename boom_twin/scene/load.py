@@ -14,11 +14,10 @@ from ..config.yaml_text import Document, Place
 from ..errors import Fault, SceneError, SceneWarning, UsageError
 from .block_reader import inner_block, validated
 from .checks import (
-    cross_sections,
     joint_clearance,
     joint_range,
+    parts,
     pins,
-    rigid_bodies,
     stretched_boom,
     values,
 )
@@ -68,10 +67,10 @@ CHECKS: tuple[Callable[[Draft], Findings], ...] = (
 
 
 PLAUSIBILITY: tuple[Callable[[Draft, Scene], Findings], ...] = (
-    cross_sections.material,
-    cross_sections.beams,
-    rigid_bodies.rigid_parts,
-    rigid_bodies.moving_parts,
+    parts.material,
+    parts.beams,
+    parts.rigid_parts,
+    parts.moving_parts,
     joint_clearance.clear_cylinders,
     joint_clearance.spaced_pins,
 )

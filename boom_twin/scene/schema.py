@@ -189,6 +189,12 @@ class Joint(JointGeometry):
 
     cylinder: Cylinder = Field(description="a block with closed_length and max_stroke")
 
+    @property
+    def mass(self) -> float:
+        """Mass of links, barrel and rod, kg."""
+        hung = sum(part.mass for part in (self.cylinder.barrel, self.cylinder.rod) if part is not None)
+        return hung + (self.mL or 0.0) + (self.mR or 0.0)
+
 
 class ContactLaw(Part):
     """Contact of journal and bush."""
@@ -290,9 +296,14 @@ class Scene(SummaryDisplay, Part):
             "sections": f"{len(self.sections)}, {numbers([section.length for section in self.sections])} m",
             "joints": " + ".join(joint.kind for joint in self.joints),
             "reach": f"{self.reach:.4g} m",
-            "payload": f"{self.tip.payload if self.tip and self.tip.payload else 0:g} kg",
+            "payload": f"{self.payload:g} kg",
             "postures": ", ".join(self.postures) or "none",
         }
+
+    @property
+    def payload(self) -> float:
+        """Point mass at the tip, kg; 0 if the scene has none."""
+        return 0.0 if self.tip is None else self.tip.payload or 0.0
 
     @property
     def reach(self) -> float:

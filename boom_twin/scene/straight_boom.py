@@ -38,10 +38,6 @@ class StraightBoom:
     mass: float
     """Mass of all that moves, kg."""
 
-    def damping_ratios(self, betas: Array, delays: Array) -> Array:
-        """Return the damping ratio of each mode, shape (k,), from `betas` of the sections and d/k of the cylinders, (n,), s."""
-        return np.asarray(np.pi * self.frequencies * (self.sections @ betas + self.joints @ delays))
-
 
 def straight_boom(scene: Scene, stiffnesses: Array) -> StraightBoom:
     """Estimate the stretched-out boom; `stiffnesses` (n,) of the oil springs in N/m, infinite where there is none."""
@@ -52,7 +48,8 @@ def straight_boom(scene: Scene, stiffnesses: Array) -> StraightBoom:
 def _estimate(scene: Scene, stiffnesses: Array) -> StraightBoom:
     n = len(scene.sections)
     starts = np.concatenate([[0.0], np.cumsum([section.length for section in scene.sections])])
-    levers = np.array([_lever(scene, i) for i in range(n)])
+    angles = [np.clip(0.0, *np.radians(joint.range_deg)) for joint in scene.joints]
+    levers = np.nan_to_num([float(cylinder_length(linkage(scene, i), angle)[1]) for i, angle in enumerate(angles)])
     places, masses = _masses(scene, starts)
     at, owner, compliance = _springs(scene, starts, levers, stiffnesses)
     arms = np.maximum(places[None, :] - at[:, None], 0.0)
@@ -67,18 +64,11 @@ def _estimate(scene: Scene, stiffnesses: Array) -> StraightBoom:
     return StraightBoom(1.0 / (2.0 * np.pi * sizes[kept]), shares[:n].T, shares[n:].T, levers, moments, float(masses.sum()))
 
 
-def _lever(scene: Scene, i: int) -> float:
-    low, high = np.radians(scene.joints[i].range_deg)
-    return float(np.nan_to_num(cylinder_length(linkage(scene, i), min(max(0.0, low), high))[1]))
-
-
 def _masses(scene: Scene, starts: Array) -> tuple[Array, Array]:
     """Return the places (m from the base pivot) and masses (kg) along the line; links and cylinders hang in the pivots."""
-    points = [(float(starts[-1]), scene.tip.payload or 0.0 if scene.tip is not None else 0.0)]
+    points = [(float(starts[-1]), scene.payload)]
     for start, section, joint in zip(starts, scene.sections, scene.joints, strict=False):
-        cylinder = joint.cylinder
-        hung = [part.mass for part in (cylinder.barrel, cylinder.rod) if part is not None]
-        points.append((float(start), sum(hung) + (joint.mL or 0.0) + (joint.mR or 0.0)))
+        points.append((float(start), joint.mass))
         points += [(start + part.com[0], part.mass) for part in (section.root, section.head) if part is not None]
         points += _spread(start, (0.0, section.length), scene.line_fill or 0.0)
         points += _spread(start, section.beam or (0.0, 0.0), section.rho_A or 0.0)

@@ -24,7 +24,7 @@ def left_out(scene: Scene) -> tuple[LeftOut, ...]:
     """Return one entry per key that is absent somewhere, in the order sections, joints, the rest."""
     found = _absent("sections", [_absent_in_section(scene, i) for i in range(len(scene.sections))])
     found += _absent("joints", [_absent_in_joint(joint) for joint in scene.joints])
-    if scene.tip is None or not scene.tip.payload:
+    if not scene.payload:
         found.append(LeftOut("tip.payload", "no mass at the tip"))
     if not scene.line_fill:
         found.append(LeftOut("line_fill", "the pipe line is empty"))
@@ -184,12 +184,11 @@ def weight_of(scene: Scene) -> float:
 def explain(scene: Scene) -> Account:
     """Return the bookkeeping of the model that a scene describes."""
     numbers = range(len(scene.sections))
-    payload = scene.tip.payload if scene.tip is not None else None
     return Account(
         sections=tuple(_section(scene, i) for i in numbers),
         joints=tuple(_joint(scene, i) for i in numbers),
         pins=tuple(pin for i in numbers for owner in ("cylinder", "joint") for pin in scene.pins_of(f"{owner}_{i + 1}")),
-        payload=payload or 0.0,
+        payload=scene.payload,
         left_out=left_out(scene),
     )
 

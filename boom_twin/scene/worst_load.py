@@ -68,7 +68,7 @@ def _turning(scene: Scene) -> Array:
     """Return the gravity moment of section j and of all that hangs at its end, shape (n, 360): N m by its heading."""
     gx, gy = gravity_in_base(scene)
     headings, rows = np.radians(CIRCLE), []
-    beyond = 0.0 if scene.tip is None else scene.tip.payload or 0.0
+    beyond = scene.payload
     for section, joint in zip(reversed(scene.sections), reversed(scene.joints), strict=True):
         fill = (scene.line_fill or 0.0) * section.length
         beam = section.beam or (0.0, 0.0)
@@ -78,8 +78,7 @@ def _turning(scene: Scene) -> Array:
         along, across = (sum(mass * centre[axis] for mass, centre in parts) for axis in (0, 1))
         x, y = along * np.cos(headings) - across * np.sin(headings), along * np.sin(headings) + across * np.cos(headings)
         rows.append(gy * x - gx * y)
-        hung = sum(part.mass for part in (joint.cylinder.barrel, joint.cylinder.rod) if part is not None)
-        beyond = sum(mass for mass, _ in parts) + hung + (joint.mL or 0.0) + (joint.mR or 0.0)
+        beyond = sum(mass for mass, _ in parts) + joint.mass
     return np.array(rows[::-1])
 
 

@@ -44,7 +44,9 @@ def joints(draft: Draft) -> Findings:
 def _curve(draft: Draft, i: int, joint: Joint, row: np.record) -> Findings:
     """Check the cylinder's length over range_deg: faults if the joint is of no use at all, else one warning."""
     place: Place = ("joints", i, "range_deg")
-    degrees, lengths = lengths_over(joint, row)
+    degrees = grid_of(joint)
+    with np.errstate(invalid="ignore"):
+        lengths = cylinder_length(row, np.radians(degrees))[0]
     if not np.isfinite(lengths).any():
         bound = f"{UNMET} any angle of it"
         remedy = f"Check D, E, lL and lR, their signs and their units: {_sizes_to_meet(row, degrees)}."
@@ -73,13 +75,6 @@ def grid_of(joint: Joint) -> Array:
     return np.linspace(low, high, 1 + math.ceil((high - low) / STEP_DEG))
 
 
-def lengths_over(joint: Joint, row: np.record) -> tuple[Array, Array]:
-    """Return the angles (deg) over a joint's range, and the cylinder's lengths there (m), NaN where links do not meet."""
-    degrees = grid_of(joint)
-    with np.errstate(invalid="ignore"):
-        return degrees, cylinder_length(row, np.radians(degrees))[0]
-
-
 def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array, lengths: Array) -> Findings:
     """Yield one warning of all that a part of the range is not good for, with the part that is."""
     closed, reached = np.isfinite(lengths), _reached(joint, lengths)
@@ -95,7 +90,8 @@ def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array
         beyond = intervals(degrees, closed & ~reached)
         reasons.append(f"{_reach_words(joint, shortest, longest)}: stroke out of reach at {beyond}")
         if closed.all() and longest < 2.0 * shortest:
-            closed_length, max_stroke = _down(shortest), _up(longest - _down(shortest))
+            closed_length = math.floor(1e3 * shortest) / 1e3
+            max_stroke = math.ceil(1e3 * (longest - closed_length)) / 1e3
             remedies.append(f"give closed_length {closed_length:g} and max_stroke {max_stroke:g} m if the nameplate says so")
     if turns.size:
         angles = ", ".join(f"{degrees[k]:.1f}" for k in turns)
@@ -189,16 +185,6 @@ def usable(degrees: Array, lengths: Array) -> tuple[float, float]:
     whole_low = low if first == 0 else math.ceil(low)
     whole_high = high if last == len(degrees) - 1 else math.floor(high)
     return (whole_low, whole_high) if whole_low < whole_high else (low, high)
-
-
-def _down(length: float) -> float:
-    """Return the length (m) rounded down to whole millimetres."""
-    return math.floor(1e3 * length) / 1e3
-
-
-def _up(length: float) -> float:
-    """Return the length (m) rounded up to whole millimetres."""
-    return math.ceil(1e3 * length) / 1e3
 
 
 def geometry_of(draft: Draft, i: int) -> np.record | None:

@@ -21,7 +21,10 @@ def placed_pins(draft: Draft) -> Findings:
             before, own = draft.section(i - 1), draft.section(i)
             if before is not None:
                 yield from _on_head(draft, i, joint, before)
-                yield from _c_nearby(draft, i, joint, before)
+                if joint.C is not None and _far(before.length, (before.length + joint.C[0], joint.C[1])):
+                    bound = f"C lies far outside sections[{i - 1}], which is {before.length:g} m long"
+                    remedy = "C is measured from the OUTBOARD pivot of the section before, so its x is negative."
+                    yield draft.warning(("joints", i, "C"), joint.C, bound, remedy)
             if own is not None:
                 yield from _on_root(draft, i, joint, own)
 
@@ -53,13 +56,6 @@ def _on_root(draft: Draft, i: int, joint: Joint, own: Section) -> Findings:
         bound = f"E must lie on the rigid root of sections[{i}], x <= {last:.6g} m from its inboard pivot"
         remedy = f"Move E, or start the beam of sections[{i}] at x0 >= {joint.E[0]:.6g} m."
         yield draft.fault(("joints", i, "E"), joint.E, bound, remedy)
-
-
-def _c_nearby(draft: Draft, i: int, joint: Joint, before: Section) -> Findings:
-    if joint.C is not None and _far(before.length, (before.length + joint.C[0], joint.C[1])):
-        bound = f"C lies far outside sections[{i - 1}], which is {before.length:g} m long"
-        remedy = "C is measured from the OUTBOARD pivot of the section before, so its x is negative."
-        yield draft.warning(("joints", i, "C"), joint.C, bound, remedy)
 
 
 def thin_parts(draft: Draft) -> Findings:

@@ -90,7 +90,7 @@ def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
 def _damping_of_all(draft: Draft, scene: Scene, found: StraightBoom, part: tuple[Place, float, float]) -> Findings:
     betas = np.array([section.beta or 0.0 for section in scene.sections])
     delays = np.array([(joint.cylinder.d or 0.0) / middle_stiffness(joint.cylinder) for joint in scene.joints])
-    ratio = float(found.damping_ratios(betas, delays)[0])
+    ratio = float(np.pi * found.frequencies[0] * (found.sections[0] @ betas + found.joints[0] @ delays))
     if not DAMPING[0] <= ratio <= DAMPING[1]:
         low, high = (100.0 * limit for limit in DAMPING)
         bound = f"all damping together gives the first mode a ratio of {100 * ratio:.2g} %; expected {low:g} to {high:g} %"
@@ -153,8 +153,7 @@ def _stiff(draft: Draft, scene: Scene, _found: StraightBoom) -> Findings:
 
 
 def _payload(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
-    payload = 0.0 if scene.tip is None else scene.tip.payload or 0.0
-    boom = found.mass - payload
+    payload, boom = scene.payload, found.mass - scene.payload
     if payload > MOST_PAYLOAD * boom > 0.0:
         bound = f"expected at most {MOST_PAYLOAD * boom:.3g} kg, half of what the boom weighs"
         yield draft.warning(("tip", "payload"), payload, bound, "Give kg; concrete in the pipe line is line_fill.")
