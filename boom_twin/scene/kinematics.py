@@ -65,16 +65,6 @@ def transmission_angles(row: np.record, angles: Array) -> Array:
         return np.asarray(np.abs(np.arcsin(np.sin(left - right))))
 
 
-def levers_and_transmission(scene: Scene, index: int, samples: int) -> tuple[float, float, float | None]:
-    """Return the least and greatest lever ds/dphi (m) of joint `index`, and the least transmission angle (rad) of a six-bar."""
-    row, angles = linkage(scene, index), np.radians(np.linspace(*scene.joints[index].range_deg, samples))
-    with np.errstate(invalid="ignore"):
-        levers = np.abs(cylinder_length(row, angles)[1])
-    direct = scene.joints[index].kind == "A"
-    least = None if direct else float(np.nanmin(transmission_angles(row, angles)))
-    return float(np.nanmin(levers)), float(np.nanmax(levers)), least
-
-
 def stroke_range(scene: Scene, index: int, samples: int) -> tuple[float, float]:
     """Return the least and greatest stroke (m) of joint `index` at `samples` angles of its range, within the cylinder's travel.
 

@@ -7,10 +7,10 @@ from itertools import combinations
 
 import numpy as np
 
-from ..kernels.elements.linkage import LINK_L, link_angles
+from ..kernels.elements.linkage import LINK_L, cylinder_length, link_angles
 from ..kernels.plane_algebra import turned
 from ..types import Array
-from .kinematics import levers_and_transmission, linkage
+from .kinematics import linkage, transmission_angles
 from .schema import Scene, section_depth
 
 PIN = 0.5  # diameter of a pin over the bore
@@ -44,11 +44,13 @@ class LinkageAccount:
 
 def linkage_account(scene: Scene, i: int) -> LinkageAccount:
     """Return what joint `i` (0-based) of a scene does over its range."""
-    least, greatest, between = levers_and_transmission(scene, i, STEPS)
-    degrees = np.linspace(*scene.joints[i].range_deg, STEPS)
+    row, degrees = linkage(scene, i), np.linspace(*scene.joints[i].range_deg, STEPS)
     pins = joint_pins(scene, i, np.radians(degrees))
-    transmission = None if between is None else float(np.degrees(between))
-    return LinkageAccount((least, greatest), transmission, nearest_pins(pins, degrees), _over_pivot(scene, i, pins, degrees))
+    with np.errstate(invalid="ignore"):
+        levers = np.abs(cylinder_length(row, np.radians(degrees))[1])
+    between = float(np.degrees(np.nanmin(transmission_angles(row, np.radians(degrees))))) if i else None
+    lever = float(np.nanmin(levers)), float(np.nanmax(levers))
+    return LinkageAccount(lever, between, nearest_pins(pins, degrees), _over_pivot(scene, i, pins, degrees))
 
 
 def pin_diameter(scene: Scene, i: int) -> float:
