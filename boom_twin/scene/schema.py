@@ -192,8 +192,8 @@ class Joint(JointGeometry):
     @property
     def mass(self) -> float:
         """Mass of links, barrel and rod, kg."""
-        hung = sum(part.mass for part in (self.cylinder.barrel, self.cylinder.rod) if part is not None)
-        return hung + (self.mL or 0.0) + (self.mR or 0.0)
+        parts = (self.cylinder.barrel, self.cylinder.rod)
+        return sum((part.mass for part in parts if part is not None), start=(self.mL or 0.0) + (self.mR or 0.0))
 
 
 class ContactLaw(Part):

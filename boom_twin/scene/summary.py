@@ -178,7 +178,8 @@ class Account:
 
 def weight_of(scene: Scene) -> float:
     """Return the weight of a boom with its load, N."""
-    return explain(scene).mass * math.hypot(*scene.gravity)
+    sections = sum(_section(scene, i).mass for i in range(len(scene.sections)))
+    return (sections + sum(joint.mass for joint in scene.joints) + scene.payload) * math.hypot(*scene.gravity)
 
 
 def explain(scene: Scene) -> Account:
