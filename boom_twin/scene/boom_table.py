@@ -199,7 +199,8 @@ def csv_document(text: str, source: str) -> Document:
         raise SceneError(source, (Fault("table", source, f"not a readable CSV file ({error})", "Export it again."),)) from None
     if len(rows) < 2:
         raise SceneError(source, (Fault("table", source, "no row under the header", "Give a row for every section."),))
-    columns = [_column(rows[0], number, source) for number in range(len(rows[0]))]
+    used = min(len(rows[0]), max(map(len, rows[1:])))  # a header may end with an empty cell
+    columns = [_column(rows[0], number, source) for number in range(used)]
     filled = [(line, row) for line, row in enumerate(rows[1:], 2) if any(cell.strip() for cell in row)]
     for i, (line, row) in enumerate(filled):
         document.values["sections"].append({})
