@@ -16,7 +16,7 @@ Kernels never raise: they return a status (see `boom_twin.kernels.tables`), and 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from .system.terminal_text import printable
 
@@ -52,34 +52,24 @@ class _Absent:
 
 
 ABSENT = _Absent()
+FaultKind = Literal["fault", "warning", "note"]
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Fault in a scene, or an irregularity that is only a warning.
-
-    Parameters
-    ----------
-    path : str
-        Where, in the words of the file: ``sections[1].root.mass``.
-    value : object
-        What stands there; `ABSENT` if nothing does.
-    bound : str
-        What would be allowed.
-    remedy : str
-        What to do about it.
-    line : int, optional
-        Line of the file, from 1.
-    is_note : bool
-        Told, but no warning: ``check --strict`` lets it pass.
-    """
+    """Fault in a scene, or an irregularity that is only a warning."""
 
     path: str
+    """Place in the words of the file: ``sections[1].root.mass``."""
     value: Any
+    """Value that stands there; `ABSENT` if there is none."""
     bound: str
+    """What would be allowed."""
     remedy: str
     line: int | None = None
-    is_note: bool = False
+    """Line of the file, from 1."""
+    kind: FaultKind = "fault"
+    """``warning`` if the scene can be used; ``note`` if ``check --strict`` lets it pass, too."""
 
     def __str__(self) -> str:
         where = self.path if self.line is None else f"line {self.line}: {self.path}"
@@ -88,9 +78,9 @@ class Fault:
         return printable(f"{where} {state}: {self.bound}{stop} {self.remedy}")
 
     @property
-    def kind(self) -> str:
-        """Name of a fault that does not stop a scene: ``note`` or ``warning``."""
-        return "note" if self.is_note else "warning"
+    def is_note(self) -> bool:
+        """Return True for a note."""
+        return self.kind == "note"
 
 
 def _shortened(value: Any, width: int = 60) -> str:
@@ -105,22 +95,17 @@ def _shortened(value: Any, width: int = 60) -> str:
 
 
 class SceneError(BoomTwinError):
-    """Error of a scene that cannot be used.
+    """Error of a scene that cannot be used."""
 
-    Attributes
-    ----------
-    source : str
-        The file, or where else the scene came from.
-    faults : tuple of Fault
-        All that was found, in the order of the file.
-    oddities : tuple of Fault
-        What would only have been a `SceneWarning`; often the cause of a fault.
-    """
+    source: str
+    """The file, or where else the scene came from."""
+    faults: tuple[Fault, ...]
+    """All faults, in the order of the file."""
+    oddities: tuple[Fault, ...]
+    """What would only have been a `SceneWarning`; often the cause of a fault."""
 
     def __init__(self, source: str, faults: tuple[Fault, ...], oddities: tuple[Fault, ...] = ()) -> None:
-        self.source = source
-        self.faults = faults
-        self.oddities = oddities
+        self.source, self.faults, self.oddities = source, faults, oddities
         count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
         lines = [f"{source}: {count}", *(f"  {fault}" for fault in faults)]
         super().__init__("\n".join(lines + [f"  {oddity.kind}: {oddity}" for oddity in oddities]))

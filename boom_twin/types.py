@@ -57,48 +57,31 @@ G = 9.80665
 
 @dataclass(frozen=True, slots=True)
 class SensorKind:
-    """Sensors of one stream.
-
-    Attributes
-    ----------
-    title : str
-        What people call them.
-    message : str
-        Type of its messages: a JointState, whose `field` is read by names, or an Imu, whose ``linear_acceleration`` is read by
-        axes.
-    stem : str
-        Of the names of its channels: ``joint`` gives ``joint_1`` .. ``joint_n``.
-    ends : tuple of str
-        Of the names, where there is not one channel for each joint: ``x`` gives ``tip_imu_x``.
-    units : dict of str to float
-        How much of the SI unit, which is the first, each unit is.
-    noise, resolution : str
-        The fields of `boom_twin.config.settings.Settings` that have them; an empty one stands for 0.
-    lack : str
-        What there is not without these sensors; empty where few rigs have them, and nobody misses them.
-    field : str
-        Of a JointState: ``position`` or ``effort``.
-    part : str
-        The stem of the names in messages, where it is another: a force is that of ``cylinder_1``.
-    shown : str
-        The unit, one of `units`, in which pictures and the live page show residuals; by default the SI unit.
-    alarms : tuple of str
-        What gives an alarm of a single sensor. Jumps, spikes and more noise than stated are the sensor's own only if what it
-        measures changes little from one reading to the next.
-    """
+    """Sensors of one stream."""
 
     title: str
+    """Name for people."""
     message: str
+    """Type of its messages: a JointState, read by names, or an Imu, read by axes."""
     stem: str
+    """Start of its channel names: ``joint`` gives ``joint_1`` .. ``joint_n``."""
     ends: tuple[str, ...]
+    """Ends of its channel names, if there is not one channel for each joint: ``x`` gives ``tip_imu_x``."""
     units: dict[str, float]
+    """Size of each unit in the SI unit, which is the first."""
     noise: str
     resolution: str
+    """Fields of `boom_twin.config.settings.Settings` with noise and resolution; an empty name stands for 0."""
     lack: str
+    """What is missing without these sensors; empty if few rigs have them."""
     field: str = "position"
+    """Field of a JointState that is read: ``position`` or ``effort``."""
     part: str = ""
+    """Stem of the names in messages, if it differs: a force is that of ``cylinder_1``."""
     shown: str = ""
+    """The unit, one of `units`, in which pictures and the live page show residuals; by default the SI unit."""
     alarms: tuple[str, ...] = ("stuck", "dropout", "range", "jump", "spikes", "noise")
+    """Alarms of a single sensor. Jumps, spikes and noise count only if its quantity changes little per reading."""
 
     @property
     def is_imu(self) -> bool:
@@ -217,22 +200,16 @@ LIMIT = 1e7
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Message of the rig, mapped to the scene's order and units.
-
-    Attributes
-    ----------
-    stream : Stream
-    stamp : int
-        Nanoseconds, `header.stamp` of the message.
-    values : ndarray
-        ``STROKES``: (n,) m. ``ANGLES``: (n,) rad, of an inclinometer to the horizontal. ``IMU``: (2,) m/s^2, specific
-        force along x and z of the tip. ``FORCES``: (n,) N, of the cylinders, positive in tension.
-        NaN where the message had no value; beyond `LIMIT` is taken for none.
-    """
+    """Message of the rig, mapped to the scene's order and units."""
 
     stream: Stream
     stamp: int
+    """Nanoseconds, `header.stamp` of the message."""
     values: Array
+    """``STROKES``: (n,) m. ``ANGLES``: (n,) rad, of an inclinometer to the horizontal. ``IMU``: (2,) m/s^2, specific force
+    along x and z of the tip. ``FORCES``: (n,) N, of the cylinders, positive in tension. NaN where the message had no value;
+    a value beyond `LIMIT` counts as none.
+    """
 
 
 @dataclass(frozen=True, slots=True)
@@ -328,23 +305,16 @@ class Residuals:
 
     The prediction is that of the strokes up to this stamp. Residuals of strokes are innovations: the prediction, its mean over
     the filter's models by their probabilities, is that of the strokes before them.
-
-    Attributes
-    ----------
-    stream : Stream
-    stamp : int
-        Nanoseconds.
-    names : tuple of str
-        One per channel: ``cylinder_1``, .., ``joint_1``, .., ``tip_imu_x``, ``tip_imu_z``, or ``cylinder_force_1``, ..
-    values, sigmas : ndarray, shape (len(names),)
-        The residual in the unit of the sensor, and the standard deviation expected of it. NaN where not measured.
     """
 
     stream: Stream
     stamp: int
+    """Nanoseconds."""
     names: tuple[str, ...]
+    """One per channel: ``cylinder_1``, .., ``joint_1``, .., ``tip_imu_x``, ``tip_imu_z``, or ``cylinder_force_1``, .."""
     values: Array
     sigmas: Array
+    """Residuals in the unit of the sensor and their expected standard deviations, shape (len(names),); NaN if not measured."""
 
     @property
     def normalised(self) -> Array:
@@ -354,100 +324,64 @@ class Residuals:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """Change of a running twin that takes effect at one stroke sample; a replay repeats it.
-
-    Attributes
-    ----------
-    stamp : int
-        Of that sample, nanoseconds.
-    from_rest : bool
-        Whether the model began with it, at rest.
-    settings : dict of str to float
-        All that can change while the twin runs, see `boom_twin.config.settings.Settings`.
-    zeros : dict of str to float
-        What sensors read too much, by channel (``cylinder_1`` m, ``joint_1`` rad, ``tip_imu_x`` m/s^2, ``cylinder_force_1``
-        N); 0 if not named.
-    is_new : bool
-        Whether the twin itself began with it: nothing that was measured before is known to it.
-    """
+    """Change of a running twin that takes effect at one stroke sample; a replay repeats it."""
 
     stamp: int
+    """Stamp of that sample, nanoseconds."""
     from_rest: bool
+    """True if the model began with it, at rest."""
     settings: dict[str, float]
+    """Values of all settings that can change while the twin runs, see `boom_twin.config.settings.Settings`."""
     zeros: dict[str, float]
+    """Zero errors by channel (``cylinder_1`` m, ``joint_1`` rad, ``tip_imu_x`` m/s^2, ``cylinder_force_1`` N), else 0."""
     is_new: bool = False
+    """True if the twin itself began with it and knows nothing that was measured before."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ranked:
-    """Cause that may explain an alarm.
-
-    Attributes
-    ----------
-    cause : str
-        A parameter of the scene, a sensor, or ``unknown``.
-    probability : float
-        Beside the other causes, given that something is wrong.
-    parts : tuple of (str, float, float, str)
-        What would be the matter: kind, estimate, its standard deviation, unit (empty for a share).
-    """
+    """Cause that may explain an alarm."""
 
     cause: str
+    """A parameter of the scene, a sensor, or ``unknown``."""
     probability: float
+    """Probability among all causes, given that something is wrong."""
     parts: tuple[tuple[str, float, float, str], ...]
+    """Fault parts: kind, estimate, its standard deviation, unit (empty for a share)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """Alarm about the rig, its sensors, or the model of it.
-
-    Attributes
-    ----------
-    channel : str
-        Where it shows.
-    kind : str
-        What is the matter, in a word.
-    since : int
-        Stamp (ns) from which it shows.
-    until : int or None
-        Stamp (ns) at which it ended; None while it lasts.
-    cause : str or None
-        The scene's parameter or the sensor at fault; None if that cannot be told.
-    told : str
-        One sentence.
-    ranked : tuple of Ranked
-        Causes that may explain it, the most probable first; empty where the sensor itself gives it away.
-    """
+    """Alarm about the rig, its sensors, or the model of it."""
 
     channel: str
+    """Channel that shows it."""
     kind: str
+    """Kind of fault in one word."""
     since: int
+    """Onset, stamp in ns."""
     until: int | None
+    """End, stamp in ns; None while it lasts."""
     cause: str | None
+    """The scene's parameter or the sensor at fault; None if unknown."""
     told: str
+    """Sentence for an operator."""
     ranked: tuple[Ranked, ...] = ()
+    """Causes that may explain it, the most probable first; empty if the sensor itself shows it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """Health of the rig at one stamp (ns).
-
-    Attributes
-    ----------
-    stamp : int
-        End of the newest block of residuals that was judged.
-    alarms : tuple of Alarm
-        All that last, and those that have ended since the last `Health`.
-    tip_sigmas : ndarray, shape (2,)
-        Standard deviation of the predicted tip's x and y, m.
-    noise : dict
-        How many times the stated noise most sensors of a stream have, at least 1; ``noise_over_`` and the name of its setting.
-    """
+    """Health of the rig at one stamp (ns)."""
 
     stamp: int
+    """End of the newest block of residuals that was evaluated."""
     alarms: tuple[Alarm, ...]
+    """Active alarms, and those that have ended since the last `Health`."""
     tip_sigmas: Array
+    """Standard deviation of the predicted tip's x and y, m, shape (2,)."""
     noise: Mapping[str, float] = field(default_factory=dict)
+    """Noise of most sensors of a stream over the stated noise, at least 1, by ``noise_over_`` and the name of its setting."""
 
 
 class _Rows(Protocol):
@@ -475,43 +409,30 @@ _MADE_OF_ROWS = frozenset({"prediction", "estimate", "residuals"})
 
 @dataclass(frozen=True, slots=True)
 class Report(_MadeWhenAsked):
-    """Report on one sample and all that it caused.
-
-    Attributes
-    ----------
-    stamp : int
-        Of the sample, nanoseconds.
-    accepted : bool
-        False when the sample was not used; `events` says why. One that is held (``leap``, ``late``, ``second source``) is
-        a witness of time only, unless a later report gives it `earlier`.
-    prediction : Prediction or None
-        Set for every stroke sample that the model was stepped to.
-    residuals : tuple of Residuals
-        All that became known by this sample, in order of their stamps.
-    events : tuple of str
-        What was out of the ordinary, by the names in `boom_twin.twin.events.EVENTS`.
-    status : str
-        ``ok``, or one sentence on a failure of the model.
-    change : Change or None
-        Set where the model began from rest, or something that was asked for took effect.
-    health : Health or None
-        Set once a second, and where an alarm began, changed or ended.
-    estimate : Estimate or None
-        Set beside every prediction.
-    earlier : tuple of Report
-        Of samples that were held until this one confirmed their stamps, in their order.
-    """
+    """Report on one sample and all that it caused."""
 
     stamp: int
+    """Stamp of the sample, nanoseconds."""
     accepted: bool
+    """False if the sample was not used; `events` says why. A held one (`HELD`) serves time checks only, unless it is in the
+    `earlier` of a later report.
+    """
     prediction: Prediction | None = None
+    """Prediction at every stroke sample that the model was stepped to."""
     residuals: tuple[Residuals, ...] = ()
+    """Residuals that became known by this sample, in order of their stamps."""
     events: tuple[str, ...] = ()
+    """Irregularities, by the names in `boom_twin.twin.events.EVENTS`."""
     status: str = "ok"
+    """``ok``, or one sentence on a failure of the model."""
     change: Change | None = None
+    """Set if the model began from rest, or a requested change took effect."""
     health: Health | None = None
+    """Set once a second, and when an alarm begins, changes or ends."""
     estimate: Estimate | None = None
+    """Set beside every prediction."""
     earlier: tuple[Report, ...] = ()
+    """Reports of samples that were held until this one confirmed their stamps, in their order."""
 
     @classmethod
     def of_rows(cls, stamp: int, rows: _Rows, events: tuple[str, ...], health: Health | None) -> Report:

@@ -23,8 +23,8 @@ from ..kernels.transfer.clearance_pins import axis_of
 from ..kernels.transfer.time_step import ANEW, advance
 from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton, strokes_of_posture
+from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
-from ..scene.source import SceneSource, as_scene
 from ..system.summary_display import SummaryDisplay, numbers
 from ..types import Array, StrokeReading
 from .modal import Mode, constraints, natural_modes, negative_pivots

@@ -22,8 +22,8 @@ from ..kernels.tables import BEAM, JOINT_A, JOINT_B, OK, SENTENCES, Z_SECTION, M
 from ..kernels.transfer.clearance_pins import load_pins
 from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.frequency_response import TIP_FORCE, harmonic_response
+from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
-from ..scene.source import SceneSource, as_scene
 from ..system.summary_display import SummaryDisplay
 from ..types import Array, ComplexArray
 from .bending_moments import Station, moments_by_unknowns, stations

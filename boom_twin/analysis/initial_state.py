@@ -33,8 +33,8 @@ from ..kernels.transfer.clearance_pins import offset_of
 from ..kernels.transfer.forward_kinematics import link_frame, place
 from ..kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance
 from ..scene.kinematics import joint_angles_of_strokes
+from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
-from ..scene.source import SceneSource, as_scene
 from ..system.atomic_files import write_atomic
 from ..system.received_files import open_received
 from ..types import Array

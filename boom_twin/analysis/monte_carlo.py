@@ -12,8 +12,8 @@ import numpy as np
 
 from ..errors import BoomTwinError, SolverError, UsageError
 from ..scene.edit import parameter, parameter_names, with_parameters
+from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
-from ..scene.source import SceneSource, as_scene
 from ..system.cores import usable_cores
 from ..types import Array
 from .simulate import Simulation, simulate

@@ -16,8 +16,8 @@ from ..errors import SolverError, UsageError
 from ..kernels.tables import OK, SENTENCES
 from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes
+from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
-from ..scene.source import SceneSource, as_scene
 from ..system.summary_display import SummaryDisplay, data_frame, numbers
 from ..types import Array
 from .drive import DriveCourse, Run

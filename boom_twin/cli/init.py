@@ -11,13 +11,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from ..config.yaml_text import whole_text
+from ..config.yaml_text import Document, Place, whole_text, words
 from ..errors import UsageError
-from ..scene.block_reader import validated
-from ..scene.boom_table import TABLE, checked_table, frozen, read_table
+from ..scene.block_reader import meaning_at, validated
+from ..scene.boom_table import BoomTable, checked_table, frozen, read_table
 from ..scene.checks.values import NEEDED
 from ..scene.first_scene import first_scene
-from ..scene.yaml_reader import NUMBER, Document, Place, words
+from ..scene.yaml_reader import NUMBER
 from ..system.atomic_files import check_new, check_target, write_atomic
 from .output import tell_oddities
 
@@ -118,11 +118,11 @@ def _ask(values: dict[str, Any], place: Place, default: str | None) -> None:
     block: Any = values
     for step in place[:-1]:
         block = block[step]
-    meaning = f"{words(place)}, {TABLE.meaning_at(place)}"
+    meaning = f"{words(place)}, {meaning_at(BoomTable, place)}"
     while True:
         answer = _line(f"{meaning}{f' [{default}]' if default else ''}: ") or default or ""
         block[place[-1]] = _value(answer)
-        wrong = [fault for fault in validated(Document(frozen(values)), TABLE).faults if _is_at(fault.path, place)]
+        wrong = [fault for fault in validated(Document(frozen(values)), BoomTable).faults if _is_at(fault.path, place)]
         if answer and not wrong:
             return
         print("\n".join(f"  {fault}" for fault in wrong) or "  A value is needed.")

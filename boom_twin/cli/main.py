@@ -21,7 +21,7 @@ from typing import NoReturn, Protocol, TextIO, cast
 
 from .. import __version__
 from ..errors import BoomTwinError
-from ..system.blas_threads import use_one_blas_thread
+from ..system.cores import use_one_blas_thread
 from ..system.terminal_text import PrintableStream, open_closed_streams
 from .output import QuietStream
 

@@ -1,9 +1,9 @@
-"""Read untrusted YAML text to plain values within limits, and edit single values of it with comments and layout kept."""
+"""Read untrusted YAML text to plain values with their lines, within limits; edit single values and keep all other text."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
 from typing import Any, cast
@@ -13,18 +13,20 @@ from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import CollectionNode, MappingNode, Node, ScalarNode, SequenceNode
 
-from ..errors import BoomTwinError
+from ..errors import BoomTwinError, Fault, FaultKind
 from ..system.received_files import open_received
+from ..system.terminal_text import printable
 
 LARGEST = 4 * 2**20
 """Size limit of a file that is read, bytes."""
 MOST = 50_000
 """Limit for the number of values in a file, with aliases expanded."""
-DEEPEST = 30
+DEEPEST = 20
 
 TAG = "tag:yaml.org,2002:"
 TYPED = {"int": "whole number", "float": "number", "bool": "true or false", "null": "empty value"}
 """Kinds of scalars other than text, with their names for messages."""
+Place = tuple[str | int, ...]
 
 
 def read_plain(path: Path, failure: type[BoomTwinError], remedy: str, received: bool = False) -> Any:
@@ -54,25 +56,136 @@ def plain(text: str) -> Any:
         nested deeper than `DEEPEST`.
     """
     try:
-        root, constructor = bounded_nodes(text)
-        return None if root is None else _Values(constructor).of(root, 0)
+        reader = YamlReader(text, list)
     except RecursionError:
         raise ValueError("nested too deeply") from None
     except YAMLError as error:
         raise ValueError(" ".join(str(error).split())) from None
+    if reader.document.faults:
+        raise ValueError(str(reader.document.faults[0]))
+    return reader.document.values
 
 
-def bounded_nodes(text: str) -> tuple[Node | None, Any]:
-    """Return the root node of an untrusted YAML text (None if empty) and the constructor of its scalars.
+def words(place: Place) -> str:
+    """Return a place in the words of the file: ``sections[1].root.mass``; line ends in a key are shown as escapes."""
+    text = ""
+    for step in place:
+        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
+    return printable(text, keep="") or "scene"
+
+
+@dataclass
+class Document:
+    """Values of a text, line (from 1) and cell of a spreadsheet of the places in it, and what was wrong with the writing."""
+
+    values: Any = None
+    lines: dict[Place, int] = field(default_factory=dict)
+    faults: list[Fault] = field(default_factory=list)
+    cells: dict[Place, str] = field(default_factory=dict)
+
+    def line(self, place: Place) -> int | None:
+        """Return the line of a place; of the nearest block around it if the place itself is not in the text."""
+        while place not in self.lines and place:
+            place = place[:-1]
+        return self.lines.get(place)
+
+    def written(self, place: Place) -> Any:
+        """Return the value at a place as it stands in the text, for example with its unit; None where there is none."""
+        value = self.values
+        for step in place:
+            try:
+                value = value[step]
+            except (KeyError, IndexError, TypeError):
+                return None
+        return value
+
+    def fault(self, place: Place, value: Any, bound: str, remedy: str, kind: FaultKind = "fault") -> Fault:
+        """Return a fault or a warning at a place of this text."""
+        return Fault(words(place) + self._cells_at(place), value, bound, remedy, self.line(place), kind)
+
+    def _cells_at(self, place: Place) -> str:
+        """Return `` (cell C3)`` for a place, or the cells of both its numbers; nothing for a block."""
+        cells = [cell for own, cell in self.cells.items() if own[: len(place)] == place and len(own) - len(place) <= 1]
+        return f" (cell{'s' * (len(cells) > 1)} {', '.join(cells)})" if 0 < len(cells) <= 2 else ""
+
+
+class YamlReader:
+    """Reader of an untrusted YAML text to a `Document` of plain values.
+
+    No tag of the text can make an object: mappings become dict, sequences become `sequence`, scalars become float, int, bool,
+    str or None. What is YAML but not allowed here is in ``document.faults``.
 
     Raises
     ------
     YAMLError, RecursionError, ValueError
-        It is not YAML, holds more than `MOST` values, or is nested too deeply.
+        The text is not YAML, holds more than `MOST` values, or is nested too deeply.
     """
-    yaml = YAML(typ="safe", pure=True)
-    yaml.Composer = BoundedComposer
-    return yaml.compose(text), yaml.constructor
+
+    def __init__(self, text: str, sequence: type[list[Any]] | type[tuple[Any, ...]]) -> None:
+        yaml = YAML(typ="safe", pure=True)
+        yaml.Composer = BoundedComposer
+        root = yaml.compose(text)
+        self.document, self.is_empty = Document(), root is None
+        self._sequence, self._constructor, self._count = sequence, yaml.constructor, 0
+        if root is not None:
+            self.document.values = self._value(root, ())
+
+    def text(self, node: ScalarNode, place: Place) -> Any:
+        """Return the value of a scalar that YAML takes for text."""
+        return node.value
+
+    def fault(self, place: Place, value: Any, bound: str, remedy: str) -> None:
+        """Note what is not allowed."""
+        self.document.faults.append(self.document.fault(place, value, bound, remedy))
+
+    def _value(self, node: Node, place: Place) -> Any:
+        self._count += 1
+        self.document.lines.setdefault(place, node.start_mark.line + 1)
+        if len(place) > DEEPEST or self._count > MOST:
+            if self._count <= MOST + 1:
+                bound = f"nested too deeply, or too many values (more than {MOST} with aliases)"
+                self.fault(place, "...", bound, "Write it without aliases that hold themselves.")
+            return None
+        if isinstance(node, ScalarNode):
+            return self._scalar(node, place)
+        if node.tag not in (TAG + "map", TAG + "seq"):
+            self._refuse_tag(node, place)
+        if isinstance(node, MappingNode):
+            return self._mapping(node, place)
+        return self._sequence(self._value(item, (*place, i)) for i, item in enumerate(node.value))
+
+    def _mapping(self, node: MappingNode, place: Place) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            key = str(key_node.value) if isinstance(key_node, ScalarNode) else "?"
+            here = (*place, key)
+            line = key_node.start_mark.line + 1
+            if not isinstance(key_node, ScalarNode) or key_node.tag == TAG + "merge":
+                self.fault(here, "...", "this kind of key is not used here", "Write plain keys.")
+            elif key in found:
+                bound = f"the key is there twice, on line {self.document.lines[here]} and on line {line}"
+                self.fault(here, found[key], bound, "Keep one of them.")
+            else:
+                self.document.lines[here] = line
+                found[key] = self._value(value_node, here)
+        return found
+
+    def _scalar(self, node: ScalarNode, place: Place) -> Any:
+        kind = str(node.tag).removeprefix(TAG)
+        if kind not in TYPED:
+            if kind in ("str", "timestamp"):
+                return self.text(node, place)
+            self._refuse_tag(node, place)
+            return node.value
+        try:
+            return self._constructor.construct_object(node)
+        except (ArithmeticError, LookupError, TypeError, ValueError, YAMLError):
+            self.fault(place, node.value, f"this is no {TYPED[kind]}", "Write the value alone, without a tag.")
+            return node.value
+
+    def _refuse_tag(self, node: Node, place: Place) -> None:
+        value = node.value if isinstance(node, ScalarNode) else "..."
+        self.fault(place, value, f"the tag {node.tag} is not allowed", "Remove the tag: only plain values are read.")
 
 
 class BoundedComposer(Composer):
@@ -101,53 +214,6 @@ class BoundedComposer(Composer):
         return super().compose_node(parent, index)
 
 
-class _Values:
-    """Converter of nodes to values."""
-
-    def __init__(self, constructor: Any) -> None:
-        self._constructor, self._count = constructor, 0
-
-    def of(self, node: Node, depth: int) -> Any:
-        self._count += 1
-        if self._count > MOST or depth > DEEPEST:
-            raise ValueError(f"more than {MOST} values by aliases, or nested deeper than {DEEPEST}")
-        if isinstance(node, MappingNode):
-            return self._mapping(node, depth)
-        if isinstance(node, ScalarNode):
-            return self._scalar(node)
-        return [self.of(item, depth + 1) for item in node.value]
-
-    def _mapping(self, node: MappingNode, depth: int) -> dict[Any, Any]:
-        found: dict[Any, Any] = {}
-        for key_node, value_node in node.value:
-            line = key_node.start_mark.line + 1
-            if not isinstance(key_node, ScalarNode) or key_node.tag == TAG + "merge":
-                raise ValueError(f"line {line}: a key that is not plain")
-            key = self._scalar(key_node)
-            if key in found:
-                raise ValueError(f"line {line}: key {key} stands there twice")
-            found[key] = self.of(value_node, depth + 1)
-        return found
-
-    def _scalar(self, node: ScalarNode) -> Any:
-        kind = str(node.tag).removeprefix(TAG)
-        if kind in TYPED:
-            return typed_value(self._constructor, node)
-        if kind not in ("str", "timestamp"):
-            raise ValueError(f"line {node.start_mark.line + 1}: the tag {node.tag}, which is not allowed")
-        return node.value
-
-
-def typed_value(constructor: Any, node: ScalarNode) -> Any:
-    """Return the value of a scalar of a kind in `TYPED`. Raise ValueError if its text does not fit, as in ``!!bool maybe``."""
-    try:
-        return constructor.construct_object(node)
-    except (ArithmeticError, LookupError, TypeError, ValueError, YAMLError):
-        kind, line = str(node.tag).removeprefix(TAG), node.start_mark.line + 1
-        raise ValueError(f"line {line}: {node.value[:40]!r}, which is no {TYPED[kind]}") from None
-
-
-Place = Sequence[str | int]
 Pair = tuple[Node, Node]
 
 
@@ -192,6 +258,8 @@ def yaml_text(value: Any) -> str:
     """Return a value as YAML with six digits. A text of several lines becomes a block for the outermost mapping."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key}: {yaml_text(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(yaml_text, value)) + "]"
     if isinstance(value, str) and "\n" in value:
         return "|2-\n" + "\n".join(f"  {line}".rstrip() for line in value.split("\n"))
     if isinstance(value, bool | str):

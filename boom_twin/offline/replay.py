@@ -34,8 +34,8 @@ from ..health.fault_twins import FaultTwins, Hypothesis
 from ..messages.sample_decoder import ODDITIES, stamp_of
 from ..messages.topic_table import Topics
 from ..scene.edit import anew, loaded
+from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
-from ..scene.source import SceneSource, as_scene
 from ..system.atomic_files import write_atomic
 from ..system.received_files import sha256_of
 from ..system.result_folder import REPLAY, UnfinishedResult, result_folder

@@ -2,55 +2,50 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from ..errors import Fault
-from .checks.findings import unknown_key, value_fault
-from .format import Format
-from .units import converted, unit_of
-from .yaml_reader import Document, Place
+from ..config.yaml_text import Document, Place, words
+from ..errors import ABSENT, Fault
+from .units import converted, quantity, unit_of
+from .yaml_reader import NUMBER
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 Root = TypeVar("Root", bound=BaseModel)
 EMPTY: tuple[Any, ...] = (None, {}, ())
-LISTS = ("sections", "joints", "pins")
+ITEM = "a block of keys, as in the default scene"
+LONGEST = 40  # characters of a text that is taken for a number
 
 
 @dataclass(frozen=True)
 class Validated(Generic[Root]):
-    """Content of a document, with the faults of its values.
-
-    Attributes
-    ----------
-    block : BaseModel or None
-        The whole, if every value is good by itself.
-    known : object
-        The plain values without unknown keys.
-    broken : frozenset of Place
-        Where values are not good.
-    faults : tuple of Fault
-        Of single values and unknown keys.
-    """
+    """Content of a document, with the faults of its values."""
 
     block: Root | None
+    """The whole, if every value is good by itself."""
     known: Any
+    """The plain values without unknown keys."""
     broken: frozenset[Place]
+    """Places of values that are not good."""
     faults: tuple[Fault, ...]
+    """Faults of single values and unknown keys."""
 
 
-def validated(document: Document, form: Format[Root]) -> Validated[Root]:
-    """The block that a document of this format holds, with all faults of single values."""
-    known, faults = _known(document, form, document.values, form.root, ())
+def validated(document: Document, root: type[Root]) -> Validated[Root]:
+    """Return the block that a document holds, with all faults of single values."""
+    faults: list[Fault] = []
+    known = _known(document, root, document.values, root, (), faults)
     try:
-        return Validated(form.root.model_validate(known, strict=True), known, frozenset(), tuple(faults))
+        return Validated(root.model_validate(known, strict=True), known, frozenset(), tuple(faults))
     except ValidationError as error:
         details = [each for each in error.errors(include_url=False) if not _counts_faulty(each)]
-    faults += [value_fault(document, form, detail, detail["loc"]) for detail in details]
+    faults += [_value_fault(document, root, detail) for detail in details]
     return Validated(None, known, frozenset(detail["loc"] for detail in details), tuple(faults))
 
 
@@ -59,29 +54,170 @@ def _counts_faulty(detail: ErrorDetails) -> bool:
     return detail["type"] == "too_short" and detail["loc"] in (("sections",), ("joints",)) and len(detail["input"]) > 0
 
 
-def _known(document: Document, form: Format[Any], block: Any, model: type[BaseModel], place: Place) -> tuple[Any, list[Fault]]:
-    """A block without unknown keys and without empty ones, quantities in their keys' units; a fault for every unknown key."""
+def _known(
+    document: Document, root: type[BaseModel], block: Any, model: type[BaseModel], place: Place, faults: list[Fault]
+) -> Any:
+    """Return a block without unknown and empty keys, with quantities in their keys' units. Add unknown keys to `faults`."""
     if not isinstance(block, dict):
-        return block, []
+        return block
     known: dict[str, Any] = {}
-    faults: list[Fault] = []
     for key, value in block.items():
-        here = (*place, key)
-        inner = form.blocks.get(model, {}).get(key)
+        here, inner = (*place, key), inner_block(model, key)
         if key not in model.model_fields:
-            faults.append(unknown_key(document, form, here, value, model))
+            faults.append(_unknown_key(document, root, here, value, model))
         elif value in EMPTY:
             continue
-        elif key in LISTS and inner is not None:
-            if not isinstance(value, tuple):
-                known[key] = value
-                continue
-            pairs = [_known(document, form, item, inner, (*here, i)) for i, item in enumerate(value)]
-            known[key] = tuple(item for item, _ in pairs)
-            faults += [fault for _, found in pairs for fault in found]
-        elif inner is not None:
-            known[key], found = _known(document, form, value, inner, here)
-            faults += found
+        elif inner is None:
+            known[key] = converted(value, unit_of(meaning_of(model, key)))
+        elif not _is_list(model, key):
+            known[key] = _known(document, root, value, inner, here, faults)
+        elif isinstance(value, tuple):
+            known[key] = tuple(_known(document, root, item, inner, (*here, i), faults) for i, item in enumerate(value))
         else:
-            known[key] = converted(value, unit_of(form.meaning[model].get(key, "")))
-    return known, faults
+            known[key] = value
+    return known
+
+
+# -- what a model says of its keys ------------------------------------------------------------------------------------
+
+
+def meaning_of(model: type[BaseModel], key: str) -> str:
+    """Return the meaning and unit of a key, as error messages quote them."""
+    return model.model_fields[key].description or ""
+
+
+def inner_block(model: type[BaseModel], key: str) -> type[BaseModel] | None:
+    """Return the block, or the block of each item, that a key of a model holds; None for plain values and unknown keys."""
+    return _block(model.model_fields[key].annotation) if key in model.model_fields else None
+
+
+def _block(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next(filter(None, map(_block, get_args(annotation))), None)
+
+
+def _is_list(model: type[BaseModel], key: str) -> bool:
+    return get_origin(model.model_fields[key].annotation) is tuple
+
+
+def _homes(model: type[BaseModel], place: str = "") -> Iterator[tuple[type[BaseModel], str]]:
+    """Yield every block of a file with its place, the whole file first."""
+    yield model, place or "the top level"
+    for key in model.model_fields:
+        if (inner := inner_block(model, key)) is not None:
+            yield from _homes(inner, f"{place}.{key}".lstrip(".") + "[i]" * _is_list(model, key))
+
+
+def meaning_at(root: type[BaseModel], place: Place) -> str:
+    """Return meaning and unit of the key at or around a place of a file, empty if there are none."""
+    if place[:1] == ("postures",) and len(place) > 1:
+        return "section angles to the horizontal, degrees"
+    model: type[BaseModel] = root
+    meaning = ""
+    for step in place:
+        if isinstance(step, int):
+            meaning = ITEM if meaning.startswith("a list with one block") else meaning
+        elif step in model.model_fields:
+            meaning, model = meaning_of(model, step), inner_block(model, step) or model
+    return meaning
+
+
+# -- the words of a refused value -------------------------------------------------------------------------------------
+
+
+BOUNDS = {
+    "finite_number": "it must be a finite number",
+    "greater_than": "it must be greater than {gt:g}",
+    "greater_than_equal": "it must not be less than {ge:g}",
+    "less_than": "it must be less than {lt:g}",
+    "less_than_equal": "it must not be more than {le:g}",
+    "literal_error": "it must be {expected}",
+    "string_type": "text is needed, not {what}",
+    "tuple_type": "a list is needed, not {what}",
+    "bool_type": "true or false is needed, not {what}",
+    "dict_type": "a block of keys is needed, not {what}",
+    "model_type": "a block of keys is needed, not {what}",
+}
+
+
+def _unknown_key(document: Document, root: type[BaseModel], place: Place, value: Any, model: type[BaseModel]) -> Fault:
+    """Return the fault of a key that `model` does not have: the nearest one, and where the key belongs if known elsewhere."""
+    key = str(place[-1])
+    if key.isdigit() and value is None:
+        bound = "a number stands where a key is expected"
+        return document.fault(place, value, bound, "Decimals take a point, not a comma.")
+    here = {name.lower(): name for name in reversed(model.model_fields)}
+    near = difflib.get_close_matches(key.lower(), here, n=1, cutoff=0.0)
+    remedy = f"The nearest known key here is `{here[near[0]]}`."
+    homes = [home for other, home in _homes(root) if other is not model and key in other.model_fields]
+    if homes:
+        remedy = f"`{key}` is a key of {' or '.join(homes)}. " + remedy
+    elif not difflib.get_close_matches(key.lower(), here, n=1):
+        remedy += f" All of them: {', '.join(model.model_fields)}."
+    where = f"in {words(place[:-1])}" if len(place) > 1 else "at the top level"
+    return document.fault(place, value, f"unknown key {where}", remedy)
+
+
+def _value_fault(document: Document, root: type[BaseModel], detail: ErrorDetails) -> Fault:
+    """Return a pydantic error in the words of the file."""
+    place, kind, value, limits = detail["loc"], detail["type"], detail["input"], detail.get("ctx", {})
+    meaning = meaning_at(root, place)
+    give = f"Give {meaning}." if meaning else "Give such a value."
+    if kind == "missing" and not isinstance(place[-1], int):
+        return document.fault(place, ABSENT, "it is needed", give)
+    if kind == "missing" or kind in ("too_long", "too_short"):
+        return _length_fault(document, detail, place, give)
+    if kind in ("float_type", "int_type", "int_from_float", "float_parsing", "int_parsing"):
+        whole = "a whole number" if kind.startswith("int") else "a number"
+        unfit = quantity(value, unit_of(meaning)) if isinstance(value, str) else None
+        if isinstance(unfit, str):
+            return document.fault(place, value, unfit, give)
+        bound = f"{whole} is needed, not {_what(value)}"
+        return document.fault(place, value, bound, _number_remedy(value, give))
+    if kind == "string_type":
+        give = "Put it in quotes."
+    bound = BOUNDS[kind].format(what=_what(value), **limits) if kind in BOUNDS else detail["msg"]
+    return document.fault(place, value, bound, give)
+
+
+def _length_fault(document: Document, detail: ErrorDetails, place: Place, give: str) -> Fault:
+    """Return the fault of a list with too few or too many entries."""
+    if detail["type"] == "missing":
+        place = place[:-1]
+    value = detail["input"]
+    found = len(value) if isinstance(value, tuple) else 0
+    if place in (("sections",), ("joints",)):
+        return document.fault(place, value, "at least one entry is needed", give)
+    bound = f"a list of 2 numbers is needed, it has {found}"
+    if found > 2:
+        give += " Decimals take a point, not a comma."
+    return document.fault(place, value, bound, give)
+
+
+def _what(value: Any) -> str:
+    """Return the kind of a value, in a newcomer's words."""
+    if isinstance(value, bool):
+        return "true or false"
+    if isinstance(value, str):
+        return "text"
+    if isinstance(value, int | float):
+        return "a whole number" if isinstance(value, int) else "a decimal number"
+    if value is None:
+        return "nothing"
+    return "a list" if isinstance(value, tuple) else "a block"
+
+
+def _number_remedy(value: Any, give: str) -> str:
+    """Return the remedy for a value that should be a number."""
+    if not isinstance(value, str):
+        return give
+    text = value.strip()
+    if len(text) > LONGEST:
+        return give
+    pointed = text.replace(",", ".", 1)
+    if NUMBER.fullmatch(text):
+        return f"Write it without quotes: {text}."
+    if NUMBER.fullmatch(pointed):
+        return f"Write a decimal point: {pointed}."
+    return give

@@ -5,109 +5,81 @@ from __future__ import annotations
 import csv
 import re
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
+from ..config.yaml_text import Document, Place
 from ..errors import ABSENT, Fault, SceneError
-from .block_reader import validated
-from .format import Format
-from .glossary import MEANING
-from .schema import Base, Bore, BulkModulus, Finite, Joint, Material, NotNegative, Part, Point, Positive, Section
-from .yaml_reader import NUMBER, Document, Kind, Place, parse, read_text
+from .block_reader import meaning_of, validated
+from .schema import (
+    CAP_LINE,
+    ROD_LINE,
+    Base,
+    Bore,
+    BulkModulus,
+    Cylinder,
+    Finite,
+    JointGeometry,
+    Material,
+    NotNegative,
+    Part,
+    Point,
+    Positive,
+    Rod,
+    Scene,
+    Section,
+)  # fmt: skip
+from .yaml_reader import NUMBER, Kind, parse, read_text
 
 STEEL = Material(E=2.1e11, rho=7850.0)
 
 
+PIPE = "what rides on a metre of the box beside it: pipe line, hoses, clamps, kg/m"
+
+
 class BoxSection(Part):
-    """One section whose beam is a box: outer height and width, wall, m; what else its metre weighs, kg/m."""
+    """One section whose beam is a box."""
 
-    length: Positive
-    beam: Point
-    height: Positive
-    width: Positive
-    wall: Positive
-    pipe: NotNegative | None = None
-    rod_pin: Point | None = None
+    length: Positive = Field(description=meaning_of(Section, "length"))
+    beam: Point = Field(description=meaning_of(Section, "beam"))
+    height: Positive = Field(description=meaning_of(Section, "height"))
+    width: Positive = Field(description="the outer width of the box, m")
+    wall: Positive = Field(description="the thickness of its walls, m")
+    pipe: NotNegative | None = Field(default=None, description=PIPE)
+    rod_pin: Point | None = Field(default=None, description=meaning_of(Section, "rod_pin"))
 
 
-class DrawnJoint(Part):
-    """One joint as in a scene, with bore and rod of its cylinder, m, and the oil in its lines, m^3."""
+class DrawnJoint(JointGeometry):
+    """One joint as in a scene, with bore and rod of its cylinder."""
 
-    kind: Literal["A", "B1", "B2", "B3"]
-    range_deg: tuple[Finite, Finite]
     bore: Bore
-    rod: Positive
-    C: Point | None = None
-    D: Point | None = None
-    E: Point | None = None
-    lL: Positive | None = None
-    lR: Positive | None = None
-    side: Literal["left", "right"] | None = None
-    R: Point | None = None
-    mL: NotNegative | None = None
-    mR: NotNegative | None = None
-    closed_length: Positive | None = None
-    max_stroke: Positive | None = None
-    cap_line: NotNegative = 5e-4
-    rod_line: NotNegative = 5e-4
+    rod: Rod
+    closed_length: Positive | None = Field(
+        default=None, description=f"{meaning_of(Cylinder, 'closed_length')}; without it, worked out from the pins"
+    )
+    max_stroke: Positive | None = Field(
+        default=None, description=f"{meaning_of(Cylinder, 'max_stroke')}; without it, worked out from the pins"
+    )
+    cap_line: NotNegative = Field(default=5e-4, description=CAP_LINE)
+    rod_line: NotNegative = Field(default=5e-4, description=ROD_LINE)
 
 
 class BoomTable(Part):
     """A boom as its drawing shows it; SI units, ranges and postures in degrees, the base's inclination with its unit."""
 
-    description: str = ""
-    material: Material = STEEL
-    base: Base
-    pipe: NotNegative = 0.0
+    description: str = Field(default="", description="text")
+    material: Material = Field(default=STEEL, description="a block with E (Pa) and rho (kg/m^3); steel if it is not there")
+    base: Base = Field(description=meaning_of(Scene, "base"))
+    pipe: NotNegative = Field(default=0.0, description=PIPE)
     bulk_modulus: BulkModulus = 1.4e9
-    damping_ratio: Annotated[float, Field(gt=0, lt=1)] = 0.01
-    payload: NotNegative | None = None
-    line_fill: NotNegative | None = None
-    sections: Annotated[tuple[BoxSection, ...], Field(min_length=1)]
-    joints: Annotated[tuple[DrawnJoint, ...], Field(min_length=1)]
-    postures: dict[str, tuple[Finite, ...]] = Field(default_factory=dict)
+    damping_ratio: float = Field(default=0.01, gt=0, lt=1, description="the damping ratio of the first mode, 0.005 to 0.03")
+    payload: NotNegative | None = Field(default=None, description="the point mass at the tip, for example an end hose, kg")
+    line_fill: NotNegative | None = Field(default=None, description=meaning_of(Scene, "line_fill"))
+    sections: tuple[BoxSection, ...] = Field(min_length=1, description=meaning_of(Scene, "sections"))
+    joints: tuple[DrawnJoint, ...] = Field(min_length=1, description=meaning_of(Scene, "joints"))
+    postures: dict[str, tuple[Finite, ...]] = Field(default={}, description=meaning_of(Scene, "postures"))
 
-
-_PIPE = "what rides on a metre of the box beside it: pipe line, hoses, clamps, kg/m"
-TABLE = Format(
-    BoomTable,
-    {
-        BoomTable: {
-            "description": "text",
-            "material": "a block with E (Pa) and rho (kg/m^3); steel if it is not there",
-            "base": "a block with pivot and cylinder_pin",
-            "pipe": _PIPE,
-            "bulk_modulus": "the bulk modulus of the oil in Pa, 1.4e9 to 1.7e9; less with air in it",
-            "damping_ratio": "the damping ratio of the first mode, 0.005 to 0.03",
-            "payload": "the point mass at the tip, for example an end hose, kg",
-            "line_fill": "the concrete in the pipe line, kg/m",
-            "sections": "a list with one block per section",
-            "joints": "a list with one block per joint",
-            "postures": "a block of names, each with a list of section angles in degrees",
-        },
-        Material: MEANING[Material],
-        Base: MEANING[Base],
-        BoxSection: {
-            **{key: MEANING[Section][key] for key in ("length", "beam", "height", "rod_pin")},
-            "width": "the outer width of the box, m",
-            "wall": "the thickness of its walls, m",
-            "pipe": _PIPE,
-        },
-        DrawnJoint: {
-            **{key: MEANING[Joint][key] for key in ("kind", "range_deg", "C", "D", "E", "lL", "lR", "side", "R", "mL", "mR")},
-            "bore": "the diameter of the piston, m",
-            "rod": "the diameter of the rod, m",
-            "closed_length": "the length from pin to pin at stroke 0, m; without it, worked out from the pins",
-            "max_stroke": "the largest stroke, m; without it, worked out from the pins",
-            "cap_line": "the oil between piston and valve on the cap side at stroke 0, m^3",
-            "rod_line": "the oil between piston and valve on the rod side at max_stroke, m^3",
-        },
-    },
-    {BoomTable: "the top level", Material: "material", Base: "base", BoxSection: "sections[i]", DrawnJoint: "joints[i]"},
-    {BoomTable: {"material": Material, "base": Base, "sections": BoxSection, "joints": DrawnJoint}},
-)
-"""What a table may hold."""
 
 PAIRS = {"x": 0, "y": 1, "start": 0, "end": 1, "low": 0, "high": 1, "along": 0, "left": 1}
 """Ending of the name of a column that holds one of two numbers, as in C_x, beam_end, range_deg_low."""
@@ -118,7 +90,7 @@ _HEADER = re.compile(r"(\w+?)(?:_(x|y|start|end|low|high|along|left))?\s*(?:[\[(
 
 
 def read_table(path: Path) -> tuple[BoomTable, Document]:
-    """The table in a file (.csv, .tsv, .txt, else YAML), and the document with the lines of its values.
+    """Return the table in a file (.csv, .tsv, .txt, else YAML), and the document with the lines of its values.
 
     Raises
     ------
@@ -131,11 +103,11 @@ def read_table(path: Path) -> tuple[BoomTable, Document]:
 
 
 def checked_table(document: Document, source: str) -> BoomTable:
-    """The table that a document holds; SceneError with all its faults."""
+    """Return the table that a document holds; SceneError with all its faults."""
     if isinstance(document.values, dict) and "gravity" in document.values:
         bound, remedy = "only a scene has it, and this is to be a table of dimensions", "`boom_twin check` takes a scene."
         raise SceneError(source, (document.fault(("gravity",), document.values["gravity"], bound, remedy),))
-    read = validated(document, TABLE)
+    read = validated(document, BoomTable)
     faults = [*read.faults, *document.faults]
     if read.block is not None:
         faults += _faults(document, read.block)
@@ -156,7 +128,7 @@ def _faults(document: Document, table: BoomTable) -> list[Fault]:
             bound = f"the rod must be thinner than the bore, {joint.bore:g} m"
             found.append(document.fault(("joints", i, "rod"), joint.rod, bound, "Give both as diameters."))
     if table.material.rho is None:
-        remedy = f"Give {MEANING[Material]['rho']}."
+        remedy = f"Give {meaning_of(Material, 'rho')}."
         found.append(document.fault(("material", "rho"), ABSENT, "masses are worked out with it", remedy))
     if len(table.joints) != len(table.sections):
         bound = f"there are {len(table.sections)} sections, and every section has one joint"
@@ -176,7 +148,7 @@ def _pipes_of_some(document: Document, table: BoomTable) -> list[Fault]:
 
 
 def _angle_without_unit(document: Document) -> list[Fault]:
-    """An inclination as a bare number: a scene takes it for rad, beside ranges in degrees."""
+    """Return a fault of an inclination as a bare number: a scene takes it for rad, beside ranges in degrees."""
     base = document.values.get("base") if isinstance(document.values, dict) else None
     value = base.get("inclination") if isinstance(base, dict) else None
     if not isinstance(value, int | float) or value == 0:
@@ -189,7 +161,7 @@ SLIMMEST = 0.3  # width of a box over its height
 
 
 def odd_boxes(table: BoomTable, document: Document) -> list[Fault]:
-    """A warning of every box that is wider than high, for it would be stiffer the other way round, or much too slim."""
+    """Return a warning of every box that is wider than high, or much too slim."""
     found = []
     for i, section in enumerate(table.sections):
         h, b, place = section.height, section.width, ("sections", i)
@@ -200,20 +172,20 @@ def odd_boxes(table: BoomTable, document: Document) -> list[Fault]:
                 f"{softer:.3g} times as much in the plane as one of {b:g} by {h:g} m"
             )
             remedy = f"Give height: {b:g} and width: {h:g}, if they are swapped."
-            found.append(document.fault((*place, "height"), h, bound, remedy))
+            found.append(document.fault((*place, "height"), h, bound, remedy, "warning"))
         elif b < SLIMMEST * h:
             bound = f"expected at least {SLIMMEST * h:.3g} m for a box {h:g} m high"
-            found.append(document.fault((*place, "width"), b, bound, "Give the outer width, and check its unit."))
+            found.append(document.fault((*place, "width"), b, bound, "Give the outer width, and check its unit.", "warning"))
     return found
 
 
 def second_moment(height: float, width: float, wall: float) -> float:
-    """I (m^4) of a box about the axis across the plane of the boom."""
+    """Return I (m^4) of a box about the axis across the plane of the boom."""
     return (width * height**3 - (width - 2 * wall) * (height - 2 * wall) ** 3) / 12
 
 
 def csv_document(text: str, source: str) -> Document:
-    """A CSV text as the values of a table: a header, then a row for every section with its joint.
+    """Return a CSV text as the values of a table: a header, then a row for every section with its joint.
 
     A column is named as the key in the YAML table, with ``_x``, ``_y`` and the like (`PAIRS`) for one of two numbers, and may
     name a unit: ``length [mm]``. Columns of the base and of the whole boom have one value, in the first row or the same in all;
@@ -227,40 +199,51 @@ def csv_document(text: str, source: str) -> Document:
         raise SceneError(source, (Fault("table", source, f"not a readable CSV file ({error})", "Export it again."),)) from None
     if len(rows) < 2:
         raise SceneError(source, (Fault("table", source, "no row under the header", "Give a row for every section."),))
-    columns = [_HEADER.fullmatch(name.strip()) for name in rows[0]]
-    _refuse_twins(rows[0], columns, source)
+    used = min(len(rows[0]), max(map(len, rows[1:])))  # a header may end with an empty cell
+    columns = [_column(rows[0], number, source) for number in range(used)]
     filled = [(line, row) for line, row in enumerate(rows[1:], 2) if any(cell.strip() for cell in row)]
     for i, (line, row) in enumerate(filled):
         document.values["sections"].append({})
         document.values["joints"].append({})
-        for number, (column, cell) in enumerate(zip(columns, row, strict=False)):
-            if column is None or (place := _place(column, i)) is None:
-                name, known = rows[0][number], ", ".join(_columns())
-                raise SceneError(source, (Fault("header", name, "no such column", f"Known are {known}.", 1),))
-            if place[-1] == "pipe" and not any(cell.strip() for _, other in filled[1:] for cell in other[number : number + 1]):
-                place = ("pipe",)  # in the first row alone: of the whole boom
-            is_of_all = place[0] not in ("sections", "joints")
-            if is_of_all and i > 0:
-                first = "".join(filled[0][1][number : number + 1]).strip()
-                if cell.strip() not in ("", first):
-                    where, bound = f"{rows[0][number]}, {_letters(number)}{line}", f"the first row has {first or 'none'}"
+        for number, ((key, end, unit), cell) in enumerate(zip(columns, map(str.strip, row), strict=False)):
+            others = [other[number].strip() for _, other in filled if number < len(other)]
+            home = "" if key == "pipe" and not any(others[1:]) else HOMES[key]
+            if home in ("", "base") and i > 0:
+                if cell not in ("", others[0]):
+                    where, bound = f"{rows[0][number]}, {_letters(number)}{line}", f"the first row has {others[0] or 'none'}"
                     remedy = "It belongs to the whole boom: give it in the first row only, or the same in all."
-                    raise SceneError(source, (Fault(where, cell.strip(), bound, remedy, line),))
-            elif cell.strip():
-                _put(document, place, _value(cell.strip(), column[3]), line)
+                    raise SceneError(source, (Fault(where, cell, bound, remedy, line),))
+            elif cell:
+                place: Place = () if not home else ("base",) if home == "base" else (home, i)
+                place = (*place, key) if end is None else (*place, key, PAIRS[end])
+                _put(document, place, _value(cell, unit), line)
                 document.cells[place] = f"{_letters(number)}{line}"
     document.values["base"].setdefault("pivot", [0.0, 0.0])  # without such columns, the origin is there
     document.values = frozen(document.values)
     return document
 
 
-def _refuse_twins(names: list[str], columns: list[re.Match[str] | None], source: str) -> None:
-    """Raise SceneError if two columns are of the same key: the second would overwrite the first."""
-    seen: dict[tuple[str, str | None], int] = {}
-    for number, column in enumerate(columns):
-        if column is not None and (before := seen.setdefault((column[1], column[2]), number)) != number:
-            bound = f"columns {_letters(before)} and {_letters(number)} have the same name"
-            raise SceneError(source, (Fault("header", names[number].strip(), bound, "Correct one, or remove it.", 1),))
+HOMES = {
+    **dict.fromkeys(Base.model_fields, "base"),
+    **dict.fromkeys(DrawnJoint.model_fields, "joints"),
+    **dict.fromkeys(BoxSection.model_fields, "sections"),
+    **dict.fromkeys(("description", "bulk_modulus", "damping_ratio", "payload", "line_fill"), ""),
+}
+"""Keys that a column may be named after, with the block that has them."""
+
+
+def _column(names: list[str], number: int, source: str) -> tuple[str, str | None, str | None]:
+    """Return key, ending and unit of a column. Raise SceneError if there is no such key, or an earlier column has the name."""
+    columns = [_HEADER.fullmatch(name.strip()) for name in names[: number + 1]]
+    column, name = columns[-1], names[number].strip()
+    if column is None or column[1] not in HOMES:
+        known = f"Known are {', '.join(sorted(HOMES))}."
+        raise SceneError(source, (Fault("header", name, "no such column", known, 1),))
+    before = next(i for i, other in enumerate(columns) if other and other.group(1, 2) == column.group(1, 2))
+    if before < number:
+        bound = f"columns {_letters(before)} and {_letters(number)} have the same name"
+        raise SceneError(source, (Fault("header", name, bound, "Correct one, or remove it.", 1),))
+    return column[1], column[2], column[3]
 
 
 def _letters(column: int) -> str:
@@ -268,44 +251,22 @@ def _letters(column: int) -> str:
     return (_letters(column // 26 - 1) if column > 25 else "") + chr(ord("A") + column % 26)
 
 
-def _columns() -> list[str]:
-    """Keys that a column may be named after."""
-    return sorted({key for model in (BoxSection, DrawnJoint, Base) for key in model.model_fields} | {*_OF_ALL})
-
-
-_OF_ALL = ("description", "bulk_modulus", "damping_ratio", "payload", "line_fill")
-
-
-def _place(column: re.Match[str], row: int) -> Place | None:
-    key, end = column[1], column[2]
-    homes: list[tuple[type[BaseModel], Place]] = [
-        (BoxSection, ("sections", row)),
-        (DrawnJoint, ("joints", row)),
-        (Base, ("base",)),
-    ]
-    for model, home in homes:
-        if key in model.model_fields:
-            return (*home, key) if end is None else (*home, key, PAIRS[end])
-    return (key,) if key in _OF_ALL else None
-
-
 def _value(cell: str, unit: str | None) -> Any:
-    if unit is not None and NUMBER.fullmatch(cell):
-        return f"{cell} {unit}"
-    return float(cell) if NUMBER.fullmatch(cell) else cell
+    if NUMBER.fullmatch(cell):
+        return float(cell) if unit is None else f"{cell} {unit}"
+    return cell
 
 
 def _put(document: Document, place: Place, value: Any, line: int) -> None:
     block: Any = document.values
-    keys = place[:-1] if isinstance(place[-1], str) else place[:-2]
-    for step in keys:
+    is_half = isinstance(place[-1], int)
+    for step in place[:-2] if is_half else place[:-1]:
         block = block[step]
-    if isinstance(place[-1], int):
+    if is_half:
         if not isinstance(block.get(place[-2]), list):
             block[place[-2]] = [None, None]
-        block[place[-2]][place[-1]] = value
-    else:
-        block[place[-1]] = value
+        block = block[place[-2]]
+    block[place[-1]] = value
     for depth in range(1, len(place) + 1):
         document.lines.setdefault(place[:depth], line)
 

@@ -9,7 +9,6 @@ stroke.
 from __future__ import annotations
 
 import math
-import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,19 +18,18 @@ from typing import Any, TypeVar, cast
 from pydantic import BaseModel
 from ruamel.yaml.error import YAMLError
 
-from ..config.yaml_text import whole_text, with_value, yaml_text
+from ..config.yaml_text import Place, with_value, words, yaml_text
 from ..errors import SceneError, UsageError
 from .load import examine_text, structure
 from .oil_spring import middle_stiffness
 from .schema import Cylinder, CylinderPart, RigidPart, Scene, Section, Tip
-from .yaml_reader import Place, parse, with_end_mark, words
+from .yaml_reader import parse, text_of
 
 Body = TypeVar("Body", RigidPart, CylinderPart)
-_NAME = re.compile(r"(cylinder|section)_([1-9]\d*)\.(k|d|EI|beta|mass)")
 
 
 def parameter_names(scene: Scene) -> tuple[str, ...]:
-    """Every parameter that `scene` has; payload, line fill and inclination always, for they may be nothing."""
+    """Return every parameter that `scene` has; payload, line fill and inclination always, for they may be nothing."""
     names = []
     for i, joint in enumerate(scene.joints):
         names += [f"cylinder_{i + 1}.k"] if joint.cylinder.is_compressible else []
@@ -44,32 +42,23 @@ def parameter_names(scene: Scene) -> tuple[str, ...]:
 
 
 def parameter(scene: Scene, name: str) -> float:
-    """Value of one parameter, SI.
+    """Return the value of one parameter, SI.
 
     Raises
     ------
     UsageError
         The scene has no parameter of that name.
     """
-    owner, index, key = _parsed(scene, name)
-    if owner == "tip":
-        return 0.0 if scene.tip is None or scene.tip.payload is None else scene.tip.payload
-    if owner == "line_fill":
-        return scene.line_fill or 0.0
-    if owner == "base":
-        return scene.base.inclination
-    if owner == "cylinder":
-        cylinder = scene.joints[index].cylinder
-        return middle_stiffness(cylinder) if key == "k" else float(cylinder.d or 0.0)
-    section = scene.sections[index]
-    if key == "EI":
-        assert section.I is not None
-        return scene.material.E * section.I
-    return section_mass(section) if key == "mass" else float(section.beta or 0.0)
+    part, key = _owner(scene, name)
+    if isinstance(part, Cylinder) and key == "k":
+        return middle_stiffness(part)
+    if isinstance(part, Section) and key == "EI":
+        return scene.material.E * (part.I or 0.0)
+    return section_mass(part) if isinstance(part, Section) and key == "mass" else float(getattr(part, key) or 0.0)
 
 
 def with_parameters(scene: Scene, values: Mapping[str, float]) -> Scene:
-    """The scene with other values of some parameters, SI; what is not named stays.
+    """Return the scene with other values of some parameters, SI; what is not named stays.
 
     Raises
     ------
@@ -89,70 +78,54 @@ def with_rigid_cylinders(scene: Scene) -> Scene:
 
 
 def section_mass(section: Section) -> float:
-    """Mass (kg) of root, beam and head."""
+    """Return the mass (kg) of root, beam and head."""
     beam = 0.0 if section.beam is None or section.rho_A is None else section.rho_A * (section.beam[1] - section.beam[0])
     return beam + sum(part.mass for part in (section.root, section.head) if part is not None)
 
 
 def _with_one(scene: Scene, name: str, value: float) -> Scene:
-    owner, index, key = _parsed(scene, name)
-    least_is_open = key in ("k", "EI", "mass")
-    bound = "" if owner == "base" else " and above 0" if least_is_open else " and at least 0"
-    if not math.isfinite(value) or (bound and not (value > 0.0 if least_is_open else value >= 0.0)):
+    part, key = _owner(scene, name)
+    is_positive = key in ("k", "EI", "mass")
+    bound = "" if key == "inclination" else " and above 0" if is_positive else " and at least 0"
+    if not math.isfinite(value) or (bound and not (value > 0.0 if is_positive else value >= 0.0)):
         raise UsageError(f"{name} = {value:g}: must be finite{bound}.")
-    if owner == "base":
-        return cast(Scene, _with(scene, ("base", "inclination"), value))
-    place, part = cast(Place, (owner,)), cast(Any, value)
-    if owner == "cylinder":
-        place, part = ("joints", index, "cylinder"), _cylinder(scene.joints[index].cylinder, key, value)
-    elif owner == "section":
-        place, part = ("sections", index), _section(scene, scene.sections[index], key, value)
-    elif owner == "tip":
-        part = (scene.tip or Tip()).model_copy(update={"payload": value})
-    return cast(Scene, _with(scene, place, part))
-
-
-def _cylinder(cylinder: Cylinder, key: str, value: float) -> Cylinder:
-    if key == "k" and (oil := cylinder.oil) is not None:
-        modulus = oil.bulk_modulus * value / middle_stiffness(cylinder)
-        return cylinder.model_copy(update={"oil": oil.model_copy(update={"bulk_modulus": modulus})})
-    return cylinder.model_copy(update={key: value})
-
-
-def _section(scene: Scene, section: Section, key: str, value: float) -> Section:
-    if key == "EI":
-        return section.model_copy(update={"I": value / scene.material.E})
-    if key == "beta":
-        return section.model_copy(update={"beta": value})
-    factor = value / section_mass(section)
-    changes: dict[str, object] = {
-        name: scaled(part, factor) for name in ("root", "head") if (part := getattr(section, name)) is not None
-    }
-    if section.rho_A is not None:
-        changes["rho_A"] = factor * section.rho_A
-    if section.rho_I is not None:
-        changes["rho_I"] = factor * section.rho_I
-    return section.model_copy(update=changes)
+    changes: dict[str, Any] = {key: value}
+    if isinstance(part, Cylinder) and key == "k" and (oil := part.oil) is not None:
+        modulus = oil.bulk_modulus * value / middle_stiffness(part)
+        changes = {"oil": oil.model_copy(update={"bulk_modulus": modulus})}
+    elif isinstance(part, Section) and key == "EI":
+        changes = {"I": value / scene.material.E}
+    elif isinstance(part, Section) and key == "mass":
+        factor = value / section_mass(part)
+        changes = {end: scaled(body, factor) for end in ("root", "head") if (body := getattr(part, end)) is not None}
+        changes |= {each: factor * own for each in ("rho_A", "rho_I") if (own := getattr(part, each)) is not None}
+    return cast(Scene, _with(scene, _place(name), part.model_copy(update=changes)))
 
 
 def scaled(part: Body, factor: float) -> Body:
-    """A part with `factor` times its mass and inertia."""
+    """Return a part with `factor` times its mass and inertia."""
     return part.model_copy(update={"mass": factor * part.mass, "inertia": factor * part.inertia})
 
 
-def _parsed(scene: Scene, name: str) -> tuple[str, int, str]:
-    """Owner, 0-based index and key of a name."""
-    if name == "tip.payload":
-        return "tip", 0, "payload"
-    if name == "line_fill":
-        return "line_fill", 0, "line_fill"
-    if name == "base.inclination":
-        return "base", 0, "inclination"
-    found = _NAME.fullmatch(name)
-    if found is None or name not in parameter_names(scene):
-        known = ", ".join(parameter_names(scene))
-        raise UsageError(f"{name}: the scene has no such parameter. It has {known}.")
-    return found[1], int(found[2]) - 1, found[3]
+def _place(name: str) -> Place:
+    """Return the place of the block that has a parameter."""
+    owner, dot, _ = name.partition(".")
+    kind, _, number = owner.partition("_")
+    if kind == "cylinder":
+        return ("joints", int(number) - 1, "cylinder")
+    if kind == "section":
+        return ("sections", int(number) - 1)
+    return (owner,) if dot else ()
+
+
+def _owner(scene: Scene, name: str) -> tuple[Any, str]:
+    """Return the block that has a parameter, and the key. UsageError if the scene has no such parameter."""
+    if name not in parameter_names(scene):
+        raise UsageError(f"{name}: the scene has no such parameter. It has {', '.join(parameter_names(scene))}.")
+    part: Any = scene
+    for step in _place(name):
+        part = part[step] if isinstance(step, int) else getattr(part, step)
+    return Tip() if name == "tip.payload" and part is None else part, name.rpartition(".")[2]
 
 
 Value = bool | int
@@ -172,7 +145,7 @@ class Edit:
 
 
 def edited(scene: Scene, edits: Iterable[Edit]) -> Scene:
-    """The scene that the file describes after all `edits`."""
+    """Return the scene that the file describes after all `edits`."""
     for edit in edits:
         scene = _with(scene, edit.place, edit.value)
     return scene
@@ -185,7 +158,7 @@ def merged(edits: Iterable[Edit]) -> tuple[Edit, ...]:
 
 
 def _with(part: Any, place: Sequence[str | int], value: Any) -> Any:
-    """`part` (a block, a list, or a value if `place` is empty) with the value at `place` exchanged."""
+    """Return `part` (a block, a list, or a value if `place` is empty) with the value at `place` exchanged."""
     if not place:
         return value
     step, rest = place[0], place[1:]
@@ -196,7 +169,7 @@ def _with(part: Any, place: Sequence[str | int], value: Any) -> Any:
 
 
 def rewritten(text: str, scene: Scene, edits: Iterable[Edit]) -> str:
-    """Text of a scene after `edits`; `scene` is what the text describes.
+    """Return the text of a scene after `edits`; `scene` is what the text describes.
 
     Where blocks share their text (YAML aliases) an edit of one would change the other too: then the result is written anew,
     without comments.
@@ -214,29 +187,12 @@ def rewritten(text: str, scene: Scene, edits: Iterable[Edit]) -> str:
 
 
 def anew(scene: Scene) -> str:
-    """A scene as a file without comments."""
+    """Return a scene as a file without comments."""
     return text_of(scene.model_dump(mode="json", exclude_none=True))
 
 
-def text_of(document: Mapping[str, Any]) -> str:
-    """A scene file with these keys; UsageError if a value is none that YAML has."""
-    try:
-        return with_end_mark(whole_text(_plain(document)))
-    except YAMLError as error:
-        raise UsageError(f"scene: {str(error).splitlines()[0]}. Give texts, numbers, lists and dicts only.") from None
-
-
-def _plain(value: Any) -> Any:
-    """Values of NumPy as Python's, tuples as lists."""
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return _plain(value.tolist()) if hasattr(value, "tolist") else value
-
-
 def changed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
-    """The scene with other values, checked as a file is: parameters by name, ``payload``, keys at the top of a scene file.
+    """Return the scene with other values, checked as a file is: parameters, ``payload``, keys at the top of a scene file.
 
     Raises
     ------
@@ -262,6 +218,6 @@ def changed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
 
 
 def loaded(scene: Scene, payload: float, line_fill: float) -> Scene:
-    """The scene with that payload (kg) and line fill (kg/m); below 0 its own."""
+    """Return the scene with that payload (kg) and line fill (kg/m); below 0 its own."""
     loads = {"tip.payload": payload, "line_fill": line_fill}
     return with_parameters(scene, {name: value for name, value in loads.items() if value >= 0.0})

@@ -17,18 +17,18 @@ from ..errors import UsageError
 from ..kernels.elements.linkage import DIRECT, LINK_L, LINK_R, LINKAGE, angles_of_lengths, cylinder_length, link_angles
 from ..kernels.plane_algebra import turned
 from ..types import Array
-from .schema import Base, Joint, Scene, Section
+from .schema import Base, JointGeometry, Scene, Section
 
 MARGIN = math.radians(1.0)  # beyond range_deg: strokes at the ends, with their sensors' noise, still have an angle
 
 
 def linkage(scene: Scene, index: int) -> np.record:
-    """Geometry of joint `index` (0-based) as one record of `LINKAGE`."""
+    """Return the geometry of joint `index` (0-based) as one record of `LINKAGE`."""
     return linkage_of(scene.joints[index], scene.base, scene.sections[0])
 
 
-def linkage_of(joint: Joint, base: Base | None, first: Section | None) -> np.record:
-    """Geometry of a joint from its parts; kind A needs the base and the first section, the others neither."""
+def linkage_of(joint: JointGeometry, base: Base | None, first: Section | None) -> np.record:
+    """Return the geometry of a joint from its parts; kind A needs the base and the first section, the others neither."""
     row = np.zeros(1, LINKAGE).view(np.recarray)
     if joint.kind == "A":
         pin, pivot = base.cylinder_pin, base.pivot  # type: ignore[union-attr]
@@ -52,31 +52,21 @@ def linkage_of(joint: Joint, base: Base | None, first: Section | None) -> np.rec
 
 
 def stroke_curve(scene: Scene, index: int, angles: Array) -> Array:
-    """Strokes (m) of joint `index` at relative `angles` (rad), shape as `angles`; NaN where the links do not close."""
+    """Return strokes (m) of joint `index` at relative `angles` (rad), shape as `angles`; NaN where the links do not close."""
     row, closed = linkage(scene, index), scene.joints[index].cylinder.closed_length
     with np.errstate(invalid="ignore"):
         return np.asarray(cylinder_length(row, np.atleast_1d(angles))[0] - closed)
 
 
 def transmission_angles(row: np.record, angles: Array) -> Array:
-    """Angles (rad, 0 to pi/2) at which the links of a six-bar meet in Q, 0 at a dead centre; NaN where they do not meet."""
+    """Return the angles (rad, 0 to pi/2) of the links of a six-bar in Q, 0 at a dead centre; NaN where they do not meet."""
     with np.errstate(invalid="ignore"):
         left, right = link_angles(row, angles)
         return np.asarray(np.abs(np.arcsin(np.sin(left - right))))
 
 
-def levers_and_transmission(scene: Scene, index: int, samples: int) -> tuple[float, float, float | None]:
-    """Least and greatest lever ds/dphi (m) over the range of joint `index`; least transmission angle (rad) of a six-bar."""
-    row, angles = linkage(scene, index), np.radians(np.linspace(*scene.joints[index].range_deg, samples))
-    with np.errstate(invalid="ignore"):
-        levers = np.abs(cylinder_length(row, angles)[1])
-    direct = scene.joints[index].kind == "A"
-    least = None if direct else float(np.nanmin(transmission_angles(row, angles)))
-    return float(np.nanmin(levers)), float(np.nanmax(levers)), least
-
-
 def stroke_range(scene: Scene, index: int, samples: int) -> tuple[float, float]:
-    """Least and greatest stroke (m) of joint `index` at `samples` angles of its range, within the cylinder's travel.
+    """Return the least and greatest stroke (m) of joint `index` at `samples` angles of its range, within the cylinder's travel.
 
     The least is above the greatest where the range and the travel have nothing in common.
     """
@@ -157,7 +147,7 @@ def joint_angles_of_strokes(
 
 
 def gravity_in_base(scene: Scene) -> Array:
-    """Gravity (m/s^2), shape (2,), in the axes of the base, which an inclination turns."""
+    """Return gravity (m/s^2), shape (2,), in the axes of the base, which an inclination turns."""
     gx, gy = scene.gravity
     c, s = math.cos(scene.base.inclination), math.sin(scene.base.inclination)
     return np.array([c * gx + s * gy, c * gy - s * gx])
@@ -181,7 +171,7 @@ class PassiveJoints:
         self.names = tuple(name.format(i) for i, own in enumerate(kinds, start=1) for name in own)
 
     def positions(self, angles: Array) -> list[float]:
-        """Angles (rad, from -pi to pi) in the order of `names`, at relative joint `angles` (rad), shape (n,).
+        """Return the angles (rad, from -pi to pi) in the order of `names`, at relative joint `angles` (rad), shape (n,).
 
         A barrel and link L are measured in the section before (the base for joint 1), link R in its own section. NaN where
         the links do not close.
@@ -194,7 +184,7 @@ class PassiveJoints:
 
 
 def _plain(row: np.record) -> SimpleNamespace:
-    """The fields of a record as Python numbers, which cost a tenth to read."""
+    """Return the fields of a record as Python numbers, which cost a tenth to read."""
     return SimpleNamespace(**{name: row[name].item() for name in LINKAGE.names or ()})
 
 
@@ -241,33 +231,26 @@ class JointPins:
 
 @dataclass(frozen=True)
 class Skeleton:
-    """An undeformed boom of n sections.
-
-    Attributes
-    ----------
-    headings : ndarray, shape (n,)
-        Orientation of every section, rad.
-    pivots : ndarray, shape (n + 1, 2)
-        Inboard pivots, then the tip, m.
-    joints : tuple of JointPins
-    """
+    """An undeformed boom of n sections."""
 
     headings: Array
+    """Orientation of every section, rad, shape (n,)."""
     pivots: Array
+    """Inboard pivots, then the tip, m, shape (n + 1, 2)."""
     joints: tuple[JointPins, ...]
 
     def point(self, section: int, x: float, y: float = 0.0) -> Array:
-        """A point given in the axes of `section` (0-based), m, in the model frame."""
+        """Return a point given in the axes of `section` (0-based), m, in the model frame."""
         return placed(self.pivots[section], float(self.headings[section]), (x, y))
 
 
 def placed(origin: Array, heading: float, point: tuple[float, float]) -> Array:
-    """`point` of a frame at `origin` turned by `heading` (rad), shape (2,)."""
+    """Return `point` of a frame at `origin` turned by `heading` (rad), shape (2,)."""
     return np.asarray(origin + np.array(turned(heading, point[0], point[1])))
 
 
 def rigid_chain(pivot: Array, lengths: Array, angles: Array) -> tuple[Array, Array]:
-    """Headings (.., n) in rad, and pivots and tip (.., n + 1, 2) in m, of rigid sections at relative joint `angles` (rad).
+    """Return headings (.., n) in rad, pivots and tip (.., n + 1, 2) in m, of rigid sections at relative joint `angles` (rad).
 
     `angles` have shape (.., n); the first `pivot` (2,) in m; `lengths` (n,) of the sections, m.
     """
@@ -277,7 +260,7 @@ def rigid_chain(pivot: Array, lengths: Array, angles: Array) -> tuple[Array, Arr
 
 
 def skeleton(scene: Scene, angles: Array) -> Skeleton:
-    """Pins of the undeformed boom at relative joint `angles` (rad), shape (n,)."""
+    """Return the pins of the undeformed boom at relative joint `angles` (rad), shape (n,)."""
     headings, pivots = rigid_chain(np.array(scene.base.pivot), np.array([s.length for s in scene.sections]), angles)
     joints = tuple(_pins(scene, i, pivots[i], headings) for i in range(len(headings)))
     return Skeleton(headings, pivots, joints)

@@ -7,10 +7,10 @@ from itertools import combinations
 
 import numpy as np
 
-from ..kernels.elements.linkage import LINK_L, link_angles
+from ..kernels.elements.linkage import LINK_L, cylinder_length, link_angles
 from ..kernels.plane_algebra import turned
 from ..types import Array
-from .kinematics import levers_and_transmission, linkage
+from .kinematics import linkage, transmission_angles
 from .schema import Scene, section_depth
 
 PIN = 0.5  # diameter of a pin over the bore
@@ -30,43 +30,37 @@ class Nearest:
 
 @dataclass(frozen=True)
 class LinkageAccount:
-    """A joint over its range.
-
-    Attributes
-    ----------
-    lever : tuple of float
-        Least and greatest ds/dphi, m.
-    transmission_deg : float or None
-        Least angle between the links; None for kind A.
-    nearest : Nearest or None
-        Of the pins that move against each other; None for kind A.
-    over_pivot : tuple of str
-        What runs over the pivot's pin, with the angle where it is in the middle of it: ``link L at -142 deg``.
-    """
+    """A joint over its range."""
 
     lever: tuple[float, float]
+    """Least and greatest ds/dphi, m."""
     transmission_deg: float | None
+    """Least angle between the links; None for kind A."""
     nearest: Nearest | None
+    """Nearest of the pins that move against each other; None for kind A."""
     over_pivot: tuple[str, ...]
+    """What runs over the pivot's pin, with the angle where it is in the middle of it: ``link L at -142 deg``."""
 
 
 def linkage_account(scene: Scene, i: int) -> LinkageAccount:
-    """Joint `i` (0-based) of a scene over its range."""
-    least, greatest, between = levers_and_transmission(scene, i, STEPS)
-    degrees = np.linspace(*scene.joints[i].range_deg, STEPS)
+    """Return what joint `i` (0-based) of a scene does over its range."""
+    row, degrees = linkage(scene, i), np.linspace(*scene.joints[i].range_deg, STEPS)
     pins = joint_pins(scene, i, np.radians(degrees))
-    transmission = None if between is None else float(np.degrees(between))
-    return LinkageAccount((least, greatest), transmission, nearest_pins(pins, degrees), _over_pivot(scene, i, pins, degrees))
+    with np.errstate(invalid="ignore"):
+        levers = np.abs(cylinder_length(row, np.radians(degrees))[1])
+    between = float(np.degrees(np.nanmin(transmission_angles(row, np.radians(degrees))))) if i else None
+    lever = float(np.nanmin(levers)), float(np.nanmax(levers))
+    return LinkageAccount(lever, between, nearest_pins(pins, degrees), _over_pivot(scene, i, pins, degrees))
 
 
 def pin_diameter(scene: Scene, i: int) -> float:
-    """Diameter (m) that the pins of joint `i` (0-based) are taken to have: half the bore, which without `oil` is guessed."""
+    """Return the assumed diameter (m) of the pins of joint `i` (0-based): half the bore, which is guessed without `oil`."""
     oil = scene.joints[i].cylinder.oil
     return PIN * (BORE * section_depth(scene, i) if oil is None else oil.bore)
 
 
 def joint_pins(scene: Scene, i: int, phi: Array) -> dict[str, Array]:
-    """Pins of joint `i` (0-based) by name at angles `phi` (rad), in the axes of its carrier from the pivot, as x + iy, m.
+    """Return the pins of joint `i` (0-based) by name at angles `phi` (rad), as x + iy (m) from the pivot in its carrier's axes.
 
     The rod pin is ``Q`` in kind B1, ``R`` in the other six-bars, ``rod_pin`` in kind A. NaN where the links do not meet.
     """
@@ -91,7 +85,7 @@ def rod_pin_of(pins: dict[str, Array]) -> str:
 
 
 def nearest_pins(pins: dict[str, Array], degrees: Array) -> Nearest | None:
-    """The two pins of a six-bar that come closest; None for kind A, whose pins are its measures."""
+    """Return the two pins of a six-bar that come closest; None for kind A, whose pins are its measures."""
     if "Q" not in pins:
         return None
     found = []
@@ -103,7 +97,7 @@ def nearest_pins(pins: dict[str, Array], degrees: Array) -> Nearest | None:
 
 
 def distances_to(point: Array, start: Array, end: Array) -> tuple[Array, Array]:
-    """Distance (m) of points from the line between two others, and where on it (0 to 1) that is; all x + iy, shape (m,)."""
+    """Return the distance (m) of points from the line between two others, and where on it (0 to 1) that is; all x + iy."""
     along = end - start
     place = np.clip(((point - start) * along.conj()).real / np.abs(along) ** 2, 0.0, 1.0)
     return np.abs(point - start - place * along), place

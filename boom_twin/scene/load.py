@@ -3,49 +3,45 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import Fault, SceneError, SceneWarning
-from .block_reader import validated
+from ..config.yaml_text import Document, Place
+from ..errors import Fault, SceneError, SceneWarning, UsageError
+from .block_reader import inner_block, validated
 from .checks import (
-    clearance,
-    cross_sections,
-    cylinder_clearance,
-    geometry,
+    joint_clearance,
     joint_range,
-    pin_spacing,
-    rigid_bodies,
+    parts,
+    pins,
     stretched_boom,
     values,
 )
-from .checks.findings import Draft, Finding
-from .format import SCENE
-from .glossary import BLOCKS
+from .checks.draft import Draft, Findings
 from .schema import Scene
-from .yaml_reader import Document, Place, missing_end_mark, parse, read_text
+from .yaml_reader import missing_end_mark, parse, read_text, text_of
 
 
 def structure(document: Document) -> tuple[Scene | None, Draft, list[Fault]]:
-    """The scene if every value is good by itself, else None; what is usable of it; and all faults of single values."""
-    read = validated(document, SCENE)
+    """Return the scene (None if a value is not good by itself), what is usable of it, and all faults of single values."""
+    read = validated(document, Scene)
     deep = (("sections",), ("joints",), ("postures",))
     broken = {place[:2] if place[:1] in deep else place[:1] for place in read.broken}
     return read.block, _draft(document, read.known, broken), list(read.faults)
 
 
 def _draft(document: Document, known: Any, broken: set[Place]) -> Draft:
-    """The usable parts of `known`: everything that is neither in `broken` nor inside it."""
+    """Return the usable parts of `known`: everything that is neither in `broken` nor inside it."""
     if not isinstance(known, dict):
         return Draft(document)
     usable = {key: value for key, value in known.items() if (key,) not in broken}
     blocks: dict[str, Any] = {}
     for key, value in usable.items():
-        model = BLOCKS[Scene].get(key)
+        model = inner_block(Scene, key)
         if key in ("sections", "joints") and model is not None:
             items = enumerate(value)
             blocks[key] = tuple(None if (key, i) in broken else model.model_validate(v, strict=True) for i, v in items)
@@ -56,27 +52,27 @@ def _draft(document: Document, known: Any, broken: set[Place]) -> Draft:
     return Draft(document, **blocks)
 
 
-CHECKS: tuple[Callable[[Draft], Iterator[Finding]], ...] = (
+CHECKS: tuple[Callable[[Draft], Findings], ...] = (
     values.counts,
     values.sections,
     values.modes,
     values.joints,
-    geometry.pins,
-    geometry.thin_parts,
-    geometry.centres,
-    clearance.pins,
+    pins.placed_pins,
+    pins.thin_parts,
+    pins.centres,
+    pins.worn_pins,
     joint_range.joints,
     values.suspects,
 )
 
 
-PLAUSIBILITY: tuple[Callable[[Draft, Scene], Iterator[Finding]], ...] = (
-    cross_sections.material,
-    cross_sections.beams,
-    rigid_bodies.rigid_parts,
-    rigid_bodies.moving_parts,
-    cylinder_clearance.clear_cylinders,
-    pin_spacing.spaced_pins,
+PLAUSIBILITY: tuple[Callable[[Draft, Scene], Findings], ...] = (
+    parts.material,
+    parts.beams,
+    parts.rigid_parts,
+    parts.moving_parts,
+    joint_clearance.clear_cylinders,
+    joint_clearance.spaced_pins,
 )
 """Of a scene without faults: parts against each other."""
 
@@ -85,22 +81,22 @@ DEFAULT_NAME = "default scene"
 
 
 def default_text() -> str:
-    """Text of the package's default scene."""
+    """Return the text of the package's default scene."""
     return _text("msg_config", "scene.yaml")
 
 
 def clearance_text() -> str:
-    """Text of the package's block `clearance`, which can follow the default scene."""
+    """Return the text of the package's block `clearance`, which can follow the default scene."""
     return _text("msg_config", "clearance.yaml")
 
 
 def example_names() -> tuple[str, ...]:
-    """Names of the package's example scenes."""
+    """Return the names of the package's example scenes."""
     return tuple(sorted(file.name.removesuffix(".yaml") for file in (files("boom_twin") / "examples").iterdir()))
 
 
 def example_text(name: str) -> str:
-    """Text of one of the package's example scenes."""
+    """Return the text of one of the package's example scenes."""
     return _text("examples", f"{name}.yaml")
 
 
@@ -109,7 +105,7 @@ def _text(folder: str, name: str) -> str:
 
 
 def load_scene(source: str | Path | Mapping[str, Any] | None = None) -> Scene:
-    """A boom as its scene file describes it.
+    """Load a boom as its scene file describes it.
 
     Parameters
     ----------
@@ -131,16 +127,26 @@ def load_scene(source: str | Path | Mapping[str, Any] | None = None) -> Scene:
     SceneWarning
         One for each thing that can be computed but looks odd.
     """
-    scene, oddities = _examine_values(source) if isinstance(source, Mapping) else examine(source)
+    if isinstance(source, Mapping):
+        scene, oddities = examine_text(text_of(source), "mapping")
+    else:
+        scene, oddities = examine(source)
     for oddity in oddities:
         warnings.warn(str(oddity), SceneWarning, stacklevel=2)
     return scene
 
 
-def _examine_values(values: Mapping[str, Any]) -> tuple[Scene, list[Fault]]:
-    from .edit import text_of  # which reads scenes itself
+SceneSource = Scene | Mapping[str, Any] | str | Path | None
+"""Forms in which functions accept a boom; a mapping has the keys of a scene file."""
 
-    return examine_text(text_of(values), "mapping")
+
+def as_scene(source: SceneSource) -> Scene:
+    """Return the scene that `source` is, names or describes, see `load_scene`. UsageError if it is none of `SceneSource`."""
+    if isinstance(source, Scene):
+        return source
+    if source is None or isinstance(source, str | Path | Mapping):
+        return load_scene(source)
+    raise UsageError(f"scene = {source!r}: give a Scene, the path of a scene file, a dict with its keys, or None.")
 
 
 def examine(source: str | Path | None = None) -> tuple[Scene, list[Fault]]:
@@ -152,39 +158,31 @@ def examine(source: str | Path | None = None) -> tuple[Scene, list[Fault]]:
 
 def examine_text(text: str, name: str, whole: bool = False) -> tuple[Scene, list[Fault]]:
     """Load a scene from its text like `examine`; `name`: its name in errors; `whole`: a checksum says it is not cut off."""
-    cut, unmarked = (None, None) if whole else missing_end_mark(text)
-    if cut is not None:
-        raise SceneError(name, (cut,))
+    mark = None if whole else missing_end_mark(text)
+    if mark is not None and mark.kind == "fault":
+        raise SceneError(name, (mark,))
     document = parse(text, name)
     scene, draft, faults = structure(document)
     with np.errstate(all="ignore"):  # what overflows fits nowhere, and the checks say so
         findings = [finding for check in CHECKS for finding in check(draft)]
-        if scene is not None and not faults and all(finding.odd for finding in findings):
+        if scene is not None and not faults and all(finding.kind != "fault" for finding in findings):
             findings += _implausible(draft, scene, findings)
-    faults += document.faults + [finding.fault for finding in findings if not finding.odd]
-    odd = [finding.fault for finding in findings if finding.odd]
-    oddities = _in_order(odd if unmarked is None else [*odd, unmarked])
-    if faults or scene is None:
-        raise SceneError(name, tuple(_in_order(faults)), tuple(oddities))
+    findings = sorted([*faults, *document.faults, *findings, *filter(None, [mark])], key=lambda finding: finding.line or 0)
+    oddities = [finding for finding in findings if finding.kind != "fault"]
+    if scene is None or len(oddities) < len(findings):
+        raise SceneError(name, tuple(finding for finding in findings if finding.kind == "fault"), tuple(oddities))
     return scene, oddities
 
 
-def _implausible(draft: Draft, scene: Scene, findings: list[Finding]) -> list[Finding]:
+def _implausible(draft: Draft, scene: Scene, findings: list[Fault]) -> list[Fault]:
     """Return warnings of values that do not fit together, none for a block that has a finding already."""
-    more: list[Finding] = []
-    told = {_block(finding) for finding in findings}
+    more: list[Fault] = []
     for check in PLAUSIBILITY:
-        new = [finding for finding in check(draft, scene) if _block(finding) not in told]
-        told |= {_block(finding) for finding in new}
-        more += new
-    return more + stretched_boom.stretched_boom(draft, scene, [finding.fault.path for finding in (*findings, *more)])
+        told = {_block(finding) for finding in (*findings, *more)}
+        more += [finding for finding in check(draft, scene) if _block(finding) not in told]
+    return more + stretched_boom.stretched_boom(draft, scene, [finding.path for finding in (*findings, *more)])
 
 
-def _block(finding: Finding) -> str:
-    """``sections[1]`` of ``sections[1].root.mass``."""
-    return finding.fault.path.partition(".")[0]
-
-
-def _in_order(faults: Iterable[Fault]) -> list[Fault]:
-    """Sorted by their lines in the file."""
-    return sorted(faults, key=lambda fault: fault.line or 0)
+def _block(finding: Fault) -> str:
+    """Return ``sections[1]`` of ``sections[1].root.mass``."""
+    return finding.path.partition(".")[0]

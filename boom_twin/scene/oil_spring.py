@@ -21,7 +21,7 @@ STATIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def oil_record(cylinder: Cylinder) -> np.record:
-    """Oil and chambers of a cylinder with `oil`, as one record of `OIL`."""
+    """Return the oil and chambers of a cylinder with `oil`, as one record of `OIL`."""
     oil = cylinder.oil
     assert oil is not None
     row = np.zeros(1, OIL).view(np.recarray)
@@ -32,7 +32,7 @@ def oil_record(cylinder: Cylinder) -> np.record:
 
 
 def stiffness(cylinder: Cylinder, stroke: float) -> float:
-    """k (N/m) at a stroke (m); infinite where the cylinder is incompressible."""
+    """Return k (N/m) at a stroke (m); infinite where the cylinder is incompressible."""
     if cylinder.oil is None:
         return math.inf if cylinder.k is None else cylinder.k
     compliance = float(oil_compliance(oil_record(cylinder), stroke))
@@ -40,10 +40,10 @@ def stiffness(cylinder: Cylinder, stroke: float) -> float:
 
 
 def middle_stiffness(cylinder: Cylinder) -> float:
-    """k (N/m) in the middle of the stroke."""
+    """Return k (N/m) in the middle of the stroke."""
     return stiffness(cylinder, 0.5 * cylinder.max_stroke)
 
 
 def stiffness_over_stroke(cylinder: Cylinder) -> tuple[float, ...]:
-    """k (N/m) at each of `STATIONS`."""
+    """Return k (N/m) at each of `STATIONS`."""
     return tuple(stiffness(cylinder, share * cylinder.max_stroke) for share in STATIONS)

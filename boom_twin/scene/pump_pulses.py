@@ -16,17 +16,17 @@ CHANGE_OVER = 0.1
 
 
 def ease(x: Array) -> Array:
-    """Quintic from 0 to 1 over x in [0, 1] with zero rate and acceleration at both ends."""
+    """Ease from 0 to 1 over x in [0, 1] by a quintic with zero rate and acceleration at both ends."""
     x = np.clip(x, 0.0, 1.0)
     return np.asarray(x**3 * (10.0 - 15.0 * x + 6.0 * x**2))
 
 
 def pump_pulses(times: Array, frequency: float, change_over: float = CHANGE_OVER) -> Array:
-    """Share of the full force at `times` (m,), in s from the first pulse: pulses of `frequency` (Hz), none before."""
+    """Return share of the full force at `times` (m,), in s from the first pulse: pulses of `frequency` (Hz), none before."""
     into = np.maximum(times, 0.0) % (1.0 / frequency)
     return np.asarray(ease(into / change_over) - ease((into - 0.5 / frequency) / change_over))
 
 
 def upward(inclination: float) -> Array:
-    """Unit vector (2,) of the vertical in the axes of a base that is inclined so (rad)."""
+    """Return the unit vector (2,) of the vertical in the axes of a base that is inclined so (rad)."""
     return np.array([math.sin(inclination), math.cos(inclination)])

@@ -1,6 +1,7 @@
-"""The scene schema: every part of a boom as a validated pydantic model, with the unit and the bounds of each value.
+"""The scene schema: every part of a boom as a validated pydantic model, with meaning, unit and bounds of each value.
 
-Frames, signs and the meaning of every point are told in the comments of the default scene (``boom_twin scene``).
+Frames, signs and the meaning of every point are told in the comments of the default scene (``boom_twin scene``). Error messages
+quote the descriptions of the fields. A number with another unit is converted to the unit that the description states.
 All values are SI. ``None`` means "not named, therefore not in the model".
 """
 
@@ -21,13 +22,19 @@ Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
 Point = tuple[Finite, Finite]
 Modes = Annotated[int, Field(ge=0, le=10)]
+Mass = Annotated[NotNegative, Field(description="the mass in kg")]
+Inertia = Annotated[NotNegative, Field(description="the inertia about the centre of mass in kg m^2")]
 
+_LAWS = tuple(LAWS)
 if TYPE_CHECKING:
     LawName = str
 else:
-    LawName = Literal[tuple(LAWS)]  # pydantic refuses any other, and names them
+    LawName = Literal[_LAWS]  # pydantic refuses any other, and names them
 
 IDEAL_BELOW = 1e-6  # m; a pin with less radial clearance is taken for ideal
+MODES = "the number of bending coordinates per flexible part: a whole number from 0 to 10"
+AXIAL = "true or false, whether flexible parts stretch"
+GEOMETRIC = "true or false, whether flexible parts have geometric stiffness"
 
 
 class Part(BaseModel):
@@ -37,52 +44,53 @@ class Part(BaseModel):
 
 
 class Material(Part):
-    """E (Pa), Poisson's ratio, density (kg/m^3)."""
+    """Material of a boom or of a bush."""
 
-    name: str = "steel"
-    E: Positive
-    nu: Annotated[float, Field(gt=-1, le=0.5)] = 0.3
-    rho: Positive | None = None
+    name: str = Field(default="steel", description="text")
+    E: Positive = Field(description="Young's modulus in Pa, 2.06e11 for steel")
+    nu: float = Field(default=0.3, gt=-1, le=0.5, description="Poisson's ratio, above -1 and at most 0.5")
+    rho: Positive | None = Field(default=None, description="the density in kg/m^3")
 
 
 class Base(Part):
-    """Pivot of section 1, barrel pin of cylinder 1 (m); inclination (rad) turns the base anticlockwise."""
+    """Base of the boom; an inclination turns it anticlockwise."""
 
-    pivot: Point
-    cylinder_pin: Point
-    inclination: Finite = 0.0
+    pivot: Point = Field(description="[x, y] of the pin of section 1, m")
+    cylinder_pin: Point = Field(description="[x, y] of the barrel pin of cylinder 1, m")
+    inclination: Finite = Field(default=0.0, description="the turn of the base, rad")
 
 
 class RigidPart(Part):
-    """Mass (kg), centre in the axes of its section (m), inertia about that centre (kg m^2)."""
+    """Rigid end of a section, or the whole of a rigid section."""
 
-    mass: NotNegative
-    com: Point
-    inertia: NotNegative
+    mass: Mass
+    com: Point = Field(description="[x, y] of the centre of mass in the axes of the section, m")
+    inertia: Inertia
 
 
 class Section(Part):
-    """One boom section, pivot to pivot; lengths in m from the inboard pivot.
+    """One boom section, pivot to pivot.
 
-    ``beam`` = (x0, x1) bounds the flexible part; A (m^2), I (m^4), rho_A (kg/m), rho_I (kg m), beta (s). ``height`` is the
-    outer height of the box: no part of the model, but stresses and checks need it. ``modes``, ``axial`` and ``geometric`` take
-    the boom's where the section does not name them.
+    ``height`` is no part of the model, but stresses and checks need it. ``modes``, ``axial`` and ``geometric`` take the boom's
+    where the section does not name them.
     """
 
-    length: Positive
-    beam: tuple[Finite, Finite] | None = None
-    A: Positive | None = None
-    I: Positive | None = None  # noqa: E741 - the field's symbol, and the contract's key
-    rho_A: Positive | None = None
-    rho_I: NotNegative | None = None
-    beta: NotNegative | None = None
-    height: Positive | None = None
-    modes: Modes | None = None
-    axial: bool | None = None
-    geometric: bool | None = None
-    root: RigidPart | None = None
-    head: RigidPart | None = None
-    rod_pin: Point | None = None
+    length: Positive = Field(description="the length from pivot to pivot, m")
+    beam: tuple[Finite, Finite] | None = Field(
+        default=None, description="[x0, x1] of the flexible part, m from the inboard pivot"
+    )
+    A: Positive | None = Field(default=None, description="the area of the cross-section, m^2")
+    I: Positive | None = Field(default=None, description="the second moment of area, m^4")  # noqa: E741 - the contract's key
+    rho_A: Positive | None = Field(default=None, description="the mass per metre, kg/m")
+    rho_I: NotNegative | None = Field(default=None, description="the rotary inertia per metre, kg m")
+    beta: NotNegative | None = Field(default=None, description="the stiffness-proportional damping, s")
+    height: Positive | None = Field(default=None, description="the outer height of the box, m")
+    modes: Modes | None = Field(default=None, description=MODES)
+    axial: bool | None = Field(default=None, description=AXIAL)
+    geometric: bool | None = Field(default=None, description=GEOMETRIC)
+    root: RigidPart | None = Field(default=None, description="a block with mass, com, inertia of the rigid inboard part")
+    head: RigidPart | None = Field(default=None, description="a block with mass, com, inertia of the rigid outboard part")
+    rod_pin: Point | None = Field(default=None, description="[x, y] of the rod pin of cylinder 1, m")
 
     @property
     def section_modulus(self) -> float | None:
@@ -91,26 +99,30 @@ class Section(Part):
 
 
 class CylinderPart(Part):
-    """Barrel or rod: mass (kg), inertia about its own centre (kg m^2), distance of that centre from its pin (m)."""
+    """Barrel or rod of a cylinder."""
 
-    mass: NotNegative
-    inertia: NotNegative
-    com: NotNegative
+    mass: Mass
+    inertia: Inertia
+    com: NotNegative = Field(description="the distance of the centre of mass from the part's pin, m")
 
 
-Bore = Annotated[float, Field(ge=1e-3, le=1.0, allow_inf_nan=False)]
-BulkModulus = Annotated[float, Field(ge=1e7, le=1e11)]
-"""Diameter of a piston, m. One of more than 1 m is in no boom: it was given in mm."""
+Bore = Annotated[float, Field(ge=1e-3, le=1.0, allow_inf_nan=False, description="the diameter of the piston, m")]
+"""Diameter of a piston. One of more than 1 m is in no boom: it was given in mm."""
+Rod = Annotated[Positive, Field(description="the diameter of the rod, m")]
+OIL_MODULUS = "the bulk modulus of the oil in Pa, 1.4e9 to 1.7e9; less with air in it"
+BulkModulus = Annotated[float, Field(ge=1e7, le=1e11, description=OIL_MODULUS)]
+CAP_LINE = "the oil between piston and valve on the cap side at stroke 0, m^3"
+ROD_LINE = "the oil between piston and valve on the rod side at max_stroke, m^3"
 
 
 class Oil(Part):
-    """Oil shut in both chambers: diameters of piston and rod (m), bulk modulus (Pa), oil in the lines of each side (m^3)."""
+    """Oil shut in both chambers of a cylinder."""
 
     bore: Bore
-    rod: Positive
+    rod: Rod
     bulk_modulus: BulkModulus
-    cap_line: NotNegative
-    rod_line: NotNegative
+    cap_line: NotNegative = Field(description=CAP_LINE)
+    rod_line: NotNegative = Field(description=ROD_LINE)
 
     @property
     def cap_area(self) -> float:
@@ -124,18 +136,18 @@ class Oil(Part):
 
 
 class Cylinder(Part):
-    """Drive with oil spring and damper d (N s/m); lengths in m.
+    """Drive with oil spring and damper.
 
-    The spring is a number k (N/m), or follows from `oil` over the stroke; neither means incompressible.
+    The spring is a number `k`, or follows from `oil` over the stroke; neither means incompressible.
     """
 
-    k: Positive | None = None
-    oil: Oil | None = None
-    d: NotNegative | None = None
-    closed_length: Positive
-    max_stroke: Positive
-    barrel: CylinderPart | None = None
-    rod: CylinderPart | None = None
+    k: Positive | None = Field(default=None, description="the stiffness of the oil spring, N/m")
+    oil: Oil | None = Field(default=None, description="a block with bore, rod, bulk_modulus, cap_line, rod_line, instead of k")
+    d: NotNegative | None = Field(default=None, description="the viscous damping, N s/m")
+    closed_length: Positive = Field(description="the length from pin to pin at stroke 0, m")
+    max_stroke: Positive = Field(description="the largest stroke, m")
+    barrel: CylinderPart | None = Field(default=None, description="a block with mass, inertia, com")
+    rod: CylinderPart | None = Field(default=None, description="a block with mass, inertia, com")
 
     @property
     def is_compressible(self) -> bool:
@@ -143,26 +155,27 @@ class Cylinder(Part):
         return self.k is not None or self.oil is not None
 
 
-class Joint(Part):
-    """Joint that turns one section: kind A (slider-crank), B1, B2 or B3 (six-bar).
+class JointGeometry(Part):
+    """Pins, links and range of a joint that turns one section: kind A (slider-crank), B1, B2 or B3 (six-bar).
 
-    C, D relative to the outboard pivot of the section before, E to the pivot of its own section (m); link lengths
-    lL, lR (m) and masses mL, mR (kg); R places the rod pin on a link (B2, B3). ``range_deg`` is in degrees. ``side`` of D->E on
-    which the links meet, seen from D to E; not named: left.
+    ``side`` of D->E is seen from D to E; not named: left.
     """
 
-    kind: Literal["A", "B1", "B2", "B3"]
-    range_deg: tuple[Finite, Finite]
-    C: Point | None = None
-    D: Point | None = None
-    E: Point | None = None
-    side: Literal["left", "right"] | None = None
-    lL: Positive | None = None
-    lR: Positive | None = None
-    R: Point | None = None
-    mL: NotNegative | None = None
-    mR: NotNegative | None = None
-    cylinder: Cylinder
+    kind: Literal["A", "B1", "B2", "B3"] = Field(description="A, B1, B2 or B3")
+    range_deg: tuple[Finite, Finite] = Field(description="[low, high] of the relative joint angle, degrees")
+    C: Point | None = Field(
+        default=None, description="[x, y] of the barrel pin from the outboard pivot of the section before, m"
+    )
+    D: Point | None = Field(
+        default=None, description="[x, y] of the pivot of link L from the outboard pivot of the section before, m"
+    )
+    E: Point | None = Field(default=None, description="[x, y] of the pin of link R from the pivot of its own section, m")
+    side: Literal["left", "right"] | None = Field(default=None, description="left or right of D->E, where the links meet")
+    lL: Positive | None = Field(default=None, description="the length of link L, m")
+    lR: Positive | None = Field(default=None, description="the length of link R, m")
+    R: Point | None = Field(default=None, description="[along, left], the place of the rod pin on its link, m")
+    mL: NotNegative | None = Field(default=None, description="the mass of link L, kg")
+    mR: NotNegative | None = Field(default=None, description="the mass of link R, kg")
 
     @property
     def side_sign(self) -> float:
@@ -170,14 +183,28 @@ class Joint(Part):
         return -1.0 if self.side == "right" else 1.0
 
 
-class ContactLaw(Part):
-    """Contact of journal and bush: law, exponent, restitution, Coulomb friction; a bush of another material (E in Pa)."""
+class Joint(JointGeometry):
+    """Joint with its cylinder."""
 
-    law: LawName = "lankarani-nikravesh"
-    exponent: Annotated[float, Field(ge=1.3, le=3)] = 1.5
-    restitution: Annotated[float, Field(gt=0, le=1)] = 0.9
-    friction: Annotated[float, Field(ge=0, le=2)] = 0.0
-    bush: Material | None = None
+    cylinder: Cylinder = Field(description="a block with closed_length and max_stroke")
+
+    @property
+    def mass(self) -> float:
+        """Mass of links, barrel and rod, kg."""
+        parts = (self.cylinder.barrel, self.cylinder.rod)
+        return sum((part.mass for part in parts if part is not None), start=(self.mL or 0.0) + (self.mR or 0.0))
+
+
+class ContactLaw(Part):
+    """Contact of journal and bush."""
+
+    law: LawName = Field(default="lankarani-nikravesh", description=f"{', '.join(_LAWS[:-1])} or {_LAWS[-1]}")
+    exponent: float = Field(default=1.5, ge=1.3, le=3, description="the exponent of the penetration, 1.3 to 3; 1.5 for Hertz's")
+    restitution: float = Field(default=0.9, gt=0, le=1, description="the coefficient of restitution, above 0 and at most 1")
+    friction: float = Field(default=0.0, ge=0, le=2, description="Coulomb's coefficient of friction, 0 to 2")
+    bush: Material | None = Field(
+        default=None, description="a block with E (Pa) and nu of the bush, if it is not of the boom's material"
+    )
 
     @property
     def given_restitution(self) -> float:
@@ -186,50 +213,57 @@ class ContactLaw(Part):
 
 
 class Pin(Part):
-    """A pin with play: ``at`` names it, as in ``cylinder_1.rod``; radius of the journal and radial clearance, m."""
+    """A pin with play."""
 
-    at: str
-    pin_radius: Positive
-    radial_clearance: NotNegative
+    at: str = Field(
+        description="which pin: cylinder_i.rod, cylinder_i.barrel, joint_i.pivot, joint_i.link_L, joint_i.link_R or joint_i.Q"
+    )
+    pin_radius: Positive = Field(description="the radius of the pin, m")
+    radial_clearance: NotNegative = Field(description="the radius of the hole less that of the pin, m")
 
 
 class Clearance(Part):
-    """Pins that are not ideal, and whether they are real contact or springs and dampers linearised at their preload."""
+    """Pins that are not ideal: real contact, or springs and dampers linearised at their preload."""
 
-    treatment: Literal["contact", "spring-damper"] = "contact"
-    contact: ContactLaw = ContactLaw()
-    pins: tuple[Pin, ...] = ()
+    treatment: Literal["contact", "spring-damper"] = Field(default="contact", description="contact or spring-damper")
+    contact: ContactLaw = Field(default=ContactLaw(), description="a block with law, exponent, restitution, friction")
+    pins: tuple[Pin, ...] = Field(default=(), description="a list with one block per pin")
 
 
 class Tip(Part):
-    """Payload: a point mass at the outboard pivot of the last section (kg)."""
+    """Payload of the boom."""
 
-    payload: NotNegative | None = None
+    payload: NotNegative | None = Field(
+        default=None, description="the point mass at the outboard pivot of the last section, kg"
+    )
 
 
 class Scene(SummaryDisplay, Part):
-    """A whole boom with its base, its gravity (m/s^2) and its named postures (deg to the base's x axis).
+    """A whole boom with its base, its gravity and its named postures (angles to the base's x axis).
 
-    ``modes``: bending coordinates per flexible part. ``axial``: whether flexible parts stretch. ``geometric``: whether they
-    turn finitely, which gives them the stiffness of axial loads; else bending is linear.
+    ``geometric`` parts turn finitely, which gives them the stiffness of axial loads; else bending is linear.
     """
 
-    description: str = ""
-    gravity: Point
-    material: Material
-    base: Base
-    modes: Modes = 3
-    axial: bool = True
-    geometric: bool = True
-    sections: Annotated[tuple[Section, ...], Field(min_length=1)]
-    joints: Annotated[tuple[Joint, ...], Field(min_length=1)]
-    tip: Tip | None = None
-    line_fill: NotNegative | None = None
-    clearance: Clearance | None = None
-    postures: dict[str, tuple[Finite, ...]] = {}
+    description: str = Field(default="", description="text")
+    gravity: Point = Field(description="[x, y] in m/s^2, for example [0.0, -9.81]")
+    material: Material = Field(description="a block with E (Pa)")
+    base: Base = Field(description="a block with pivot and cylinder_pin")
+    modes: Modes = Field(default=3, description=MODES)
+    axial: bool = Field(default=True, description=AXIAL)
+    geometric: bool = Field(default=True, description=GEOMETRIC)
+    sections: tuple[Section, ...] = Field(min_length=1, description="a list with one block per section")
+    joints: tuple[Joint, ...] = Field(min_length=1, description="a list with one block per joint")
+    tip: Tip | None = Field(default=None, description="a block with payload (kg)")
+    line_fill: NotNegative | None = Field(default=None, description="the concrete in the pipe line, kg/m")
+    clearance: Clearance | None = Field(
+        default=None, description="a block with pins, and contact and treatment if they are not the usual ones"
+    )
+    postures: dict[str, tuple[Finite, ...]] = Field(
+        default={}, description="a block of names, each with a list of section angles in degrees"
+    )
 
     def with_(self, changes: Mapping[str, Any] | None = None, /, **named: Any) -> Scene:
-        """The scene with other values, checked as a scene file is: ``scene.with_(payload=40)``.
+        """Return the scene with other values, checked as a scene file is: ``scene.with_(payload=40)``.
 
         Parameters
         ----------
@@ -261,9 +295,14 @@ class Scene(SummaryDisplay, Part):
             "sections": f"{len(self.sections)}, {numbers([section.length for section in self.sections])} m",
             "joints": " + ".join(joint.kind for joint in self.joints),
             "reach": f"{self.reach:.4g} m",
-            "payload": f"{self.tip.payload if self.tip and self.tip.payload else 0:g} kg",
+            "payload": f"{self.payload:g} kg",
             "postures": ", ".join(self.postures) or "none",
         }
+
+    @property
+    def payload(self) -> float:
+        """Point mass at the tip, kg; 0 if the scene has none."""
+        return 0.0 if self.tip is None else self.tip.payload or 0.0
 
     @property
     def reach(self) -> float:
@@ -271,12 +310,12 @@ class Scene(SummaryDisplay, Part):
         return sum(section.length for section in self.sections)
 
     def pins_of(self, owner: str) -> tuple[Pin, ...]:
-        """Pins with clearance of ``cylinder_i`` or ``joint_i``, in the order in which the scene lists them."""
+        """Return the pins with clearance of ``cylinder_i`` or ``joint_i``, in the order in which the scene lists them."""
         pins = () if self.clearance is None else self.clearance.pins
         return tuple(pin for pin in pins if pin.at.split(".")[0] == owner and pin.radial_clearance >= IDEAL_BELOW)
 
     def modes_of(self, index: int) -> int:
-        """Bending coordinates per flexible part of section `index` (0-based)."""
+        """Return the bending coordinates per flexible part of section `index` (0-based)."""
         own = self.sections[index].modes
         return self.modes if own is None else own
 
@@ -300,7 +339,7 @@ SHARE = 0.05  # of its length, where a section has no A and I
 
 
 def section_depth(scene: Scene, i: int) -> float:
-    """Depth (m) to draw section `i` (0-based) with: its height, that of a box with its A and I, or a share of its length."""
+    """Return the depth (m) to draw section `i` (0-based) with: its height, else that of a box with its A and I."""
     section = scene.sections[i]
     if section.height is not None:
         return section.height

@@ -27,7 +27,7 @@ class Split:
 
 
 def splits(scene: Scene, index: int) -> tuple[Split, ...]:
-    """Splits of the beam of section `index` (0-based) from inboard to outboard; none for a rigid section."""
+    """Return the splits of the beam of section `index` (0-based) from inboard to outboard; none for a rigid section."""
     section = scene.sections[index]
     if section.beam is None or not scene.is_flexible(index):
         return ()
@@ -42,7 +42,7 @@ def splits(scene: Scene, index: int) -> tuple[Split, ...]:
 
 
 def flexible_parts(scene: Scene, index: int) -> tuple[tuple[float, float], ...]:
-    """Ends (m from the inboard pivot) of the flexible parts of section `index` (0-based), none for a rigid section."""
+    """Return ends (m from the inboard pivot) of the flexible parts of section `index` (0-based), none for a rigid section."""
     pieces = []
     for span in _cut_spans(scene):
         if span.section == index:
@@ -67,7 +67,7 @@ class _Span:
 
 
 def _cut_spans(scene: Scene) -> list[_Span]:
-    """All parts between pins, base to tip; the longest pieces cut until there are `LEAST`."""
+    """Return all parts between pins, base to tip; the longest pieces cut until there are `LEAST`."""
     spans = []
     for index, section in enumerate(scene.sections):
         if section.beam is not None and scene.is_flexible(index):

@@ -24,36 +24,23 @@ CELLS = 12  # of a beam
 
 @dataclass(frozen=True)
 class StraightBoom:
-    """A stretched-out boom of n sections with k modes.
-
-    Attributes
-    ----------
-    frequencies : ndarray, shape (k,)
-        Hz, ascending, at most n + 2 of them.
-    sections, joints : ndarray, shape (k, n)
-        Shares of strain energy: of bending by section, of oil by joint.
-    levers : ndarray, shape (n,)
-        Change of stroke by angle, m/rad.
-    moments : ndarray, shape (n,)
-        Of the weight of all that lies outboard about the pivots, N m.
-    mass : float
-        Of all that moves, kg.
-    """
+    """A stretched-out boom of n sections with k modes."""
 
     frequencies: Array
+    """Natural frequencies, Hz, ascending, at most n + 2 of them, shape (k,)."""
     sections: Array
     joints: Array
+    """Shares of strain energy: of bending by section, of oil by joint, shape (k, n)."""
     levers: Array
+    """Change of stroke by angle, m/rad, shape (n,)."""
     moments: Array
+    """Moments about the pivots of the weight of all that lies outboard, N m, shape (n,)."""
     mass: float
-
-    def damping_ratios(self, betas: Array, delays: Array) -> Array:
-        """Damping ratio of each mode, shape (k,), by `betas` of the sections and d/k of the cylinders, both (n,), in s."""
-        return np.asarray(np.pi * self.frequencies * (self.sections @ betas + self.joints @ delays))
+    """Mass of all that moves, kg."""
 
 
 def straight_boom(scene: Scene, stiffnesses: Array) -> StraightBoom:
-    """Estimate of the stretched-out boom; `stiffnesses` (n,) of the oil springs in N/m, infinite where there is none."""
+    """Estimate the stretched-out boom; `stiffnesses` (n,) of the oil springs in N/m, infinite where there is none."""
     with np.errstate(all="ignore"):  # of absurd values
         return _estimate(scene, stiffnesses)
 
@@ -61,7 +48,8 @@ def straight_boom(scene: Scene, stiffnesses: Array) -> StraightBoom:
 def _estimate(scene: Scene, stiffnesses: Array) -> StraightBoom:
     n = len(scene.sections)
     starts = np.concatenate([[0.0], np.cumsum([section.length for section in scene.sections])])
-    levers = np.array([_lever(scene, i) for i in range(n)])
+    angles = [np.clip(0.0, *np.radians(joint.range_deg)) for joint in scene.joints]
+    levers = np.nan_to_num([float(cylinder_length(linkage(scene, i), angle)[1]) for i, angle in enumerate(angles)])
     places, masses = _masses(scene, starts)
     at, owner, compliance = _springs(scene, starts, levers, stiffnesses)
     arms = np.maximum(places[None, :] - at[:, None], 0.0)
@@ -76,18 +64,11 @@ def _estimate(scene: Scene, stiffnesses: Array) -> StraightBoom:
     return StraightBoom(1.0 / (2.0 * np.pi * sizes[kept]), shares[:n].T, shares[n:].T, levers, moments, float(masses.sum()))
 
 
-def _lever(scene: Scene, i: int) -> float:
-    low, high = np.radians(scene.joints[i].range_deg)
-    return float(np.nan_to_num(cylinder_length(linkage(scene, i), min(max(0.0, low), high))[1]))
-
-
 def _masses(scene: Scene, starts: Array) -> tuple[Array, Array]:
-    """Places (m from the base pivot) and masses (kg) along the line; links and cylinders hang in the pivots."""
-    points = [(float(starts[-1]), scene.tip.payload or 0.0 if scene.tip is not None else 0.0)]
+    """Return the places (m from the base pivot) and masses (kg) along the line; links and cylinders hang in the pivots."""
+    points = [(float(starts[-1]), scene.payload)]
     for start, section, joint in zip(starts, scene.sections, scene.joints, strict=False):
-        cylinder = joint.cylinder
-        hung = [part.mass for part in (cylinder.barrel, cylinder.rod) if part is not None]
-        points.append((float(start), sum(hung) + (joint.mL or 0.0) + (joint.mR or 0.0)))
+        points.append((float(start), joint.mass))
         points += [(start + part.com[0], part.mass) for part in (section.root, section.head) if part is not None]
         points += _spread(start, (0.0, section.length), scene.line_fill or 0.0)
         points += _spread(start, section.beam or (0.0, 0.0), section.rho_A or 0.0)
@@ -100,12 +81,11 @@ def _spread(start: float, ends: tuple[float, float], density: float) -> list[tup
 
 
 def _cells(ends: tuple[float, float]) -> Array:
-    """Middles of the cells between two ends."""
     return np.asarray(ends[0] + (ends[1] - ends[0]) * (np.arange(CELLS) + 0.5) / CELLS)
 
 
 def _springs(scene: Scene, starts: Array, levers: Array, stiffnesses: Array) -> tuple[Array, NDArray[np.int64], Array]:
-    """Places (m), owners (section i, or n + joint i) and compliances (rad/(N m)) of all that bends or gives way."""
+    """Return the places (m), owners (section i, or n + joint i) and compliances (rad/(N m)) of all that bends or gives way."""
     n, found = len(scene.sections), []
     for i, section in enumerate(scene.sections):
         if section.beam is not None and section.I is not None and scene.is_flexible(i):

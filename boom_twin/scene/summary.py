@@ -21,10 +21,10 @@ class LeftOut:
 
 
 def left_out(scene: Scene) -> tuple[LeftOut, ...]:
-    """One entry per key that is absent somewhere, in the order sections, joints, the rest."""
+    """Return one entry per key that is absent somewhere, in the order sections, joints, the rest."""
     found = _absent("sections", [_absent_in_section(scene, i) for i in range(len(scene.sections))])
     found += _absent("joints", [_absent_in_joint(joint) for joint in scene.joints])
-    if scene.tip is None or not scene.tip.payload:
+    if not scene.payload:
         found.append(LeftOut("tip.payload", "no mass at the tip"))
     if not scene.line_fill:
         found.append(LeftOut("line_fill", "the pipe line is empty"))
@@ -73,7 +73,7 @@ def _absent_in_joint(joint: Joint) -> dict[str, str]:
 
 
 def _absent(block: str, items: list[dict[str, str]]) -> list[LeftOut]:
-    """One entry per key, for all items of a list that lack it: ``sections[1, 3].beta``."""
+    """Return one entry per key, for all items of a list that lack it: ``sections[1, 3].beta``."""
     keys = dict.fromkeys((key, meaning) for item in items for key, meaning in item.items())
     found = []
     for key, meaning in keys:
@@ -177,19 +177,19 @@ class Account:
 
 
 def weight_of(scene: Scene) -> float:
-    """Weight of a boom with its load, N."""
-    return explain(scene).mass * math.hypot(*scene.gravity)
+    """Return the weight of a boom with its load, N."""
+    sections = sum(_section(scene, i).mass for i in range(len(scene.sections)))
+    return (sections + sum(joint.mass for joint in scene.joints) + scene.payload) * math.hypot(*scene.gravity)
 
 
 def explain(scene: Scene) -> Account:
-    """Bookkeeping of the model that a scene describes."""
+    """Return the bookkeeping of the model that a scene describes."""
     numbers = range(len(scene.sections))
-    payload = scene.tip.payload if scene.tip is not None else None
     return Account(
         sections=tuple(_section(scene, i) for i in numbers),
         joints=tuple(_joint(scene, i) for i in numbers),
         pins=tuple(pin for i in numbers for owner in ("cylinder", "joint") for pin in scene.pins_of(f"{owner}_{i + 1}")),
-        payload=payload or 0.0,
+        payload=scene.payload,
         left_out=left_out(scene),
     )
 

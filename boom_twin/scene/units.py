@@ -24,52 +24,34 @@ _POWERS = str.maketrans({"²": "**2", "³": "**3", "⁴": "**4", "·": "*", "^":
 
 
 def unit_of(meaning: str) -> str | None:
-    """The unit that the meaning of a key states, for example ``kg m^2``; None for a pure number."""
+    """Return the unit that the meaning of a key states, for example ``kg m^2``; None for a pure number."""
     found = _STATED.search(meaning)
     return None if found is None else found[1]
 
 
 def converted(value: Any, unit: str | None) -> Any:
-    """`value` with every text in it that is a number with a fitting unit as a number in `unit`; all else as it is."""
-    if unit is None:
-        return value
+    """Return `value` with every text in it that is a number with a fitting unit as a number in `unit`; all else as it is."""
     if isinstance(value, tuple):
         return tuple(converted(item, unit) for item in value)
     if isinstance(value, dict):
         return {key: converted(item, unit) for key, item in value.items()}
-    if isinstance(value, str) and (found := _parts(value)) is not None:
-        number = _convert(*found, unit)
-        return value if isinstance(number, str) else number
-    return value
+    found = quantity(value, unit) if isinstance(value, str) else None
+    return found if isinstance(found, float) else value
 
 
-def misfit(text: str, unit: str | None) -> str | None:
-    """Return why a text that is a number with a unit cannot be a value in `unit`; None for any other text."""
-    found = _parts(text)
-    if found is None:
-        return None
-    if unit is None:
-        return f"a number without a unit is needed, and this one has `{found[1]}`"
-    reason = _convert(*found, unit)
-    return reason if isinstance(reason, str) else None
-
-
-def _parts(text: str) -> tuple[str, str] | None:
-    """Number and unit of a quantity; None for any other text."""
+def quantity(text: str, unit: str | None) -> float | str | None:
+    """Return a number with a unit as a number in `unit`, or why it cannot be one; None for any other text."""
     text = text.strip()
-    if len(text) > _LONGEST or NUMBER.fullmatch(text):  # e-3 could be a unit
+    if len(text) > _LONGEST or NUMBER.fullmatch(text) or not (found := _QUANTITY.fullmatch(text)):  # e-3 could be a unit
         return None
-    found = _QUANTITY.fullmatch(text)
-    return None if found is None else (found["number"], found["unit"])
-
-
-def _convert(number: str, text: str, unit: str) -> float | str:
-    """The number in `unit`, or what is wrong."""
-    own, wanted = _unit(text), _unit(unit)
+    number, name = found["number"], found["unit"]
+    if unit is None:
+        return f"a number without a unit is needed, and this one has `{name}`"
+    own, wanted = _unit(name), _unit(unit)
     if own is None or wanted is None:
-        return f"`{text}` is no unit that is known"
+        return f"`{name}` is no unit that is known"
     if own.dimensionality != wanted.dimensionality or _is_angle(own) != _is_angle(wanted):
-        return f"`{text}` is no unit of this key, which is in {unit}"
+        return f"`{name}` is no unit of this key, which is in {unit}"
     try:
         return float(_registry().Quantity(Decimal(number), own).to(wanted).magnitude)
     except (ArithmeticError, ValueError):

@@ -68,7 +68,7 @@ def _turning(scene: Scene) -> Array:
     """Return the gravity moment of section j and of all that hangs at its end, shape (n, 360): N m by its heading."""
     gx, gy = gravity_in_base(scene)
     headings, rows = np.radians(CIRCLE), []
-    beyond = 0.0 if scene.tip is None else scene.tip.payload or 0.0
+    beyond = scene.payload
     for section, joint in zip(reversed(scene.sections), reversed(scene.joints), strict=True):
         fill = (scene.line_fill or 0.0) * section.length
         beam = section.beam or (0.0, 0.0)
@@ -78,13 +78,12 @@ def _turning(scene: Scene) -> Array:
         along, across = (sum(mass * centre[axis] for mass, centre in parts) for axis in (0, 1))
         x, y = along * np.cos(headings) - across * np.sin(headings), along * np.sin(headings) + across * np.cos(headings)
         rows.append(gy * x - gx * y)
-        hung = sum(part.mass for part in (joint.cylinder.barrel, joint.cylinder.rod) if part is not None)
-        beyond = sum(mass for mass, _ in parts) + hung + (joint.mL or 0.0) + (joint.mR or 0.0)
+        beyond = sum(mass for mass, _ in parts) + joint.mass
     return np.array(rows[::-1])
 
 
 def _outboard(turning: Array, reaches: list[_Reach]) -> tuple[Array, Angles]:
-    """The most that sections i, i + 1, .. turn pivot i with by heading of i, and the joint angles i + 1 for that; (n, 360)."""
+    """Return the largest moment of sections i, i + 1, .. about pivot i by heading of i, and joint angles i + 1; (n, 360)."""
     most, following = turning.copy(), np.zeros(turning.shape, dtype=np.int64)
     for i in range(len(reaches) - 2, -1, -1):
         angles = reaches[i + 1].angles
@@ -97,7 +96,7 @@ def _outboard(turning: Array, reaches: list[_Reach]) -> tuple[Array, Angles]:
 
 
 def _worst(i: int, sign: int, best: dict[int, tuple[Array, Angles]], reach: _Reach, behind: Angles) -> WorstLoad:
-    """The largest force of cylinder `i`, a pull if `sign` is 1, a push if it is -1: moment over lever, by virtual work."""
+    """Return largest force of cylinder `i`, a pull if `sign` is 1, a push if it is -1: moment over lever, by virtual work."""
     if not reach.angles.size or not behind.size:
         return WorstLoad(0.0, ())
     headings = (behind[:, -1:] + reach.angles) % 360
@@ -114,7 +113,7 @@ def _worst(i: int, sign: int, best: dict[int, tuple[Array, Angles]], reach: _Rea
 
 
 def _further(behind: Angles, angles: Angles) -> Angles:
-    """A row for every heading that one more section can have: the headings of the base, 0, and of all sections up to it."""
+    """Return a row for every heading that one more section can have: those of the base, 0, and of all sections up to it."""
     if not behind.size or not angles.size:
         return np.zeros((0, behind.shape[1] + 1), dtype=np.int64)
     headings, first = np.unique(behind[:, -1:] + angles, return_index=True)

@@ -1,7 +1,4 @@
-"""Read a scene file: YAML text to plain values, with the line of each for error messages.
-
-The text is composed to nodes and the nodes are turned into values here, so that no tag of the text can make an object:
-mappings become dict, sequences become tuple, scalars become float, int, bool, str or None.
+"""Scene files and their kind as text: read, parsed, and known not to be cut off.
 
 A line ``# end of scene`` shows that a file was not cut off, and a line in its head (`PROMISE`) says that it has one. Both are
 comments, so that the file stays plain YAML. A file that promises the mark is refused without it; one that says nothing can be
@@ -11,67 +8,19 @@ used, with a warning.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
+from ruamel.yaml.nodes import ScalarNode
 
-from ..config.yaml_text import TAG, TYPED, bounded_nodes, typed_value
-from ..errors import Fault, SceneError
-from ..system.terminal_text import printable
-
-Place = tuple[str | int, ...]
+from ..config.yaml_text import Document, Place, YamlReader, whole_text
+from ..errors import Fault, SceneError, UsageError
 
 MAX_BYTES = 4_000_000
-MAX_VALUES = 200_000
-MAX_DEPTH = 20
 SURROGATE = re.compile("[\ud800-\udfff]")
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
-
-
-def words(place: Place) -> str:
-    """A place in the words of the file: ``sections[1].root.mass``; line ends in a key are shown as escapes."""
-    text = ""
-    for step in place:
-        text += f"[{step}]" if isinstance(step, int) else f".{step}" if text else step
-    return printable(text, keep="") or "scene"
-
-
-@dataclass
-class Document:
-    """Values of a text, line (from 1) and cell of a spreadsheet of the places in it, and what was wrong with the writing."""
-
-    values: Any = None
-    lines: dict[Place, int] = field(default_factory=dict)
-    faults: list[Fault] = field(default_factory=list)
-    cells: dict[Place, str] = field(default_factory=dict)
-
-    def line(self, place: Place) -> int | None:
-        """Line of a place; of the nearest block around it if the place itself is not in the text."""
-        while place not in self.lines and place:
-            place = place[:-1]
-        return self.lines.get(place)
-
-    def written(self, place: Place) -> Any:
-        """The value at a place as it stands in the text, for example with its unit; None where there is none."""
-        value = self.values
-        for step in place:
-            try:
-                value = value[step]
-            except (KeyError, IndexError, TypeError):
-                return None
-        return value
-
-    def fault(self, place: Place, value: Any, bound: str, remedy: str) -> Fault:
-        """A fault at a place of this text."""
-        return Fault(words(place) + self._cells_at(place), value, bound, remedy, self.line(place))
-
-    def _cells_at(self, place: Place) -> str:
-        """`` (cell C3)`` of a place, or of both its numbers; nothing of a block."""
-        cells = [cell for own, cell in self.cells.items() if own[: len(place)] == place and len(own) - len(place) <= 1]
-        return f" (cell{'s' * (len(cells) > 1)} {', '.join(cells)})" if 0 < len(cells) <= 2 else ""
 
 
 class Kind(NamedTuple):
@@ -85,7 +34,7 @@ SCENE = Kind("scene", "boom_twin scene")
 
 
 def read_text(path: Path, kind: Kind = SCENE) -> str:
-    """Text of a scene file, or of another of its kind.
+    """Return the text of a scene file, or of another of its kind.
 
     Raises
     ------
@@ -108,7 +57,7 @@ def read_text(path: Path, kind: Kind = SCENE) -> str:
 
 
 def parse(text: str, source: str, kind: Kind = SCENE) -> Document:
-    """Plain values of a YAML text.
+    """Return the plain values of a YAML text, sequences as tuples, with the line of each.
 
     Raises
     ------
@@ -116,14 +65,12 @@ def parse(text: str, source: str, kind: Kind = SCENE) -> Document:
         If the text is not YAML at all. What is YAML but not allowed here is in ``Document.faults``.
     """
     try:
-        root, constructor = bounded_nodes(text)
+        reader = _SceneReader(text, tuple)
     except (YAMLError, RecursionError, ValueError) as error:
         raise SceneError(source, (_syntax_fault(text, error),)) from None
-    document = Document()
-    if root is None:
+    if reader.is_empty:
         raise _refusal(kind, source, "the file is empty", f"Start from the one that `{kind.example}` prints.")
-    document.values = _Reader(document, constructor).value(root, ())
-    return document
+    return reader.document
 
 
 def _not_utf8(data: bytes, error: UnicodeDecodeError) -> tuple[str, str]:
@@ -163,69 +110,16 @@ def _yaml_remedy(what: str) -> str:
     return "Mend the text on this line or just above it: brackets, commas, colons, indentation."
 
 
-class _Reader:
-    """Turns nodes into values; notes lines and faults in its document."""
+class _SceneReader(YamlReader):
+    """Reader that takes more spellings of numbers, and refuses half characters."""
 
-    def __init__(self, document: Document, constructor: Any) -> None:
-        self.document = document
-        self.constructor = constructor
-        self.count = 0
-
-    def value(self, node: Node, place: Place) -> Any:
-        self.count += 1
-        self.document.lines.setdefault(place, node.start_mark.line + 1)
-        if len(place) > MAX_DEPTH or self.count > MAX_VALUES:
-            if self.count <= MAX_VALUES + 1:
-                bound = "nested too deeply, or too many values, for a scene"
-                self._fault(place, "...", bound, "Write it without aliases that hold themselves.")
-            return None
-        if isinstance(node, ScalarNode):
-            return self._scalar(node, place)
-        if node.tag not in (TAG + "map", TAG + "seq"):
-            self._refuse_tag(node, place)
-        if isinstance(node, MappingNode):
-            return self._mapping(node, place)
-        return tuple(self.value(item, (*place, i)) for i, item in enumerate(node.value))
-
-    def _mapping(self, node: MappingNode, place: Place) -> dict[str, Any]:
-        found: dict[str, Any] = {}
-        for key_node, value_node in node.value:
-            key = str(key_node.value) if isinstance(key_node, ScalarNode) else "?"
-            here = (*place, key)
-            line = key_node.start_mark.line + 1
-            if not isinstance(key_node, ScalarNode) or key_node.tag == TAG + "merge":
-                self._fault(here, "...", "this kind of key is not used in scenes", "Write plain keys.")
-            elif key in found:
-                bound = f"the key is there twice, on line {self.document.lines[here]} and on line {line}"
-                self._fault(here, found[key], bound, "Keep one of them.")
-            else:
-                self.document.lines[here] = line
-                found[key] = self.value(value_node, here)
-        return found
-
-    def _scalar(self, node: ScalarNode, place: Place) -> Any:
-        kind = str(node.tag).removeprefix(TAG)
-        if kind in TYPED:
-            try:
-                return typed_value(self.constructor, node)
-            except ValueError:
-                self._fault(place, node.value, f"this is no {TYPED[kind]}", "Write the value alone, without a tag.")
-                return node.value
-        if kind not in ("str", "timestamp"):
-            self._refuse_tag(node, place)
-        elif SURROGATE.search(node.value):
-            self._fault(place, node.value, "it holds half a character", "Write the text without \\uD800 to \\uDFFF.")
+    def text(self, node: ScalarNode, place: Place) -> Any:
+        if SURROGATE.search(node.value):
+            self.fault(place, node.value, "it holds half a character", "Write the text without \\uD800 to \\uDFFF.")
             return ""
-        elif node.style is None and NUMBER.fullmatch(node.value):  # +.5e3, which YAML takes for text
+        if node.style is None and NUMBER.fullmatch(node.value):  # +.5e3, which YAML takes for text
             return float(node.value)
         return node.value
-
-    def _refuse_tag(self, node: Node, place: Place) -> None:
-        remedy = "Remove the tag: a scene holds plain values only."
-        self._fault(place, node.value if isinstance(node, ScalarNode) else "...", f"the tag {node.tag} is not allowed", remedy)
-
-    def _fault(self, place: Place, value: Any, bound: str, remedy: str) -> None:
-        self.document.faults.append(self.document.fault(place, value, bound, remedy))
 
 
 PROMISE = '# This file ends with the line "# end of scene"; without it, it was cut off.'
@@ -233,14 +127,31 @@ MARK = "# end of scene"
 
 
 def with_end_mark(text: str) -> str:
-    """The text with the mark in its last line, and in its first the promise of it, if that does not stand there already."""
+    """Return text with the mark in its last line, and in its first the promise of it, if that does not stand there already."""
     kept = [line for line in text.splitlines() if line != MARK]
     head = [] if PROMISE in kept else [PROMISE]
     return "\n".join([*head, *kept]).rstrip() + f"\n\n{MARK}\n"
 
 
-def missing_end_mark(text: str) -> tuple[Fault | None, Fault | None]:
-    """Return a fault if the end of a scene file is cut off, and a warning if it may be; None for either that does not apply.
+def text_of(document: Mapping[str, Any]) -> str:
+    """Return a scene file with these keys; UsageError if a value is none that YAML has."""
+    try:
+        return with_end_mark(whole_text(_plain(document)))
+    except YAMLError as error:
+        raise UsageError(f"scene: {str(error).splitlines()[0]}. Give texts, numbers, lists and dicts only.") from None
+
+
+def _plain(value: Any) -> Any:
+    """Return values of NumPy as Python's, tuples as lists."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return _plain(value.tolist()) if hasattr(value, "tolist") else value
+
+
+def missing_end_mark(text: str) -> Fault | None:
+    """Return a fault if the end of a scene file is cut off, a warning or a note if it may be; None if it is whole.
 
     Many files that were written by hand have no mark. That is a note, and a warning where not even the last line ends.
     """
@@ -248,13 +159,13 @@ def missing_end_mark(text: str) -> tuple[Fault | None, Fault | None]:
     number = max((i for i, line in enumerate(lines, 1) if line.strip()), default=0)
     last = lines[number - 1].strip() if number else ""
     if last == MARK:
-        return None, None
+        return None
     if PROMISE in lines and MARK not in lines:
         bound = f"the first lines say that the file ends with `{MARK}`, and it does not: it was cut off"
         remedy = "Fetch the whole file; or, if nothing is missing, add that line."
-        return Fault("end of the file", last, bound, remedy, number), None
+        return Fault("end of the file", last, bound, remedy, number)
+    kind: Literal["warning", "note"] = "note"
     bound = f"no line `{MARK}`, so one cannot tell whether the rest of the file was cut off"
-    is_note = text.endswith("\n")
-    if not is_note:
-        bound = f"no line `{MARK}`, and not even an end of line: it may have been cut off"
-    return None, Fault("end of the file", last, bound, "If nothing is missing, add that line at the end.", number, is_note)
+    if not text.endswith("\n"):
+        bound, kind = f"no line `{MARK}`, and not even an end of line: it may have been cut off", "warning"
+    return Fault("end of the file", last, bound, "If nothing is missing, add that line at the end.", number, kind)

@@ -28,26 +28,17 @@ _MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BO
 
 @dataclass(frozen=True, slots=True)
 class CsvTable:
-    """Cells of a CSV file below its header, or of some of its rows.
-
-    Attributes
-    ----------
-    path : Path
-    names : list of str
-        Names of the columns, from the header.
-    rows : list of list of str
-        The cells; empty lines are left out.
-    lines : list of int
-        Line number of each row in the file, from 1.
-    error : type
-        Type of the errors that are raised.
-    """
+    """Cells of a CSV file below its header, or of some of its rows."""
 
     path: Path
     names: list[str]
+    """Names of the columns, from the header."""
     rows: list[list[str]]
+    """The cells; empty lines are left out."""
     lines: list[int]
+    """Line number of each row in the file, from 1."""
     error: type[BoomTwinError]
+    """Type of the errors that are raised."""
 
     def column(self, name: str, blank: float | None = None) -> list[float]:
         """Return the numbers of a column, with `blank` for an empty cell. Without `blank`, an empty cell raises `error`."""

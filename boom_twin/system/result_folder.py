@@ -38,20 +38,13 @@ _WRITABLE = 0o222  # mode of a folder that somebody may write to
 
 @dataclass(frozen=True, slots=True)
 class ResultKind:
-    """Kind of result: the command and the files that it writes.
-
-    Attributes
-    ----------
-    command : str
-    files : tuple of str
-        Patterns for the paths of its files in the folder.
-    is_replaced : bool
-        True if a later run replaces the result. If not, it is a recording, which has no manifest and is never replaced.
-    """
+    """Kind of result: the command and the files that it writes."""
 
     command: str
     files: tuple[str, ...]
+    """Patterns for the paths of its files in the folder."""
     is_replaced: bool
+    """True if a later run replaces the result. If not, it is a recording, which has no manifest and is never replaced."""
 
     def has(self, name: str) -> bool:
         """Return True if a path is one of its files, or a draft beside them."""

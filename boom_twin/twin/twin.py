@@ -14,7 +14,7 @@ from ..health.baseline import Baseline
 from ..health.monitor import warm_up
 from ..kernels.tables import SENTENCES
 from ..scene.kinematics import stroke_curve
-from ..scene.source import SceneSource, as_scene
+from ..scene.load import SceneSource, as_scene
 from ..types import LIMIT, NANO, Array, Change, Health, Mount, Report, Sample, Stream, StrokeReading, channels_of
 from .adjustments import Requests, ResidualBuffer, SensorZeros
 from .block_update import CAPACITY, BlockUpdate, limits_of

@@ -98,7 +98,7 @@ def test_the_example_of_the_default_file_is_good(write: Any) -> None:
         ("sensors: [1]", "sensors = [1]: a block of channels is needed"),
         ("[1, 2]", "keys inputs, outputs, sensors are needed"),
         ("inputs: [", "not a readable YAML file"),
-        ("inputs: {}\ninputs: {}", "key inputs stands there twice"),
+        ("inputs: {}\ninputs: {}", "inputs = {}: the key is there twice"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_used_is_refused_with_its_place(write: Any, text: str, words: str) -> None:

@@ -242,6 +242,13 @@ def test_a_pipe_in_the_first_row_alone_is_that_of_the_whole_boom(tmp_path: Path)
     assert [section.rho_A for section in first.sections] == [section.rho_A for section in whole.sections] and not oddities
 
 
+def test_a_header_may_end_with_an_empty_cell(tmp_path: Path) -> None:
+    assert (
+        scene_of(tmp_path, CSV.replace("pipe,payload\n", "pipe,payload,\n"), "table.csv")[0]
+        == scene_of(tmp_path, CSV, "table.csv")[0]
+    )
+
+
 def test_a_pipe_of_some_sections_only_is_refused(tmp_path: Path) -> None:
     three = CSV.replace(",,,,,25,\n", ",,,,,25,\n") + CSV.splitlines()[2].replace(",,,,,25,", ",,,,,,") + "\n"
     with pytest.raises(SceneError, match=r"sections\[2\]\.pipe is absent: other sections have 25, 25 kg/m"):

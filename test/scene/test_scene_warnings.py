@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import pytest
 
 from boom_twin.errors import SceneError
 from boom_twin.scene import load_scene
-from boom_twin.scene.kinematics import levers_and_transmission
+from boom_twin.scene.summary import explain
 
 Place = tuple[str | int, ...]
 
@@ -114,8 +113,8 @@ def test_a_range_that_ends_next_to_a_dead_centre_warns_and_the_suggested_one_kee
     low = float(oddity.remedy.partition("[")[2].partition(",")[0])
     assert low > whole[0] and bench.oddities(lambda values: edit(values, [low, whole[1]])) == []
     scene = load_scene(bench.edited(lambda values: edit(values, [low, whole[1]])))
-    least, greatest, between = levers_and_transmission(scene, i, 1751)
-    assert least >= 0.25 * greatest and (between is None or math.degrees(between) >= 5.0)
+    found = explain(scene).joints[i].linkage
+    assert found.lever[0] >= 0.25 * found.lever[1] and (found.transmission_deg is None or found.transmission_deg >= 5.0)
 
 
 def test_one_warning_tells_all_that_is_wrong_with_a_range_and_its_remedy_mends_it(bench: Any) -> None:

@@ -10,11 +10,10 @@ import pytest
 from ruamel.yaml import YAML
 
 from boom_twin.cli.main import main
-from boom_twin.scene.checks.cylinder_clearance import passes_of
-from boom_twin.scene.edit import text_of
+from boom_twin.scene.checks.joint_clearance import passes_of
 from boom_twin.scene.kinematics import skeleton
 from boom_twin.scene.load import clearance_text, default_text, examine, examine_text, example_names, example_text
-from boom_twin.scene.yaml_reader import with_end_mark
+from boom_twin.scene.yaml_reader import text_of, with_end_mark
 
 Place = tuple[str | int, ...]
 

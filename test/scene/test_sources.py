@@ -30,7 +30,7 @@ def test_a_path_a_dict_and_nothing_are_scenes(tmp_path: Path) -> None:
 
 
 def test_values_of_numpy_are_numbers() -> None:
-    assert load_scene() == statics.__globals__["as_scene"]({**DOCUMENT, "modes": np.int64(DOCUMENT.get("modes", 3))})
+    assert load_scene() == load_scene({**DOCUMENT, "modes": np.int64(DOCUMENT.get("modes", 3))})
 
 
 def test_a_dict_is_checked_as_a_file_is() -> None:

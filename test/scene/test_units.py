@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from boom_twin.scene.glossary import MEANING
+from boom_twin.scene.block_reader import inner_block, meaning_of
 from boom_twin.scene.load import examine, load_scene
 from boom_twin.scene.schema import Material, Scene
 from boom_twin.scene.units import converted, unit_of
@@ -33,11 +33,9 @@ def in_other_units(value: Any, unit: str) -> Any:
 
 def rewritten(block: Any, model: type[BaseModel] = Scene) -> Any:
     """A block of a scene with all its values in other units."""
-    from boom_twin.scene.glossary import BLOCKS
-
     found = {}
     for key, value in block.items():
-        inner, unit = BLOCKS.get(model, {}).get(key), unit_of(MEANING[model][key])
+        inner, unit = inner_block(model, key), unit_of(meaning_of(model, key))
         if key == "postures":
             found[key] = {name: in_other_units(angles, "degrees") for name, angles in value.items()}
         elif isinstance(value, list) and inner is not None:
@@ -58,10 +56,14 @@ def test_a_scene_in_other_units_is_the_same_to_the_bit(bench: Any) -> None:
 
 def test_every_number_of_a_scene_has_a_unit_or_is_a_pure_number() -> None:
     pure = {"modes", "nu", "exponent", "restitution", "friction"}
-    for model, words in MEANING.items():
-        for key, meaning in words.items():
-            if re.search(r"\b(float|int)\b", str(model.model_fields[key].annotation)):
-                assert (unit_of(meaning) in OTHER | {"rad": 0}) != (key in pure), (model.__name__, key)
+    models: list[type[BaseModel]] = [Scene]
+    for model in models:
+        for key, field in model.model_fields.items():
+            assert field.description, f"{model.__name__}.{key} has no meaning for error messages"
+            if (inner := inner_block(model, key)) is not None:
+                models.append(inner)
+            elif re.search(r"\b(float|int)\b", str(field.annotation)):
+                assert (unit_of(field.description) in OTHER | {"rad": 0}) != (key in pure), (model.__name__, key)
 
 
 def test_angles_take_degrees_and_radians(bench: Any) -> None:
@@ -100,9 +102,9 @@ def test_a_percentage_is_no_angle_and_a_pure_number_takes_no_unit(bench: Any) ->
     assert "a number without a unit is needed" in pure.bound
 
 
-def test_a_new_key_of_the_glossary_needs_no_more_than_its_meaning() -> None:
+def test_a_new_key_needs_no_more_than_its_description() -> None:
     assert converted(("8 bar", 3.0), unit_of("the pressure in Pa, 2e7 at work")) == (800000.0, 3.0)
-    assert unit_of(MEANING[Material]["name"]) is None
+    assert unit_of(meaning_of(Material, "name")) is None
 
 
 def test_a_scene_in_plain_numbers_imports_no_library_of_units() -> None:

@@ -9,13 +9,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ...config.yaml_text import Place
 from ...kernels.elements.linkage import cylinder_length
 from ...types import Array
 from ..kinematics import linkage_of, transmission_angles
 from ..schema import Joint
-from ..yaml_reader import Place
-from .findings import Draft, Finding, fault, warning
-from .geometry import TOLERANCE
+from .draft import Draft, Findings
+from .pins import TOLERANCE
 from .values import NEEDED
 
 STEP_DEG = 0.1
@@ -28,59 +28,54 @@ NEXT_TO = "next to a dead centre"
 Mask = NDArray[np.bool_]
 
 
-def joints(draft: Draft) -> Iterator[Finding]:
-    """Every joint with its range_deg: closing, reach and uniqueness over it, and the named postures in it."""
+def joints(draft: Draft) -> Findings:
+    """Check every joint over its range_deg: closing, reach, uniqueness, and the named postures in it."""
     for i, joint in enumerate(draft.joints):
         if joint is None or not -360 <= joint.range_deg[0] < joint.range_deg[1] <= 360:
             continue
         row = geometry_of(draft, i)
         findings = [] if row is None else list(_curve(draft, i, joint, row))
         yield from findings
-        blocked = row is None or any(not finding.odd for finding in findings)
+        blocked = row is None or any(finding.kind == "fault" for finding in findings)
         for name, degrees in _postures(draft, i):
             yield from _posture(draft, (name, i), joint, degrees, None if blocked else row)
 
 
-def _curve(draft: Draft, i: int, joint: Joint, row: np.record) -> Iterator[Finding]:
-    """The cylinder's length over range_deg: faults where there is no use of the joint at all, else one warning."""
+def _curve(draft: Draft, i: int, joint: Joint, row: np.record) -> Findings:
+    """Check the cylinder's length over range_deg: faults if the joint is of no use at all, else one warning."""
     place: Place = ("joints", i, "range_deg")
-    degrees, lengths = lengths_over(joint, row)
+    degrees = grid_of(joint)
+    with np.errstate(invalid="ignore"):
+        lengths = cylinder_length(row, np.radians(degrees))[0]
     if not np.isfinite(lengths).any():
         bound = f"{UNMET} any angle of it"
         remedy = f"Check D, E, lL and lR, their signs and their units: {_sizes_to_meet(row, degrees)}."
-        yield fault(draft, place, joint.range_deg, bound, remedy)
+        yield draft.fault(place, joint.range_deg, bound, remedy)
         return
     shortest, longest = float(np.nanmin(lengths)), float(np.nanmax(lengths))
     if longest - shortest < 1e-6:
         bound = f"over it the cylinder stays {longest:.4g} m long, so it cannot turn the joint"
         remedy = "Check the pins: one of them lies on an axis of rotation."
-        yield fault(draft, place, joint.range_deg, bound, remedy)
+        yield draft.fault(place, joint.range_deg, bound, remedy)
     elif not _reached(joint, lengths).any() and not np.isfinite(lengths).all():
         met = np.isfinite(lengths)
         bound = f"{UNMET} {intervals(degrees, ~met)}; where they do, at {intervals(degrees, met)}, the cylinder is not as long"
-        yield fault(draft, place, joint.range_deg, bound, f"Change links or pins: {_sizes_to_meet(row, degrees)}.")
+        yield draft.fault(place, joint.range_deg, bound, f"Change links or pins: {_sizes_to_meet(row, degrees)}.")
     elif not _reached(joint, lengths).any():
         remedy = "Give closed_length and max_stroke that cover this, or check the pins."
         place = ("joints", i, "cylinder", "closed_length")
-        yield fault(draft, place, joint.cylinder.closed_length, _reach_words(joint, shortest, longest), remedy)
+        yield draft.fault(place, joint.cylinder.closed_length, _reach_words(joint, shortest, longest), remedy)
     else:
         yield from _narrower(draft, i, joint, row, degrees, lengths)
 
 
 def grid_of(joint: Joint) -> Array:
-    """Angles (deg) over the range of a joint."""
+    """Return the angles (deg) over the range of a joint."""
     low, high = joint.range_deg
     return np.linspace(low, high, 1 + math.ceil((high - low) / STEP_DEG))
 
 
-def lengths_over(joint: Joint, row: np.record) -> tuple[Array, Array]:
-    """Angles (deg) over a joint's range, and the cylinder's lengths there (m), NaN where links do not meet."""
-    degrees = grid_of(joint)
-    with np.errstate(invalid="ignore"):
-        return degrees, cylinder_length(row, np.radians(degrees))[0]
-
-
-def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array, lengths: Array) -> Iterator[Finding]:
+def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array, lengths: Array) -> Findings:
     """Yield one warning of all that a part of the range is not good for, with the part that is."""
     closed, reached = np.isfinite(lengths), _reached(joint, lengths)
     shortest, longest = float(np.nanmin(lengths)), float(np.nanmax(lengths))
@@ -95,7 +90,8 @@ def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array
         beyond = intervals(degrees, closed & ~reached)
         reasons.append(f"{_reach_words(joint, shortest, longest)}: stroke out of reach at {beyond}")
         if closed.all() and longest < 2.0 * shortest:
-            closed_length, max_stroke = _down(shortest), _up(longest - _down(shortest))
+            closed_length = math.floor(1e3 * shortest) / 1e3
+            max_stroke = math.ceil(1e3 * (longest - closed_length)) / 1e3
             remedies.append(f"give closed_length {closed_length:g} and max_stroke {max_stroke:g} m if the nameplate says so")
     if turns.size:
         angles = ", ".join(f"{degrees[k]:.1f}" for k in turns)
@@ -104,7 +100,7 @@ def _narrower(draft: Draft, i: int, joint: Joint, row: np.record, degrees: Array
     reasons = reasons or tight_words
     if reasons:
         remedy = ", or ".join([_narrow_words(joint, degrees, within, tight), *remedies])
-        yield warning(draft, ("joints", i, "range_deg"), joint.range_deg, "; ".join(reasons), f"{remedy}.")
+        yield draft.warning(("joints", i, "range_deg"), joint.range_deg, "; ".join(reasons), f"{remedy}.")
 
 
 def _dead_centres(joint: Joint, row: np.record, degrees: Array, reached: Mask) -> tuple[Mask, list[str]]:
@@ -130,7 +126,7 @@ def _dead_centres(joint: Joint, row: np.record, degrees: Array, reached: Mask) -
 
 
 def _narrow_words(joint: Joint, degrees: Array, within: Array, tight: Mask) -> str:
-    """The range that does, with what it keeps from dead centres where that is possible."""
+    """Return the range that does, with what it keeps from dead centres where that is possible."""
     low, high = usable(degrees, np.where(tight, np.nan, within))
     if low >= high:
         return "Narrow range_deg to [{:g}, {:g}]".format(*usable(degrees, within))
@@ -177,7 +173,7 @@ def _turns(lengths: Array) -> NDArray[np.int64]:
 
 
 def usable(degrees: Array, lengths: Array) -> tuple[float, float]:
-    """The longest part of the range (deg) in which lengths, NaN out of reach, grow or shrink; in whole degrees."""
+    """Return the longest part of the range (deg) in which lengths, NaN out of reach, grow or shrink; in whole degrees."""
     slope = np.nan_to_num(np.sign(np.diff(lengths)))
     edges = np.flatnonzero(np.diff(slope, prepend=2.0, append=2.0))
     first, last = max(
@@ -191,18 +187,8 @@ def usable(degrees: Array, lengths: Array) -> tuple[float, float]:
     return (whole_low, whole_high) if whole_low < whole_high else (low, high)
 
 
-def _down(length: float) -> float:
-    """Return the length (m) rounded down to whole millimetres."""
-    return math.floor(1e3 * length) / 1e3
-
-
-def _up(length: float) -> float:
-    """Return the length (m) rounded up to whole millimetres."""
-    return math.ceil(1e3 * length) / 1e3
-
-
 def geometry_of(draft: Draft, i: int) -> np.record | None:
-    """Geometry of joint `i`; None if it is not complete."""
+    """Return the geometry of joint `i`; None if it is not complete."""
     joint, first = draft.joints[i], draft.section(0)
     if joint is None or (i == 0) != (joint.kind == "A"):
         return None
@@ -220,14 +206,14 @@ def _reached(joint: Joint, lengths: Array) -> Mask:
 
 
 def _postures(draft: Draft, i: int) -> Iterator[tuple[str, float]]:
-    """Names of the complete postures, and the angle (deg) at which each holds joint `i`."""
+    """Return the names of the complete postures, and the angle (deg) at which each holds joint `i`."""
     for name, angles in draft.postures.items():
         if len(angles) == len(draft.joints):
             yield name, angles[i] - (angles[i - 1] if i > 0 else 0.0)
 
 
-def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, row: np.record | None) -> Iterator[Finding]:
-    """Joint `who[1]` in posture `who[0]`: its angle in range_deg and, where its geometry is known, its stroke."""
+def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, row: np.record | None) -> Findings:
+    """Check joint `who[1]` in posture `who[0]`: its angle in range_deg and, if its geometry is known, its stroke."""
     name, i = who
     place, value = ("postures", name, i), draft.postures[name][i]
     low, high = joint.range_deg
@@ -235,16 +221,16 @@ def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, r
     if not low - TOLERANCE <= degrees <= high + TOLERANCE:
         bound = f"{says}, outside its range_deg [{low:g}, {high:g}]"
         remedy = "Change the posture or the range; a joint angle is the difference of neighbouring section angles."
-        yield fault(draft, place, value, bound, remedy)
+        yield draft.fault(place, value, bound, remedy)
     elif row is not None:
         most = joint.cylinder.max_stroke
         with np.errstate(invalid="ignore"):
             stroke = float(cylinder_length(row, math.radians(degrees))[0]) - joint.cylinder.closed_length
         if math.isnan(stroke):
-            yield fault(draft, place, value, f"{says}, where its links do not meet", "Change the posture or the links.")
+            yield draft.fault(place, value, f"{says}, where its links do not meet", "Change the posture or the links.")
         elif not -TOLERANCE <= stroke <= most + TOLERANCE:
             bound = f"{says}, a stroke of {stroke:.4g} m; cylinder {i + 1} has 0 to {most:g} m"
-            yield fault(draft, place, value, bound, "Change the posture, closed_length or max_stroke.")
+            yield draft.fault(place, value, bound, "Change the posture, closed_length or max_stroke.")
 
 
 def intervals(degrees: Array, mask: Mask) -> str:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from ...config.yaml_text import Place
+from ...errors import Fault
 from ..oil_spring import middle_stiffness
 from ..schema import Scene, section_depth
 from ..straight_boom import StraightBoom, straight_boom
 from ..worst_load import worst_loads
-from ..yaml_reader import Place
-from .findings import Draft, Finding, warning
+from .draft import Draft, Findings
 
 FREQUENCY = (4.0, 70.0)  # first one times the length of the boom, m/s
 DAMPING = (1e-3, 0.2)  # ratio of the first mode
@@ -31,7 +32,7 @@ TAKES = frozenset(
 """Keys on which all of it depends: where one of these is odd, it would be told again."""
 
 
-def stretched_boom(draft: Draft, scene: Scene, odd: Sequence[str]) -> list[Finding]:
+def stretched_boom(draft: Draft, scene: Scene, odd: Sequence[str]) -> list[Fault]:
     """Return the first implausibility that only all parts together show, estimated by `boom_twin.scene.straight_boom`.
 
     Payload, pressure, oil, frequency and damping are checked in this order: the first that is irregular causes what follows.
@@ -43,13 +44,11 @@ def stretched_boom(draft: Draft, scene: Scene, odd: Sequence[str]) -> list[Findi
     found = straight_boom(scene, stiffnesses)
     checks = (_payload, _pressure, _give, _stiff, _frequency, _damping)
     turned = [path.removesuffix("range_deg") for path in odd if path.endswith("range_deg")]  # joints whose levers are no use
-    findings = (
-        [each for each in check(draft, scene, found) if not each.fault.path.startswith(tuple(turned))] for check in checks
-    )
+    findings = ([each for each in check(draft, scene, found) if not each.path.startswith(tuple(turned))] for check in checks)
     return next(filter(None, findings), [])
 
 
-def _frequency(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
+def _frequency(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
     low, high = (limit / scene.reach for limit in FREQUENCY)
     if not all(joint.cylinder.is_compressible for joint in scene.joints):
         high = math.inf  # what was left out is not too stiff
@@ -60,10 +59,10 @@ def _frequency(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Find
             f"expected {low:.2g} to {high:.2g} Hz"
         )
         remedy = "Check E, I and k for what is too soft or too stiff, masses for what is too heavy or too light."
-        yield warning(draft, ("sections",), len(scene.sections), bound, remedy)
+        yield draft.warning(("sections",), len(scene.sections), bound, remedy)
 
 
-def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
+def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
     """Yield warnings of the damping of each part, then of all together; none where no damping is given at all."""
     if not len(found.frequencies):
         return
@@ -83,22 +82,22 @@ def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Findin
         damped = f"a mode of {pace / math.pi:.2g} Hz by {100 * pace * delay:.2g} %"
         bound = f"alone it would damp {damped}; expected {low:.2g} to {high:.2g}"
         remedy = "beta is 2 zeta / omega in s, d is 2 zeta k / omega in N s/m, zeta being the damping ratio."
-        yield warning(draft, place, value, bound, remedy)
+        yield draft.warning(place, value, bound, remedy)
     if parts and not odd:
         yield from _damping_of_all(draft, scene, found, parts[0])
 
 
-def _damping_of_all(draft: Draft, scene: Scene, found: StraightBoom, part: tuple[Place, float, float]) -> Iterator[Finding]:
+def _damping_of_all(draft: Draft, scene: Scene, found: StraightBoom, part: tuple[Place, float, float]) -> Findings:
     betas = np.array([section.beta or 0.0 for section in scene.sections])
     delays = np.array([(joint.cylinder.d or 0.0) / middle_stiffness(joint.cylinder) for joint in scene.joints])
-    ratio = float(found.damping_ratios(betas, delays)[0])
+    ratio = float(np.pi * found.frequencies[0] * (found.sections[0] @ betas + found.joints[0] @ delays))
     if not DAMPING[0] <= ratio <= DAMPING[1]:
         low, high = (100.0 * limit for limit in DAMPING)
         bound = f"all damping together gives the first mode a ratio of {100 * ratio:.2g} %; expected {low:g} to {high:g} %"
-        yield warning(draft, part[0], part[1], bound, "Give beta (s) of every section and d (N s/m) of every cylinder.")
+        yield draft.warning(part[0], part[1], bound, "Give beta (s) of every section and d (N s/m) of every cylinder.")
 
 
-def _pressure(draft: Draft, scene: Scene, _found: StraightBoom) -> Iterator[Finding]:
+def _pressure(draft: Draft, scene: Scene, _found: StraightBoom) -> Findings:
     """Yield warnings of oil pressure under the boom's weight in the worst posture: pushing on the bore, pulling on the ring."""
     if all(joint.cylinder.oil is None for joint in scene.joints):
         return
@@ -123,10 +122,10 @@ def _pressure(draft: Draft, scene: Scene, _found: StraightBoom) -> Iterator[Find
             if pressures[worst] > PRESSURE[1]:
                 area = 4.0 / math.pi * abs(load.force) / PRESSURE[1] + (oil.rod**2 if worst else 0.0)
                 remedy += f" With this rod a bore of {math.ceil(1e3 * math.sqrt(area)) / 1e3:g} m would do."
-            yield warning(draft, ("joints", i, "cylinder", "oil", "bore"), oil.bore, bound, remedy)
+            yield draft.warning(("joints", i, "cylinder", "oil", "bore"), oil.bore, bound, remedy)
 
 
-def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
+def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
     for i, joint in enumerate(scene.joints):
         k, lever = middle_stiffness(joint.cylinder), abs(float(found.levers[i]))
         if math.isfinite(k) and lever > 0.0:
@@ -137,11 +136,11 @@ def _give(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
                     f"{1e3 * force / k:.3g} mm; expected at most {1e3 * most:.3g} mm, 2 % of its stroke"
                 )
                 key, remedy = ("k", "k (N/m)") if joint.cylinder.oil is None else ("oil", "bore and rod (diameters, m)")
-                yield warning(draft, ("joints", i, "cylinder", key), k, bound, f"Check {remedy}, and the masses.")
+                yield draft.warning(("joints", i, "cylinder", key), k, bound, f"Check {remedy}, and the masses.")
 
 
-def _stiff(draft: Draft, scene: Scene, _found: StraightBoom) -> Iterator[Finding]:
-    """A constant k against the cylinder that could have it: amid its stroke s, k = 4 B A / s."""
+def _stiff(draft: Draft, scene: Scene, _found: StraightBoom) -> Findings:
+    """Check a constant k against the cylinder that could have it: amid its stroke s, k = 4 B A / s."""
     for i, joint in enumerate(scene.joints):
         bore = math.sqrt((joint.cylinder.k or 0.0) * joint.cylinder.max_stroke / (math.pi * OIL))
         depth = section_depth(scene, max(0, i - 1))
@@ -150,12 +149,11 @@ def _stiff(draft: Draft, scene: Scene, _found: StraightBoom) -> Iterator[Finding
                 f"amid its stroke a cylinder has it with a bore of {bore:.2g} m; "
                 f"expected at most {WIDEST_BORE * depth:.2g} m beside a section {depth:.2g} m high"
             )
-            yield warning(draft, ("joints", i, "cylinder", "k"), joint.cylinder.k, bound, "Check k (N/m), and its decimals.")
+            yield draft.warning(("joints", i, "cylinder", "k"), joint.cylinder.k, bound, "Check k (N/m), and its decimals.")
 
 
-def _payload(draft: Draft, scene: Scene, found: StraightBoom) -> Iterator[Finding]:
-    payload = 0.0 if scene.tip is None else scene.tip.payload or 0.0
-    boom = found.mass - payload
+def _payload(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
+    payload, boom = scene.payload, found.mass - scene.payload
     if payload > MOST_PAYLOAD * boom > 0.0:
         bound = f"expected at most {MOST_PAYLOAD * boom:.3g} kg, half of what the boom weighs"
-        yield warning(draft, ("tip", "payload"), payload, bound, "Give kg; concrete in the pipe line is line_fill.")
+        yield draft.warning(("tip", "payload"), payload, bound, "Give kg; concrete in the pipe line is line_fill.")

@@ -10,7 +10,6 @@ from boom_twin.compiler.compile import compile_scene
 from boom_twin.errors import BoomTwinError
 from boom_twin.kernels.elements.pin_contact import APPROACH, CLOSED, COLUMNS, Journal, pin_force
 from boom_twin.scene import load_scene
-from boom_twin.scene.glossary import MEANING
 from boom_twin.scene.load import default_text
 from boom_twin.scene.schema import Clearance, ContactLaw, Pin
 from boom_twin.validation.contact_law import HYSTERESIS
@@ -59,6 +58,8 @@ with open("scene.yaml", "w") as file:
 try:
     load_scene("scene.yaml")
 except BoomTwinError as error:
-    assert "'hunt-crossley-exact' or 'zhiying-qishao'" in str(error) and MEANING[ContactLaw]["law"] in str(error)
+    assert "'hunt-crossley-exact' or 'zhiying-qishao'" in str(error) and ContactLaw.model_fields["law"].description in str(
+        error
+    )
 else:
     raise AssertionError("zhiying is no law")

@@ -1,4 +1,7 @@
-"""Check that a cylinder stays clear of the pins of its joint and of its carrier section, over the range of the joint.
+"""Check that pins and cylinder of a joint keep clear of each other over its range.
+
+A pin goes through the whole width of the boom, so two of them need room beside each other in whatever planes the links lie. A
+link may run over the pivot, for it lies beside the section. In most six-bars that turn 165 degrees it does.
 
 A cylinder lies amid the section, where the pivot's pin and those of the links pass through. Its barrel is taken as thick as its
 bore and two walls, its rod as thick as it is, a pin as half the bore. Only `oil` gives them: a cylinder with `k` is not judged.
@@ -11,15 +14,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...config.yaml_text import Place
+from ...errors import Fault
 from ...types import Array
-from ..linkage_range import PIN, distances_to, joint_pins, rod_pin_of
+from ..linkage_range import BORE, PIN, distances_to, joint_pins, nearest_pins, pin_diameter, rod_pin_of
 from ..schema import Cylinder, Oil, Scene
-from ..yaml_reader import Place
-from .findings import Draft, Finding, warning
+from .draft import Draft, Findings
 from .joint_range import Mask, grid_of, usable
 
 WALL = 0.12  # of a barrel, over its bore
 BARREL = 0.9  # of the closed length; the rest is the rod's end and its eye
+ROOM = 1.25  # between the centres of two pins, over the diameter: a quarter of it is left for the eyes around them
 
 
 class Pass(NamedTuple):
@@ -31,8 +36,8 @@ class Pass(NamedTuple):
     at_barrel: Mask
 
 
-def clear_cylinders(draft: Draft, scene: Scene) -> Iterator[Finding]:
-    """All cylinders that have `oil`; of each the pin that is closest against what it needs."""
+def clear_cylinders(draft: Draft, scene: Scene) -> Findings:
+    """Check all cylinders that have `oil`; of each the pin that is closest against what it needs."""
     for i, joint in enumerate(scene.joints):
         if joint.cylinder.oil is not None:
             degrees = grid_of(joint)
@@ -43,7 +48,7 @@ def clear_cylinders(draft: Draft, scene: Scene) -> Iterator[Finding]:
                 yield _finding(draft, scene, i, worst, degrees, clear)
 
 
-def _finding(draft: Draft, scene: Scene, i: int, worst: Pass, degrees: Array, clear: Array) -> Finding:
+def _finding(draft: Draft, scene: Scene, i: int, worst: Pass, degrees: Array, clear: Array) -> Fault:
     at = int(np.nanargmin(worst.distance / worst.needed))
     part, size = ("barrel", "half the barrel") if worst.at_barrel[at] else ("rod", "half the rod")
     bound = (
@@ -55,11 +60,11 @@ def _finding(draft: Draft, scene: Scene, i: int, worst: Pass, degrees: Array, cl
     narrower = f", or narrow range_deg to [{low:g}, {high:g}]" if low < high else ""
     place: Place = ("joints", i, "C") if i else ("base", "cylinder_pin")
     value = scene.joints[i].C if i else scene.base.cylinder_pin
-    return warning(draft, place, value, bound, f"Look at `check --picture`; move {pins}{narrower}.")
+    return draft.warning(place, value, bound, f"Look at `check --picture`; move {pins}{narrower}.")
 
 
 def passes_of(scene: Scene, i: int, cylinder: Cylinder, oil: Oil, phi: Array) -> Iterator[Pass]:
-    """The pins beside the cylinder's own two, in the axes of its carrier, as complex numbers x + iy, m."""
+    """Return the pins beside the cylinder's own two, in the axes of its carrier, as complex numbers x + iy, m."""
     pins = joint_pins(scene, i, phi)
     foot, rod_pin = pins.pop("C" if i else "cylinder_pin"), pins.pop(rod_pin_of(pins))
     length = np.abs(rod_pin - foot)
@@ -71,7 +76,7 @@ def passes_of(scene: Scene, i: int, cylinder: Cylinder, oil: Oil, phi: Array) ->
 
 
 def _pins_before(scene: Scene, i: int, pivot: Array) -> dict[str, Array]:
-    """Pins at the inboard end of the carrier of joint `i`, each shape as `pivot`."""
+    """Return the pins at the inboard end of the carrier of joint `i`, each shape as `pivot`."""
     if i == 0:
         return {}
     carrier, before = scene.sections[i - 1], scene.joints[i - 1]
@@ -82,3 +87,25 @@ def _pins_before(scene: Scene, i: int, pivot: Array) -> dict[str, Array]:
             pivot + (complex(*inner) - carrier.length)
         )
     return found
+
+
+def spaced_pins(draft: Draft, scene: Scene) -> Findings:
+    """Yield a warning for each six-bar whose two closest pins have less room than they need."""
+    for i, joint in enumerate(scene.joints):
+        degrees = grid_of(joint)
+        pins, needed = joint_pins(scene, i, np.radians(degrees)), ROOM * pin_diameter(scene, i)
+        nearest = nearest_pins(pins, degrees)
+        if nearest is None or nearest.distance >= needed:
+            continue
+        apart = np.abs(pins[nearest.first] - pins[nearest.second])
+        low, high = usable(degrees, np.where(apart >= needed, degrees, np.nan))
+        narrower = f", or narrow range_deg to [{low:g}, {high:g}]" if low < high else ""
+        oil = joint.cylinder.oil
+        bore = "the bore" if oil else f"a bore guessed as {BORE:g} of the depth of the section"
+        bound = (
+            f"at {nearest.degrees:.0f} deg {nearest.first} and {nearest.second} are {nearest.distance:.3f} m apart; "
+            f"expected at least {needed:.3f} m, pins {pin_diameter(scene, i):.3f} m thick ({PIN:g} of {bore}) with their eyes"
+        )
+        key = next((name for name in ("R", "E", "D", "C") if name in (nearest.first, nearest.second)), "lL")
+        remedy = f"Look at `check --picture`; move C, D, E or R, or change lL or lR{narrower}."
+        yield draft.warning(("joints", i, key), getattr(joint, key), bound, remedy)
