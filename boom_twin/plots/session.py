@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -159,3 +160,29 @@ def parameters_picture(path: Path, title: str, note: str, intervals: Sequence[In
             axes.set_xlabel(unit)
         legend = "cross: before; dot and bar: estimate, 95 % interval; grey: cannot be told, left as before"
         panels[0].set_title(legend, fontsize=11)
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Figure of k sessions: name with unit, ascending times (s since 1970), values, standard deviations (0: not known)."""
+
+    label: str
+    times: Sequence[float]
+    values: Sequence[float]
+    sigmas: Sequence[float]
+
+
+def trends_picture(path: Path, title: str, trends: Sequence[Trend]) -> None:
+    """Draw every figure over the time of its sessions, with its value in the first and in the last of them."""
+    rows = -(-len(trends) // 2)
+    with picture(path, title, "", (16.0, 0.8 + 2.4 * rows)) as figure:
+        panels = figure.subplots(rows, 2, squeeze=False, sharex=True)
+        for axes, trend in zip_longest(panels.flat, trends):
+            if trend is None:
+                axes.set_axis_off()
+                continue
+            times = np.asarray(trend.times).astype("datetime64[s]")
+            axes.errorbar(times, trend.values, trend.sigmas, color=SKY, marker="o", markerfacecolor=BLUE, ecolor=GREY)
+            axes.set_title(f"{trend.label}: {trend.values[0]:.4g} in the first session, {trend.values[-1]:.4g} in the last")
+            axes.ticklabel_format(axis="y", useOffset=False)
+            axes.xaxis.set_tick_params(labelbottom=True)

@@ -53,6 +53,7 @@ LOOK = {
     "legend.fontsize": 12,
     "lines.linewidth": 1.3,
     "agg.path.chunksize": 20000,
+    "date.converter": "concise",
 }
 
 
