@@ -153,7 +153,7 @@ class History:
     """Everything predicted in a replay of m stroke samples, and k rows of residuals of c channels; n joints.
 
     Of a long session, rows are left out between those that hold the extremes, see `boom_twin.plots.extreme_rows`. Then
-    `residual_means`, `slow_moments` and `totals` are given, which do not follow from the rows that are left.
+    `totals` are given, which do not follow from the rows that are left.
 
     Attributes
     ----------
@@ -165,8 +165,8 @@ class History:
     residual_stamps_s : ndarray, shape (k,)
     residual_names : tuple of str
         ``joint_<i>`` (rad) or ``tip_imu_x``, ``tip_imu_z`` (m/s^2).
-    residual_values, residual_sigmas : ndarray, shape (k, c)
-        Measured minus predicted, and the deviation expected of it; NaN where a channel has no sample at that stamp.
+    residual_values, residual_sigmas, residual_means : ndarray, shape (k, c)
+        Measured minus predicted, the deviation expected of it, the mean over a second; NaN without a sample at that stamp.
     imu : ImuTrace or None
     shapes : list of (float, ndarray of shape (p, 2))
         Deflected centre lines from the base pivot to the tip, m, and when.
@@ -174,14 +174,8 @@ class History:
         From and to, s, where strokes were missing.
     alarms : list of AlarmSpan
         In the order of their beginning.
-    moments : ndarray, shape (m, k)
-        Bending moments (N m) at the stations of `boom_twin.analysis.bending_moments`.
-    orbits : Orbits or None
-        Of the pins with clearance, if there are any.
-    residual_means : ndarray, shape (k, c), or None
-        Means of `residual_values` over a second.
-    slow_moments : ndarray, shape (m, k), or None
-        Static part of `moments`.
+    moments, slow_moments : ndarray, shape (m, k)
+        Bending moments (N m) at the stations of `boom_twin.analysis.bending_moments`, and their static parts.
     totals : SessionTotals or None
     estimate : EstimateTrace or None
         None where nothing but strokes was measured.
@@ -200,14 +194,13 @@ class History:
     residual_names: tuple[str, ...]
     residual_values: Array
     residual_sigmas: Array
+    residual_means: Array
     imu: ImuTrace | None = None
     shapes: list[tuple[float, Array]] = field(default_factory=list)
     gaps: list[tuple[float, float]] = field(default_factory=list)
     alarms: list[AlarmSpan] = field(default_factory=list)
     moments: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    orbits: Orbits | None = None
-    residual_means: Array | None = None
-    slow_moments: Array | None = None
+    slow_moments: Array = field(default_factory=lambda: np.zeros((0, 0)))
     totals: SessionTotals | None = None
     estimate: EstimateTrace | None = None
     load_text: str = ""

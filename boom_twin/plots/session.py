@@ -11,7 +11,7 @@ import numpy as np
 
 from ..types import Array
 from .history import History, Truth
-from .posture import orbits_picture, posture_picture
+from .posture import posture_picture
 from .residuals import SIGMA, has_spectrum, residual_picture, running_mean, spectrum_picture
 from .style import BLUE, GREEN, GREY, ORANGE, SKY, legend_above, picture
 from .tip import tip_picture
@@ -38,8 +38,7 @@ def replay_pictures(
     -------
     list of Path
         ``tip.png``, ``residuals.png`` (if there are channels), ``posture.png`` (if there are shapes), ``spectrum.png``
-        (from 4 s on), ``orbits.png`` (if there are pins with clearance); none at all if nothing was predicted. The same
-        arrays give the same bytes.
+        (from 4 s on); none at all if nothing was predicted. The same arrays give the same bytes.
     """
     if len(history.stamps_s) == 0:
         return []
@@ -55,9 +54,6 @@ def replay_pictures(
     if has_spectrum(history):
         written.append(directory / "spectrum.png")
         spectrum_picture(written[-1], session, history, note)
-    if history.orbits is not None:
-        written.append(directory / "orbits.png")
-        orbits_picture(written[-1], f"{session}: journals in their bushes", history.orbits, note)
     return written
 
 

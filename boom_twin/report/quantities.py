@@ -18,7 +18,6 @@ from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..plots import History
-from ..plots.health import slow_part
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..system.received_files import open_received
@@ -265,7 +264,7 @@ class SectionLoads:
             column = columns[int(best)]
             moment = float(history.moments[row, column])
             if section not in self._largest or abs(moment) > abs(self._largest[section].moment):
-                when, static = float(history.stamps_s[row]), float(slow_part(history, column)[row])
+                when, static = float(history.stamps_s[row]), float(history.slow_moments[row, column])
                 about = (each[row].copy() for each in (history.strokes, history.joints, load, variance))
                 self._largest[section] = _Largest(column, moment, when, static, *about)
 
