@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..types import SENSORS
-from .data.dropped_messages import DroppedMessages
+from .data.received_messages import DroppedMessages
 from .data.status import HEALTH, ListedAlarm, Severity, StatusLamp, overall, worst
 from .data.store import Store
 from .data.topic_rows import RESIDUALS

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from boom_twin.monitor.data.dropped_messages import DroppedMessages, MalformedError
+from boom_twin.monitor.data.received_messages import DroppedMessages, MalformedError
 from boom_twin.monitor.data.status import MOST, SILENCE, AlarmList, Severity, StatusTable, overall, worst
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import dump, state

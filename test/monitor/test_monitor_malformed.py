@@ -19,14 +19,14 @@ from boom_twin.messages.report_encoder import encode_health
 from boom_twin.messages.topic_table import TYPES, Output, Topic, load_topics
 from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.monitor import log_limit as log
-from boom_twin.monitor.data import topic_rows as catching
 from boom_twin.monitor.data.analyst import Analyst
-from boom_twin.monitor.data.dropped_messages import LONGEST
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.present_posture import ResponseCompiler
+from boom_twin.monitor.data.received_messages import LONGEST_REASON
 from boom_twin.monitor.data.spectrum import MOST_POINTS, spacing, spectrogram, spectrum
 from boom_twin.monitor.data.status import MOST_NODES
 from boom_twin.monitor.data.store import Store
+from boom_twin.monitor.data.topic_rows import WAITING, PartsOfRows
 from boom_twin.monitor.protocol import dump, layout, state
 from boom_twin.types import Alarm, Health, Ranked, Stream
 
@@ -203,7 +203,7 @@ def test_a_malformed_message_is_dropped_counted_and_told_and_all_others_are_show
     bench.send(role, make(), EPOCH + 3 * STEP)
     bench.go_on(4)
     count, told = bench.lost(role)
-    assert count == 2 and reason in told and told.isprintable() and len(told) <= 2 * LONGEST
+    assert count == 2 and reason in told and told.isprintable() and len(told) <= 2 * LONGEST_REASON
     assert set(bench.store.tables) == TABLES and {table.count for table in bench.store.tables.values()} == {6}
     assert bench.store.generation == 0 and sum(loss["count"] for loss in bench.topic_rows.dropped.told()) == 2
     dump(state(bench.store, 0.0, 0.0) | layout(bench.store))
@@ -359,9 +359,8 @@ def test_what_was_dropped_is_logged_at_a_limited_rate(capfd: Any, monkeypatch: p
     assert "dropped message 1001 of /boom_twin/residuals" in lines[-1] and "\x1b" not in "".join(lines)
 
 
-def test_the_catch_bounds_what_waits() -> None:
-    bench = Bench()
-    for row in range(3000):
-        bench.send(Stream.IMU, GOOD[Stream.IMU](), EPOCH + row * STEP)
-        bench.send(Output.RESIDUALS, joint_state(["tip_imu_x", "tip_imu_z"]), EPOCH + row * STEP + 1)
-    assert max(len(bench.topic_rows._measured), len(bench.topic_rows._residuals)) <= catching.WAITING + 1
+def test_parts_that_wait_for_others_are_bounded() -> None:
+    parts = PartsOfRows(("measured", "residual"))
+    for stamp in range(0, 6000, 2):
+        assert parts.put("measured", stamp, [1.0]) is None and parts.put("residual", stamp + 1, [0.1]) is None
+    assert len(parts) == WAITING + 1 and parts.put("residual", 5998, [0.2]) == [[1.0], [0.2]]

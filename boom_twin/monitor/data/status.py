@@ -10,7 +10,7 @@ from typing import Any
 
 from ...diagnostics.recorder_status import ENDED
 from ...types import Alarm
-from .message_checks import text
+from .received_messages import text
 
 SILENCE = 3.0
 """Seconds without a word from a node after which its lamps are stale."""

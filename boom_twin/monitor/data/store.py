@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...types import NANO
-from .dropped_messages import MalformedError
-from .status import AlarmList, StatusTable
+from .received_messages import MalformedError
+from .status import AlarmList, Severity, StatusTable
 
 FIRST = 1024
 """Rows that there is room for at first."""
@@ -79,6 +79,12 @@ class Table:
 
 MOST_STATUSES = 100_000
 """Earlier states of the lamps that are kept: a day of them."""
+BACK = 1_000_000_000
+"""A stamp earlier by more than this (ns) may be that of a clock that was set back; by less it is out of order."""
+AHEAD = 60_000_000_000
+"""A stamp later by more than this (ns) may be a stray one; no table has its rows so far apart."""
+EVERY_STROKE, GAP = "displacement", 0.1
+"""Table with a row for every stroke sample, and the pause (s) of it from which on an alarm tells it."""
 
 
 class Store:
@@ -108,27 +114,61 @@ class Store:
         self.tables: dict[str, Table] = {}
         self.alarms = AlarmList()
         self._statuses: list[tuple[float, StatusTable]] = []
+        self._last: dict[str, int] = {}  # stamp (ns) of the newest row of every table
+        self._held: dict[str, tuple[int, Sequence[float]]] = {}
 
     def clear(self) -> None:
         """Delete all rows and the epoch; keep the lamps."""
         self.generation += 1
         self.epoch = 0
-        self.tables = {}
+        self.tables, self._last, self._held = {}, {}, {}
 
     def time(self, stamp: int) -> float:
         """Return the seconds since the epoch, which the first stamp (ns) sets."""
         self.epoch = self.epoch or stamp
         return (stamp - self.epoch) * NANO
 
+    def receive(self, name: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
+        """Add a row to a table whatever its stamp is.
+
+        A row whose stamp leaps is held back until the next one of its table. If that goes on from it, time has leapt and both
+        are added; else it was a stray one. Time that was set back deletes all rows before.
+
+        Raises
+        ------
+        MalformedError
+            Its stamp is not after that of the row before, it has other columns, or the row held back was a stray one.
+        """
+        self._check(name, columns)
+        last, held = self._last.get(name, stamp - 1), self._held.get(name)
+        is_leap = not -BACK <= stamp - last <= AHEAD
+        if not is_leap and stamp <= last:
+            raise MalformedError(f"its stamp is not after the last one but {(last - stamp) * NANO:.9g} s before it")
+        self._held.pop(name, None)
+        if is_leap and held is not None and 0 < stamp - held[0] <= AHEAD:
+            if stamp < last:
+                self.clear()
+            self.append(name, columns, *held)
+            held = None
+        elif is_leap:
+            self._held[name] = stamp, values
+        if name not in self._held:
+            self.append(name, columns, stamp, values)
+            self._last[name] = stamp
+        if held is not None:
+            raise MalformedError(f"its stamp leaps by {(held[0] - last) * NANO:.9g} s, and the next one's does not")
+
     def append(self, name: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
         """Add a row to a table; the first row creates the table."""
-        self.check(name, columns)
-        table = self.tables.get(name)
-        if table is None:
-            table = self.tables[name] = Table(name, columns, self._capacity)
-        table.append(self.time(stamp), values)
+        self._check(name, columns)
+        if name not in self.tables:
+            self.tables[name] = Table(name, columns, self._capacity)
+        table, time = self.tables[name], self.time(stamp)
+        if name == EVERY_STROKE and table.count and time - table.newest > GAP:
+            self.alarms.add("cylinder_strokes", Severity.WARN, f"gap of {time - table.newest:.2f} s", table.newest, time)
+        table.append(time, values)
 
-    def check(self, name: str, columns: Sequence[str]) -> None:
+    def _check(self, name: str, columns: Sequence[str]) -> None:
         """Raise MalformedError if a table has other columns than these."""
         table = self.tables.get(name)
         if table is not None and table.columns != tuple(columns):
