@@ -15,8 +15,8 @@ from .actions import ViewerActions
 from .connections import Connection
 from .data.analyst import Analyst
 from .data.feed import Feed
-from .data.present_posture import ResponseCompiler
 from .data.session_list import SessionList
+from .data.tip_response import ResponseCompiler
 from .viewer import SessionChoice, Viewer
 
 PAGE = Path(__file__).parent / "page"

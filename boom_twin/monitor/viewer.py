@@ -18,9 +18,9 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from .actions import ViewerActions
 from .data.analyst import Analyst, response_messages
 from .data.feed import Feed, Playback
-from .data.present_posture import TipResponses
 from .data.session_list import SessionList
 from .data.store import Table
+from .data.tip_response import TipResponses
 from .protocol import ROWS, alarms, dump, layout, pack, state
 
 PERIOD = 1.0 / 30.0

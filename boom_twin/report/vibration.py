@@ -9,7 +9,7 @@ import numpy as np
 
 from ..analysis.even_times import spacing, unbroken
 from ..analysis.free_vibration import ORDER, Vibration, free_vibrations, is_free
-from ..monitor.data.present_posture import ModeList
+from ..analysis.posture_modes import ModeList
 from ..plots import History
 from ..scene.schema import Scene
 from ..scene.summary import weight_of

@@ -15,6 +15,7 @@ from monitor.conftest import read_all
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from boom_twin import statics
+from boom_twin.analysis.posture_modes import ModeList
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_session
 from boom_twin.bag.session_sheet import SessionSheet
@@ -26,8 +27,8 @@ from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.monitor.data.analyst import Analyst
 from boom_twin.monitor.data.bag_feed import ENOUGH, bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
-from boom_twin.monitor.data.present_posture import ModeList, ResponseCompiler, ResponseList
 from boom_twin.monitor.data.status import ListedAlarm, Severity, overall
+from boom_twin.monitor.data.tip_response import ResponseCompiler, ResponseList
 from boom_twin.monitor.protocol import dump, state
 from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from ...analysis.posture_modes import MOVED, ModeList
 from ...deviation.load_spectrum import tip_load
 from ..protocol import RESPONSE, SPECTROGRAM, SPECTRUM, pack
 from .feed import Feed
-from .present_posture import MOVED, ModeList, ResponseCompiler, ResponseList, TipResponses
-from .spectrum import SEGMENT, STEP, WINDOW, Spectrum, spectrogram, spectrum
+from .spectrum import SEGMENT, STEP, WINDOW, Peak, spectrogram, spectrum
+from .tip_response import ResponseCompiler, ResponseList, TipResponses
 from .topic_rows import ESTIMATE
 
 
@@ -70,20 +71,19 @@ class Analyst:
                 return None
             end = table.until(time)
             key = (store.generation, end)
-            if self._known is None or self._known[0] != key:
-                times, values = table.rows(table.until(time - WINDOW), end)
-                found = await asyncio.to_thread(
-                    self._work_out, times, values[:, signal.columns].astype(float), self._feed.strokes(time)
-                )
-                if found is None:
-                    return None
-                natural, result = found
-                moved = self._moved(time)
-                number = list(store.tables).index(signal.table)
-                block = pack(SPECTRUM, number, result.frequencies, result.densities.astype("f4"))
-                peaks = [self._placed(asdict(peak), natural, time, moved > MOVED) for peak in result.peaks]
-                lines = {"kind": "lines", "natural": natural, "peaks": peaks, "source": signal.name, "axes": signal.axes}
-                self._known = key, ({**lines, "moved": moved if moved > MOVED else 0.0}, block)
+            if self._known is not None and self._known[0] == key:
+                return self._known[1]
+            times, values = table.rows(table.until(time - WINDOW), end)
+            found = await asyncio.to_thread(spectrum, times, values[:, signal.columns].astype(float))
+            if found is None:
+                return None
+            natural = await asyncio.to_thread(self._natural, self._feed.strokes(time))
+            moved = self._moved(time)
+            number = list(store.tables).index(signal.table)
+            block = pack(SPECTRUM, number, found.frequencies, found.densities.astype("f4"))
+            peaks = [self._placed(peak, natural, time, moved > MOVED) for peak in found.peaks]
+            lines = {"kind": "lines", "natural": natural, "peaks": peaks, "source": signal.name, "axes": signal.axes}
+            self._known = key, ({**lines, "moved": moved if moved > MOVED else 0.0}, block)
             return self._known[1]
 
     async def response_at(self, time: float) -> TipResponses:
@@ -140,22 +140,19 @@ class Analyst:
         strokes = self._feed.strokes_between(time - WINDOW, time)
         return float(np.ptp(strokes, axis=0).max()) if len(strokes) else 0.0
 
-    def _work_out(self, times: Any, values: Any, strokes: list[float]) -> tuple[list[float], Spectrum] | None:
-        found = spectrum(times, values)
-        return None if found is None else (self._natural(strokes), found)
-
-    def _placed(self, peak: dict[str, Any], natural: list[float], time: float, has_moved: bool) -> dict[str, Any]:
+    def _placed(self, peak: Peak, natural: list[float], time: float, has_moved: bool) -> dict[str, Any]:
         """Return a peak with the number of its mode, its deviation from the model, and its drift since the first look.
 
         None of these is given if the boom has moved, because its frequencies do not belong to one posture.
         """
-        mode = None if has_moved else _mode(peak["frequency"], natural)
-        if mode is None:
-            return {**peak, "mode": None, "deviation": None, "drift": None}
-        ratio = peak["frequency"] / natural[mode - 1]
+        told: dict[str, Any] = {**asdict(peak), "mode": None, "deviation": None, "drift": None}
+        mode = int(np.argmin(np.abs(np.array(natural) - peak.frequency))) + 1 if natural and not has_moved else 0
+        if not mode or abs(natural[mode - 1] - peak.frequency) > MATCH * natural[mode - 1]:
+            return told
+        ratio = peak.frequency / natural[mode - 1]
         if mode not in self._firsts or time < self._firsts[mode][0]:
             self._firsts[mode] = time, ratio
-        return {**peak, "mode": mode, "deviation": ratio - 1.0, "drift": ratio / self._firsts[mode][1] - 1.0}
+        return told | {"mode": mode, "deviation": ratio - 1.0, "drift": ratio / self._firsts[mode][1] - 1.0}
 
     def _natural(self, strokes: list[float]) -> list[float]:
         scene = self._feed.scene()
@@ -169,9 +166,3 @@ def response_messages(found: TipResponses) -> tuple[dict[str, Any], bytes]:
     """Return text message ``loads`` and binary block of a response; the block is empty if there is no response."""
     text = {"kind": "loads", "names": found.loads, "trouble": found.trouble}
     return text, pack(RESPONSE, 0, found.frequencies, found.accelerations.astype("f4")) if found.loads else b""
-
-
-def _mode(frequency: float, natural: list[float]) -> int | None:
-    """Return the number, from 1, of the nearest natural frequency, if it is near."""
-    number = min(range(len(natural)), key=lambda i: abs(natural[i] - frequency), default=None)
-    return None if number is None or abs(natural[number] - frequency) > MATCH * natural[number] else number + 1

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks, hilbert, welch
 
+from ...analysis.even_times import spacing
 from ...types import Array
 
 WINDOW = 40.0
@@ -25,10 +26,6 @@ BAND = 0.3
 """Half width of the band around a peak whose decay gives the damping, as a share of its frequency."""
 FALL = 0.3
 """Share of its start down to which a decay is looked at."""
-
-
-MOST_POINTS = 40_000
-"""Evenly spaced points that rows are brought to at most: a millisecond apart in a `WINDOW`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +61,6 @@ def spectrum(times: Array, values: Array) -> Spectrum | None:
     return Spectrum(frequencies, densities, peaks)
 
 
-def spacing(times: Array) -> float:
-    """Return the usual step (s) of `times` (n,), at least their whole span divided by `MOST_POINTS`."""
-    return max(float(np.median(np.diff(times))), float(times[-1] - times[0]) / MOST_POINTS)
-
-
 def _peaks(frequencies: Array, density: Array, values: Array, rate: float) -> list[Peak]:
     """Return the highest peaks that stand out, their frequencies by a parabola through the decibels."""
     level = 10.0 * np.log10(np.maximum(density, 1e-30))
@@ -88,17 +80,7 @@ def damping(values: Array, rate: float, frequency: float) -> float:
     """Return the damping ratio of the mode at `frequency` (Hz), from the autocorrelation's decay in the band around it.
 
     The autocorrelation of a lightly damped mode under random excitation decays as its free vibration does, as
-    exp(-2 pi zeta f t) (Cole 1973). NaN where it does not decay.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n, c)
-        At `rate` (Hz).
-
-    Returns
-    -------
-    float
-        Damping ratio, 1 is critical; NaN where the vibration does not decay.
+    exp(-2 pi zeta f t) (Cole 1973). NaN where it does not decay. `values` (n, c) are at `rate` (Hz).
     """
     count = len(values)
     power = np.square(np.abs(np.fft.rfft(values - values.mean(axis=0), 2 * count, axis=0))).sum(axis=1)
@@ -130,19 +112,9 @@ FULL = 0.9
 def spectrogram(times: Array, values: Array, ends: Array) -> NDArray[np.float32]:
     """Return one-sided densities, (m/s^2)^2/Hz, of the segments before `ends`.
 
-    Each is a periodogram with Hann's window, both directions added; Welch's method averages such.
-
-    Parameters
-    ----------
-    times, values : ndarray, shapes (n,) and (n, c)
-        s, m/s^2.
-    ends : ndarray, shape (k,)
-        s.
-
-    Returns
-    -------
-    ndarray, shape (k, len(FREQUENCIES))
-        NaN where rows are missing, and above half the rate.
+    Each is a periodogram with Hann's window, both directions added; Welch's method averages such. `values` (n, c) in m/s^2 are
+    at `times` (n,) in s, `ends` (k,) are in s. A row has the densities at `FREQUENCIES`; NaN where rows are missing, and above
+    half the rate.
     """
     found = np.full((len(ends), len(FREQUENCIES)), np.nan, dtype=np.float32)
     finite = np.isfinite(values).all(axis=1)

@@ -1,80 +1,27 @@
-"""Natural frequencies and tip response of the model in the posture that is shown.
+"""Response of the tip to loads in the posture that is shown.
 
-The model is evaluated again only if the boom has moved, in a thread beside the server, so that no sample waits for it.
+The first one on a computer compiles for half a minute, which is done in a child process, so that the page goes on.
 """
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Sequence
+import asyncio
+from asyncio.subprocess import DEVNULL
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
-from ...analysis.equilibrium import settle
 from ...analysis.frequency_response import UPWARD, linearised_boom
-from ...analysis.modal import natural_modes
-from ...compiler.compile import compile_scene
+from ...analysis.posture_modes import PresentPosture
 from ...errors import BoomTwinError
 from ...kernels.jit import could_be_kept
 from ...kernels.transfer.frequency_response import harmonic_response
-from ...scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+from ...scene.kinematics import strokes_of_posture
 from ...scene.load import load_scene
 from ...scene.schema import Scene
 from ...system.child_process import python_command
 from ...types import Array
-
-if TYPE_CHECKING:
-    import asyncio
-
-MOVED = 0.005
-"""m of any stroke after which all is worked out anew."""
-
-Found = TypeVar("Found")
-
-
-class PresentPosture(Generic[Found]):
-    """Result that depends on the strokes of one boom, computed again when it has moved by `MOVED`."""
-
-    def __init__(self) -> None:
-        self._at: Array | None = None
-        self._found: Found | None = None
-        self._one_at_a_time = threading.Lock()  # a thread goes on when the viewer that waited for it has gone
-
-    def at(self, strokes: Sequence[float]) -> Found:
-        """Return the result at `strokes` (m), the same object as before if the boom has not moved."""
-        now = np.asarray(strokes, dtype=np.float64)
-        with self._one_at_a_time:
-            if self._found is None or self._at is None or np.max(np.abs(now - self._at)) > MOVED:
-                self._found, self._at = self._work_out(now), now
-            return self._found
-
-    def _work_out(self, strokes: Array) -> Found:
-        raise NotImplementedError
-
-
-COUNT = 6
-WIDTH = 1e-4
-"""Relative accuracy of the frequencies."""
-
-
-class ModeList(PresentPosture[list[float]]):
-    """Lowest `COUNT` natural frequencies (Hz) about the equilibrium; none where there is no equilibrium."""
-
-    def __init__(self, scene: Scene) -> None:
-        super().__init__()
-        self._scene, self._plan = scene, compile_scene(scene)
-
-    def _work_out(self, strokes: Array) -> list[float]:
-        state, work = self._plan.state(), self._plan.work()
-        try:
-            settle(self._plan, state, work, strokes, joint_angles_of_strokes(self._scene, strokes))
-        except BoomTwinError:
-            return []
-        return [mode.frequency for mode in natural_modes(self._plan, state, work, COUNT, WIDTH)]
-
 
 FREQUENCIES = np.geomspace(0.25, 30.0, 400)
 """Hz, of the responses."""
@@ -125,8 +72,8 @@ class ResponseList(PresentPosture[TipResponses]):
 class ResponseCompiler:
     """Compilation in a child process, once for all viewers, of what responses need and this computer has not compiled yet.
 
-    It takes half a minute, in which a compiler in a thread of the server would leave it little of the interpreter's lock.
-    A viewer that goes away meanwhile does not stop it, or a page that is opened and closed again would never have responses.
+    A compiler in a thread of the server would leave it little of the interpreter's lock. A viewer that goes away meanwhile
+    does not stop it, or a page that is opened and closed again would never have responses.
     """
 
     def __init__(self) -> None:
@@ -134,8 +81,6 @@ class ResponseCompiler:
 
     async def finish(self) -> None:
         """Wait until the compilation is done, and start it if needed."""
-        import asyncio  # which a replay, whose report uses this module, has no need of
-
         self._task = self._task or asyncio.create_task(_compile_beside())
         await asyncio.shield(self._task)
 
@@ -148,9 +93,6 @@ class ResponseCompiler:
 async def _compile_beside() -> None:
     if not could_be_kept(harmonic_response):
         return
-    import asyncio
-    from asyncio.subprocess import DEVNULL
-
     process = await asyncio.create_subprocess_exec(*python_command(__name__), stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL)
     try:
         await process.wait()
