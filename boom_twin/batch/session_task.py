@@ -112,7 +112,7 @@ def row_of(task: SessionTask) -> Row:
     from ..offline.history import draw
     from ..offline.replay import replay_into
     from ..report.evaluation import Evaluator
-    from ..report.page import Subject, write_report
+    from ..report.page import write_report
     from ..report.quantities import read
     from ..system.result_folder import REPLAY, result_folder
 
@@ -130,7 +130,7 @@ def row_of(task: SessionTask) -> Row:
         found = evaluator.finish(result, building.folder)
         if task.report:
             draw(result, found.history, building.folder)
-            write_report(Subject(result, found, scene.scene, scene.source, False), building.folder)
+            write_report(found, building.folder)
         _, quantities = read(building.folder)
         if not task.keep_bag:
             rmtree(building.folder / "bag")

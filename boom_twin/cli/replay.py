@@ -24,9 +24,7 @@ from .main import (
 )
 
 if TYPE_CHECKING:
-    from ..bag.session_model import SessionScene
     from ..offline.recording import Stretch
-    from ..offline.replay import Replay
     from ..report.evaluation import Evaluation
 
 
@@ -103,7 +101,7 @@ def run(args: Namespace) -> int:
 
         result = replay_into(building, args.bag, scene, *options, take=take, with_bag=not args.no_bag, causes=args.causes)
         found = evaluator.finish(result, building.folder)
-        files = [path.name for path in _write(args, result, found, scene, building.folder)]
+        files = [path.name for path in _write(args, found, building.folder)]
         if table is not None:
             table.finish()
             files.append(name)
@@ -126,18 +124,16 @@ def flat(summary: dict[str, Any]) -> dict[str, Any]:
     return found | {f"alarm_{key}": [alarm[key] for alarm in alarms] for key in ("channel", "kind", "from_s", "to_s", "cause")}
 
 
-def _write(args: Namespace, result: Replay, found: Evaluation, scene: SessionScene, out: Path) -> list[Path]:
+def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
     """Write pictures and report, as they are wanted; return these files and the file of the figures."""
     from ..offline.history import draw
-    from ..report.page import Subject, write_report
+    from ..report.page import write_report
 
     files = [found.file]
     if not args.no_pictures:
-        files += draw(result, found.history, out)
+        files += draw(found.result, found.history, out)
     if args.report:
-        known = args.section_height is not None or all(part.height for part in scene.scene.sections if part.beam is not None)
-        subject = Subject(result, found, scene.scene, scene.source, known)
-        files.append(write_report(subject, out))
+        files.append(write_report(found, out))
     return files
 
 

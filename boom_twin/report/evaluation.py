@@ -19,28 +19,45 @@ from .vibration import HoldFinder, HoldInterval
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Result of the evaluation of a replay.
+    """Everything that a report tells of a replay.
 
     Attributes
     ----------
+    result : Replay
+    scene : Scene
     history : History
     still : list of HoldInterval
     loads : list of Load
         Of the flexible sections.
-    file : Path
-        Where the figures are.
+    has_heights : bool
+        True if the stresses are by heights that the scene or the user gave.
     fatigue : list of Fatigue
         Of all stations, if it was asked for.
     category : float or None
         Detail category (MPa) that it was asked for.
+    file : Path
+        Where the figures are.
     """
 
+    result: Replay
+    scene: Scene
     history: History
     still: list[HoldInterval]
     loads: list[Load]
-    file: Path
+    has_heights: bool
     fatigue: list[Fatigue]
     category: float | None
+    file: Path
+
+    @property
+    def name(self) -> str:
+        """Name of the session."""
+        return self.result.session.path.resolve().name
+
+    @property
+    def origin(self) -> str:
+        """Origin of the session; empty if it states none."""
+        return self.result.session.notes.get("origin", "")
 
 
 class Evaluator:
@@ -57,16 +74,9 @@ class Evaluator:
         Detail category (MPa) for the fatigue of all stations; without it fatigue is not looked at.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        settings: Settings,
-        heights: Array | None = None,
-        category: float | None = None,
-    ) -> None:
-        self._scene, self._settings = scene, settings
-        self._history = HistoryBuilder(scene)
-        self._quantities, self._holds, self._heights = QuantityBuilder(scene), HoldFinder(scene), heights
+    def __init__(self, scene: Scene, settings: Settings, heights: Array | None = None, category: float | None = None) -> None:
+        self._scene, self._settings, self._heights, self._category = scene, settings, heights, category
+        self._history, self._quantities, self._holds = HistoryBuilder(scene), QuantityBuilder(scene), HoldFinder(scene)
         self._fatigue = None if category is None else FatigueCounter(scene, category, heights)
 
     def add(self, stretch: Stretch) -> None:
@@ -81,7 +91,15 @@ class Evaluator:
         """Return the evaluation of the replay and write its figures into `folder`; to be called once."""
         still = self._holds.finish()
         found = self._quantities.quantities(result.recording.totals.tip_sigma, still, self._settings)
-        file = write(folder, self._scene, found)
-        fatigue, category = ([], None) if self._fatigue is None else (self._fatigue.found(), self._fatigue.category)
-        loads = self._quantities.loads(self._heights)
-        return Evaluation(self._history.history(result.recording), still, loads, file, fatigue, category)
+        heights = self._heights is not None or all(part.height for part in self._scene.sections if part.beam is not None)
+        return Evaluation(
+            result,
+            self._scene,
+            self._history.history(result.recording),
+            still,
+            self._quantities.loads(self._heights),
+            heights,
+            [] if self._fatigue is None else self._fatigue.found(),
+            self._category,
+            write(folder, self._scene, found),
+        )
