@@ -41,19 +41,9 @@ TURN = 0.04
 
 
 class BagFeed(Feed):
-    """Feed of a recorded session, read further at every `poll`.
+    """Feed of a recorded session, read further at every `poll`."""
 
-    Parameters
-    ----------
-    title, store, topics, scene
-        As of a `Feed`.
-    length : float
-        Seconds from its first message to the last.
-    """
-
-    def __init__(self, title: str, store: Store, topics: Topics, scene: Scene, length: float) -> None:
-        super().__init__(title, store, topics, scene, length)
-        self._steps: Generator[None] | None = None
+    _steps: Generator[None] | None = None
 
     def begin(self, steps: Generator[None]) -> None:
         """Start reading; every step of `steps` reads a part of the session."""
@@ -92,24 +82,10 @@ def bag_feed(
     window: TimeWindow = WHOLE,
     namespace: str = "",
 ) -> BagFeed:
-    """Open a session.
+    """Open a recording, or the result bag of a replay.
 
-    Parameters
-    ----------
-    path : Path
-        A recording, or the result bag of a replay.
-    scene : Scene or SessionScene, optional
-        Of the rig; None: the one that the session was made with, else the package's own.
-    settings : Settings
-        For the twin, where the session has no outputs.
-    mapping : Path, optional
-        How topics and sensors are read; as for `boom_twin.offline.replay.replay`.
-    baseline : Path, optional
-        What is known of this rig while all is well; likewise.
-    window : TimeWindow, optional
-        The part that is shown; a twin starts at rest where it begins.
-    namespace : str
-        Likewise.
+    The parameters are those of `boom_twin.offline.replay.replay`; `settings` are for the twin, where the session has no
+    outputs, and the twin starts at rest where the `window` begins.
 
     Raises
     ------
@@ -134,7 +110,7 @@ def bag_feed(
         feed.begin(_take_published(session, feed, topics, counts, window))
     else:
         twin = _Twin(feed, topics, scene, settings, usual)
-        feed.begin(_take_predicted(session, topics, counts, twin, window))
+        feed.begin(_take_predicted(session, feed, topics, counts, twin, window))
     return feed
 
 
@@ -162,7 +138,7 @@ def _take_published(
 
 
 def _take_predicted(
-    session: Session, topics: Topics, counts: dict[str, int], twin: _Twin, window: TimeWindow
+    session: Session, feed: Feed, topics: Topics, counts: dict[str, int], twin: _Twin, window: TimeWindow
 ) -> Generator[None]:
     """Run a twin on the recorded inputs and store its predictions, one sample a step."""
     wanted = [name for name in topics.heard if "/" + name.lstrip("/") in counts]
@@ -174,7 +150,7 @@ def _take_predicted(
                 twin.took(step)
             yield
         twin.finish()
-        if not twin.has_predicted:
+        if not feed.store.tables:
             raise BagError(f"{session.path}: no stroke could be used; they need names cylinder_1 .. in m, or a mapping.")
     finally:
         ahead.stop()
@@ -197,11 +173,6 @@ class _Twin:
         self._peers = {stream: Peers(topic.absolute) for stream, topic in topics.inputs.items()}
         self._looked: float | None = None
         self.twin.warm_up()
-
-    @property
-    def has_predicted(self) -> bool:
-        """Return True if the twin has predicted anything yet."""
-        return bool(self._feed.store.tables)
 
     def took(self, step: Step) -> None:
         """Show the results of one sample."""

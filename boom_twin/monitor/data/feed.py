@@ -97,25 +97,12 @@ SLOWEST, FASTEST = 0.1, 10.0
 
 
 class Playback:
-    """Position in a recorded session. Unless held, it advances at a speed up to what has been read of the session.
-
-    Parameters
-    ----------
-    feed : Feed
-        Of a recorded session.
-
-    Attributes
-    ----------
-    position : float
-        s.
-    speed : float
-        Session time over real time.
-    is_held : bool
-    """
+    """Position (s) in a recorded session. Unless held, it advances at a speed up to what has been read of the session."""
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
-        self.position, self.speed, self.is_held = 0.0, 1.0, False
+        self.position, self.is_held = 0.0, False
+        self.speed = 1.0  # session time over real time
 
     def advance(self, span: float) -> float:
         """Advance by `span` (s) of real time and return the position; hold at the end."""
@@ -132,6 +119,12 @@ class Playback:
     def pace(self, speed: float) -> None:
         """Set the speed, limited to the permitted range."""
         self.speed = min(max(speed, SLOWEST), FASTEST)
+
+    def hold(self, is_held: float) -> None:
+        """Hold, or go on; from the end of the session that is from its beginning."""
+        if self.is_at_end and not is_held:
+            self.seek(0.0)
+        self.is_held = bool(is_held)
 
     def seek(self, position: float) -> None:
         """Move to `position` (s), limited to what has been read."""

@@ -71,16 +71,7 @@ class StatusTable:
     nodes: Mapping[str, tuple[float, tuple[StatusLamp, ...]]] = field(default_factory=dict)
 
     def told(self, now: float, statuses: Iterable[Any], clock: float) -> StatusTable:
-        """Return the table after one DiagnosticArray of one or more nodes.
-
-        Parameters
-        ----------
-        now : float
-            Time of its arrival, s, as given to `groups` later.
-        statuses : iterable of diagnostic_msgs/DiagnosticStatus
-        clock : float
-            Its stamp, s.
-        """
+        """Return the table after a DiagnosticArray with these `statuses` and the stamp `clock` (s), which came at `now` (s)."""
         found: dict[str, list[StatusLamp]] = {}
         for status in statuses:
             node, _, name = text(status.name).partition(": ")
@@ -217,8 +208,11 @@ class AlarmList:
         for key in [key for key in self._open if key not in lamps or lamps[key].level <= Severity.OK]:
             self._open.pop(key).end = time
         for key, lamp in lamps.items():
-            if lamp.level > Severity.OK:
-                self._raise(key, lamp.name, lamp.level, lamp.reason, time)
+            alarm = self._open.get(key)
+            if alarm is None and lamp.level > Severity.OK:
+                self._open[key] = self.add(lamp.name, lamp.level, lamp.reason, time)
+            elif alarm is not None and lamp.level > alarm.level:
+                alarm.level, alarm.reason, alarm.is_acknowledged = lamp.level, lamp.reason, False
 
     def judge(self, now: float, told: Sequence[Alarm], time: Callable[[int], float]) -> None:
         """Update the alarms of the rig's health to those reported at `now` (s): active ones and those that have just ended.
@@ -261,13 +255,6 @@ class AlarmList:
         """Acknowledge all ended health alarms, because the node has released them."""
         for alarm in self.all:
             alarm.is_acknowledged |= bool(alarm.causes) and alarm.end is not None
-
-    def _raise(self, key: str, name: str, level: Severity, reason: str, time: float) -> None:
-        alarm = self._open.get(key)
-        if alarm is None:
-            self._open[key] = self.add(name, level, reason, time)
-        elif level > alarm.level:
-            alarm.level, alarm.reason, alarm.is_acknowledged = level, reason, False
 
 
 def _renew(alarm: ListedAlarm, found: Alarm, time: Callable[[int], float]) -> None:
