@@ -38,14 +38,9 @@ class Workers:
 
 @contextmanager
 def connected(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
-    """Yield the workers of the scheduler at an address, or those of this process, which opens no port.
+    """Yield the workers of the scheduler at an address (``tcp://host:8786``), or those of this process, which opens no port.
 
-    Parameters
-    ----------
-    scheduler : str, optional
-        Address, such as ``tcp://host:8786``.
-    workers : int, optional
-        Number of sessions at once on this machine; by default its number of cores.
+    `workers` is the number of sessions at once on this machine, by default that of its cores.
 
     Raises
     ------
