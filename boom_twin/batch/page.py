@@ -38,7 +38,7 @@ COLUMNS = (
 )  # fmt: skip
 TRENDS = ("residual_rms_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
 """First part of the names of figures that are drawn over time."""
-MOST_TRENDS = 24
+MAX_TRENDS = 24
 
 
 def write_page(path: Path, rows: Sequence[Row]) -> None:
@@ -86,7 +86,7 @@ def _trends(rows: Sequence[Row]) -> Iterator[str]:
     for rig, found in sorted(rigs.items()):
         found.sort(key=lambda row: int(row["first_stamp_ns"]))
         names = sorted({name for row in found for name in row if name.startswith(TRENDS) and not name.endswith("_sigma")})
-        trends = [trend for name in names if len((trend := _trend(name, found)).values) > 1][:MOST_TRENDS]
+        trends = [trend for name in names if len((trend := _trend(name, found)).values) > 1][:MAX_TRENDS]
         if trends:
             yield heading(f"Over time: {rig}")
             yield paragraph("Sessions by the stamp of their first prediction; bars are standard deviations.", "note")

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from tempfile import TemporaryFile
 from threading import Thread
 
-LOOK = 0.1
+LOOK_PERIOD = 0.1
 """Seconds between looks at the memory."""
-MOST_TOLD = 2000
+STDERR_BYTES = 2000
 """Number of last bytes of a process's stderr that are reported."""
 
 
@@ -60,7 +60,7 @@ def run_supervised(command: Sequence[str], task: bytes, seconds: float, memory: 
                 process.stdin.close()
         out.seek(0)
         if not reason and code:
-            told.seek(max(0, told.seek(0, os.SEEK_END) - MOST_TOLD))
+            told.seek(max(0, told.seek(0, os.SEEK_END) - STDERR_BYTES))
             lines = told.read().decode(errors="replace").strip().splitlines()
             cause = f"signal {-code}" if code < 0 else f"itself with code {code}"
             reason = lines[-1] if lines and code > 0 else f"its process was ended by {cause}"
@@ -72,7 +72,7 @@ def _watch(process: subprocess.Popen[bytes], seconds: float, memory: int) -> tup
     end, peak = time.monotonic() + seconds, 0
     while True:
         with suppress(subprocess.TimeoutExpired):
-            process.wait(LOOK)
+            process.wait(LOOK_PERIOD)
             return "", peak
         peak = max(peak, _memory(process.pid))
         if peak > memory:

@@ -68,7 +68,7 @@ class RecorderProcess:
                 self._process.kill()
 
 
-LONGEST = 500
+NOTE_LENGTH = 500
 """Characters of a note."""
 NO_TEXT = ("Cc", "Cs")
 """Unicode's categories of control characters, and of halves of characters, which cannot be published."""
@@ -122,8 +122,8 @@ class ViewerActions:
 
     def _mark(self, request: dict[str, Any]) -> str:
         note = request.get("note")
-        if not isinstance(note, str) or len(note) > LONGEST or any(category(sign) in NO_TEXT for sign in note):
-            raise ValueError(f"a note is a text of at most {LONGEST} characters, none of them a control character")
+        if not isinstance(note, str) or len(note) > NOTE_LENGTH or any(category(sign) in NO_TEXT for sign in note):
+            raise ValueError(f"a note is a text of at most {NOTE_LENGTH} characters, none of them a control character")
         self._feed.publish(f"mark: {note}")
         return f"marked: {note}"
 

@@ -2,7 +2,7 @@
 
 A connection that has sent no whole request has few seconds and few places, in which the newest drives out
 the oldest. A page sends its request at once, so a thousand silent connections do not keep it out. Connections whose request was
-accepted have places of their own. A viewer's WebSocket needs neither, see `boom_twin.monitor.server.MOST_VIEWERS`.
+accepted have places of their own. A viewer's WebSocket needs neither, see `boom_twin.monitor.server.MAX_VIEWERS`.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from .access_control import POLICY
 LOG = logging.getLogger("boom_twin.monitor.connections")
 REQUEST_TIME = 5.0
 """Seconds that a connection may take for its first whole request, and for each further one."""
-LONGEST = 200
+LOGGED_LENGTH = 200
 """Characters of what the log says of one."""
-MOST, MOST_OF_ONE = 256, 64
+MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64
 """Connections of one kind, silent or let in; as many of one address."""
 
 
@@ -69,8 +69,8 @@ class Connections:
     def _count(self, kind: list[Connection], connection: Connection) -> None:
         """Add the newest connection of a kind, and close the one that must make room for it, if any."""
         same = [each for each in kind if each.address == connection.address]
-        if len(same) >= MOST_OF_ONE or len(kind) >= MOST:
-            self._cut_off(same[0] if len(same) >= MOST_OF_ONE else kind[0], "a newer one")
+        if len(same) >= MAX_OF_ADDRESS or len(kind) >= MAX_CONNECTIONS:
+            self._cut_off(same[0] if len(same) >= MAX_OF_ADDRESS else kind[0], "a newer one")
         kind.append(connection)
 
     def _cut_off(self, connection: Connection, reason: str) -> None:
@@ -129,7 +129,7 @@ class Connection(web.RequestHandler):
         if isinstance(exc, ConnectionError):
             return web.Response(status=status)
         if status == HTTPStatus.BAD_REQUEST:
-            LOG.warning("no request from %s: %s", self.address, printable(str(message)[:LONGEST], keep=""))
+            LOG.warning("no request from %s: %s", self.address, printable(str(message)[:LOGGED_LENGTH], keep=""))
             response: web.StreamResponse = web.Response(status=status, text=message)
             response.force_close()
         else:

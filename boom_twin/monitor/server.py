@@ -20,8 +20,8 @@ from .data.tip_response import ResponseCompiler
 from .viewer import SessionChoice, Viewer
 
 PAGE = Path(__file__).parent / "page"
-MOST_VIEWERS = 16
-LONGEST = 4096
+MAX_VIEWERS = 16
+MAX_REQUEST_BYTES = 4096
 """Bytes of a request of the page."""
 POLL_PERIOD = 1.0 / 60.0
 """Seconds between looks at what has come."""
@@ -53,7 +53,7 @@ class Server:
 
     def application(self) -> web.Application:
         """Return the application for `aiohttp.web`."""
-        application = web.Application(middlewares=[self._guard], client_max_size=LONGEST)
+        application = web.Application(middlewares=[self._guard], client_max_size=MAX_REQUEST_BYTES)
         routes = {"/": self._index, "/socket": self._connect, "/page/{name}": self._file}
         application.add_routes([web.get(path, handler) for path, handler in routes.items()])
         application.on_response_prepare.append(_add_policy)
@@ -79,9 +79,9 @@ class Server:
         return web.FileResponse(file)
 
     async def _connect(self, request: web.Request) -> web.StreamResponse:
-        if len(self._viewers) >= MOST_VIEWERS:
-            raise web.HTTPServiceUnavailable(text=f"{MOST_VIEWERS} pages are open already; close one")
-        socket = web.WebSocketResponse(heartbeat=HEARTBEAT, max_msg_size=LONGEST, compress=False)
+        if len(self._viewers) >= MAX_VIEWERS:
+            raise web.HTTPServiceUnavailable(text=f"{MAX_VIEWERS} pages are open already; close one")
+        socket = web.WebSocketResponse(heartbeat=HEARTBEAT, max_msg_size=MAX_REQUEST_BYTES, compress=False)
         self._viewers.add(socket)
         try:
             await socket.prepare(request)

@@ -35,7 +35,7 @@ HISTORY = 600.0
 """Seconds that a page is given when it is opened, or goes elsewhere in a session."""
 SINGLE = frozenset({"shape"})
 """Tables of which the newest row is enough."""
-MOST_REQUESTS = 40
+MAX_REQUESTS = 40
 """Requests of a page in a second."""
 
 
@@ -209,7 +209,7 @@ class Viewer:
             now = time.monotonic()
             second, count = (now, 1) if now - second > 1.0 else (second, count + 1)
             try:
-                if count > MOST_REQUESTS or message.type is not WSMsgType.TEXT:
+                if count > MAX_REQUESTS or message.type is not WSMsgType.TEXT:
                     raise ValueError("too many requests, or not text")
                 answer = self._do(json.loads(message.data))
             except (ValueError, TypeError, KeyError, RecursionError, OverflowError):

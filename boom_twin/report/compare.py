@@ -71,7 +71,7 @@ def side_of(path: Path, replayed: Callable[[Path], Path], window: TimeWindow = W
     return ComparedSession(path.resolve().name, scene, found, alarms, incomplete)
 
 
-SURE = 4.0
+SIGNIFICANT = 4.0
 """Standard deviations from which a difference is no chance: one in a thousand for means of ten batches (t distribution)."""
 
 
@@ -114,7 +114,7 @@ def _row(name: str, a: Quantity | None, b: Quantity | None) -> ComparisonRow:
     if a.sigma is None or b.sigma is None:
         return ComparisonRow(name, a.unit, a.value, b.value, difference)
     sigma = hypot(a.sigma, b.sigma)
-    return ComparisonRow(name, a.unit, a.value, b.value, difference, sigma, abs(difference) > SURE * sigma)
+    return ComparisonRow(name, a.unit, a.value, b.value, difference, sigma, abs(difference) > SIGNIFICANT * sigma)
 
 
 def flat(one: ComparedSession, other: ComparedSession, rows: list[ComparisonRow]) -> dict[str, Any]:
@@ -139,7 +139,7 @@ def as_text(one: ComparedSession, other: ComparedSession, rows: list[ComparisonR
         numbers = "".join(f" {_number(value):>12s}" for value in (row.a, row.b, row.difference))
         mark = {True: "differs", False: "", None: "?"}[row.is_significant]
         lines.append(f"{row.name:32s}{numbers} {_number(row.sigma):>10s}  {row.unit:6s} {mark}".rstrip())
-    lines += ["", f"differs: by more than {SURE:g} standard deviations; ?: it is not known how sure the figures are"]
+    lines += ["", f"differs: by more than {SIGNIFICANT:g} standard deviations; ?: it is not known how sure the figures are"]
     lines.append("damping, peaks, moments and travel also differ where postures and moves do")
     for letter, side in (("A", one), ("B", other)):
         lines.append(f"alarms of {letter}, {side.name}: {len(side.alarms) or 'none'}")

@@ -14,7 +14,7 @@ from ..scene.schema import Scene
 from ..types import Array
 from .fatigue import Fatigue, FatigueCounter
 from .quantities import Load, QuantityBuilder, write
-from .vibration import HoldFinder, HoldInterval
+from .vibration import RestFinder, RestPeriod
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Evaluation:
     result : Replay
     scene : Scene
     history : History
-    still : list of HoldInterval
+    rests : list of RestPeriod
     loads : list of Load
         Of the flexible sections.
     has_heights : bool
@@ -42,7 +42,7 @@ class Evaluation:
     result: Replay
     scene: Scene
     history: History
-    still: list[HoldInterval]
+    rests: list[RestPeriod]
     loads: list[Load]
     has_heights: bool
     fatigue: list[Fatigue]
@@ -76,7 +76,7 @@ class Evaluator:
 
     def __init__(self, scene: Scene, settings: Settings, heights: Array | None = None, category: float | None = None) -> None:
         self._scene, self._settings, self._heights, self._category = scene, settings, heights, category
-        self._history, self._quantities, self._holds = HistoryBuilder(scene), QuantityBuilder(scene), HoldFinder(scene)
+        self._history, self._quantities, self._rests = HistoryBuilder(scene), QuantityBuilder(scene), RestFinder(scene)
         self._fatigue = None if category is None else FatigueCounter(scene, category, heights)
 
     def add(self, stretch: Stretch) -> None:
@@ -85,18 +85,18 @@ class Evaluator:
         self._quantities.add(own, stretch.estimates.load, stretch.estimates.load_variance)
         if self._fatigue is not None:
             self._fatigue.add(own)
-        self._holds.add(own, stretch.estimates.load)
+        self._rests.add(own, stretch.estimates.load)
 
     def finish(self, result: Replay, folder: Path) -> Evaluation:
         """Return the evaluation of the replay and write its figures into `folder`; to be called once."""
-        still = self._holds.finish()
-        found = self._quantities.quantities(result.recording.totals.tip_sigma, still, self._settings)
+        rests = self._rests.finish()
+        found = self._quantities.quantities(result.recording.totals.tip_sigma, rests, self._settings)
         heights = self._heights is not None or all(part.height for part in self._scene.sections if part.beam is not None)
         return Evaluation(
             result,
             self._scene,
             self._history.history(result.recording),
-            still,
+            rests,
             self._quantities.loads(self._heights),
             heights,
             [] if self._fatigue is None else self._fatigue.found(),

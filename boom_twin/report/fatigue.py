@@ -14,7 +14,6 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import import_module
-from types import ModuleType
 
 import numpy as np
 
@@ -27,16 +26,16 @@ from ..types import Array
 
 CATEGORY = 71.0
 """MPa, of a welded box where nothing better is known."""
-CUT_OFF = 1e8
-KNEE = 5e6
-GIVEN = 2e6
-SMALL = 1e5  # Pa; cycles below are noise, and do no damage in any category
+CUT_OFF_CYCLES = 1e8
+KNEE_CYCLES = 5e6
+CATEGORY_CYCLES = 2e6
+NOISE_RANGE = 1e5  # Pa; cycles below are noise, and do no damage in any category
 BIN = 1e4  # Pa, in which ranges are added up
 
 
 @dataclass(frozen=True)
 class Fatigue:
-    """Fatigue of one station in one session: cycles above `SMALL`, their largest range (Pa), damage.
+    """Fatigue of one station in one session: cycles above `NOISE_RANGE`, their largest range (Pa), damage.
 
     A damage of 1 is the end of the station's life.
     """
@@ -52,10 +51,10 @@ def endured(ranges: Array, category: float) -> Array:
 
     N is infinite below the cut-off.
     """
-    knee = 1e6 * category * (GIVEN / KNEE) ** (1.0 / 3.0)
-    limit = knee * (KNEE / CUT_OFF) ** 0.2
+    knee = 1e6 * category * (CATEGORY_CYCLES / KNEE_CYCLES) ** (1.0 / 3.0)
+    limit = knee * (KNEE_CYCLES / CUT_OFF_CYCLES) ** 0.2
     with np.errstate(divide="ignore", over="ignore"):
-        steep, flat = GIVEN * (1e6 * category / ranges) ** 3, KNEE * (knee / ranges) ** 5
+        steep, flat = CATEGORY_CYCLES * (1e6 * category / ranges) ** 3, KNEE_CYCLES * (knee / ranges) ** 5
     return np.where(ranges >= knee, steep, np.where(ranges >= limit, flat, np.inf))
 
 
@@ -69,7 +68,11 @@ class RainflowCounter:
     """Rainflow counter of a stress that comes in parts. It needs the package `rainflow`."""
 
     def __init__(self) -> None:
-        self._rainflow, self._open = _package(), np.zeros(0)
+        try:
+            self._rainflow = import_module("rainflow")
+        except ImportError:
+            raise UsageError("--fatigue: needs the package rainflow. Install it: pip install 'boom_twin[fatigue]'.") from None
+        self._open = np.zeros(0)
         self._closed: Counter[int] = Counter()  # by range in `BIN`
 
     def add(self, stress: Array) -> None:
@@ -86,7 +89,7 @@ class RainflowCounter:
         self._open = series[sorted(left)]
 
     def cycles(self) -> list[tuple[float, float]]:
-        """Return range (Pa) and count of all cycles so far above `SMALL`.
+        """Return range (Pa) and count of all cycles so far above `NOISE_RANGE`.
 
         A cycle that has not closed counts as a half.
         """
@@ -94,7 +97,7 @@ class RainflowCounter:
         series = self._open if len(self._open) != 2 else np.insert(self._open, 1, self._open.mean())  # of two it counts none
         for size, _, count, _, _ in self._rainflow.extract_cycles(series):
             found[round(size / BIN)] += count
-        return [(size * BIN, count) for size, count in sorted(found.items()) if size * BIN > SMALL]
+        return [(size * BIN, count) for size, count in sorted(found.items()) if size * BIN > NOISE_RANGE]
 
 
 class FatigueCounter:
@@ -129,10 +132,3 @@ class FatigueCounter:
             count, largest = sum(count for _, count in cycles), max((size for size, _ in cycles), default=0.0)
             rows.append(Fatigue(station, count, largest, damage_of(cycles, self.category)))
         return rows
-
-
-def _package() -> ModuleType:
-    try:
-        return import_module("rainflow")
-    except ImportError:
-        raise UsageError("--fatigue: needs the package rainflow. Install it: pip install 'boom_twin[fatigue]'.") from None

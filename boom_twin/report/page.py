@@ -20,10 +20,10 @@ from ..system.atomic_files import write_atomic
 from ..twin.events import EVENTS
 from ..types import NANO, SECOND, SENSORS, Alarm, Stream
 from .evaluation import Evaluation
-from .fatigue import SMALL
+from .fatigue import NOISE_RANGE
 from .html import heading, image, page, paragraph, table
 from .quantities import Load
-from .vibration import LEAST, NEAR, course
+from .vibration import MODE_DISTANCE, SHORTEST_REST, course
 
 FILE_NAME = "report.html"
 NO_JUDGE = "The rig's health was not judged."
@@ -155,23 +155,23 @@ def _residuals(folder: Path) -> list[str]:
 
 
 def _vibration(found: Evaluation, folder: Path) -> list[str]:
-    peaks = [(0.5 * (hold.start + hold.stop), each.frequency) for hold in found.still for each in hold.measured.values()]
+    peaks = [(0.5 * (rest.start + rest.stop), each.frequency) for rest in found.rests for each in rest.measured.values()]
     path = folder / "frequencies.png"
     frequency_picture(path, found.name, *course(found.history, found.scene), peaks, found.origin)
     source = SENSORS[Stream.ANGLES if found.history.imu is None else Stream.IMU].title
     told = (
         "Lines: the model, about the equilibrium in the posture of the moment. "
-        f"Dots: free vibration in the {source} while the boom stood still for {LEAST:g} s and more (eigensystem realisation), "
-        f"within {NEAR:.0%} of a mode, clear of the noise, and dying away."
+        f"Dots: free vibration in the {source} while the boom stood still for {SHORTEST_REST:g} s and more (eigensystem "
+        f"realisation), within {MODE_DISTANCE:.0%} of a mode, clear of the noise, and dying away."
     )
     rows = [
-        (f"{hold.start:.1f} to {hold.stop:.1f} s", mode + 1, hold.model[mode], *_measured(each, hold.model[mode]))
-        for hold in found.still
-        for mode, each in sorted(hold.measured.items())
+        (f"{rest.start:.1f} to {rest.stop:.1f} s", mode + 1, rest.model[mode], *_measured(each, rest.model[mode]))
+        for rest in found.rests
+        for mode, each in sorted(rest.measured.items())
     ]
     head = ("while still", "mode", "model, Hz", "measured, Hz", "apart, %", "damping, %")
     measured = table(head, rows) if rows else paragraph("Nothing was measured: no free vibration, or no standing still.")
-    shaken = ", ".join(f"{hold.start:.1f} to {hold.stop:.1f} s" for hold in found.still if hold.is_shaken)
+    shaken = ", ".join(f"{rest.start:.1f} to {rest.stop:.1f} s" for rest in found.rests if rest.is_shaken)
     why = f"Still, but shaken by a load at the tip, so that lines are no natural frequencies: {shaken}."
     left_out = [paragraph(why, "note")] if shaken else []
     title = heading("Natural frequencies and damping")
@@ -234,10 +234,10 @@ def _fatigue(found: Evaluation) -> list[str]:
     if found.category is None or not found.fatigue:
         return []
     told = (
-        f"Rainflow counts (ASTM E1049) of the predicted bending stress, ranges above {1e-6 * SMALL:g} MPa; damage by the S-N "
-        f"curve of EN 1993-1-9 for detail category {found.category:g} MPa, the same at all stations, without partial factors. "
-        "Damage grows with the third to fifth power of stress. What only sensors know of is NOT in it: of a boom that a pump "
-        "shakes this counts the moves alone, and the damage is more."
+        f"Rainflow counts (ASTM E1049) of the predicted bending stress, ranges above {1e-6 * NOISE_RANGE:g} MPa; damage by the "
+        f"S-N curve of EN 1993-1-9 for detail category {found.category:g} MPa, the same at all stations, without partial "
+        "factors. Damage grows with the third to fifth power of stress. What only sensors know of is NOT in it: of a boom that "
+        "a pump shakes this counts the moves alone, and the damage is more."
     )
     rows = [
         (row.station.name, row.cycles, 1e-6 * row.largest, row.damage, 1.0 / row.damage if row.damage else None)

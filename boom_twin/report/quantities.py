@@ -22,7 +22,7 @@ from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..system.received_files import open_received
 from ..types import Array, Stream, sensor_kind, stream_of
-from .vibration import HoldInterval
+from .vibration import RestPeriod
 
 FILE_NAME = "quantities.json"
 BATCHES = 10
@@ -76,11 +76,11 @@ class QuantityBuilder:
         """Return the loads, see `SectionLoads.loads`."""
         return self._loads.loads(heights)
 
-    def quantities(self, tip_sigma: float | None, still: list[HoldInterval], settings: Settings) -> list[Quantity]:
+    def quantities(self, tip_sigma: float | None, rests: list[RestPeriod], settings: Settings) -> list[Quantity]:
         """Return all figures of the session; `tip_sigma` is the largest deviation of the predicted tip, m, if it is known."""
         return [
             *self._residuals(),
-            *_frequencies(still),
+            *_frequencies(rests),
             Quantity("tip_displacement_max", self._displacement, tip_sigma, "m"),
             Quantity("tip_acceleration_max", self._acceleration, None, "m/s^2"),
             *(
@@ -140,10 +140,10 @@ class BatchMeans:
         return total / self.count, float(means.std(ddof=1) / sqrt(len(means))) if len(means) > 1 else 0.0
 
 
-def _frequencies(still: list[HoldInterval]) -> Iterator[Quantity]:
+def _frequencies(rests: list[RestPeriod]) -> Iterator[Quantity]:
     """Yield measured over model frequency, and damping, of every mode that was seen."""
-    for mode in sorted({mode for hold in still for mode in hold.measured}):
-        seen = [(hold.model[mode], hold.measured[mode]) for hold in still if mode in hold.measured]
+    for mode in sorted({mode for rest in rests for mode in rest.measured}):
+        seen = [(rest.model[mode], rest.measured[mode]) for rest in rests if mode in rest.measured]
         ratios = np.array([(each.frequency / model, each.frequency_sigma / model) for model, each in seen])
         dampings = np.array([(each.damping, each.damping_sigma) for _, each in seen])
         yield _weighted(f"frequency_ratio_mode_{mode + 1}", ratios, FREQUENCY_ERROR)

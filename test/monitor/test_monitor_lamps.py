@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from boom_twin.monitor.data.received_messages import DroppedMessages, MalformedError
-from boom_twin.monitor.data.status import MOST, SILENCE, AlarmList, Severity, StatusTable, overall, worst
+from boom_twin.monitor.data.status import MAX_ALARMS, SILENCE, AlarmList, Severity, StatusTable, overall, worst
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import dump, state
 from boom_twin.types import Alarm, Ranked
@@ -195,8 +195,8 @@ def test_an_acknowledged_alarm_that_gets_worse_asks_again() -> None:
 
 def test_alarms_that_are_kept_are_bounded_and_the_newest() -> None:
     alarms = AlarmList()
-    for time in range(2 * MOST):
+    for time in range(2 * MAX_ALARMS):
         alarms.follow(time, StatusTable().told(0.0, [status("n: model", WARN if time % 2 else OK)], 0.0))
         alarms.add("event", Severity.OK, "", time, time)
-    assert len(alarms.all) <= MOST and alarms.all[-1].begin == 2 * MOST - 1
+    assert len(alarms.all) <= MAX_ALARMS and alarms.all[-1].begin == 2 * MAX_ALARMS - 1
     assert worst([]) is None

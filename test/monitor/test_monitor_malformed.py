@@ -23,10 +23,10 @@ from boom_twin.monitor.data.analyst import Analyst
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.received_messages import LONGEST_REASON
 from boom_twin.monitor.data.spectrum import spectrogram, spectrum
-from boom_twin.monitor.data.status import MOST_NODES
+from boom_twin.monitor.data.status import MAX_NODES
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.data.tip_response import ResponseCompiler
-from boom_twin.monitor.data.topic_rows import WAITING, PartsOfRows
+from boom_twin.monitor.data.topic_rows import MAX_WAITING, PartsOfRows
 from boom_twin.monitor.protocol import dump, layout, state
 from boom_twin.types import Alarm, Health, Ranked, Stream
 
@@ -322,7 +322,7 @@ def test_nodes_without_end_do_not_fill_the_board_and_the_twin_stays() -> None:
         if number % 100 == 0:
             bench.send(Output.DIAGNOSTICS, GOOD[Output.DIAGNOSTICS]())
     table = bench.store.statuses(bench.now)
-    assert len(table.nodes) <= MOST_NODES and "boom_twin" in table.nodes
+    assert len(table.nodes) <= MAX_NODES and "boom_twin" in table.nodes
     assert all(len(lamp.reason) <= 500 for _, lamps in table.nodes.values() for lamp in lamps)
 
 
@@ -354,7 +354,7 @@ def test_what_was_dropped_is_logged_at_a_limited_rate(capfd: Any, monkeypatch: p
     finally:
         logging.getLogger().handlers[:] = handlers
     lines = capfd.readouterr().err.splitlines()
-    assert len(lines) == log.MOST + 1 and f"({1000 - log.MOST} lines before this were left out)" in lines[-1]
+    assert len(lines) == log.MAX_RECORDS + 1 and f"({1000 - log.MAX_RECORDS} lines before this were left out)" in lines[-1]
     assert "dropped message 1001 of /boom_twin/residuals" in lines[-1] and "\x1b" not in "".join(lines)
 
 
@@ -362,4 +362,4 @@ def test_parts_that_wait_for_others_are_bounded() -> None:
     parts = PartsOfRows(("measured", "residual"))
     for stamp in range(0, 6000, 2):
         assert parts.put("measured", stamp, [1.0]) is None and parts.put("residual", stamp + 1, [0.1]) is None
-    assert len(parts) == WAITING + 1 and parts.put("residual", 5998, [0.2]) == [[1.0], [0.2]]
+    assert len(parts) == MAX_WAITING + 1 and parts.put("residual", 5998, [0.2]) == [[1.0], [0.2]]

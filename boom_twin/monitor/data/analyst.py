@@ -37,9 +37,9 @@ SIGNALS = (
 """The best first: the prediction knows nothing of what shakes the boom."""
 UNKNOWN_SCENE = TipResponses(trouble="the model is not known: give --scene")
 UNKNOWN_POSTURE = TipResponses(trouble="the strokes are not known yet")
-KNOWN = 0.9
+KNOWN_SHARE = 0.9
 """Share of the rows of a signal that must have a value."""
-MATCH = 0.2
+MODE_DISTANCE = 0.2
 """Relative distance up to which a peak is taken for a mode of the model."""
 
 
@@ -131,7 +131,7 @@ class Analyst:
             table = self._feed.store.tables.get(signal.table)
             if table is not None:
                 _, values = table.rows(table.until(time - SEGMENT), table.until(time))
-                if len(values) and np.isfinite(values[:, signal.columns]).all(axis=1).mean() > KNOWN:
+                if len(values) and np.isfinite(values[:, signal.columns]).all(axis=1).mean() > KNOWN_SHARE:
                     return signal
         return PREDICTION
 
@@ -147,7 +147,7 @@ class Analyst:
         """
         told: dict[str, Any] = {**asdict(peak), "mode": None, "deviation": None, "drift": None}
         mode = int(np.argmin(np.abs(np.array(natural) - peak.frequency))) + 1 if natural and not has_moved else 0
-        if not mode or abs(natural[mode - 1] - peak.frequency) > MATCH * natural[mode - 1]:
+        if not mode or abs(natural[mode - 1] - peak.frequency) > MODE_DISTANCE * natural[mode - 1]:
             return told
         ratio = peak.frequency / natural[mode - 1]
         if mode not in self._firsts or time < self._firsts[mode][0]:

@@ -32,7 +32,7 @@ from ...types import NANO, Stream
 from .feed import Feed
 from .store import Store
 
-LOOK = 1.0
+LOOK_PERIOD = 1.0
 """Seconds between looks at the state of the twin, as of the node."""
 ENOUGH = Output.TIP_ACCELERATION
 """A session with this output is shown as its node published it."""
@@ -188,7 +188,7 @@ class _Twin:
         for key, encoded in chain.from_iterable(map(self._encoder.fill, report.all)):
             if key in self._names:
                 self._feed.topic_rows.take_encoded(self._names[key], encoded, self._feed.now())
-        if self._time - self._looked >= LOOK or self._watch.is_urgent():
+        if self._time - self._looked >= LOOK_PERIOD or self._watch.is_urgent():
             self._look()
 
     def finish(self) -> None:

@@ -19,12 +19,12 @@ SEGMENT = 8.0
 HIGHEST = 30.0
 """Hz; no peak above it."""
 LOWEST = 0.3
-MOST = 5
+MAX_PEAKS = 5
 PROMINENCE = 6.0
 """dB by which a peak stands out."""
 BAND = 0.3
 """Half width of the band around a peak whose decay gives the damping, as a share of its frequency."""
-FALL = 0.3
+DECAY_FLOOR = 0.3
 """Share of its start down to which a decay is looked at."""
 
 
@@ -67,7 +67,7 @@ def _peaks(frequencies: Array, density: Array, values: Array, rate: float) -> li
     found, _ = find_peaks(level, prominence=PROMINENCE)
     found = [i for i in found if LOWEST <= frequencies[i] <= min(HIGHEST, 0.4 * rate)]
     peaks = []
-    for i in sorted(found, key=lambda place: -level[place])[:MOST]:
+    for i in sorted(found, key=lambda place: -level[place])[:MAX_PEAKS]:
         below, top, above = level[i - 1 : i + 2]
         bend = below - 2.0 * top + above
         offset = 0.5 * (below - above) / bend if bend else 0.0
@@ -92,7 +92,7 @@ def damping(values: Array, rate: float, frequency: float) -> float:
     if not envelope[start] > 0.0:
         return nan
     stop = min(start + round(12.0 * rate / frequency), count // 2)
-    low = np.flatnonzero(envelope[start:stop] < FALL * envelope[start])
+    low = np.flatnonzero(envelope[start:stop] < DECAY_FLOOR * envelope[start])
     stop = start + int(low[0]) if len(low) else stop
     if stop - start < rate / frequency:
         return nan
@@ -105,7 +105,7 @@ STEP = 2.0
 """Seconds of session time from one column to the next; columns end at its multiples."""
 FREQUENCIES = np.arange(0.0, 20.0 + 0.5 / SEGMENT, 1.0 / SEGMENT)
 """Hz, of every column."""
-FULL = 0.9
+COVERAGE = 0.9
 """Share of a segment that its rows must span."""
 
 
@@ -122,7 +122,7 @@ def spectrogram(times: Array, values: Array, ends: Array) -> NDArray[np.float32]
     places = np.searchsorted(times, np.stack([ends - SEGMENT, ends]), side="right")
     for column, (first, stop) in enumerate(places.T):
         segment = times[first:stop]
-        if len(segment) > 32 and segment[-1] - segment[0] > FULL * SEGMENT:
+        if len(segment) > 32 and segment[-1] - segment[0] > COVERAGE * SEGMENT:
             density = _periodogram(segment, values[first:stop])[: len(FREQUENCIES)]
             found[column, : len(density)] = density
     return found

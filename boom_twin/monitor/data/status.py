@@ -14,7 +14,7 @@ from .received_messages import text
 
 SILENCE = 3.0
 """Seconds without a word from a node after which its lamps are stale."""
-MOST_NODES, FORGOTTEN = 200, 60.0
+MAX_NODES, FORGET_AFTER = 200, 60.0
 """Where more nodes than so many have told something, those that have been silent for so many seconds are forgotten."""
 GROUPS = ("sensors", "model", "residuals", "timing", "recorder")
 HEALTH = "health"
@@ -77,8 +77,8 @@ class StatusTable:
             node, _, name = text(status.name).partition(": ")
             found.setdefault(node, []).append(_lamp(name or node, status, clock))
         nodes = {**self.nodes, **{node: (now, tuple(lamps)) for node, lamps in found.items()}}
-        if len(nodes) > MOST_NODES:
-            nodes = {node: told for node, told in nodes.items() if now - told[0] <= FORGOTTEN}
+        if len(nodes) > MAX_NODES:
+            nodes = {node: told for node, told in nodes.items() if now - told[0] <= FORGET_AFTER}
         return StatusTable(nodes)
 
     def groups(self, now: float) -> dict[str, list[StatusLamp]]:
@@ -150,7 +150,7 @@ def _number(text: str) -> float:
         return nan
 
 
-MOST = 500
+MAX_ALARMS = 500
 """Alarms that are kept."""
 
 
@@ -192,7 +192,7 @@ class AlarmList:
     Attributes
     ----------
     all : list of ListedAlarm
-        The newest `MOST` of them, by their begin.
+        The newest `MAX_ALARMS` of them, by their begin.
     """
 
     def __init__(self) -> None:
@@ -241,7 +241,7 @@ class AlarmList:
         """Add an alarm, with its end (s) if it is over, such as a gap."""
         self._number += 1
         alarm = ListedAlarm(self._number, name, level, reason, begin, end)
-        self.all = [*self.all[-MOST + 1 :], alarm]
+        self.all = [*self.all[-MAX_ALARMS + 1 :], alarm]
         return alarm
 
     def acknowledge(self, number: int) -> ListedAlarm | None:

@@ -13,7 +13,7 @@ from ...types import NANO
 from .received_messages import MalformedError
 from .status import AlarmList, Severity, StatusTable
 
-FIRST = 1024
+FIRST_ROOM = 1024
 """Rows that there is room for at first."""
 Rows = tuple[NDArray[np.float64], NDArray[np.float32]]
 
@@ -40,7 +40,7 @@ class Table:
     def __init__(self, name: str, columns: Sequence[str], capacity: int) -> None:
         self.name, self.columns, self.count = name, tuple(columns), 0
         self._capacity = capacity
-        self._times = np.zeros(min(capacity, FIRST))
+        self._times = np.zeros(min(capacity, FIRST_ROOM))
         self._values = np.zeros((len(self._times), len(columns)), dtype=np.float32)
 
     @property
@@ -77,11 +77,11 @@ class Table:
         return self._times[places], self._values[places]
 
 
-MOST_STATUSES = 100_000
+MAX_STATUSES = 100_000
 """Earlier states of the lamps that are kept: a day of them."""
-BACK = 1_000_000_000
+SET_BACK = 1_000_000_000
 """A stamp earlier by more than this (ns) may be that of a clock that was set back; by less it is out of order."""
-AHEAD = 60_000_000_000
+LEAP_AHEAD = 60_000_000_000
 """A stamp later by more than this (ns) may be a stray one; no table has its rows so far apart."""
 EVERY_STROKE, GAP = "displacement", 0.1
 """Table with a row for every stroke sample, and the pause (s) of it from which on an alarm tells it."""
@@ -141,11 +141,11 @@ class Store:
         """
         self._check(name, columns)
         last, held = self._last.get(name, stamp - 1), self._held.get(name)
-        is_leap = not -BACK <= stamp - last <= AHEAD
+        is_leap = not -SET_BACK <= stamp - last <= LEAP_AHEAD
         if not is_leap and stamp <= last:
             raise MalformedError(f"its stamp is not after the last one but {(last - stamp) * NANO:.9g} s before it")
         self._held.pop(name, None)
-        if is_leap and held is not None and 0 < stamp - held[0] <= AHEAD:
+        if is_leap and held is not None and 0 < stamp - held[0] <= LEAP_AHEAD:
             if stamp < last:
                 self.clear()
             self.append(name, columns, *held)
@@ -184,8 +184,8 @@ class Store:
         if not self._keeps_statuses:
             self._statuses.clear()
         self._statuses.append((time, statuses))
-        if len(self._statuses) > MOST_STATUSES:
-            del self._statuses[: MOST_STATUSES // 2]
+        if len(self._statuses) > MAX_STATUSES:
+            del self._statuses[: MAX_STATUSES // 2]
         self.alarms.follow(self.newest, statuses)
 
     def statuses(self, time: float) -> StatusTable:

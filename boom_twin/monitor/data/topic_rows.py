@@ -28,16 +28,16 @@ from .received_messages import (
     check_stamp,
     text,
 )
-from .status import MOST_NODES, Severity
+from .status import MAX_NODES, Severity
 from .store import Store
 
-LONGEST = 1_000_000
+MAX_BYTES = 1_000_000
 """Bytes of an encoded message; a longer one is not decoded."""
-MOST_STATUSES, MOST_CAUSES, MOST_MARKERS = 500, 100, 500
+MAX_STATUSES, MAX_CAUSES, MAX_MARKERS = 500, 100, 500
 """Statuses or alarms of one message, causes of one alarm, markers of one shape."""
-MOST_COLUMNS = 1000
+MAX_COLUMNS = 1000
 """Numbers of one row; a boom of nine sections has some two hundred."""
-WAITING = 1000
+MAX_WAITING = 1000
 """Stamps of which parts may wait for the others."""
 COMPARED = Stream.IMU
 """The stream whose readings are shown beside the predicted ones; of all others the residuals are."""
@@ -66,7 +66,7 @@ FORCE_COLUMNS = tuple(f"{kind}_{axis}_m_s2" for kind in ("measured", "predicted"
 
 
 class PartsOfRows:
-    """Parts of rows that wait for the others of their stamp; the oldest are dropped when more than `WAITING` wait."""
+    """Parts of rows that wait for the others of their stamp; the oldest are dropped when more than `MAX_WAITING` wait."""
 
     def __init__(self, names: Sequence[Hashable]) -> None:
         self._names = names
@@ -74,7 +74,7 @@ class PartsOfRows:
 
     def put(self, name: Hashable, stamp: int, values: Sequence[float]) -> list[Sequence[float]] | None:
         """Return all parts of the row at `stamp` (ns), in their order, if this is the last of them."""
-        if len(self._waiting) > WAITING:
+        if len(self._waiting) > MAX_WAITING:
             del self._waiting[next(iter(self._waiting))]
         parts = self._waiting.setdefault(stamp, {})
         parts[name] = values
@@ -158,7 +158,7 @@ class TopicRows:
         """Take a CDR-encoded message of a topic, as `take` does."""
         self._now = now
         with self.dropped.guard(topic):
-            check_count("bytes", len(data), LONGEST)
+            check_count("bytes", len(data), MAX_BYTES)
             self._takers[topic](decode(data, self._types[topic]))
 
     def measure(self, sample: Sample) -> None:
@@ -238,7 +238,7 @@ class TopicRows:
             self._append("force", FORCE_COLUMNS, stamp, [x, z, x - left_x, z - left_z, *sigmas])
 
     def _take_shape(self, msg: Any) -> None:
-        check_count("markers", len(msg.markers), MOST_MARKERS)
+        check_count("markers", len(msg.markers), MAX_MARKERS)
         lines = {(marker.ns, marker.id): marker.points for marker in msg.markers}
         boom, straight = lines.get(("boom", 0)), lines.get(("boom_undeflected", 0))
         pins = [point for (kind, _), ends in lines.items() if kind == "cylinders" for point in ends]
@@ -252,24 +252,24 @@ class TopicRows:
         columns = [f"{name}_{i}_{axis}_m" for name, count in names for i in range(count) for axis in "xz"]
         columns += [f"force_{i + 1}_N" for i in range(len(self._forces))]
         columns += [f"stroke_{i + 1}_m" for i in range(len(self._strokes))]
-        check_count("numbers of a shape", len(columns), MOST_COLUMNS)
+        check_count("numbers of a shape", len(columns), MAX_COLUMNS)
         values = check_numbers([number for point in (*boom, *straight, *pins) for number in (point.x, point.z)])
         self._append("shape", columns, check_stamp(msg.markers[0]), values + self._forces + self._strokes)
 
     def _take_health(self, msg: Any) -> None:
-        check_count("alarms", len(msg.status), MOST_STATUSES)
+        check_count("alarms", len(msg.status), MAX_STATUSES)
         store, found = self._store, decode_health(msg)
         for alarm in found:
-            check_count("causes of an alarm", len(alarm.ranked), MOST_CAUSES)
+            check_count("causes of an alarm", len(alarm.ranked), MAX_CAUSES)
             check_instant(alarm.since)
             check_instant(alarm.since if alarm.until is None else alarm.until)
         store.alarms.judge(store.time(check_stamp(msg)), found, store.time)
 
     def _take_state(self, msg: Any) -> None:
-        check_count("statuses", len(msg.status), MOST_STATUSES)
+        check_count("statuses", len(msg.status), MAX_STATUSES)
         store = self._store
         statuses = store.statuses(self._now).told(self._now, msg.status, stamp_of(msg) * NANO)
-        check_count("nodes on one topic", len(statuses.nodes), MOST_NODES)
+        check_count("nodes on one topic", len(statuses.nodes), MAX_NODES)
         for status in msg.status:
             if str(status.name).endswith(": model"):
                 self._scene = next((pair.value for pair in status.values if pair.key == "scene"), self._scene)
