@@ -45,14 +45,28 @@ RESIDUALS = {stream: "joints" if stream is Stream.ANGLES else stream.value for s
 """Names of the tables of residuals."""
 NO_MEASUREMENT = "no measurement"
 """Oddity of `SampleDecoder` that is no fault here: an Imu states that it has no measurement."""
-PLANE = ("x_m", "z_m")
-VECTORS: dict[Output, tuple[str, tuple[str, str], Callable[[Any], Any]]] = {
-    Output.TIP_DISPLACEMENT: ("displacement", PLANE, attrgetter("vector")),
-    Output.TIP_POSITION: ("position", PLANE, attrgetter("point")),
-    Output.TIP_ACCELERATION: ("acceleration", ("x_m_s2", "z_m_s2"), attrgetter("accel.linear")),
-    Output.TIP_UNCERTAINTY: ("uncertainty", PLANE, attrgetter("vector")),
+VECTORS: dict[Output, Callable[[Any], Any]] = {
+    Output.TIP_DISPLACEMENT: attrgetter("vector"),
+    Output.TIP_POSITION: attrgetter("point"),
+    Output.TIP_ACCELERATION: attrgetter("accel.linear"),
+    Output.TIP_UNCERTAINTY: attrgetter("vector"),
+    Output.ESTIMATE_POSE: attrgetter("pose.pose.position"),
+    Output.ESTIMATE_ACCELERATION: attrgetter("accel.accel.linear"),
+    Output.ESTIMATE_LOAD: attrgetter("wrench.force"),
 }
-"""Outputs that are a vector in the plane of the boom: table, its columns, and where the vector is in a message."""
+"""Outputs that are a vector in the plane of the boom, and where it is in a message."""
+COVARIANCES = {
+    Output.ESTIMATE_POSE: attrgetter("pose.covariance"),
+    Output.ESTIMATE_ACCELERATION: attrgetter("accel.covariance"),
+}
+PLANE = ("x_m", "z_m")
+TABLES = {
+    Output.TIP_DISPLACEMENT: ("displacement", PLANE),
+    Output.TIP_POSITION: ("position", PLANE),
+    Output.TIP_ACCELERATION: ("acceleration", ("x_m_s2", "z_m_s2")),
+    Output.TIP_UNCERTAINTY: ("uncertainty", PLANE),
+}
+"""Tables of such outputs, with their columns."""
 ESTIMATE = "estimate"
 ESTIMATE_COLUMNS = (
     "x_m", "z_m", "sigma_x_m", "sigma_z_m", "x_m_s2", "z_m_s2", "sigma_x_m_s2", "sigma_z_m_s2", "load_x_N", "load_z_N",
@@ -138,9 +152,6 @@ class TopicRows:
     def _by_role(self) -> dict[Output, Callable[[Any], None]]:
         return {
             **{role: partial(self._take_vector, role) for role in VECTORS},
-            Output.ESTIMATE_POSE: self._take_pose,
-            Output.ESTIMATE_ACCELERATION: self._take_acceleration_estimate,
-            Output.ESTIMATE_LOAD: self._take_load,
             Output.JOINT_STATES: self._take_cylinders,
             Output.RESIDUALS: self._take_residuals,
             Output.SHAPE: self._take_shape,
@@ -183,24 +194,14 @@ class TopicRows:
             raise MalformedError(", ".join(odd))
 
     def _take_vector(self, role: Output, msg: Any) -> None:
-        table, columns, vector_of = VECTORS[role]
-        vector, stamp = vector_of(msg), check_stamp(msg)
+        vector, stamp = VECTORS[role](msg), check_stamp(msg)
         values = check_numbers((vector.x, vector.z))
-        self._append(table, columns, stamp, values)
+        if role in COVARIANCES:
+            values += _deviations(COVARIANCES[role](msg))
+        if role in TABLES:
+            self._append(*TABLES[role], stamp, values)
         if role in JOINED:
             self._join_estimate(role, stamp, values)
-
-    def _take_pose(self, msg: Any) -> None:
-        place, covariance = msg.pose.pose.position, msg.pose.covariance
-        self._join_estimate(Output.ESTIMATE_POSE, check_stamp(msg), _with_deviations(place, covariance))
-
-    def _take_acceleration_estimate(self, msg: Any) -> None:
-        values = _with_deviations(msg.accel.accel.linear, msg.accel.covariance)
-        self._join_estimate(Output.ESTIMATE_ACCELERATION, check_stamp(msg), values)
-
-    def _take_load(self, msg: Any) -> None:
-        force = msg.wrench.force
-        self._join_estimate(Output.ESTIMATE_LOAD, check_stamp(msg), check_numbers((force.x, force.z)))
 
     def _join_estimate(self, role: Output, stamp: int, values: list[float]) -> None:
         """Add the row of an estimate as soon as all its parts are there."""
@@ -276,9 +277,9 @@ class TopicRows:
         store.set_statuses(self._now, statuses)
 
 
-def _with_deviations(vector: Any, covariance: Any) -> list[float]:
-    """Return x and z of a vector, and their standard deviations from a covariance by rows (36,)."""
-    x, z, x2, z2 = check_numbers((vector.x, vector.z, covariance[0], covariance[14]))
-    if min(x2, z2) < 0.0:
-        raise MalformedError(f"a variance is {min(x2, z2):g}; at least 0 is possible")
-    return [x, z, sqrt(x2), sqrt(z2)]
+def _deviations(covariance: Any) -> list[float]:
+    """Return the standard deviations of x and z from a covariance by rows (36,)."""
+    variances = check_numbers((covariance[0], covariance[14]))
+    if min(variances) < 0.0:
+        raise MalformedError(f"a variance is {min(variances):g}; at least 0 is possible")
+    return [sqrt(variance) for variance in variances]
