@@ -99,7 +99,7 @@ class Evaluator:
             rests,
             self._quantities.loads(self._heights),
             heights,
-            [] if self._fatigue is None else self._fatigue.found(),
+            [] if self._fatigue is None else self._fatigue.results(),
             self._category,
             write(folder, self._scene, found),
         )

@@ -124,7 +124,7 @@ class FatigueCounter:
         for counter, stress in zip(self._counters, (history.moments / self._moduli).T, strict=True):
             counter.add(stress)
 
-    def found(self) -> list[Fatigue]:
+    def results(self) -> list[Fatigue]:
         """Return the fatigue of every station, base to tip."""
         rows = []
         for station, counter in zip(self._stations, self._counters, strict=True):

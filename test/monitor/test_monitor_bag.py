@@ -37,7 +37,7 @@ from boom_twin.types import StrokeReading
 
 
 def test_rows_are_those_of_the_replay(feed: Feed, replayed: Path) -> None:
-    assert not feed.topic_rows.dropped.told()
+    assert not feed.topic_rows.dropped.losses()
     topic = load_topics().outputs[Output.TIP_ACCELERATION].absolute
     messages = [message for _, _, message in read(scan(replayed / "bag"), {topic: TYPES[Output.TIP_ACCELERATION]})]
     times, values = feed.store.tables["acceleration"].rows(0, len(messages))
@@ -246,4 +246,4 @@ def test_a_malformed_message_of_a_session_is_dropped_and_told(tmp_path: Path) ->
     feed = read_all(bag_feed(tmp_path / "bag", load_scene(), Settings()))
     assert not feed.trouble and feed.store.tables["acceleration"].count == 10
     told = {"topic": states.absolute, "count": 1, "reason": "1 names, but 1 of position, 0 of effort"}
-    assert feed.topic_rows.dropped.told() == [told]
+    assert feed.topic_rows.dropped.losses() == [told]

@@ -205,7 +205,7 @@ def test_a_malformed_message_is_dropped_counted_and_told_and_all_others_are_show
     count, told = bench.lost(role)
     assert count == 2 and reason in told and told.isprintable() and len(told) <= 2 * LONGEST_REASON
     assert set(bench.store.tables) == TABLES and {table.count for table in bench.store.tables.values()} == {6}
-    assert bench.store.generation == 0 and sum(loss["count"] for loss in bench.topic_rows.dropped.told()) == 2
+    assert bench.store.generation == 0 and sum(loss["count"] for loss in bench.topic_rows.dropped.losses()) == 2
     dump(state(bench.store, 0.0, 0.0) | layout(bench.store))
 
 
@@ -232,7 +232,7 @@ def test_bytes_that_are_no_message_are_dropped() -> None:
         bench.topic_rows.take_encoded(chance.choice([topic(role).absolute, chance.choice(names)]), bytes(data), 0.0)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 50e6 and sum(loss["count"] for loss in bench.topic_rows.dropped.told()) > 1000
+    assert peak < 50e6 and sum(loss["count"] for loss in bench.topic_rows.dropped.losses()) > 1000
     dump(state(bench.store, 0.0, 0.0) | layout(bench.store))
     bench.go_on(10**6, 5)
     last = EPOCH + (10**6 + 4) * STEP - bench.store.epoch
@@ -258,7 +258,7 @@ def test_a_pause_costs_no_message() -> None:
     bench = Bench()
     bench.go_on(0)
     bench.go_on(10**5)
-    assert not bench.topic_rows.dropped.told() and bench.store.tables["displacement"].count == 6
+    assert not bench.topic_rows.dropped.losses() and bench.store.tables["displacement"].count == 6
     assert [alarm.name for alarm in bench.store.alarms.all if not alarm.causes] == ["cylinder_strokes"]
 
 

@@ -50,7 +50,7 @@ class Made(Feed):
 
     def tell(self, level: int) -> None:
         statuses = [status("boom_twin: model"), status("boom_twin: sensor joint_1", level, "frozen")]
-        self.store.set_statuses(self.now(), self.store.statuses(self.now()).told(self.now(), statuses, 0.0))
+        self.store.set_statuses(self.now(), self.store.statuses(self.now()).updated(self.now(), statuses, 0.0))
 
     def now(self) -> float:
         return self.store.newest if self.end is not None else 0.0

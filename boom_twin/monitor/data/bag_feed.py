@@ -202,7 +202,7 @@ class _Twin:
     def _look(self) -> None:
         found = all_pieces(self._watch.look(self.twin.counts, True, self._peers, (), self._time))
         store, now = self._feed.store, self._feed.now()
-        store.set_statuses(now, store.statuses(now).told(now, map(_as_message, found), self._time))
+        store.set_statuses(now, store.statuses(now).updated(now, map(_as_message, found), self._time))
         self._looked = self._time
 
 

@@ -54,7 +54,7 @@ class DroppedMessages:
         except Exception as error:  # whatever a message holds, the page goes on
             self._add(topic, f"cannot be read: {type(error).__name__}: {error}")
 
-    def told(self) -> list[dict[str, Any]]:
+    def losses(self) -> list[dict[str, Any]]:
         """Return the losses as plain values, the most messages first."""
         return [asdict(loss) for loss in sorted(self.by_topic.values(), key=lambda loss: -loss.count)]
 

@@ -70,7 +70,7 @@ class StatusTable:
 
     nodes: Mapping[str, tuple[float, tuple[StatusLamp, ...]]] = field(default_factory=dict)
 
-    def told(self, now: float, statuses: Iterable[Any], clock: float) -> StatusTable:
+    def updated(self, now: float, statuses: Iterable[Any], clock: float) -> StatusTable:
         """Return the table after a DiagnosticArray with these `statuses` and the stamp `clock` (s), which came at `now` (s)."""
         found: dict[str, list[StatusLamp]] = {}
         for status in statuses:

@@ -269,7 +269,7 @@ class TopicRows:
     def _take_state(self, msg: Any) -> None:
         check_count("statuses", len(msg.status), MAX_STATUSES)
         store = self._store
-        statuses = store.statuses(self._now).told(self._now, msg.status, stamp_of(msg) * NANO)
+        statuses = store.statuses(self._now).updated(self._now, msg.status, stamp_of(msg) * NANO)
         check_count("nodes on one topic", len(statuses.nodes), MAX_NODES)
         for status in msg.status:
             if str(status.name).endswith(": model"):
