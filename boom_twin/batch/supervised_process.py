@@ -21,21 +21,11 @@ STDERR_BYTES = 2000
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Result of a supervised process.
+    """Result of a supervised process."""
 
-    Attributes
-    ----------
-    output : bytes
-        Content of its stdout; whole only if `reason` is empty.
-    reason : str
-        Reason of the failure in one line; empty if it ended with code 0.
-    peak : int
-        Largest observed resident memory, bytes. Pages that its processes share are counted in each.
-    """
-
-    output: bytes
-    reason: str
-    peak: int
+    output: bytes  # content of its stdout; whole only if there is no reason
+    reason: str  # of the failure in one line; empty if it ended with code 0
+    peak: int  # largest observed resident memory, bytes; pages that its processes share are counted in each
 
 
 def run_supervised(command: Sequence[str], task: bytes, seconds: float, memory: int) -> Outcome:

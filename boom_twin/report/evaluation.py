@@ -19,35 +19,17 @@ from .vibration import RestFinder, RestPeriod
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Everything that a report tells of a replay.
-
-    Attributes
-    ----------
-    result : Replay
-    scene : Scene
-    history : History
-    rests : list of RestPeriod
-    loads : list of Load
-        Of the flexible sections.
-    has_heights : bool
-        True if the stresses are by heights that the scene or the user gave.
-    fatigue : list of Fatigue
-        Of all stations, if it was asked for.
-    category : float or None
-        Detail category (MPa) that it was asked for.
-    file : Path
-        Where the figures are.
-    """
+    """Everything that a report tells of a replay."""
 
     result: Replay
     scene: Scene
     history: History
     rests: list[RestPeriod]
-    loads: list[Load]
-    has_heights: bool
-    fatigue: list[Fatigue]
-    category: float | None
-    file: Path
+    loads: list[Load]  # of the flexible sections
+    has_heights: bool  # the stresses are by heights that the scene or the user gave
+    fatigue: list[Fatigue]  # of all stations, if it was asked for
+    category: float | None  # detail category (MPa) that it was asked for
+    file: Path  # of the figures
 
     @property
     def name(self) -> str:

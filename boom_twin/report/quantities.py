@@ -217,30 +217,16 @@ def digest(scene: Scene) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """Most loaded station of a section.
-
-    Attributes
-    ----------
-    station : Station
-    column : int
-        Of `History.moments`.
-    moment, time, static : float
-        The largest moment in magnitude (N m), when (s), and the static part of it then (N m).
-    unknown, sigma : float
-        What the load at the tip that only sensors know of adds to it then, at rest, and the deviation of that, N m; NaN where
-        nothing but strokes was measured.
-    modulus : float
-        Of the section, m^3.
-    """
+    """Most loaded station of a section."""
 
     station: Station
-    column: int
-    moment: float
-    time: float
-    static: float
-    unknown: float
-    sigma: float
-    modulus: float
+    column: int  # of `History.moments`
+    moment: float  # N m, the largest in magnitude
+    time: float  # s, when
+    static: float  # N m, the static part of it then
+    unknown: float  # N m, by the load at the tip that only sensors know of, at rest; NaN where only strokes were measured
+    sigma: float  # N m, standard deviation of that
+    modulus: float  # m^3, of the section
 
     @property
     def stress(self) -> float:
@@ -287,19 +273,16 @@ class SectionLoads:
 
 
 class _Largest(NamedTuple):
-    """Largest moment of a section so far: column, N m, when (s), its static part; and the state at that time.
-
-    Strokes (m), joint angles (rad), estimated load at the tip (N) and its variance (N^2).
-    """
+    """Largest moment of a section so far, as in `Load`, and the state at that time."""
 
     column: int
     moment: float
     time: float
     static: float
-    strokes: Array
-    joints: Array
-    load: Array
-    variance: Array
+    strokes: Array  # m
+    joints: Array  # rad
+    load: Array  # N, estimated at the tip
+    variance: Array  # N^2, of that
 
 
 def section_heights(text: str | None, scene: Scene) -> Array | None:

@@ -38,30 +38,17 @@ LEVELS = (Severity.OK, Severity.WARN, Severity.ERROR, Severity.STALE)
 
 @dataclass(frozen=True, slots=True)
 class StatusLamp:
-    """One status of a node.
-
-    Attributes
-    ----------
-    name, group, reason : str
-    level : Severity
-    quantity : str
-        What was judged, its unit at the end; empty if nothing was.
-    value, limit : float
-    age : float
-        Seconds that the level had lasted when it was told; NaN if not known.
-    is_last : bool
-        Whether its node said that no further one comes.
-    """
+    """One status of a node."""
 
     name: str
     group: str
     level: Severity
     reason: str
-    quantity: str = ""
+    quantity: str = ""  # that was judged, its unit at the end
     value: float = nan
     limit: float = nan
-    age: float = nan
-    is_last: bool = False
+    age: float = nan  # seconds that the level had lasted when it was reported
+    is_last: bool = False  # its node said that no further one comes
 
 
 @dataclass(frozen=True)
@@ -158,30 +145,16 @@ MAX_ALARMS = 500
 class ListedAlarm:
     """Alarm in the list: a lamp that was not well, or an alarm of the health monitor.
 
-    Attributes
-    ----------
-    number : int
-        By which it is acknowledged.
-    name, reason : str
-        The reason is that of the worst level; the judge's are as it told them last.
-    level : Severity
-        The worst; of the judge ERROR where the cause is named, else WARN.
-    begin : float
-        Session time, s.
-    end : float or None
-        None while it lasts.
-    is_acknowledged : bool
-    causes : tuple of (str, float)
-        Of the judge only: what may explain it, with a probability beside the others, the most probable first; NaN where the
-        sensor itself gives it away.
+    Only the health monitor's have `causes`, the most probable first, each with its probability (NaN where the sensor itself
+    gives it away).
     """
 
-    number: int
+    number: int  # by which it is acknowledged
     name: str
-    level: Severity
-    reason: str
-    begin: float
-    end: float | None = None
+    level: Severity  # the worst; of the health monitor ERROR where the cause is named, else WARN
+    reason: str  # of the worst level; of the health monitor the newest
+    begin: float  # s, session time
+    end: float | None = None  # None while it lasts
     is_acknowledged: bool = False
     causes: tuple[tuple[str, float], ...] = ()
 

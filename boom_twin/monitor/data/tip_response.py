@@ -30,24 +30,12 @@ MILLIMETRE = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TipResponses:
-    """Amplitude of the tip's acceleration under harmonic loads.
+    """Amplitude of the tip's acceleration under harmonic loads."""
 
-    Attributes
-    ----------
-    loads : tuple of str
-        In words.
-    frequencies : ndarray, shape (k,)
-        Hz.
-    accelerations : ndarray, shape (k, loads)
-        Amplitudes, both directions together, m/s^2.
-    trouble : str
-        Why there are none; else empty.
-    """
-
-    loads: tuple[str, ...] = ()
-    frequencies: Array = field(default_factory=lambda: np.zeros(0))
-    accelerations: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    trouble: str = ""
+    loads: tuple[str, ...] = ()  # in words
+    frequencies: Array = field(default_factory=lambda: np.zeros(0))  # (k,), Hz
+    accelerations: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, loads), both directions together, m/s^2
+    trouble: str = ""  # why there are none
 
 
 class ResponseList(PresentPosture[TipResponses]):
