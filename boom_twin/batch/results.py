@@ -31,12 +31,7 @@ _OWN = frozenset({MARK, TABLE, PAGE, ROWS, SESSIONS})
 def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
     """Make or reopen the folder of a batch and lock it against other batches.
 
-    Parameters
-    ----------
-    out : Path
-        Folder that is missing, empty, or of an earlier batch.
-    sessions : sequence of Path
-        Sessions to be read. None may lie in `out`, nor `out` in one of them.
+    None of the sessions to be read may lie in `out`, nor `out` in one of them.
 
     Raises
     ------

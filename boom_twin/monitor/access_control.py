@@ -39,17 +39,7 @@ class AccessControl:
     On loopback the ``Host`` must be `host` or a usual name of this machine, so that no page of another name that resolves to it
     gets in.
     Elsewhere a token is needed: once in the address (``/?token=..``), from then on in a cookie. A WebSocket must come from a
-    page of this server (``Origin``).
-
-    Parameters
-    ----------
-    host : str
-        That the server listens on.
-
-    Attributes
-    ----------
-    token : str
-        Empty on loopback.
+    page of this server (``Origin``). On loopback the `token` is empty.
     """
 
     def __init__(self, host: str) -> None:

@@ -21,12 +21,8 @@ RECORDER_TIMEOUT = 2 * PATIENCE
 class RecorderProcess:
     """Recorder in a child process, at most one at a time.
 
-    Parameters
-    ----------
-    folder : Path
-        Every recording gets a directory in it, named by its time (UTC).
-    options : sequence of str
-        Further arguments of ``boom_twin record``.
+    Every recording gets a directory in `folder`, named by its time (UTC); `options` are further arguments of
+    ``boom_twin record``.
     """
 
     def __init__(self, folder: Path, options: Sequence[str] = ()) -> None:
@@ -78,16 +74,7 @@ AT_NODE = "acknowledge-at-node"
 
 
 class ViewerActions:
-    """Actions of the page's viewers, limited to those permitted at start.
-
-    Parameters
-    ----------
-    feed : Feed
-    permitted : set of str
-        Of `ACTS`, and `AT_NODE`.
-    recording : RecorderProcess, optional
-        What ``record`` starts and stops.
-    """
+    """Actions of the page's viewers, limited to those of `ACTS` and `AT_NODE` that were permitted at start."""
 
     def __init__(self, feed: Feed, permitted: frozenset[str], recording: RecorderProcess | None = None) -> None:
         self._feed, self._recording = feed, recording

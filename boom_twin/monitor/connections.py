@@ -30,12 +30,7 @@ MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64
 class Connections:
     """All connections to one server: those that sent no whole request yet, and those whose request was accepted.
 
-    Each kind is in the order of its last use, and the oldest makes room for a new one.
-
-    Parameters
-    ----------
-    server : aiohttp.web.Server
-        What answers their requests.
+    Each kind is in the order of its last use, and the oldest makes room for a new one. The `server` answers their requests.
     """
 
     def __init__(self, server: web.Server) -> None:

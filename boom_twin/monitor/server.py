@@ -34,16 +34,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """Server of the live page for one feed.
-
-    Parameters
-    ----------
-    feed : Feed
-    actions : ViewerActions
-    access : AccessControl
-    sessions : SessionList, optional
-        What viewers may choose from; `feed` is the one that is open.
-    """
+    """Server of the live page for one feed, which is the one of the `sessions` that is open, if there are several."""
 
     def __init__(self, feed: Feed, actions: ViewerActions, access: AccessControl, sessions: SessionList | None = None) -> None:
         self._feed, self._actions, self._access = feed, actions, access

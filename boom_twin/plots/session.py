@@ -20,19 +20,9 @@ from .tip import tip_picture
 def replay_pictures(
     directory: Path, history: History, truth: Truth | None = None, *, session: str = "session", note: str = ""
 ) -> list[Path]:
-    """Draw what was replayed.
+    """Draw what was replayed into a directory, which is made if it is not there.
 
-    Parameters
-    ----------
-    directory : Path
-        Where the PNG files go; made if it is not there.
-    history : History
-    truth : Truth, optional
-        Drawn over the prediction, if known.
-    session : str
-        Name of the session, for the titles.
-    note : str
-        Small print on every picture, such as "synthetic session of a virtual rig".
+    `session` is its name for the titles, and `note` small print such as "synthetic session of a virtual rig".
 
     Returns
     -------
@@ -61,22 +51,12 @@ SHOWN = 30.0
 """Standard deviations at which a bar is cut off, with its number beside it."""
 
 
-def compare_picture(path: Path, title: str, names: list[str], apart: list[float], sure: float, note: str = "") -> None:
+def compare_picture(path: Path, title: str, names: list[str], apart: list[float], sure: float) -> None:
     """Write the comparison of two sessions: a bar for every figure.
 
-    Parameters
-    ----------
-    path : Path
-    title : str
-    names : list of str
-        Of the figures.
-    apart : list of float
-        B minus A, over the standard deviation of that.
-    sure : float
-        From where on a difference is no chance.
-    note : str
+    It is as long as B minus A over the standard deviation of that, which is no chance from `sure` on.
     """
-    with picture(path, title, note, (16.0, 2.0 + 0.42 * max(len(names), 1))) as figure:
+    with picture(path, title, "", (16.0, 2.0 + 0.42 * max(len(names), 1))) as figure:
         axes = figure.add_subplot()
         places = np.arange(len(names))
         axes.axvspan(-sure, sure, color=GREEN, alpha=0.12, linewidth=0, label="may be chance")
@@ -112,14 +92,7 @@ def held_out_picture(
 ) -> None:
     """Draw residuals over their expected deviation, before on the left and after on the right.
 
-    Parameters
-    ----------
-    names : sequence of str
-        c channels.
-    times : pair of ndarray, shape (k,)
-        s.
-    normalised : pair of ndarray, shape (k, c)
-        NaN where not measured.
+    For each there are `times` (k,) in s, and `normalised` residuals (k, channels), NaN where not measured.
     """
     with picture(path, title, note, (16.0, max(6.0, 1.2 + 1.5 * len(names)))) as figure:
         panels = figure.subplots(len(names), 2, squeeze=False, sharex="col")

@@ -103,13 +103,7 @@ class RainflowCounter:
 class FatigueCounter:
     """Fatigue of all stations, added up over the blocks of a session.
 
-    Parameters
-    ----------
-    scene : Scene
-    category : float
-        Detail category of all stations, MPa.
-    heights : ndarray, shape (n,), optional
-        Outer heights of the sections, m; see `boom_twin.analysis.bending_stress.section_moduli`.
+    `category` is the detail category of all stations, MPa; for `heights` see `boom_twin.analysis.bending_stress`.
     """
 
     def __init__(self, scene: Scene, category: float, heights: Array | None = None) -> None:

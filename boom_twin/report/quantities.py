@@ -45,12 +45,7 @@ class Quantity:
 
 
 class QuantityBuilder:
-    """Computation of a session's quantities, block by block.
-
-    Parameters
-    ----------
-    scene : Scene
-    """
+    """Computation of a session's quantities, block by block."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -114,16 +109,10 @@ class QuantityBuilder:
 
 
 class BatchMeans:
-    """Mean of values that come in parts, and its standard deviation by the method of batch means.
-
-    Attributes
-    ----------
-    count : int
-        Values.
-    """
+    """Mean of values that come in parts, and its standard deviation by the method of batch means."""
 
     def __init__(self) -> None:
-        self.count = 0
+        self.count = 0  # values so far
         self._sums: list[tuple[float, int]] = []  # of each of `BATCHES` pieces of each part: sum and number of values
 
     def add(self, values: Array) -> None:

@@ -79,12 +79,7 @@ class RestPeriod:
 
 
 class RestFinder:
-    """Search for the rest periods of a session that last `SHORTEST_REST`; of a long one, `EVALUATED` seconds are used.
-
-    Parameters
-    ----------
-    scene : Scene
-    """
+    """Search for the rest periods of a session that last `SHORTEST_REST`; of a long one, `EVALUATED` seconds are used."""
 
     def __init__(self, scene: Scene) -> None:
         self._modes, self._least_load = ModeList(scene), SHAKING_LOAD * weight_of(scene)

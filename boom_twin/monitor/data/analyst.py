@@ -44,14 +44,7 @@ MODE_DISTANCE = 0.2
 
 
 class Analyst:
-    """Analysis of one feed, one computation of a kind at a time, because the model's workspace is one.
-
-    Parameters
-    ----------
-    feed : Feed
-    compiler : ResponseCompiler
-        Common to all feeds.
-    """
+    """Analysis of one feed, one computation of a kind at a time, because the model's workspace is one."""
 
     def __init__(self, feed: Feed, compiler: ResponseCompiler) -> None:
         self._feed, self._compiler = feed, compiler

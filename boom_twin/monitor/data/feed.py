@@ -27,22 +27,16 @@ class Feed:
         What is shown, in words.
     store : Store
     topics : Topics
-        Their names, and how sensors are read.
     scene : Scene, optional
         By default the package's own, if the node says that it uses that. No file is opened that a message names.
     end : float, optional
         Length of a recorded session, s; None if it is live.
-
-    Attributes
-    ----------
-    trouble : str
-        Why there is not more to be had; empty as long as all is well.
     """
 
     def __init__(self, title: str, store: Store, topics: Topics, scene: Scene | None = None, end: float | None = None) -> None:
         self.title, self.store, self.end = title, store, end
         self.topic_rows = TopicRows(store, topics)
-        self.trouble = ""
+        self.trouble = ""  # why there is not more to be had
         self._scene, self._reads = scene, topics.stroke_reading
         self._plan: Plan | None = None
 

@@ -34,12 +34,7 @@ class TopicLoss:
 
 
 class DroppedMessages:
-    """Counter of dropped messages; each is logged, see `boom_twin.monitor.log_limit` for the rate of these lines.
-
-    Attributes
-    ----------
-    by_topic : dict of str to TopicLoss
-    """
+    """Counter of dropped messages; each is logged, see `boom_twin.monitor.log_limit` for the rate of these lines."""
 
     def __init__(self) -> None:
         self.by_topic: dict[str, TopicLoss] = {}

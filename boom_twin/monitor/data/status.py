@@ -160,16 +160,10 @@ class ListedAlarm:
 
 
 class AlarmList:
-    """List of alarms, which begin and end as the lamps leave and reach the level OK.
-
-    Attributes
-    ----------
-    all : list of ListedAlarm
-        The newest `MAX_ALARMS` of them, by their begin.
-    """
+    """List of alarms, which begin and end as the lamps leave and reach the level OK."""
 
     def __init__(self) -> None:
-        self.all: list[ListedAlarm] = []
+        self.all: list[ListedAlarm] = []  # the newest `MAX_ALARMS`, by their begin
         self._open: dict[str, ListedAlarm] = {}
         self._judged: dict[tuple[str, int], ListedAlarm] = {}
         self._number = 0

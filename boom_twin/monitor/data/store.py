@@ -19,27 +19,14 @@ Rows = tuple[NDArray[np.float64], NDArray[np.float32]]
 
 
 class Table:
-    """Named columns and a time for every row; the oldest rows make room for new ones.
+    """Named columns (``x_m``) and a time for every row; of more than `capacity` rows the oldest make room for new ones.
 
     Memory is taken as rows come.
-
-    Parameters
-    ----------
-    name : str
-    columns : sequence of str
-        Their unit at the end: ``x_m``.
-    capacity : int
-        Rows that are kept.
-
-    Attributes
-    ----------
-    count : int
-        Rows that ever came; they are numbered from 0 on.
     """
 
     def __init__(self, name: str, columns: Sequence[str], capacity: int) -> None:
-        self.name, self.columns, self.count = name, tuple(columns), 0
-        self._capacity = capacity
+        self.name, self.columns, self._capacity = name, tuple(columns), capacity
+        self.count = 0  # rows that ever came; they are numbered from 0 on
         self._times = np.zeros(min(capacity, FIRST_ROOM))
         self._values = np.zeros((len(self._times), len(columns)), dtype=np.float32)
 
@@ -88,30 +75,13 @@ EVERY_STROKE, GAP = "displacement", 0.1
 
 
 class Store:
-    """Data of a feed: tables, states of the lamps, and alarms.
-
-    Parameters
-    ----------
-    capacity : int
-        Rows kept of every table.
-    keeps_statuses : bool
-        Whether earlier states of the lamps are kept, as a replay needs them.
-
-    Attributes
-    ----------
-    epoch : int
-        Stamp (ns) that times count from: the first one.
-    generation : int
-        Raised when all is forgotten because time was set back.
-    tables : dict of str to Table
-        In order of their first row.
-    alarms : AlarmList
-    """
+    """Data of a feed: tables of at most `capacity` rows, states of the lamps (earlier ones too, for a recording), alarms."""
 
     def __init__(self, capacity: int, keeps_statuses: bool = False) -> None:
         self._capacity, self._keeps_statuses = capacity, keeps_statuses
-        self.generation, self.epoch = 0, 0
-        self.tables: dict[str, Table] = {}
+        self.generation = 0  # raised when all is deleted because time was set back
+        self.epoch = 0  # stamp (ns) that times count from: the first one
+        self.tables: dict[str, Table] = {}  # in the order of their first row
         self.alarms = AlarmList()
         self._statuses: list[tuple[float, StatusTable]] = []
         self._last: dict[str, int] = {}  # stamp (ns) of the newest row of every table

@@ -123,12 +123,7 @@ class TopicRows:
     ``shape``          x, z of the deflected line and of the undeflected one, four of every cylinder's pins, forces, strokes
     =================  ==================================================================================================
 
-    Attributes
-    ----------
-    names : frozenset of str
-        Absolute names of the topics that it takes.
-    dropped : DroppedMessages
-        What could not be used.
+    It takes the topics of the absolute `names`.
     """
 
     def __init__(self, store: Store, topics: Topics) -> None:
