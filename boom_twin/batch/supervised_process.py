@@ -14,7 +14,7 @@ from tempfile import TemporaryFile
 from threading import Thread
 
 LOOK_PERIOD = 0.1
-"""Seconds between looks at the memory."""
+"""Seconds between two measurements of the memory."""
 STDERR_BYTES = 2000
 """Number of last bytes of a process's stderr that are reported."""
 

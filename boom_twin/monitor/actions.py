@@ -70,7 +70,7 @@ NO_TEXT = ("Cc", "Cs")
 """Unicode's categories of control characters, and of halves of characters, which cannot be published."""
 ACTS = ("mark", "acknowledge", "record")
 AT_NODE = "acknowledge-at-node"
-"""Permits ``acknowledge``, and that it makes the node let go of alarms that ended."""
+"""Permits ``acknowledge``, which then makes the node release alarms that have ended, too."""
 
 
 class ViewerActions:

@@ -35,7 +35,7 @@ class LogRateLimit(logging.Filter):
 
 
 def write_log() -> None:
-    """Write warnings of all loggers of this process to its standard error, as many as `LogRateLimit` lets through."""
+    """Write warnings of all loggers of this process to its standard error, at the rate of `LogRateLimit`."""
     handler = logging.StreamHandler(sys.stderr)
     handler.addFilter(LogRateLimit())
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])

@@ -24,11 +24,11 @@ MAX_VIEWERS = 16
 MAX_REQUEST_BYTES = 4096
 """Bytes of a request of the page."""
 POLL_PERIOD = 1.0 / 60.0
-"""Seconds between looks at what has come."""
+"""Seconds between two polls of the feed."""
 PEAK_PERIOD = 10.0
-"""Seconds between looks at the spectrum of a live session when nobody looks."""
+"""Seconds between two spectra of a live session while no page is open."""
 HEARTBEAT = 60.0
-"""Seconds without an answer after which a viewer is taken to have gone."""
+"""Seconds without an answer after which the connection of a viewer is closed."""
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 

@@ -1,7 +1,7 @@
-"""One viewer of the live page: what it is sent and what it asks for.
+"""Viewer of the live page: messages sent to it, and its requests.
 
-Nothing is queued for it. What it is still to be sent follows from what it has got: rows by their numbers, lamps and alarms by
-their newest state. A page that does not read is skipped over the rows it missed, and gets the lamps as they are then.
+No message is queued. The rows to send follow from the numbers of the rows already sent; lamps and alarms are sent as they are
+now. A page that does not keep up loses rows, and no state of the lamps.
 """
 
 from __future__ import annotations

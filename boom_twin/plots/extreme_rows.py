@@ -13,7 +13,7 @@ from ..types import Array
 class ExtremeRows:
     """Table of arrays side by side that keeps all rows while they are few, and of more rows the extremes in bins.
 
-    A row stays if a key has its least or its largest value in its bin of consecutive rows there, so a curve through the rows
+    A row stays if it has the least or the largest value of a key in its bin of consecutive rows. So a curve through the rows
     that are left spans in every bin what all rows spanned. Bins get twice as wide whenever `most` rows are not enough: the
     extremes of a wide bin are among those of its halves.
 

@@ -44,7 +44,7 @@ def frequency_picture(
 ) -> None:
     """Write the picture of natural frequencies (Hz) over time.
 
-    Those of the model (k, modes) are at `times` (k,) in s; `measured` ones are a time and a frequency each.
+    The model's (k, modes) are at `times` (k,) in s. A measured one is a time and a frequency.
     """
     with picture(path, f"{session}: natural frequencies", note, (16.0, 6.0)) as figure:
         axes = figure.add_subplot()

@@ -79,8 +79,8 @@ def _boom(axes: Axes, scene: Scene) -> None:
 def folded_section(pivot: Array, before: float, angle: float, length: float, aside: float) -> Array:
     """Return the line of a section that its joint turns by `angle` (rad) from the heading `before`, shape (3, 2), m.
 
-    A folded section would lie on the section before, so it is moved `aside` (m), by the more the farther it is beyond 90
-    degrees, to the side from which it came.
+    A folded section would lie on the section before. So it is moved to the side from which it came, by up to `aside` (m) at
+    180 degrees, and not at all up to 90 degrees.
     """
     along = np.array([np.cos(before), np.sin(before)])
     across = np.sign(angle) * np.array([-along[1], along[0]])

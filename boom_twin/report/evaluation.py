@@ -19,7 +19,7 @@ from .vibration import RestFinder, RestPeriod
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Everything that a report tells of a replay."""
+    """Contents of the report of a replay."""
 
     result: Replay
     scene: Scene
@@ -53,7 +53,7 @@ class Evaluator:
     heights : ndarray, shape (n,), optional
         Of the sections, m, for the stresses; by default those of the scene, or of thin-walled boxes.
     category : float, optional
-        Detail category (MPa) for the fatigue of all stations; without it fatigue is not looked at.
+        Detail category (MPa) for the fatigue of all stations; without it fatigue is not computed.
     """
 
     def __init__(self, scene: Scene, settings: Settings, heights: Array | None = None, category: float | None = None) -> None:

@@ -1,11 +1,12 @@
 """Fatigue of a session: rainflow counts of the bending stress at every station, and damage by the S-N curves of EN 1993-1-9.
 
-A cycle of range S (Pa) does the damage 1/N(S) (Palmgren and Miner). For a detail category C, the range endured 2e6 times,
+A cycle of range S (Pa) does the damage 1/N(S) (Palmgren and Miner). The detail category C is the range endured 2e6 times, D
+the range endured 5e6 times and L the range endured 1e8 times:
 
-    N = 2e6 (C/S)^3  above the range D that is endured 5e6 times,   5e6 (D/S)^5  below it,   endless below L, endured 1e8 times.
+    N = 2e6 (C/S)^3  for S >= D,   5e6 (D/S)^5  for L <= S < D,   infinite  for S < L.
 
-Cycles are counted by the package `rainflow` (ASTM E1049). Of a long session they are counted stretch by stretch: cycles that
-have closed are added up, and turning points of those that have not go before the next stretch, which leaves the count as it is.
+Cycles are counted by the package `rainflow` (ASTM E1049), in a long session stretch by stretch. Cycles that have closed are
+added up. Turning points of open cycles are put before the next stretch, so the count is that of the whole session.
 """
 
 from __future__ import annotations

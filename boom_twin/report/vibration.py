@@ -48,8 +48,8 @@ class Series(NamedTuple):
 def vibrations(times: Array, values: Array) -> list[Vibration]:
     """Return the modes by frequency in `values` (k, c) at `times` (k,) in s; none of less than a second or two.
 
-    They are found in means at even times. Means of a decaying vibration decay with the same frequency and damping, while a
-    filter would spoil the ends.
+    Samples are averaged at even times first: means of a decaying vibration have the same frequency and damping. A filter would
+    spoil the ends.
     """
     columns = [column for column in values.T if 2 * np.isfinite(column).sum() > len(column)]
     if len(times) < 2 or not columns:
@@ -91,7 +91,7 @@ class RestFinder:
     def add(self, history: History, load: Array) -> None:
         """Add the next rows, all of them; a rest period that lasts to their end waits for those that follow.
 
-        `load`, shape (rows, 2), is the estimated load at the tip (N), NaN without sensors that tell it.
+        `load`, shape (rows, 2), is the estimated load at the tip (N), NaN without sensors.
         """
         self._strokes = self._strokes.followed_by(Series(history.stamps_s, history.strokes))
         self._load = self._load.followed_by(Series(history.stamps_s, load))

@@ -33,7 +33,7 @@ from .feed import Feed
 from .store import Store
 
 LOOK_PERIOD = 1.0
-"""Seconds between looks at the state of the twin, as of the node."""
+"""Seconds between two diagnoses of the twin, as of the node."""
 ENOUGH = Output.TIP_ACCELERATION
 """A session with this output is shown as its node published it."""
 TURN = 0.04

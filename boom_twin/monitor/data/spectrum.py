@@ -13,7 +13,7 @@ from ...analysis.even_times import spacing
 from ...types import Array
 
 WINDOW = 40.0
-"""Seconds that are looked at."""
+"""Seconds before the time shown of which the spectrum is."""
 SEGMENT = 8.0
 """Seconds of one segment of Welch's method (Hann window, half overlapping, mean removed)."""
 HIGHEST = 30.0
@@ -25,7 +25,7 @@ PROMINENCE = 6.0
 BAND = 0.3
 """Half width of the band around a peak whose decay gives the damping, as a share of its frequency."""
 DECAY_FLOOR = 0.3
-"""Share of its start down to which a decay is looked at."""
+"""Share of its initial value down to which a decay is evaluated."""
 
 
 @dataclass(frozen=True, slots=True)

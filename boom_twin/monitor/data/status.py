@@ -15,7 +15,7 @@ from .received_messages import text
 SILENCE = 3.0
 """Seconds without a word from a node after which its lamps are stale."""
 MAX_NODES, FORGET_AFTER = 200, 60.0
-"""Where more nodes than so many have told something, those that have been silent for so many seconds are forgotten."""
+"""Number of nodes above which those that have been silent for so many seconds are deleted."""
 GROUPS = ("sensors", "model", "residuals", "timing", "recorder")
 HEALTH = "health"
 """The status that stands for all alarms of the rig's health."""

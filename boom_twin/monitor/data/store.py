@@ -69,9 +69,9 @@ MAX_STATUSES = 100_000
 SET_BACK = 1_000_000_000
 """A stamp earlier by more than this (ns) may be that of a clock that was set back; by less it is out of order."""
 LEAP_AHEAD = 60_000_000_000
-"""A stamp later by more than this (ns) may be a stray one; no table has its rows so far apart."""
+"""A stamp later by more than this (ns) may be an outlier; no table has its rows so far apart."""
 EVERY_STROKE, GAP = "displacement", 0.1
-"""Table with a row for every stroke sample, and the pause (s) of it from which on an alarm tells it."""
+"""Table with a row for every stroke sample; a longer pause (s) between its rows raises an alarm."""
 
 
 class Store:
@@ -102,12 +102,12 @@ class Store:
         """Add a row to a table whatever its stamp is.
 
         A row whose stamp leaps is held back until the next one of its table. If that goes on from it, time has leapt and both
-        are added; else it was a stray one. Time that was set back deletes all rows before.
+        are added; else it was an outlier. Time that was set back deletes all rows before.
 
         Raises
         ------
         MalformedError
-            Its stamp is not after that of the row before, it has other columns, or the row held back was a stray one.
+            Its stamp is not after that of the row before, it has other columns, or the row held back was an outlier.
         """
         self._check(name, columns)
         last, held = self._last.get(name, stamp - 1), self._held.get(name)
