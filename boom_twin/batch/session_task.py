@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 OK, FAILED = "ok", "failed"
 """Status of a row."""
+ALARM = ("channel", "kind", "from_s", "to_s", "cause", "told")
+"""Keys of an alarm in a row."""
 Row = dict[str, Any]
 
 
@@ -139,9 +141,6 @@ def _calibrated(task: SessionTask, scene: Scene, settings: Settings, window: Tim
             name = f"calibrated_{estimate.unknown.name}"
             row |= {name: estimate.value, f"{name}_sigma": (estimate.high - estimate.low) / (2.0 * BETWEEN)}
     return row
-
-
-ALARM = ("channel", "kind", "from_s", "to_s", "cause", "told")
 
 
 def main() -> int:
