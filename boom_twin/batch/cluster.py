@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 REMEDY = 'Run `pip install "boom_twin[batch]"`.'
 KILLED = "the workers that had it were ended from outside. Look for what ends them, as the system's memory."
-COUNTED = 5
+COUNT_PERIOD = 5
 """Seconds between two counts of a cluster's workers."""
-CONNECT = 20.0
+CONNECT_TIMEOUT = 20.0
 """Seconds for a scheduler to answer."""
 
 
@@ -38,14 +38,9 @@ class Workers:
 
 @contextmanager
 def connected(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
-    """Yield the workers of the scheduler at an address, or those of this process, which opens no port.
+    """Yield the workers of the scheduler at an address (``tcp://host:8786``), or those of this process, which opens no port.
 
-    Parameters
-    ----------
-    scheduler : str, optional
-        Address, such as ``tcp://host:8786``.
-    workers : int, optional
-        Number of sessions at once on this machine; by default its number of cores.
+    `workers` is the number of sessions at once on this machine, by default that of its cores.
 
     Raises
     ------
@@ -63,7 +58,7 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
     except ImportError:
         raise UsageError(f"dask is not installed, and --scheduler needs it. {REMEDY}") from None
     try:
-        client = Client(scheduler, timeout=CONNECT, set_as_default=False)
+        client = Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)
     except (TimeoutError, OSError, ValueError) as error:
         remedy = "Start `dask scheduler`, check host and port."
         raise BagError(f"--scheduler {scheduler}: no Dask scheduler answers ({type(error).__name__}). {remedy}") from None
@@ -120,7 +115,7 @@ def rows_of(workers: Workers, tasks: Sequence[SessionTask]) -> Iterator[Row]:
                     threads.append(Thread(target=go, daemon=True))  # sessions end with this process, see end_with_caller
                     threads[-1].start()
                 try:
-                    row = rows.get(timeout=COUNTED)
+                    row = rows.get(timeout=COUNT_PERIOD)
                 except Empty:
                     continue
             yield row

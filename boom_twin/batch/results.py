@@ -17,7 +17,7 @@ from ..system.atomic_files import DRAFT, write_atomic
 from ..system.received_files import real_path
 from ..system.result_folder import check_lasting
 from ..system.terminal_text import printable
-from .session_task import OK, Row
+from .session_task import ALARM, OK, Row
 
 MARK, TABLE, PAGE = "batch.json", "sessions.parquet", "batch.html"
 ROWS, SESSIONS = "rows", "sessions"
@@ -31,12 +31,7 @@ _OWN = frozenset({MARK, TABLE, PAGE, ROWS, SESSIONS})
 def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
     """Make or reopen the folder of a batch and lock it against other batches.
 
-    Parameters
-    ----------
-    out : Path
-        Folder that is missing, empty, or of an earlier batch.
-    sessions : sequence of Path
-        Sessions to be read. None may lie in `out`, nor `out` in one of them.
+    None of the sessions to be read may lie in `out`, nor `out` in one of them.
 
     Raises
     ------
@@ -136,8 +131,7 @@ def write_table(path: Path, rows: Sequence[Row]) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    alarm = pa.struct([(name, pa.float64() if name.endswith("_s") else pa.string()) for name in
-                       ("channel", "kind", "from_s", "to_s", "cause", "told")])  # fmt: skip
+    alarm = pa.struct([(name, pa.float64() if name.endswith("_s") else pa.string()) for name in ALARM])
     types: dict[str, Any] = {
         **{name: pa.list_(pa.float64()) if kind == "list" else pa.type_for_alias(kind) for name, kind in _ALWAYS.items()},
         "alarms": pa.list_(alarm),

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from ..errors import BoomTwinError
 from ..system.child_process import python_command
-from .supervised_process import Limits, end_with_caller, run_supervised
+from .supervised_process import end_with_caller, run_supervised
 
 if TYPE_CHECKING:
     from ..bag.time_window import TimeWindow
@@ -23,60 +23,38 @@ if TYPE_CHECKING:
 
 OK, FAILED = "ok", "failed"
 """Status of a row."""
+ALARM = ("channel", "kind", "from_s", "to_s", "cause", "told")
+"""Keys of an alarm in a row."""
 Row = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class SessionTask:
-    """Task of replaying one session.
+    """Task of replaying one session."""
 
-    Attributes
-    ----------
-    key : str
-        Key of its row.
-    session : str
-        Path of the session.
-    out : str
-        Folder of its replay.
-    fingerprint : str
-        Digest, see `boom_twin.batch.sources.fingerprint`.
-    scene, params, mapping, baseline : str or None
-        Paths as for ``boom_twin replay``.
-    report, keep_bag : bool
-        True to write the report with its pictures, and to keep the replay's bag.
-    time, memory : float, int
-        Limits in seconds and in bytes of resident memory.
-    retries : int
-        Number of further attempts if the session fails.
-    start, duration : float, float or None
-        Window of the session, s, see `boom_twin.bag.time_window.TimeWindow`.
-    calibrate : bool
-        True to estimate the scene's parameters from the session as well. That assumes a healthy rig.
-    """
-
-    key: str
+    key: str  # of its row
     session: str
-    out: str
-    fingerprint: str
+    out: str  # folder of its replay
+    fingerprint: str  # see `boom_twin.batch.sources.fingerprint`
     scene: str | None
     params: str | None
     mapping: str | None
     baseline: str | None
-    report: bool
-    keep_bag: bool
-    time: float
-    memory: int
-    retries: int
-    start: float = 0.0
+    report: bool  # is to be written, with its pictures
+    keep_bag: bool  # of the replay
+    time: float  # limit, s
+    memory: int  # limit of resident memory, bytes
+    retries: int  # further attempts if the session fails
+    start: float = 0.0  # of the window, s, see `boom_twin.bag.time_window.TimeWindow`
     duration: float | None = None
-    calibrate: bool = False
+    calibrate: bool = False  # the scene's parameters from the session as well; that assumes a healthy rig
 
 
 def run_task(task: SessionTask) -> Row:
     """Replay a session in a process of its own and return its row, with the reason if it failed. Dask workers call this."""
     line = json.dumps(asdict(task)).encode() + b"\n"
     for attempt in range(1, task.retries + 2):
-        found = run_supervised(python_command(__name__), line, Limits(task.time, task.memory))
+        found = run_supervised(python_command(__name__), line, task.time, task.memory)
         if not found.reason:
             with suppress(ValueError):
                 return {**json.loads(found.output), "attempts": attempt, "peak_memory_bytes": found.peak}
@@ -112,7 +90,7 @@ def row_of(task: SessionTask) -> Row:
     from ..offline.history import draw
     from ..offline.replay import replay_into
     from ..report.evaluation import Evaluator
-    from ..report.page import Subject, write_report
+    from ..report.page import write_report
     from ..report.quantities import read
     from ..system.result_folder import REPLAY, result_folder
 
@@ -130,7 +108,7 @@ def row_of(task: SessionTask) -> Row:
         found = evaluator.finish(result, building.folder)
         if task.report:
             draw(result, found.history, building.folder)
-            write_report(Subject(result, found, scene.scene, scene.source, False), building.folder)
+            write_report(found, building.folder)
         _, quantities = read(building.folder)
         if not task.keep_bag:
             rmtree(building.folder / "bag")
@@ -163,9 +141,6 @@ def _calibrated(task: SessionTask, scene: Scene, settings: Settings, window: Tim
             name = f"calibrated_{estimate.unknown.name}"
             row |= {name: estimate.value, f"{name}_sigma": (estimate.high - estimate.low) / (2.0 * BETWEEN)}
     return row
-
-
-ALARM = ("channel", "kind", "from_s", "to_s", "cause", "told")
 
 
 def main() -> int:

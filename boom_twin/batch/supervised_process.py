@@ -13,51 +13,26 @@ from dataclasses import dataclass
 from tempfile import TemporaryFile
 from threading import Thread
 
-LOOK = 0.1
-"""Seconds between looks at the memory."""
-MOST_TOLD = 2000
+LOOK_PERIOD = 0.1
+"""Seconds between two measurements of the memory."""
+STDERR_BYTES = 2000
 """Number of last bytes of a process's stderr that are reported."""
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
-    """Limits of a process with all its children: `time` in seconds, `memory` in bytes of resident memory."""
-
-    time: float
-    memory: int
-
-
-@dataclass(frozen=True, slots=True)
 class Outcome:
-    """Result of a supervised process.
+    """Result of a supervised process."""
 
-    Attributes
-    ----------
-    output : bytes
-        Content of its stdout; whole only if `reason` is empty.
-    reason : str
-        Reason of the failure in one line; empty if it ended with code 0.
-    peak : int
-        Largest observed resident memory, bytes. Pages that its processes share are counted in each.
-    """
-
-    output: bytes
-    reason: str
-    peak: int
+    output: bytes  # content of its stdout; whole only if there is no reason
+    reason: str  # of the failure in one line; empty if it ended with code 0
+    peak: int  # largest observed resident memory, bytes; pages that its processes share are counted in each
 
 
-def run_supervised(command: Sequence[str], task: bytes, limits: Limits) -> Outcome:
-    """Run `command` with one line on stdin and return its result.
+def run_supervised(command: Sequence[str], task: bytes, seconds: float, memory: int) -> Outcome:
+    """Run `command` with the line `task` on stdin and return its result.
 
     Stdin stays open: its end shows the process that its caller has ended. The process leads a group of its own, and all of
-    the group is ended with it.
-
-    Parameters
-    ----------
-    command : sequence of str
-    task : bytes
-        The line for stdin, with its line end.
-    limits : Limits
+    the group is ended with it. It may take so many `seconds`, and with all its children so much resident `memory`, bytes.
     """
     with TemporaryFile() as out, TemporaryFile() as told:
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=out, stderr=told, start_new_session=True)
@@ -66,7 +41,7 @@ def run_supervised(command: Sequence[str], task: bytes, limits: Limits) -> Outco
             with suppress(BrokenPipeError):
                 process.stdin.write(task)
                 process.stdin.flush()
-            reason, peak = _watch(process, limits)
+            reason, peak = _watch(process, seconds, memory)
         finally:
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
@@ -75,24 +50,25 @@ def run_supervised(command: Sequence[str], task: bytes, limits: Limits) -> Outco
                 process.stdin.close()
         out.seek(0)
         if not reason and code:
-            told.seek(max(0, told.seek(0, os.SEEK_END) - MOST_TOLD))
-            reason = _last_line(told.read()) if code > 0 else ""
-            reason = reason or f"its process was ended by {_cause(code)}"
+            told.seek(max(0, told.seek(0, os.SEEK_END) - STDERR_BYTES))
+            lines = told.read().decode(errors="replace").strip().splitlines()
+            cause = f"signal {-code}" if code < 0 else f"itself with code {code}"
+            reason = lines[-1] if lines and code > 0 else f"its process was ended by {cause}"
         return Outcome(out.read(), reason, peak)
 
 
-def _watch(process: subprocess.Popen[bytes], limits: Limits) -> tuple[str, int]:
+def _watch(process: subprocess.Popen[bytes], seconds: float, memory: int) -> tuple[str, int]:
     """Wait for the end of a process. Return the limit that it passed (empty if none) and its largest observed memory, bytes."""
-    end, peak = time.monotonic() + limits.time, 0
+    end, peak = time.monotonic() + seconds, 0
     while True:
         with suppress(subprocess.TimeoutExpired):
-            process.wait(LOOK)
+            process.wait(LOOK_PERIOD)
             return "", peak
         peak = max(peak, _memory(process.pid))
-        if peak > limits.memory:
-            return f"needs {peak / 1e6:.0f} MB of memory, more than {limits.memory / 1e6:.0f} MB. Raise --memory.", peak
+        if peak > memory:
+            return f"needs {peak / 1e6:.0f} MB of memory, more than {memory / 1e6:.0f} MB. Raise --memory.", peak
         if time.monotonic() > end:
-            return f"takes longer than {limits.time:g} s. Raise --timeout.", peak
+            return f"takes longer than {seconds:g} s. Raise --timeout.", peak
 
 
 def _memory(pid: int) -> int:
@@ -106,15 +82,6 @@ def _memory(pid: int) -> int:
             with suppress(psutil.Error):
                 total += each.memory_info().rss
     return total
-
-
-def _last_line(told: bytes) -> str:
-    lines = told.decode(errors="replace").strip().splitlines()
-    return lines[-1] if lines else ""
-
-
-def _cause(code: int) -> str:
-    return f"signal {-code}" if code < 0 else f"itself with code {code}"
 
 
 def end_with_caller() -> None:

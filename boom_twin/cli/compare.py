@@ -71,8 +71,8 @@ def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) ->
 
 def _draw(out: Path, one: ComparedSession, other: ComparedSession, rows: list[ComparisonRow]) -> None:
     from ..plots.session import compare_picture
-    from ..report.compare import SURE
+    from ..report.compare import SIGNIFICANT
 
     known = [(row.name, row.difference / row.sigma) for row in rows if row.sigma and row.difference is not None]
     title = f"B ({other.name}) against A ({one.name})"
-    compare_picture(out / "compare.png", title, [name for name, _ in known], [apart for _, apart in known], SURE)
+    compare_picture(out / "compare.png", title, [name for name, _ in known], [apart for _, apart in known], SIGNIFICANT)

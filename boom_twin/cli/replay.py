@@ -25,9 +25,7 @@ from .arguments import (
 from .output import open_session_scene, open_session_settings, print_result, tell, warn_incomplete
 
 if TYPE_CHECKING:
-    from ..bag.session_model import SessionScene
     from ..offline.recording import Stretch
-    from ..offline.replay import Replay
     from ..report.evaluation import Evaluation
 
 
@@ -113,7 +111,7 @@ def run(args: Namespace) -> int:
             causes=args.causes,
         )
         found = evaluator.finish(result, building.folder)
-        files = [path.name for path in _write(args, result, found, scene, building.folder)]
+        files = [path.name for path in _write(args, found, building.folder)]
         if table is not None:
             table.finish()
             files.append(name)
@@ -132,18 +130,16 @@ def flat(summary: dict[str, Any]) -> dict[str, Any]:
     return found | {f"alarm_{key}": [alarm[key] for alarm in alarms] for key in ("channel", "kind", "from_s", "to_s", "cause")}
 
 
-def _write(args: Namespace, result: Replay, found: Evaluation, scene: SessionScene, out: Path) -> list[Path]:
+def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
     """Write pictures and report, as they are wanted; return these files and the file of the figures."""
     from ..offline.history import draw
-    from ..report.page import Subject, write_report
+    from ..report.page import write_report
 
     files = [found.file]
     if not args.no_pictures:
-        files += draw(result, found.history, out)
+        files += draw(found.result, found.history, out)
     if args.report:
-        known = args.section_height is not None or all(part.height for part in scene.scene.sections if part.beam is not None)
-        subject = Subject(result, found, scene.scene, scene.source, known)
-        files.append(write_report(subject, out))
+        files.append(write_report(found, out))
     return files
 
 

@@ -36,20 +36,9 @@ def in_address(host: str) -> str:
 class AccessControl:
     """Access control of the page: checks Host, Origin and token of every request.
 
-    On loopback the ``Host`` must be `host` or a usual name of this machine, so that no page of another name that resolves to it
-    gets in.
-    Elsewhere a token is needed: once in the address (``/?token=..``), from then on in a cookie. A WebSocket must come from a
-    page of this server (``Origin``).
-
-    Parameters
-    ----------
-    host : str
-        That the server listens on.
-
-    Attributes
-    ----------
-    token : str
-        Empty on loopback.
+    On loopback the `token` is empty, and the ``Host`` must be `host` or a usual name of this machine. So a page of another
+    name that resolves to this machine is refused. Elsewhere the token is needed, once in the address (``/?token=..``), from
+    then on in a cookie. A WebSocket must come from a page of this server (``Origin``).
     """
 
     def __init__(self, host: str) -> None:

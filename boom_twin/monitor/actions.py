@@ -21,12 +21,8 @@ RECORDER_TIMEOUT = 2 * PATIENCE
 class RecorderProcess:
     """Recorder in a child process, at most one at a time.
 
-    Parameters
-    ----------
-    folder : Path
-        Every recording gets a directory in it, named by its time (UTC).
-    options : sequence of str
-        Further arguments of ``boom_twin record``.
+    Every recording gets a directory in `folder`, named by its time (UTC); `options` are further arguments of
+    ``boom_twin record``.
     """
 
     def __init__(self, folder: Path, options: Sequence[str] = ()) -> None:
@@ -68,26 +64,17 @@ class RecorderProcess:
                 self._process.kill()
 
 
-LONGEST = 500
+NOTE_LENGTH = 500
 """Characters of a note."""
 NO_TEXT = ("Cc", "Cs")
 """Unicode's categories of control characters, and of halves of characters, which cannot be published."""
 ACTS = ("mark", "acknowledge", "record")
 AT_NODE = "acknowledge-at-node"
-"""Permits ``acknowledge``, and that it makes the node let go of alarms that ended."""
+"""Permits ``acknowledge``, which then makes the node release alarms that have ended, too."""
 
 
 class ViewerActions:
-    """Actions of the page's viewers, limited to those permitted at start.
-
-    Parameters
-    ----------
-    feed : Feed
-    permitted : set of str
-        Of `ACTS`, and `AT_NODE`.
-    recording : RecorderProcess, optional
-        What ``record`` starts and stops.
-    """
+    """Actions of the page's viewers, limited to those of `ACTS` and `AT_NODE` that were permitted at start."""
 
     def __init__(self, feed: Feed, permitted: frozenset[str], recording: RecorderProcess | None = None) -> None:
         self._feed, self._recording = feed, recording
@@ -122,8 +109,8 @@ class ViewerActions:
 
     def _mark(self, request: dict[str, Any]) -> str:
         note = request.get("note")
-        if not isinstance(note, str) or len(note) > LONGEST or any(category(sign) in NO_TEXT for sign in note):
-            raise ValueError(f"a note is a text of at most {LONGEST} characters, none of them a control character")
+        if not isinstance(note, str) or len(note) > NOTE_LENGTH or any(category(sign) in NO_TEXT for sign in note):
+            raise ValueError(f"a note is a text of at most {NOTE_LENGTH} characters, none of them a control character")
         self._feed.publish(f"mark: {note}")
         return f"marked: {note}"
 

@@ -2,14 +2,13 @@
 
 A connection that has sent no whole request has few seconds and few places, in which the newest drives out
 the oldest. A page sends its request at once, so a thousand silent connections do not keep it out. Connections whose request was
-accepted have places of their own. A viewer's WebSocket needs neither, see `boom_twin.monitor.server.MOST_VIEWERS`.
+accepted have places of their own. A viewer's WebSocket needs neither, see `boom_twin.monitor.server.MAX_VIEWERS`.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections import Counter
 from functools import partial
 from http import HTTPStatus
 from typing import Any
@@ -22,52 +21,22 @@ from .access_control import POLICY
 LOG = logging.getLogger("boom_twin.monitor.connections")
 REQUEST_TIME = 5.0
 """Seconds that a connection may take for its first whole request, and for each further one."""
-LONGEST = 200
+LOGGED_LENGTH = 200
 """Characters of what the log says of one."""
-MOST, MOST_OF_ONE = 256, 64
+MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64
 """Connections of one kind, silent or let in; as many of one address."""
 
 
-class ConnectionCount:
-    """Connections of one kind, ordered by their last use. The oldest makes room for a new one."""
-
-    def __init__(self) -> None:
-        self._open: dict[Connection, None] = {}
-        self._counts: Counter[str] = Counter()
-
-    def take(self, connection: Connection) -> Connection | None:
-        """Make a connection the newest; return the connection that must be closed for it, if any."""
-        self.leave(connection)
-        address, gone = connection.address, None
-        if self._counts[address] >= MOST_OF_ONE:
-            gone = next(each for each in self._open if each.address == address)
-        elif len(self._open) >= MOST:
-            gone = next(iter(self._open))
-        if gone is not None:
-            self.leave(gone)
-        self._open[connection] = None
-        self._counts[address] += 1
-        return gone
-
-    def leave(self, connection: Connection) -> None:
-        """Remove a connection, if it is there."""
-        if connection in self._open:
-            del self._open[connection]
-            self._counts -= Counter([connection.address])
-
-
 class Connections:
-    """All connections to one server.
+    """All connections to one server: those that sent no whole request yet, and those whose request was accepted.
 
-    Parameters
-    ----------
-    server : aiohttp.web.Server
-        What answers their requests.
+    Each kind is in the order of its last use, and the oldest makes room for a new one. The `server` answers their requests.
     """
 
     def __init__(self, server: web.Server) -> None:
         self._server = server
-        self._silent, self._accepted = ConnectionCount(), ConnectionCount()
+        self._silent: list[Connection] = []
+        self._accepted: list[Connection] = []
 
     def __call__(self) -> Connection:
         """Return a new connection, as `asyncio.loop.create_server` requires."""
@@ -75,47 +44,52 @@ class Connections:
 
     def begin(self, connection: Connection) -> None:
         """Count a new connection that has sent nothing yet."""
-        self._disconnect(self._silent.take(connection), "a newer one")
+        self._count(self._silent, connection)
 
     def accept(self, connection: Connection) -> None:
         """Count a connection whose request was accepted."""
-        self._silent.leave(connection)
-        self._disconnect(self._accepted.take(connection), "a newer one")
+        self.end(connection)
+        self._count(self._accepted, connection)
 
     def end(self, connection: Connection) -> None:
         """Stop counting a connection that is closed or has become a viewer's."""
-        self._silent.leave(connection)
-        self._accepted.leave(connection)
+        for kind in (self._silent, self._accepted):
+            if connection in kind:
+                kind.remove(connection)
 
     def expire(self, connection: Connection) -> None:
         """Close a connection that sent no request in time."""
-        self._disconnect(connection, f"it sent no request within {REQUEST_TIME:g} s")
+        self._cut_off(connection, f"it sent no request within {REQUEST_TIME:g} s")
 
-    def _disconnect(self, connection: Connection | None, reason: str) -> None:
-        if connection is not None:
-            self.end(connection)
-            LOG.warning("cut off a connection of %s: %s", connection.address, reason)
-            connection.abort()
+    def _count(self, kind: list[Connection], connection: Connection) -> None:
+        """Add the newest connection of a kind, and close the one that must make room for it, if any."""
+        same = [each for each in kind if each.address == connection.address]
+        if len(same) >= MAX_OF_ADDRESS or len(kind) >= MAX_CONNECTIONS:
+            self._cut_off(same[0] if len(same) >= MAX_OF_ADDRESS else kind[0], "a newer one")
+        kind.append(connection)
+
+    def _cut_off(self, connection: Connection, reason: str) -> None:
+        self.end(connection)
+        LOG.warning("cut off a connection of %s: %s", connection.address, reason)
+        connection.abort()
 
 
 class Connection(web.RequestHandler):
     """Connection whose requests aiohttp reads. Every answer has the headers of `POLICY`, also that to an invalid request."""
 
-    __slots__ = ("_all", "_deadline", "_link", "address")
+    __slots__ = ("_all", "_deadline", "address")
 
     def __init__(self, server: web.Server, everyone: Connections) -> None:
         loop = asyncio.get_running_loop()
         how: dict[str, Any] = {"keepalive_timeout": REQUEST_TIME, "lingering_time": 0.0, "auto_decompress": False}
         super().__init__(server, loop=loop, access_log=None, **how)  # type: ignore[arg-type]
         self._all, self.address = everyone, ""
-        self._link: asyncio.Transport | None = None
         self._deadline: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Start waiting for a request."""
         super().connection_made(transport)
-        assert isinstance(transport, asyncio.Transport)
-        self._link, self.address = transport, str((transport.get_extra_info("peername") or [""])[0])
+        self.address = str((transport.get_extra_info("peername") or [""])[0])
         self._deadline = asyncio.get_running_loop().call_later(REQUEST_TIME, partial(self._all.expire, self))
         self._all.begin(self)
 
@@ -137,8 +111,8 @@ class Connection(web.RequestHandler):
     def abort(self) -> None:
         """Close the connection without an answer."""
         self._cancel_deadline()
-        if self._link is not None:
-            self._link.abort()
+        if self.transport is not None:
+            self.transport.abort()
 
     def handle_error(
         self, request: web.BaseRequest, status: int = 500, exc: BaseException | None = None, message: str | None = None
@@ -150,7 +124,7 @@ class Connection(web.RequestHandler):
         if isinstance(exc, ConnectionError):
             return web.Response(status=status)
         if status == HTTPStatus.BAD_REQUEST:
-            LOG.warning("no request from %s: %s", self.address, printable(str(message)[:LONGEST], keep=""))
+            LOG.warning("no request from %s: %s", self.address, printable(str(message)[:LOGGED_LENGTH], keep=""))
             response: web.StreamResponse = web.Response(status=status, text=message)
             response.force_close()
         else:

@@ -8,12 +8,12 @@ import time
 
 PERIOD = 10.0
 """Seconds."""
-MOST = 3
+MAX_RECORDS = 3
 """Records of one logger written in a `PERIOD`."""
 
 
 class LogRateLimit(logging.Filter):
-    """Filter that passes `MOST` records of each logger in a `PERIOD`.
+    """Filter that passes `MAX_RECORDS` records of each logger in a `PERIOD`.
 
     The first record after the period states how many were left out.
     """
@@ -27,15 +27,15 @@ class LogRateLimit(logging.Filter):
         now = time.monotonic()
         begin, count = self._periods.get(record.name, (now, 0))
         if now - begin >= PERIOD:
-            if count > MOST:
-                record.msg, record.args = f"{record.getMessage()} ({count - MOST} lines before this were left out)", None
+            if count > MAX_RECORDS:
+                record.msg, record.args = f"{record.getMessage()} ({count - MAX_RECORDS} lines before this were left out)", None
             begin, count = now, 0
         self._periods[record.name] = begin, count + 1
-        return count < MOST
+        return count < MAX_RECORDS
 
 
 def write_log() -> None:
-    """Write warnings of all loggers of this process to its standard error, as many as `LogRateLimit` lets through."""
+    """Write warnings of all loggers of this process to its standard error, at the rate of `LogRateLimit`."""
     handler = logging.StreamHandler(sys.stderr)
     handler.addFilter(LogRateLimit())
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..types import SENSORS
-from .data.dropped_messages import DroppedMessages
+from .data.received_messages import DroppedMessages
 from .data.status import HEALTH, ListedAlarm, Severity, StatusLamp, overall, worst
 from .data.store import Store
 from .data.topic_rows import RESIDUALS
@@ -56,7 +56,7 @@ def state(store: Store, now: float, time: float, dropped: DroppedMessages | None
     groups = store.statuses(now).groups(now)
     groups["residuals"] = _with_alarms(groups["residuals"], list(store.alarms.lamps(time)))
     level, reason = overall(groups)
-    losses = [] if dropped is None else dropped.told()
+    losses = [] if dropped is None else dropped.losses()
     if losses and level == Severity.OK:
         level, reason = Severity.WARN, f"messages dropped: {sum(loss['count'] for loss in losses)}, see below"
     told = [{"name": name, **_group(lamps)} for name, lamps in groups.items()]

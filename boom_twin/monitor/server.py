@@ -15,35 +15,26 @@ from .actions import ViewerActions
 from .connections import Connection
 from .data.analyst import Analyst
 from .data.feed import Feed
-from .data.present_posture import ResponseCompiler
 from .data.session_list import SessionList
+from .data.tip_response import ResponseCompiler
 from .viewer import SessionChoice, Viewer
 
 PAGE = Path(__file__).parent / "page"
-MOST_VIEWERS = 16
-LONGEST = 4096
+MAX_VIEWERS = 16
+MAX_REQUEST_BYTES = 4096
 """Bytes of a request of the page."""
 POLL_PERIOD = 1.0 / 60.0
-"""Seconds between looks at what has come."""
+"""Seconds between two polls of the feed."""
 PEAK_PERIOD = 10.0
-"""Seconds between looks at the spectrum of a live session when nobody looks."""
+"""Seconds between two spectra of a live session while no page is open."""
 HEARTBEAT = 60.0
-"""Seconds without an answer after which a viewer is taken to have gone."""
+"""Seconds without an answer after which the connection of a viewer is closed."""
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """Server of the live page for one feed.
-
-    Parameters
-    ----------
-    feed : Feed
-    actions : ViewerActions
-    access : AccessControl
-    sessions : SessionList, optional
-        What viewers may choose from; `feed` is the one that is open.
-    """
+    """Server of the live page for one feed, which is the one of the `sessions` that is open, if there are several."""
 
     def __init__(self, feed: Feed, actions: ViewerActions, access: AccessControl, sessions: SessionList | None = None) -> None:
         self._feed, self._actions, self._access = feed, actions, access
@@ -53,7 +44,7 @@ class Server:
 
     def application(self) -> web.Application:
         """Return the application for `aiohttp.web`."""
-        application = web.Application(middlewares=[self._guard], client_max_size=LONGEST)
+        application = web.Application(middlewares=[self._guard], client_max_size=MAX_REQUEST_BYTES)
         routes = {"/": self._index, "/socket": self._connect, "/page/{name}": self._file}
         application.add_routes([web.get(path, handler) for path, handler in routes.items()])
         application.on_response_prepare.append(_add_policy)
@@ -79,9 +70,9 @@ class Server:
         return web.FileResponse(file)
 
     async def _connect(self, request: web.Request) -> web.StreamResponse:
-        if len(self._viewers) >= MOST_VIEWERS:
-            raise web.HTTPServiceUnavailable(text=f"{MOST_VIEWERS} pages are open already; close one")
-        socket = web.WebSocketResponse(heartbeat=HEARTBEAT, max_msg_size=LONGEST, compress=False)
+        if len(self._viewers) >= MAX_VIEWERS:
+            raise web.HTTPServiceUnavailable(text=f"{MAX_VIEWERS} pages are open already; close one")
+        socket = web.WebSocketResponse(heartbeat=HEARTBEAT, max_msg_size=MAX_REQUEST_BYTES, compress=False)
         self._viewers.add(socket)
         try:
             await socket.prepare(request)

@@ -1,7 +1,7 @@
-"""One viewer of the live page: what it is sent and what it asks for.
+"""Viewer of the live page: messages sent to it, and its requests.
 
-Nothing is queued for it. What it is still to be sent follows from what it has got: rows by their numbers, lamps and alarms by
-their newest state. A page that does not read is skipped over the rows it missed, and gets the lamps as they are then.
+No message is queued. The rows to send follow from the numbers of the rows already sent; lamps and alarms are sent as they are
+now. A page that does not keep up loses rows, and no state of the lamps.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from .actions import ViewerActions
 from .data.analyst import Analyst, response_messages
 from .data.feed import Feed, Playback
-from .data.present_posture import TipResponses
 from .data.session_list import SessionList
 from .data.store import Table
+from .data.tip_response import TipResponses
 from .protocol import ROWS, alarms, dump, layout, pack, state
 
 PERIOD = 1.0 / 30.0
@@ -35,7 +35,7 @@ HISTORY = 600.0
 """Seconds that a page is given when it is opened, or goes elsewhere in a session."""
 SINGLE = frozenset({"shape"})
 """Tables of which the newest row is enough."""
-MOST_REQUESTS = 40
+MAX_REQUESTS = 40
 """Requests of a page in a second."""
 
 
@@ -47,17 +47,7 @@ class SessionChoice(NamedTuple):
 
 
 class Viewer:
-    """Viewer served over one WebSocket until it is closed.
-
-    Parameters
-    ----------
-    socket : WebSocketResponse
-        Prepared.
-    feed, actions, analyst
-        Common to all viewers.
-    choice : SessionChoice, optional
-        Where there are several sessions.
-    """
+    """Viewer served over one prepared WebSocket until it is closed; all else is common to all viewers."""
 
     def __init__(
         self,
@@ -103,7 +93,9 @@ class Viewer:
         statuses = None
         while not self._socket.closed:
             now = time.monotonic()
-            position = self._advance(now - last)
+            if self._playback is not None:
+                self._playback.advance(now - last)
+            position = self._position
             last = now
             await self._restart_if_cleared()
             newest = feed.store.statuses(position)
@@ -112,10 +104,6 @@ class Viewer:
                 await self._send_state(position)
             await self._send_rows(position)
             await asyncio.sleep(max(0.0, PERIOD - (time.monotonic() - now)))
-
-    def _advance(self, span: float) -> float:
-        """Return the session time up to which the page is to have all data."""
-        return self._feed.store.newest if self._playback is None else self._playback.advance(span)
 
     async def _restart_if_cleared(self) -> None:
         store = self._feed.store
@@ -166,16 +154,11 @@ class Viewer:
         first = self._sent.get(table.name)
         if first is None:
             first = table.until(position - HISTORY)
-        elif end - first > CHUNK or (table.count and position - self._time_of(table, first) > BEHIND):
-            first = table.until(position - BEHIND) if self._playback is None else first
+        elif self._playback is None and (end - first > CHUNK or position - _time_of(table, first) > BEHIND):
+            first = table.until(position - BEHIND)
         if table.name in SINGLE:
             first = max(first, end - 1)
         return max(first, table.first), end
-
-    @staticmethod
-    def _time_of(table: Table, row: int) -> float:
-        times = table.rows(row, row + 1)[0]
-        return float(times[0]) if len(times) else float("inf")
 
     async def _send_spectra(self) -> None:
         while not self._socket.closed:
@@ -211,7 +194,7 @@ class Viewer:
 
     @property
     def _position(self) -> float:
-        """Session time that is shown, s."""
+        """Session time (s) that is shown: up to it the page is to have all data."""
         return self._feed.store.newest if self._playback is None else self._playback.position
 
     async def _send_text(self, message: dict[str, Any]) -> None:
@@ -226,7 +209,7 @@ class Viewer:
             now = time.monotonic()
             second, count = (now, 1) if now - second > 1.0 else (second, count + 1)
             try:
-                if count > MOST_REQUESTS or message.type is not WSMsgType.TEXT:
+                if count > MAX_REQUESTS or message.type is not WSMsgType.TEXT:
                     raise ValueError("too many requests, or not text")
                 answer = self._do(json.loads(message.data))
             except (ValueError, TypeError, KeyError, RecursionError, OverflowError):
@@ -238,16 +221,10 @@ class Viewer:
     def _do(self, request: Any) -> dict[str, Any] | None:
         if not isinstance(request, dict):
             raise ValueError("not a request")
-        play = self._playback
         if request.get("do") == "session":
             return self._choose(request["value"])
         if request.get("do") in ("seek", "speed", "hold"):
-            if play is None:
-                raise ValueError("not a recorded session")
-            value = float(request["value"])
-            if not isfinite(value):
-                raise ValueError("not a number")
-            self._control_playback(play, request["do"], value)
+            self._control_playback(request["do"], float(request["value"]))
             return None
         return self._actions.act(request)
 
@@ -256,13 +233,15 @@ class Viewer:
             raise ValueError("no such session")
         return {"kind": "answer", "do": "session", "done": True, "words": self._choice.choose(index)}
 
-    def _control_playback(self, play: Playback, what: str, value: float) -> None:
-        if what == "seek":
-            play.seek(value)
+    def _control_playback(self, what: str, value: float) -> None:
+        if (play := self._playback) is None or not isfinite(value):
+            raise ValueError("not a recorded session, or not a number")
+        before = play.position
+        {"seek": play.seek, "speed": play.pace, "hold": play.hold}[what](value)
+        if play.position != before:
             self._generation = -1
-        elif what == "speed":
-            play.pace(value)
-        else:
-            if play.is_at_end and not value:
-                self._control_playback(play, "seek", 0.0)
-            play.is_held = bool(value)
+
+
+def _time_of(table: Table, row: int) -> float:
+    times = table.rows(row, row + 1)[0]
+    return float(times[0]) if len(times) else inf

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,7 @@ from ..deviation.estimate_row import VARIANCES
 from ..deviation.sensor_model import specific_force
 from ..plots import AlarmSpan, EstimateTrace, History, ImuTrace, Truth, replay_pictures
 from ..plots.extreme_rows import ExtremeRows
-from ..plots.health import slow_part
-from ..plots.history import Orbits
+from ..plots.health import SLOW
 from ..plots.residuals import running_mean
 from ..plots.session_totals import SessionTotalsBuilder
 from ..plots.tip import WINDOW
@@ -53,7 +53,14 @@ MOST_SHAPES = 1024
 """Shapes of the boom that are kept, of which pictures show two dozen."""
 PREDICTED = (
     "stamps_s", "tip_displacement", "tip_position", "tip_acceleration", "joints", "cylinder_forces", "strokes", "moments",
+    "slow_moments",
 )  # fmt: skip
+"""Fields of a `History` with a row for every prediction."""
+ESTIMATED = tuple(f"estimated {each.name}" for each in fields(EstimateTrace))
+"""Columns of the estimates beside them."""
+RESIDUALS = ("stamps", "values", "sigmas", "means")
+EXTREME = ("tip_displacement", "tip_position", "tip_acceleration", "moments", "slow_moments", *ESTIMATED[:3])
+"""Columns whose extremes are kept."""
 
 
 class HistoryBuilder:
@@ -66,29 +73,25 @@ class HistoryBuilder:
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._plan = scene, compile_scene(scene)
-        self._predicted = ExtremeRows(MOST_ROWS, (1, 2, 3, 7, 8, 9, 10, 11, 12))
-        self._imu = ExtremeRows(MOST_ROWS, (1, 2))
-        self._residuals = {stream: ExtremeRows(MOST_ROWS, (1, 3)) for stream in Stream}
+        self._predicted = ExtremeRows(MOST_ROWS, EXTREME)
+        self._imu = ExtremeRows(MOST_ROWS, ("measured", "predicted"))
+        self._residuals = {stream: ExtremeRows(MOST_ROWS, ("values", "means")) for stream in Stream}
         self._totals = SessionTotalsBuilder()
         self._shapes = _Shapes()
         self._peak, self._peak_at = -1.0, 0.0  # largest acceleration of the tip, and when, s
 
     def add(self, stretch: Stretch) -> History:
         """Add the next stretch; return the history of it alone, with all its rows."""
-        own = _stretch_history(stretch, self._scene, self._plan)
+        groups = _channel_groups(stretch)
+        own = _stretch_history(stretch, self._scene, self._plan, [*groups.values()])
         self._note_peak(own)
         self._totals.add(own)
-        slow = np.stack([slow_part(own, i) for i in range(own.moments.shape[1])], 1) if own.moments.size else own.moments
-        pins = stretch.predictions.clearances
-        columns = *(getattr(own, name) for name in PREDICTED), slow, pins.reshape(len(pins), -1)
-        self._put(self._predicted, (*columns, *_estimate_trace(stretch).columns))
-        for stream, table in self._residuals.items():
-            rows = stretch.of(stream)
-            if len(rows.stamps):
-                stamps = _seconds(rows.stamps, stretch.first)
-                self._put(table, (stamps, rows.values, rows.sigmas, _running_means(stamps, rows.values)))
+        estimated = dict(zip(ESTIMATED, _estimate_trace(stretch).columns, strict=True))
+        self._put(self._predicted, {name: getattr(own, name) for name in PREDICTED} | estimated)
+        for stream, group in groups.items():
+            self._put(self._residuals[stream], {name: getattr(group, name) for name in RESIDUALS})
         if own.imu is not None:
-            self._put(self._imu, (own.imu.stamps_s, own.imu.measured, own.imu.predicted))
+            self._put(self._imu, {each.name: getattr(own.imu, each.name) for each in fields(ImuTrace)})
         self._shapes.add(own.shapes)
         return own
 
@@ -97,14 +100,14 @@ class HistoryBuilder:
         if np.isfinite(size).any() and float(np.nanmax(size)) > self._peak:
             self._peak, self._peak_at = float(np.nanmax(size)), float(own.stamps_s[np.nanargmax(size)])
 
-    def _put(self, table: ExtremeRows, columns: tuple[Array, ...]) -> None:
+    def _put(self, table: ExtremeRows, columns: dict[str, Array]) -> None:
         table.add(columns)
         if table.is_full:
             table.thin(self._enlarged(table))
 
     def _enlarged(self, table: ExtremeRows) -> NDArray[np.bool_]:
         """Return True for rows that are, or may be, shown enlarged: about the peak, and the newest."""
-        stamps = table.columns[0]
+        stamps = next(iter(table.columns.values()))
         if table is not self._predicted and table is not self._imu:
             return np.zeros(len(stamps), bool)
         return np.asarray((np.abs(stamps - self._peak_at) <= WINDOW) | (stamps >= stamps[-1] - WINDOW))
@@ -114,29 +117,19 @@ class HistoryBuilder:
         for table in (self._predicted, self._imu, *self._residuals.values()):
             if table.is_thin:
                 table.thin(self._enlarged(table))  # the newest ones as those before
-        predicted = self._predicted.columns
-        found, (slow, pins, *estimated) = dict(zip(PREDICTED, predicted, strict=False)), predicted[len(PREDICTED) :]
+        found: dict[str, Any] = self._predicted.columns
         load = recording.totals.load.load
         names = channels_of(len(self._scene.joints))
-        tables = [(names[stream], table.columns) for stream, table in self._residuals.items() if table.columns]
-        groups = [_ChannelGroup(own, columns[0], columns[1:]) for own, columns in tables]
-        residuals = _channels(groups, 3)
-        plan, stamps = self._plan, found["stamps_s"]
+        tables = {stream: table.columns for stream, table in self._residuals.items() if table.columns}
         return History(
-            **found,
-            residual_stamps_s=residuals[0],
-            residual_names=tuple(name for group in groups for name in group.names),
-            residual_values=residuals[1],
-            residual_sigmas=residuals[2],
-            residual_means=residuals[3],
-            imu=ImuTrace(*self._imu.columns) if self._imu.columns else None,
+            **{name: found[name] for name in PREDICTED},
+            **_residuals([_ChannelGroup(names[stream], **columns) for stream, columns in tables.items()]),
+            imu=ImuTrace(**self._imu.columns) if self._imu.columns else None,
             shapes=self._shapes.kept,
             gaps=[((start - recording.first) * NANO, (end - recording.first) * NANO) for start, end in recording.gaps],
-            alarms=_alarms(recording, float(stamps[-1])),
-            orbits=_orbits(plan, stamps, pins, recording) if plan.pins else None,
-            slow_moments=slow,
+            alarms=_alarms(recording, float(found["stamps_s"][-1])),
             totals=self._totals.totals,
-            estimate=None if load is None else EstimateTrace(*estimated),
+            estimate=None if load is None else EstimateTrace(*(found[name] for name in ESTIMATED)),
             load_text="" if load is None else load.text,
         )
 
@@ -166,12 +159,9 @@ class _Shapes:
         return [shape for _, shape in self._chosen] + ([] if is_last else self._newest)
 
 
-def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan) -> History:
-    """Return everything predicted in a stretch, with all its rows, but without gaps, alarms and orbits."""
+def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan, groups: Sequence[_ChannelGroup]) -> History:
+    """Return everything predicted in a stretch, with all its rows, but without gaps and alarms."""
     predictions = stretch.predictions
-    found = [rows for stream in Stream if len((rows := stretch.of(stream)).stamps)]
-    groups = [_ChannelGroup(rows.names, _seconds(rows.stamps, stretch.first), (rows.values, rows.sigmas)) for rows in found]
-    times, values, sigmas = _channels(groups, 2)
     stamps = _seconds(predictions.stamps, stretch.first)
     x, y = (predictions.tip_acceleration - gravity_in_base(scene)).T
     felt = np.stack(specific_force(x, y, np.cos(predictions.tip_angle), np.sin(predictions.tip_angle)), axis=1)
@@ -183,13 +173,11 @@ def _stretch_history(stretch: Stretch, scene: Scene, plan: Plan) -> History:
         joints=predictions.joints,
         cylinder_forces=predictions.cylinder_forces,
         strokes=drives_as_read(plan, predictions.strokes, predictions.cylinder_forces, stretch.reads),
-        residual_stamps_s=times,
-        residual_names=tuple(name for group in groups for name in group.names),
-        residual_values=values,
-        residual_sigmas=sigmas,
+        **_residuals(groups),
         imu=_imu(stretch.of(Stream.IMU), stamps, felt, stretch.first),
         shapes=[(float(stamps[row]), outline.shape.copy()) for row, outline in predictions.outlines.items()],
         moments=predictions.moments,
+        slow_moments=running_mean(stamps, predictions.moments, SLOW),
     )
 
 
@@ -227,35 +215,44 @@ def _alarms(recording: Recording, end: float) -> list[AlarmSpan]:
     ]
 
 
-def _orbits(plan: Plan, stamps: Array, pins: Array, recording: Recording) -> Orbits:
-    gaps, lost = plan.tables.clearances.gap, recording.totals.lost_contacts
-    return Orbits(stamps, plan.pins, gaps, pins.reshape(len(pins), -1, 4), lost)
-
-
 def _seconds(stamps: NDArray[np.int64], first: int) -> Array:
     return np.asarray((stamps - first) * NANO, float)
 
 
 class _ChannelGroup(NamedTuple):
-    """The channels of one stream: their names, stamps (k,) in s, and tables (k, channels)."""
+    """Residuals of one stream: channels, stamps (k,) in s; values, sigmas and means over a second, shape (k, channels)."""
 
     names: tuple[str, ...]
     stamps: Array
-    tables: Sequence[Array]
+    values: Array
+    sigmas: Array
+    means: Array
 
 
-def _channels(groups: Sequence[_ChannelGroup], tables: int) -> list[Array]:
-    """Return stamps and so many tables of all streams, one row per stamp and stream; NaN in other streams' columns."""
+def _channel_groups(stretch: Stretch) -> dict[Stream, _ChannelGroup]:
+    """Return the residuals of all streams that have any."""
+    found = {}
+    for stream in Stream:
+        if len((rows := stretch.of(stream)).stamps):
+            stamps = _seconds(rows.stamps, stretch.first)
+            means = _running_means(stamps, rows.values)
+            found[stream] = _ChannelGroup(rows.names, stamps, rows.values, rows.sigmas, means)
+    return found
+
+
+def _residuals(groups: Sequence[_ChannelGroup]) -> dict[str, Any]:
+    """Return a history's fields of residuals: one row per stamp and stream; NaN in other streams' columns."""
     stamps = np.concatenate([np.zeros(0), *(group.stamps for group in groups)])
-    width = sum(len(group.names) for group in groups)
-    found = [np.full((len(stamps), width), np.nan) for _ in range(tables)]
+    names = tuple(name for group in groups for name in group.names)
+    tables = [np.full((len(stamps), len(names)), np.nan) for _ in range(3)]
     row = column = 0
     for group in groups:
         place = slice(row, row + len(group.stamps)), slice(column, column + len(group.names))
-        for table, part in zip(found, group.tables, strict=True):
+        for table, part in zip(tables, group[2:], strict=True):
             table[place] = part
         row, column = place[0].stop, place[1].stop
-    return [stamps, *found]
+    given = dict(zip(("residual_values", "residual_sigmas", "residual_means"), tables, strict=True))
+    return {"residual_stamps_s": stamps, "residual_names": names, **given}
 
 
 def _imu(force: ResidualRows, stamps: Array, felt: Array, first: int) -> ImuTrace | None:

@@ -10,10 +10,10 @@ import numpy as np
 from ..analysis.equilibrium import Equilibrium
 from ..analysis.undeflected import UndeflectedBoom
 from ..compiler.compile import compile_scene
-from ..scene.kinematics import Skeleton, joint_angles_of_strokes, skeleton
+from ..scene.kinematics import JointPins, Skeleton, joint_angles_of_strokes, skeleton
 from ..scene.schema import Scene, section_depth
 from ..types import Array
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, picture
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, picture, side_view
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,44 +78,21 @@ TIMES = "\N{MULTIPLICATION SIGN}"
 
 
 def boom_picture(scene: Scene, equilibrium: Equilibrium, path: Path, title: str = "Boom at rest", note: str = "") -> Path:
-    """Draw a boom as `statics` found it.
-
-    Parameters
-    ----------
-    scene : Scene
-    equilibrium : Equilibrium
-        Of the same scene.
-    path : Path
-        PNG file to write.
-    title, note : str
-        Headline, and small print on its right.
-
-    Returns
-    -------
-    Path
-        `path`.
-    """
+    """Draw a boom as `statics` found it into a PNG file; `note` is small print. Returns `path`."""
     angles = joint_angles_of_strokes(scene, equilibrium.strokes, near=equilibrium.joints)
-    bones, straight = skeleton(scene, angles), undeformed_outline(scene, angles)
+    bones, straight = skeleton(scene, angles), UndeflectedBoom(scene, compile_scene(scene)).at(angles)
     with picture(path, title, note) as figure:
         grid = figure.add_gridspec(2, 2, width_ratios=[3.0, 1.0], height_ratios=[1.35, 1.0])
         axes, side, close = (figure.add_subplot(place) for place in (grid[:, 0], grid[0, 1], grid[1, 1]))
-        axes.set_aspect("equal", adjustable="datalim")
+        side_view(axes)
         draw_boom(axes, scene, bones)
         _deflected(axes, straight, equilibrium)
         _lengths(axes, scene, bones)
         axes.margins(0.05)
-        axes.set_xlabel("x forward, m")
-        axes.set_ylabel("y up, m")
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.0))
         _numbers(side, equilibrium)
         _detail(close, scene, bones)
     return path
-
-
-def undeformed_outline(scene: Scene, angles: Array) -> Array:
-    """Return points (k, 2) of the centre line with nothing bent, those of `Equilibrium.outline`; joint `angles` in rad."""
-    return UndeflectedBoom(scene, compile_scene(scene)).at(angles)
 
 
 def draw_boom(axes: Axes, scene: Scene, bones: Skeleton, alpha: float = 0.55) -> None:
@@ -127,11 +104,19 @@ def draw_boom(axes: Axes, scene: Scene, bones: Skeleton, alpha: float = 0.55) ->
         draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, part.cylinder.closed_length, 0.22 * size)
         for corners, colour in zip(joint.links, (GREEN, PURPLE), strict=False):
             draw_link(axes, corners, colour, 3.0)
-        for pin in (joint.pivot, joint.barrel_pin, joint.rod_pin, joint.d, joint.e, joint.q):
-            if pin is not None:
-                draw_pin(axes, pin, 4.0)
+        for pin in named_pins(joint).values():
+            draw_pin(axes, pin, 4.0)
     draw_base(axes, bones.pivots[0], size)
     draw_base(axes, bones.joints[0].barrel_pin, 0.5 * size)
+
+
+def named_pins(joint: JointPins) -> dict[str, Array]:
+    """Return the pins of a joint by the names that the scene gives them."""
+    six_bar = {"D": joint.d, "E": joint.e, "Q": joint.q}
+    ends = {"base pin": joint.barrel_pin, "rod_pin": joint.rod_pin} if joint.d is None else {"C": joint.barrel_pin}
+    if joint.kind in ("B2", "B3"):
+        ends["R"] = joint.rod_pin
+    return {"pivot": joint.pivot, **ends, **{name: pin for name, pin in six_bar.items() if pin is not None}}
 
 
 def section_parts(scene: Scene, bones: Skeleton, i: int) -> list[tuple[Array, Array, bool]]:
@@ -171,14 +156,11 @@ def _detail(axes: Axes, scene: Scene, bones: Skeleton) -> None:
     i = len(bones.joints) // 2
     joint = bones.joints[i]
     draw_boom(axes, scene, bones)
-    pins = [pin for pin in (joint.pivot, joint.barrel_pin, joint.rod_pin, joint.d, joint.e, joint.q) if pin is not None]
+    pins = list(named_pins(joint).values())
     low, high = np.min(pins, axis=0), np.max(pins, axis=0)
     middle, reach = 0.5 * (low + high), 0.58 * float(max(high - low)) + section_depth(scene, i)
-    axes.set_aspect("equal", adjustable="box")
-    axes.set_xlim(middle[0] - reach, middle[0] + reach)
-    axes.set_ylim(middle[1] - 0.8 * reach, middle[1] + 0.8 * reach)
-    axes.set_xticks([])
-    axes.set_yticks([])
+    axes.set(xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + 0.8 * np.array([-reach, reach]))
+    axes.set(aspect="equal", xticks=[], yticks=[])
     axes.spines[:].set_visible(True)
     axes.set_title(f"joint {i + 1}, kind {joint.kind}, enlarged")
 

@@ -12,7 +12,7 @@ from ..scene.kinematics import skeleton
 from ..scene.schema import Scene
 from ..types import Array
 from .boom import draw_base
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, picture
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, picture, side_view
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,17 +25,7 @@ LEAST_SHARE = 0.1  # of the width, that is left for bars however long the words 
 
 
 def envelope_picture(path: Path, scene: Scene, found: Envelope, ranges: list[tuple[str, Array]]) -> None:
-    """Write the picture.
-
-    Parameters
-    ----------
-    path : Path
-    scene : Scene
-    found : Envelope
-        Of that scene.
-    ranges : list of (str, ndarray)
-        Words with unit, as in ``frequency 1, Hz``, and the values (m,) in that unit.
-    """
+    """Write the picture; `ranges` are words with unit, as in ``frequency 1, Hz``, and the values (m,) in that unit."""
     units = list(dict.fromkeys(words.rpartition(", ")[2] for words, _ in ranges))
     note = f"{len(found.names)} postures at rest"
     with picture(path, "Envelope over the working range", note, (18.0, 11.0)) as figure:
@@ -51,7 +41,7 @@ def envelope_picture(path: Path, scene: Scene, found: Envelope, ranges: list[tup
 
 
 def _tips(axes: Axes, scene: Scene, found: Envelope) -> None:
-    axes.set_aspect("equal", adjustable="datalim")
+    side_view(axes)
     shown = axes.scatter(
         found.tips[:, 0], found.tips[:, 1], c=1e3 * found.deflections, s=26, cmap="viridis_r", zorder=3, label="tips"
     )
@@ -66,17 +56,9 @@ def _tips(axes: Axes, scene: Scene, found: Envelope) -> None:
         names.setdefault(int(row), []).append(name)
     for (place, of), colour in zip(names.items(), (INK, BLUE, ORANGE), strict=False):
         bones = skeleton(scene, np.diff(np.radians(found.angles[place]), prepend=0.0))
-        axes.plot(
-            *bones.pivots.T,
-            "o-",
-            color=colour,
-            linewidth=2.2,
-            markersize=5,
-            label=f"{' and '.join(of)}: {found.posture(place)}",
-        )
+        label = f"{' and '.join(of)}: {found.posture(place)}"
+        axes.plot(*bones.pivots.T, "o-", color=colour, linewidth=2.2, markersize=5, label=label)
     draw_base(axes, np.array(scene.base.pivot), 0.035 * scene.reach)
-    axes.set_xlabel("x forward, m")
-    axes.set_ylabel("y up, m")
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=11)
 
 

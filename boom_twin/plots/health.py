@@ -7,38 +7,19 @@ from typing import TYPE_CHECKING
 
 from ..types import Array
 from .history import AlarmSpan, History
-from .residuals import running_mean
-from .style import BLUE, GREEN, INK, ORANGE, extent, legend_above, limits, picture, shade_gaps
+from .style import BLUE, GREEN, INK, ORANGE, TIME, extent, legend_above, limits, picture, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def timeline_picture(
-    path: Path,
-    session: str,
-    end: float,
-    alarms: list[AlarmSpan],
-    note: str,
-) -> None:
-    """Write the picture of the alarms of a session.
-
-    Parameters
-    ----------
-    path : Path
-    session : str
-        Its name.
-    end : float
-        Last time of the session, s.
-    alarms : list of AlarmSpan
-        Gaps among them.
-    note : str
-    """
+def timeline_picture(path: Path, session: str, end: float, alarms: list[AlarmSpan], note: str) -> None:
+    """Write the picture of the alarms of a session, gaps among them; `end` is its last time, s."""
     with picture(path, f"{session}: alarms", note, (16.0, 1.8 + 0.45 * max(len(alarms), 1))) as figure:
         axes = figure.add_subplot()
         _bars(axes, alarms, end)
         axes.set_xlim(0.0, max(end, 1e-3))
-        axes.set_xlabel("time since first sample, s")
+        axes.set_xlabel(TIME)
 
 
 def _bars(axes: Axes, alarms: list[AlarmSpan], end: float) -> None:
@@ -61,18 +42,9 @@ def _bars(axes: Axes, alarms: list[AlarmSpan], end: float) -> None:
 def frequency_picture(
     path: Path, session: str, times: Array, model: Array, measured: list[tuple[float, float]], note: str
 ) -> None:
-    """Write the picture of natural frequencies, the model's and measured ones, over time.
+    """Write the picture of natural frequencies (Hz) over time.
 
-    Parameters
-    ----------
-    path : Path
-    session : str
-        Its name.
-    times, model : ndarray, shape (k,), (k, modes)
-        s, and the model's frequencies (Hz) then.
-    measured : list of (float, float)
-        Time (s) and frequency (Hz).
-    note : str
+    The model's (k, modes) are at `times` (k,) in s. A measured one is a time and a frequency.
     """
     with picture(path, f"{session}: natural frequencies", note, (16.0, 6.0)) as figure:
         axes = figure.add_subplot()
@@ -83,7 +55,7 @@ def frequency_picture(
             axes.plot(*zip(*measured, strict=True), "o", color=ORANGE, markersize=8, label="measured")
         axes.set_xlim(extent(times))
         axes.set_ylabel("frequency, Hz")
-        axes.set_xlabel("time since first sample, s")
+        axes.set_xlabel(TIME)
         legend_above(axes, 2)
 
 
@@ -100,17 +72,10 @@ def moment_picture(path: Path, session: str, history: History, rows: list[tuple[
             moment = 1e-3 * history.moments[:, column]
             shade_gaps(axes, history.gaps)
             axes.plot(history.stamps_s, moment, color=BLUE, linewidth=1.0, label="static and dynamic")
-            axes.plot(history.stamps_s, slow_part(history, column) * 1e-3, color=ORANGE, label=f"mean over {SLOW:g} s")
+            axes.plot(history.stamps_s, 1e-3 * history.slow_moments[:, column], color=ORANGE, label=f"mean over {SLOW:g} s")
             axes.set_ylim(*limits(moment))
             axes.set_title(name)
             axes.set_ylabel("moment, kN m")
         legend_above(panels[0], 2)
         panels[-1].set_xlim(extent(history.stamps_s))
-        panels[-1].set_xlabel("time since first sample, s")
-
-
-def slow_part(history: History, column: int) -> Array:
-    """Return the static part of a moment (N m), shape (m,): its mean over `SLOW`."""
-    if history.slow_moments is not None:
-        return history.slow_moments[:, column]
-    return running_mean(history.stamps_s, history.moments[:, column], SLOW)
+        panels[-1].set_xlabel(TIME)

@@ -1,4 +1,4 @@
-"""Records that pictures are drawn from: frozen arrays, times in seconds since the first sample."""
+"""Records that pictures are drawn from: frozen arrays, times in s since the first sample, model axes (x forward, y up)."""
 
 from __future__ import annotations
 
@@ -12,36 +12,21 @@ from ..types import Array
 
 @dataclass(frozen=True)
 class ImuTrace:
-    """Specific force at the tip, along x and z of the tip frame.
+    """Specific force at the tip, along x and z of the tip frame, m/s^2, gravity included; NaN where there is none."""
 
-    Attributes
-    ----------
-    stamps_s : ndarray, shape (j,)
-    measured, predicted : ndarray, shape (j, 2)
-        m/s^2, gravity included; NaN where there is none.
-    """
-
-    stamps_s: Array
-    measured: Array
+    stamps_s: Array  # (j,)
+    measured: Array  # (j, 2)
     predicted: Array
 
 
 @dataclass(frozen=True)
 class EstimateTrace:
-    """Tip as all sensors see it, at the stamps of the predictions (x forward, y up); NaN before anything was measured.
+    """Tip as all sensors see it, at the stamps of the predictions, shape (m, 2); NaN before anything was measured."""
 
-    Attributes
-    ----------
-    displacement, acceleration, load : ndarray, shape (m, 2)
-        Against a rigid boom on the same strokes, m; m/s^2; force that the model does not know, N.
-    displacement_sigmas, acceleration_sigmas, load_sigmas : ndarray, shape (m, 2)
-        Their standard deviations.
-    """
-
-    displacement: Array
-    acceleration: Array
-    load: Array
-    displacement_sigmas: Array
+    displacement: Array  # m, against a rigid boom on the same strokes
+    acceleration: Array  # m/s^2
+    load: Array  # N, force that the model does not know
+    displacement_sigmas: Array  # standard deviations
     acceleration_sigmas: Array
     load_sigmas: Array
 
@@ -53,42 +38,22 @@ class EstimateTrace:
 
 @dataclass(frozen=True)
 class Truth:
-    """True motion of the rig that made a synthetic session (model frame: x forward, y up).
+    """True motion of the rig that made a synthetic session."""
 
-    Attributes
-    ----------
-    stamps_s : ndarray, shape (t,)
-    tip_position, tip_acceleration : ndarray, shape (t, 2)
-        m, m/s^2.
-    """
-
-    stamps_s: Array
-    tip_position: Array
-    tip_acceleration: Array
+    stamps_s: Array  # (t,)
+    tip_position: Array  # (t, 2), m
+    tip_acceleration: Array  # (t, 2), m/s^2
 
 
 @dataclass(frozen=True)
 class Orbits:
-    """Motion of k pins with clearance, at m instants.
+    """Motion of k pins with clearance, at m instants."""
 
-    Attributes
-    ----------
-    times : ndarray, shape (m,)
-        s.
-    names : tuple of str
-    clearances : ndarray, shape (k,)
-        Radial, m.
-    pins : ndarray, shape (m, k, 4)
-        Offset x, y of the journal (m, model axes), force (N), 1 where it touches.
-    lost : ndarray of int, shape (k,)
-        How often contact was lost.
-    """
-
-    times: Array
+    times: Array  # (m,), s
     names: tuple[str, ...]
-    clearances: Array
-    pins: Array
-    lost: NDArray[np.int64]
+    clearances: Array  # (k,), radial, m
+    pins: Array  # (m, k, 4): offset x, y of the journal (m), force (N), 1 where it touches
+    lost: NDArray[np.int64]  # (k,), how often contact was lost
 
 
 @dataclass(frozen=True)
@@ -113,37 +78,22 @@ class Density:
 
 @dataclass(frozen=True)
 class ResidualDistribution:
-    """Distribution of the residuals of one channel over their expected deviations.
+    """Distribution of the residuals of one channel over their expected deviations."""
 
-    Attributes
-    ----------
-    counts : ndarray of int, shape (b,)
-        Between `boom_twin.plots.session_totals.EDGES`.
-    mean, deviation : float or None
-        None without any.
-    reach : float
-        Largest residual that a picture is to show, in the unit of the channel; 0 without any.
-    """
-
-    counts: NDArray[np.int64]
-    mean: float | None
+    counts: NDArray[np.int64]  # (b,), between `boom_twin.plots.session_totals.EDGES`
+    mean: float | None  # None without any
     deviation: float | None
-    reach: float
+    reach: float  # largest residual that a picture is to show, in the unit of the channel; 0 without any
 
 
 @dataclass(frozen=True)
 class SessionTotals:
     """Statistics of all rows of a session, also of those that are not in its `History`.
 
-    Attributes
-    ----------
-    residuals : dict of str to ResidualDistribution
-        By channel.
-    predicted, measured : tuple of Density
-        Specific force at the tip along x and z; without an IMU the predicted acceleration of the tip, and nothing measured.
+    Densities are of the specific force at the tip along x and z; without an IMU of the predicted acceleration of the tip.
     """
 
-    residuals: dict[str, ResidualDistribution]
+    residuals: dict[str, ResidualDistribution]  # by channel
     predicted: tuple[Density, ...]
     measured: tuple[Density, ...] | None
 
@@ -153,61 +103,27 @@ class History:
     """Everything predicted in a replay of m stroke samples, and k rows of residuals of c channels; n joints.
 
     Of a long session, rows are left out between those that hold the extremes, see `boom_twin.plots.extreme_rows`. Then
-    `residual_means`, `slow_moments` and `totals` are given, which do not follow from the rows that are left.
-
-    Attributes
-    ----------
-    stamps_s : ndarray, shape (m,)
-    tip_displacement, tip_position, tip_acceleration : ndarray, shape (m, 2)
-        m, m, m/s^2; x forward, y up.
-    joints, cylinder_forces, strokes : ndarray, shape (m, n)
-        rad; N, positive in tension; m, of the drives.
-    residual_stamps_s : ndarray, shape (k,)
-    residual_names : tuple of str
-        ``joint_<i>`` (rad) or ``tip_imu_x``, ``tip_imu_z`` (m/s^2).
-    residual_values, residual_sigmas : ndarray, shape (k, c)
-        Measured minus predicted, and the deviation expected of it; NaN where a channel has no sample at that stamp.
-    imu : ImuTrace or None
-    shapes : list of (float, ndarray of shape (p, 2))
-        Deflected centre lines from the base pivot to the tip, m, and when.
-    gaps : list of (float, float)
-        From and to, s, where strokes were missing.
-    alarms : list of AlarmSpan
-        In the order of their beginning.
-    moments : ndarray, shape (m, k)
-        Bending moments (N m) at the stations of `boom_twin.analysis.bending_moments`.
-    orbits : Orbits or None
-        Of the pins with clearance, if there are any.
-    residual_means : ndarray, shape (k, c), or None
-        Means of `residual_values` over a second.
-    slow_moments : ndarray, shape (m, k), or None
-        Static part of `moments`.
-    totals : SessionTotals or None
-    estimate : EstimateTrace or None
-        None where nothing but strokes was measured.
-    load_text : str
-        Size and main frequency of its load, in words.
+    `totals` are given, which do not follow from the rows that are left.
     """
 
-    stamps_s: Array
-    tip_displacement: Array
-    tip_position: Array
-    tip_acceleration: Array
-    joints: Array
-    cylinder_forces: Array
-    strokes: Array
-    residual_stamps_s: Array
-    residual_names: tuple[str, ...]
-    residual_values: Array
-    residual_sigmas: Array
+    stamps_s: Array  # (m,)
+    tip_displacement: Array  # (m, 2), m
+    tip_position: Array  # (m, 2), m
+    tip_acceleration: Array  # (m, 2), m/s^2
+    joints: Array  # (m, n), rad
+    cylinder_forces: Array  # (m, n), N, positive in tension
+    strokes: Array  # (m, n), m, of the drives
+    residual_stamps_s: Array  # (k,)
+    residual_names: tuple[str, ...]  # `joint_<i>` (rad), `tip_imu_x`, .. (m/s^2)
+    residual_values: Array  # (k, c), measured minus predicted; NaN where a channel has no sample at that stamp
+    residual_sigmas: Array  # (k, c), expected deviations
+    residual_means: Array  # (k, c), over a second
     imu: ImuTrace | None = None
-    shapes: list[tuple[float, Array]] = field(default_factory=list)
-    gaps: list[tuple[float, float]] = field(default_factory=list)
-    alarms: list[AlarmSpan] = field(default_factory=list)
-    moments: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    orbits: Orbits | None = None
-    residual_means: Array | None = None
-    slow_moments: Array | None = None
+    shapes: list[tuple[float, Array]] = field(default_factory=list)  # deflected centre lines from base to tip, (p, 2), m
+    gaps: list[tuple[float, float]] = field(default_factory=list)  # from and to, where strokes were missing
+    alarms: list[AlarmSpan] = field(default_factory=list)  # in the order of their beginning
+    moments: Array = field(default_factory=lambda: np.zeros((0, 0)))  # N m at the `boom_twin.analysis.bending_moments.stations`
+    slow_moments: Array = field(default_factory=lambda: np.zeros((0, 0)))  # their static parts
     totals: SessionTotals | None = None
-    estimate: EstimateTrace | None = None
-    load_text: str = ""
+    estimate: EstimateTrace | None = None  # None where nothing but strokes was measured
+    load_text: str = ""  # size and main frequency of its load, in words

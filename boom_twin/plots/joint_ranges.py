@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..scene.kinematics import JointPins, Skeleton, skeleton, stroke_curve
+from ..scene.kinematics import Skeleton, skeleton, stroke_curve
 from ..scene.schema import Scene, section_depth
 from ..types import Array
-from .boom import draw_cylinder, draw_link, draw_pin, draw_section, section_parts
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, picture
+from .boom import draw_cylinder, draw_link, draw_pin, draw_section, named_pins, section_parts
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, picture, side_view
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,17 +29,7 @@ ENDS = ((BLUE, "lowest"), (ORANGE, "highest"))
 def joint_ranges_picture(path: Path, scene: Scene, name: str) -> Path:
     """Draw one pair of panels for each joint, and one panel of the boom with every joint at the ends of its range.
 
-    Parameters
-    ----------
-    path : Path
-    scene : Scene
-    name : str
-        What the scene is called in the title.
-
-    Returns
-    -------
-    Path
-        `path`.
+    `name` is that of the scene in the title. Returns `path`.
     """
     count = len(scene.joints)
     columns = min(COLUMNS, count + 1)
@@ -63,7 +53,7 @@ def _boom(axes: Axes, scene: Scene) -> None:
     """Draw the straight boom, each section with only its own joint turned to its ends, and the fan that it sweeps."""
     from matplotlib.patheffects import withStroke
 
-    axes.set_aspect("equal", adjustable="datalim")
+    side_view(axes)
     angles = _straight(scene)
     with np.errstate(invalid="ignore"):
         bones = skeleton(scene, angles)
@@ -83,15 +73,14 @@ def _boom(axes: Axes, scene: Scene) -> None:
         draw_pin(axes, pivot, 4.0)
     axes.set_title("each section alone at the ends of its joint's range")
     axes.set_xlabel("x forward, m; folded sections are drawn aside")
-    axes.set_ylabel("y up, m")
     axes.legend(loc="lower left", fontsize=11)
 
 
 def folded_section(pivot: Array, before: float, angle: float, length: float, aside: float) -> Array:
     """Return the line of a section that its joint turns by `angle` (rad) from the heading `before`, shape (3, 2), m.
 
-    A folded section would lie on the section before, so it is moved `aside` (m), by the more the farther it is beyond 90
-    degrees, to the side from which it came.
+    A folded section would lie on the section before. So it is moved to the side from which it came, by up to `aside` (m) at
+    180 degrees, and not at all up to 90 degrees.
     """
     along = np.array([np.cos(before), np.sin(before)])
     across = np.sign(angle) * np.array([-along[1], along[0]])
@@ -110,7 +99,7 @@ def _fan(axes: Axes, pivot: Array, ends: Array, radius: float) -> None:
 def _joint(axes: Axes, scene: Scene, i: int) -> None:
     """Draw sections before and after, links and cylinder: the ends of the range in full, positions between as a shadow."""
     axes.set_aspect("equal", adjustable="box")
-    straight, pins = _straight(scene), []
+    straight, pins = _straight(scene), list[Array]()
     for place, degrees in enumerate(np.linspace(*scene.joints[i].range_deg, POSITIONS)):
         angles = straight.copy()
         angles[: i + 1] = 0.0
@@ -119,12 +108,11 @@ def _joint(axes: Axes, scene: Scene, i: int) -> None:
             bones = skeleton(scene, angles)
         joint = bones.joints[i]
         if np.isfinite(joint.rod_pin).all():
-            pins += _pins_of(joint)
+            pins += named_pins(joint).values()
             _mechanism(axes, scene, bones, i, {0: BLUE, POSITIONS - 1: ORANGE}.get(place))
     low, high = np.min(pins or [np.zeros(2)], axis=0), np.max(pins or [np.ones(2)], axis=0)
     middle, reach = 0.5 * (low + high), 0.62 * max(*(high - low), 0.05 * scene.reach)
-    axes.set_xlim(middle[0] - reach, middle[0] + reach)
-    axes.set_ylim(middle[1] - reach, middle[1] + reach)
+    axes.set(xlim=middle[0] + np.array([-reach, reach]), ylim=middle[1] + np.array([-reach, reach]))
     axes.locator_params(nbins=5)
     joint_range = " to ".join(f"{degrees:g}" for degrees in scene.joints[i].range_deg)
     axes.set_title(f"joint {i + 1}, kind {scene.joints[i].kind}: {joint_range} deg")
@@ -148,25 +136,12 @@ def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | 
         return
     length = scene.joints[i].cylinder.closed_length
     draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, length, SLENDER * length)
-    for name, pin in _named(joint).items():
+    for name, pin in named_pins(joint).items():
         draw_pin(axes, pin, 5.0, colour)
         axes.annotate(
             name, (pin[0], pin[1]), (5, 5), textcoords="offset points", fontsize=10, color=colour, weight="bold", zorder=12,
             path_effects=[withStroke(linewidth=3.0, foreground="white")],
         )  # fmt: skip
-
-
-def _named(joint: JointPins) -> dict[str, Array]:
-    """Return the pins of a joint by the names that the scene gives them."""
-    six_bar = {"D": joint.d, "E": joint.e, "Q": joint.q}
-    ends = {"base pin": joint.barrel_pin, "rod_pin": joint.rod_pin} if joint.d is None else {"C": joint.barrel_pin}
-    if joint.kind in ("B2", "B3"):
-        ends["R"] = joint.rod_pin
-    return {"pivot": joint.pivot, **ends, **{name: pin for name, pin in six_bar.items() if pin is not None}}
-
-
-def _pins_of(joint: JointPins) -> list[Array]:
-    return list(_named(joint).values())
 
 
 def _stroke(axes: Axes, scene: Scene, i: int) -> None:

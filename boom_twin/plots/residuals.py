@@ -10,7 +10,7 @@ import numpy as np
 from ..types import Array, sensor_kind
 from .history import Density, History, ResidualDistribution
 from .session_totals import EDGES, SEGMENT, totals_of
-from .style import BLUE, GREY, INK, ORANGE, SKY, extent, legend_above, picture, shade_alarms, shade_gaps
+from .style import BLUE, GREY, INK, ORANGE, SKY, TIME, extent, legend_above, picture, shade_alarms, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,7 +30,7 @@ def residual_picture(path: Path, session: str, history: History, note: str) -> N
             found = totals[history.residual_names[channel]]
             _channel(over_time, history, channel, found.reach)
             _distribution(spread, found)
-        panels[-1, 0].set_xlabel("time since first sample, s")
+        panels[-1, 0].set_xlabel(TIME)
         panels[-1, 1].set_xlabel(f"residual / {SIGMA}")
         panels[0, 1].set_title("against the unit normal")
         legend_above(panels[0, 0], 5, handlelength=1.4, markerscale=4)
@@ -54,19 +54,17 @@ def _channel(axes: Axes, history: History, channel: int, reach: float) -> None:
     axes.plot(stamps, values, ".", color=BLUE, markersize=2.6, alpha=0.55, markeredgewidth=0, label="residual")
     axes.plot(stamps, sigma, color=INK, linewidth=1.0, label=f"±1 {SIGMA}")
     axes.plot(stamps, -sigma, color=INK, linewidth=1.0)
-    means = history.residual_means
-    mean = running_mean(stamps, values) if means is None else factor * means[measured, channel]
-    axes.plot(stamps, mean, color=ORANGE, linewidth=1.6, label="mean over 1 s")
+    axes.plot(stamps, factor * history.residual_means[measured, channel], color=ORANGE, linewidth=1.6, label="mean over 1 s")
     axes.set_ylim(-factor * reach, factor * reach)
     axes.set_xlim(extent(stamps))
 
 
 def running_mean(stamps: Array, values: Array, over: float = MEAN_OVER) -> Array:
-    """Return the mean of all samples within half of `over` (s) of each one; `stamps` ascending, no NaN, both shape (k,)."""
-    total = np.concatenate([[0.0], np.cumsum(values)])
+    """Return the mean of all samples within half of `over` (s) of each one, shape (k, ..); `stamps` (k,) ascending, no NaN."""
+    total = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
     first = np.searchsorted(stamps, stamps - 0.5 * over)
     last = np.searchsorted(stamps, stamps + 0.5 * over, side="right")
-    return np.asarray((total[last] - total[first]) / np.maximum(last - first, 1))
+    return np.asarray(((total[last] - total[first]).T / np.maximum(last - first, 1)).T)
 
 
 def _distribution(axes: Axes, found: ResidualDistribution) -> None:

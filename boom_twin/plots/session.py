@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
 
 from ..types import Array
 from .history import History, Truth
-from .posture import orbits_picture, posture_picture
+from .posture import posture_picture
 from .residuals import SIGMA, has_spectrum, residual_picture, running_mean, spectrum_picture
 from .style import BLUE, GREEN, GREY, ORANGE, SKY, legend_above, picture
 from .tip import tip_picture
@@ -19,26 +20,15 @@ from .tip import tip_picture
 def replay_pictures(
     directory: Path, history: History, truth: Truth | None = None, *, session: str = "session", note: str = ""
 ) -> list[Path]:
-    """Draw what was replayed.
+    """Draw what was replayed into a directory, which is made if it is not there.
 
-    Parameters
-    ----------
-    directory : Path
-        Where the PNG files go; made if it is not there.
-    history : History
-    truth : Truth, optional
-        Drawn over the prediction, if known.
-    session : str
-        Name of the session, for the titles.
-    note : str
-        Small print on every picture, such as "synthetic session of a virtual rig".
+    `session` is its name for the titles, and `note` small print such as "synthetic session of a virtual rig".
 
     Returns
     -------
     list of Path
         ``tip.png``, ``residuals.png`` (if there are channels), ``posture.png`` (if there are shapes), ``spectrum.png``
-        (from 4 s on), ``orbits.png`` (if there are pins with clearance); none at all if nothing was predicted. The same
-        arrays give the same bytes.
+        (from 4 s on); none at all if nothing was predicted. The same arrays give the same bytes.
     """
     if len(history.stamps_s) == 0:
         return []
@@ -54,9 +44,6 @@ def replay_pictures(
     if has_spectrum(history):
         written.append(directory / "spectrum.png")
         spectrum_picture(written[-1], session, history, note)
-    if history.orbits is not None:
-        written.append(directory / "orbits.png")
-        orbits_picture(written[-1], f"{session}: journals in their bushes", history.orbits, note)
     return written
 
 
@@ -64,22 +51,12 @@ SHOWN = 30.0
 """Standard deviations at which a bar is cut off, with its number beside it."""
 
 
-def compare_picture(path: Path, title: str, names: list[str], apart: list[float], sure: float, note: str = "") -> None:
+def compare_picture(path: Path, title: str, names: list[str], apart: list[float], sure: float) -> None:
     """Write the comparison of two sessions: a bar for every figure.
 
-    Parameters
-    ----------
-    path : Path
-    title : str
-    names : list of str
-        Of the figures.
-    apart : list of float
-        B minus A, over the standard deviation of that.
-    sure : float
-        From where on a difference is no chance.
-    note : str
+    It is as long as B minus A over the standard deviation of that, which is no chance from `sure` on.
     """
-    with picture(path, title, note, (16.0, 2.0 + 0.42 * max(len(names), 1))) as figure:
+    with picture(path, title, "", (16.0, 2.0 + 0.42 * max(len(names), 1))) as figure:
         axes = figure.add_subplot()
         places = np.arange(len(names))
         axes.axvspan(-sure, sure, color=GREEN, alpha=0.12, linewidth=0, label="may be chance")
@@ -115,14 +92,7 @@ def held_out_picture(
 ) -> None:
     """Draw residuals over their expected deviation, before on the left and after on the right.
 
-    Parameters
-    ----------
-    names : sequence of str
-        c channels.
-    times : pair of ndarray, shape (k,)
-        s.
-    normalised : pair of ndarray, shape (k, c)
-        NaN where not measured.
+    For each there are `times` (k,) in s, and `normalised` residuals (k, channels), NaN where not measured.
     """
     with picture(path, title, note, (16.0, max(6.0, 1.2 + 1.5 * len(names)))) as figure:
         panels = figure.subplots(len(names), 2, squeeze=False, sharex="col")
@@ -159,3 +129,29 @@ def parameters_picture(path: Path, title: str, note: str, intervals: Sequence[In
             axes.set_xlabel(unit)
         legend = "cross: before; dot and bar: estimate, 95 % interval; grey: cannot be told, left as before"
         panels[0].set_title(legend, fontsize=11)
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Figure of k sessions: name with unit, ascending times (s since 1970), values, standard deviations (0: not known)."""
+
+    label: str
+    times: Sequence[float]
+    values: Sequence[float]
+    sigmas: Sequence[float]
+
+
+def trends_picture(path: Path, title: str, trends: Sequence[Trend]) -> None:
+    """Draw every figure over the time of its sessions, with its value in the first and in the last of them."""
+    rows = -(-len(trends) // 2)
+    with picture(path, title, "", (16.0, 0.8 + 2.4 * rows)) as figure:
+        panels = figure.subplots(rows, 2, squeeze=False, sharex=True)
+        for axes, trend in zip_longest(panels.flat, trends):
+            if trend is None:
+                axes.set_axis_off()
+                continue
+            times = np.asarray(trend.times).astype("datetime64[s]")
+            axes.errorbar(times, trend.values, trend.sigmas, color=SKY, marker="o", markerfacecolor=BLUE, ecolor=GREY)
+            axes.set_title(f"{trend.label}: {trend.values[0]:.4g} in the first session, {trend.values[-1]:.4g} in the last")
+            axes.ticklabel_format(axis="y", useOffset=False)
+            axes.xaxis.set_tick_params(labelbottom=True)

@@ -101,12 +101,7 @@ def _mean(one: Density, other: Density) -> Density:
 def density(stamps: Array, values: Array, interval: float = 0.0) -> Density:
     """Return the one-sided power spectral density of `values` (k,), interpolated to even times, also across NaN.
 
-    Parameters
-    ----------
-    stamps, values : ndarray, shape (k,)
-        s.
-    interval : float, optional
-        Between the even times, s; 0: the usual one of `stamps`.
+    These are `interval` (s) apart; 0: as far as the `stamps` (k,) usually are.
     """
     known = np.isfinite(values)
     if known.sum() < 16:

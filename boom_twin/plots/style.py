@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -30,6 +30,8 @@ TONES = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "D"), (PURPLE, "^"), (SKY, "v"), (I
 """Colour and marker of one curve among others."""
 DPI = 100
 MARGIN = 0.08  # of the height of an axis, above and below what is shown
+TIME = "time since first sample, s"
+"""Label of an axis of time."""
 NOTE = 70  # characters of small print that fit beside a title
 
 LOOK = {
@@ -53,6 +55,7 @@ LOOK = {
     "legend.fontsize": 12,
     "lines.linewidth": 1.3,
     "agg.path.chunksize": 20000,
+    "date.converter": "concise",
 }
 
 
@@ -113,6 +116,25 @@ def broken(stamps: Array, values: Array, gaps: list[tuple[float, float]]) -> tup
 def extent(times: Array) -> tuple[float, float]:
     """Return the first and last of `times` (k,), at least a millisecond apart, as the limits of an axis."""
     return float(times[0]), float(max(times[-1], times[0] + 1e-3))
+
+
+def side_view(axes: Axes) -> None:
+    """Set equal scales and the labels of a side view of the boom."""
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("x forward, m")
+    axes.set_ylabel("y up, m")
+
+
+def colours_of_times(figure: Figure, axes: Any, times: Array, label: str) -> Callable[[Any], Any]:
+    """Draw a bar of the colours that stand for `times` (k,) in s beside `axes`; return the function from times to colours."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LinearSegmentedColormap, Normalize
+
+    colours = LinearSegmentedColormap.from_list("time", ["#D6E6F2", "#5A9BCB", "#08306B"])
+    mapping = ScalarMappable(Normalize(*extent(times)), colours)
+    bar = figure.colorbar(mapping, ax=axes, label=label, shrink=0.7, pad=0.01)
+    bar.outline.set_edgecolor(GREY)
+    return mapping.to_rgba
 
 
 def legend_above(axes: Axes, columns: int = 1, top: float = 1.0, **look: Any) -> None:

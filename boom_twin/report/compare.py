@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import hypot
 from pathlib import Path
 from typing import Any
@@ -20,25 +20,13 @@ from .quantities import Quantity, read
 
 @dataclass(frozen=True)
 class ComparedSession:
-    """Figures and alarms of one session, for a comparison.
-
-    Attributes
-    ----------
-    name : str
-    scene : str
-        Digest of its scene.
-    quantities : list of Quantity
-    alarms : list of dict
-        As in ``summary.json``.
-    incomplete : str
-        Why the session is not whole, in words; empty if nothing says that it is not.
-    """
+    """Figures and alarms of one session, for a comparison."""
 
     name: str
-    scene: str
+    scene: str  # digest of its scene
     quantities: list[Quantity]
-    alarms: list[dict[str, Any]]
-    incomplete: str = ""
+    alarms: list[dict[str, Any]]  # as in ``summary.json``
+    incomplete: str = ""  # why the session is not whole, in words
 
 
 def side_of(path: Path, replayed: Callable[[Path], Path], window: TimeWindow = WHOLE) -> ComparedSession:
@@ -71,32 +59,21 @@ def side_of(path: Path, replayed: Callable[[Path], Path], window: TimeWindow = W
     return ComparedSession(path.resolve().name, scene, found, alarms, incomplete)
 
 
-SURE = 4.0
+SIGNIFICANT = 4.0
 """Standard deviations from which a difference is no chance: one in a thousand for means of ten batches (t distribution)."""
 
 
 @dataclass(frozen=True, slots=True)
 class ComparisonRow:
-    """One figure of both sessions, None where a session has none of it.
-
-    Attributes
-    ----------
-    name, unit : str
-    a, b, difference : float or None
-        The difference is b minus a.
-    sigma : float or None
-        Standard deviation of the difference; None where that of a or b is not known.
-    is_significant : bool or None
-        None where nobody can say.
-    """
+    """One figure of both sessions, None where a session has none of it."""
 
     name: str
     unit: str
     a: float | None
     b: float | None
-    difference: float | None = None
-    sigma: float | None = None
-    is_significant: bool | None = None
+    difference: float | None = None  # b minus a
+    sigma: float | None = None  # standard deviation of the difference; None where that of a or b is not known
+    is_significant: bool | None = None  # None where that is not known
 
 
 def rows_of(one: ComparedSession, other: ComparedSession) -> list[ComparisonRow]:
@@ -114,19 +91,18 @@ def _row(name: str, a: Quantity | None, b: Quantity | None) -> ComparisonRow:
     if a.sigma is None or b.sigma is None:
         return ComparisonRow(name, a.unit, a.value, b.value, difference)
     sigma = hypot(a.sigma, b.sigma)
-    return ComparisonRow(name, a.unit, a.value, b.value, difference, sigma, abs(difference) > SURE * sigma)
+    return ComparisonRow(name, a.unit, a.value, b.value, difference, sigma, abs(difference) > SIGNIFICANT * sigma)
 
 
 def flat(one: ComparedSession, other: ComparedSession, rows: list[ComparisonRow]) -> dict[str, Any]:
     """Return a comparison as one flat object: every column of the table as a list, and the alarms in words."""
-    columns = ("name", "unit", "a", "b", "difference", "sigma", "is_significant")
     return {
         "session_a": one.name,
         "session_b": other.name,
         "incomplete_a": one.incomplete or None,
         "incomplete_b": other.incomplete or None,
         "same_scene": one.scene == other.scene,
-        **{column: [getattr(row, column) for row in rows] for column in columns},
+        **{each.name: [getattr(row, each.name) for row in rows] for each in fields(ComparisonRow)},
         "alarms_a": [alarm_as_text(alarm) for alarm in one.alarms],
         "alarms_b": [alarm_as_text(alarm) for alarm in other.alarms],
     }
@@ -139,7 +115,7 @@ def as_text(one: ComparedSession, other: ComparedSession, rows: list[ComparisonR
         numbers = "".join(f" {_number(value):>12s}" for value in (row.a, row.b, row.difference))
         mark = {True: "differs", False: "", None: "?"}[row.is_significant]
         lines.append(f"{row.name:32s}{numbers} {_number(row.sigma):>10s}  {row.unit:6s} {mark}".rstrip())
-    lines += ["", f"differs: by more than {SURE:g} standard deviations; ?: it is not known how sure the figures are"]
+    lines += ["", f"differs: by more than {SIGNIFICANT:g} standard deviations; ?: it is not known how sure the figures are"]
     lines.append("damping, peaks, moments and travel also differ where postures and moves do")
     for letter, side in (("A", one), ("B", other)):
         lines.append(f"alarms of {letter}, {side.name}: {len(side.alarms) or 'none'}")

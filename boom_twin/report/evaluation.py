@@ -14,33 +14,32 @@ from ..scene.schema import Scene
 from ..types import Array
 from .fatigue import Fatigue, FatigueCounter
 from .quantities import Load, QuantityBuilder, write
-from .vibration import HoldFinder, HoldInterval
+from .vibration import RestFinder, RestPeriod
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Result of the evaluation of a replay.
+    """Contents of the report of a replay."""
 
-    Attributes
-    ----------
-    history : History
-    still : list of HoldInterval
-    loads : list of Load
-        Of the flexible sections.
-    file : Path
-        Where the figures are.
-    fatigue : list of Fatigue
-        Of all stations, if it was asked for.
-    category : float or None
-        Detail category (MPa) that it was asked for.
-    """
-
+    result: Replay
+    scene: Scene
     history: History
-    still: list[HoldInterval]
-    loads: list[Load]
-    file: Path
-    fatigue: list[Fatigue]
-    category: float | None
+    rests: list[RestPeriod]
+    loads: list[Load]  # of the flexible sections
+    has_heights: bool  # the stresses are by heights that the scene or the user gave
+    fatigue: list[Fatigue]  # of all stations, if it was asked for
+    category: float | None  # detail category (MPa) that it was asked for
+    file: Path  # of the figures
+
+    @property
+    def name(self) -> str:
+        """Name of the session."""
+        return self.result.session.path.resolve().name
+
+    @property
+    def origin(self) -> str:
+        """Origin of the session; empty if it states none."""
+        return self.result.session.notes.get("origin", "")
 
 
 class Evaluator:
@@ -54,19 +53,12 @@ class Evaluator:
     heights : ndarray, shape (n,), optional
         Of the sections, m, for the stresses; by default those of the scene, or of thin-walled boxes.
     category : float, optional
-        Detail category (MPa) for the fatigue of all stations; without it fatigue is not looked at.
+        Detail category (MPa) for the fatigue of all stations; without it fatigue is not computed.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        settings: Settings,
-        heights: Array | None = None,
-        category: float | None = None,
-    ) -> None:
-        self._scene, self._settings = scene, settings
-        self._history = HistoryBuilder(scene)
-        self._quantities, self._holds, self._heights = QuantityBuilder(scene), HoldFinder(scene), heights
+    def __init__(self, scene: Scene, settings: Settings, heights: Array | None = None, category: float | None = None) -> None:
+        self._scene, self._settings, self._heights, self._category = scene, settings, heights, category
+        self._history, self._quantities, self._rests = HistoryBuilder(scene), QuantityBuilder(scene), RestFinder(scene)
         self._fatigue = None if category is None else FatigueCounter(scene, category, heights)
 
     def add(self, stretch: Stretch) -> None:
@@ -75,13 +67,21 @@ class Evaluator:
         self._quantities.add(own, stretch.estimates.load, stretch.estimates.load_variance)
         if self._fatigue is not None:
             self._fatigue.add(own)
-        self._holds.add(own, stretch.estimates.load)
+        self._rests.add(own, stretch.estimates.load)
 
     def finish(self, result: Replay, folder: Path) -> Evaluation:
         """Return the evaluation of the replay and write its figures into `folder`; to be called once."""
-        still = self._holds.finish()
-        found = self._quantities.quantities(result.recording.totals.tip_sigma, still, self._settings)
-        file = write(folder, self._scene, found)
-        fatigue, category = ([], None) if self._fatigue is None else (self._fatigue.found(), self._fatigue.category)
-        loads = self._quantities.loads(self._heights)
-        return Evaluation(self._history.history(result.recording), still, loads, file, fatigue, category)
+        rests = self._rests.finish()
+        found = self._quantities.quantities(result.recording.totals.tip_sigma, rests, self._settings)
+        heights = self._heights is not None or all(part.height for part in self._scene.sections if part.beam is not None)
+        return Evaluation(
+            result,
+            self._scene,
+            self._history.history(result.recording),
+            rests,
+            self._quantities.loads(self._heights),
+            heights,
+            [] if self._fatigue is None else self._fatigue.results(),
+            self._category,
+            write(folder, self._scene, found),
+        )

@@ -1,11 +1,12 @@
 """Fatigue of a session: rainflow counts of the bending stress at every station, and damage by the S-N curves of EN 1993-1-9.
 
-A cycle of range S (Pa) does the damage 1/N(S) (Palmgren and Miner). For a detail category C, the range endured 2e6 times,
+A cycle of range S (Pa) does the damage 1/N(S) (Palmgren and Miner). The detail category C is the range endured 2e6 times, D
+the range endured 5e6 times and L the range endured 1e8 times:
 
-    N = 2e6 (C/S)^3  above the range D that is endured 5e6 times,   5e6 (D/S)^5  below it,   endless below L, endured 1e8 times.
+    N = 2e6 (C/S)^3  for S >= D,   5e6 (D/S)^5  for L <= S < D,   infinite  for S < L.
 
-Cycles are counted by the package `rainflow` (ASTM E1049). Of a long session they are counted stretch by stretch: cycles that
-have closed are added up, and turning points of those that have not go before the next stretch, which leaves the count as it is.
+Cycles are counted by the package `rainflow` (ASTM E1049), in a long session stretch by stretch. Cycles that have closed are
+added up. Turning points of open cycles are put before the next stretch, so the count is that of the whole session.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import import_module
-from types import ModuleType
 
 import numpy as np
 
@@ -27,16 +27,16 @@ from ..types import Array
 
 CATEGORY = 71.0
 """MPa, of a welded box where nothing better is known."""
-CUT_OFF = 1e8
-KNEE = 5e6
-GIVEN = 2e6
-SMALL = 1e5  # Pa; cycles below are noise, and do no damage in any category
+CUT_OFF_CYCLES = 1e8
+KNEE_CYCLES = 5e6
+CATEGORY_CYCLES = 2e6
+NOISE_RANGE = 1e5  # Pa; cycles below are noise, and do no damage in any category
 BIN = 1e4  # Pa, in which ranges are added up
 
 
 @dataclass(frozen=True)
 class Fatigue:
-    """Fatigue of one station in one session: cycles above `SMALL`, their largest range (Pa), damage.
+    """Fatigue of one station in one session: cycles above `NOISE_RANGE`, their largest range (Pa), damage.
 
     A damage of 1 is the end of the station's life.
     """
@@ -52,10 +52,10 @@ def endured(ranges: Array, category: float) -> Array:
 
     N is infinite below the cut-off.
     """
-    knee = 1e6 * category * (GIVEN / KNEE) ** (1.0 / 3.0)
-    limit = knee * (KNEE / CUT_OFF) ** 0.2
+    knee = 1e6 * category * (CATEGORY_CYCLES / KNEE_CYCLES) ** (1.0 / 3.0)
+    limit = knee * (KNEE_CYCLES / CUT_OFF_CYCLES) ** 0.2
     with np.errstate(divide="ignore", over="ignore"):
-        steep, flat = GIVEN * (1e6 * category / ranges) ** 3, KNEE * (knee / ranges) ** 5
+        steep, flat = CATEGORY_CYCLES * (1e6 * category / ranges) ** 3, KNEE_CYCLES * (knee / ranges) ** 5
     return np.where(ranges >= knee, steep, np.where(ranges >= limit, flat, np.inf))
 
 
@@ -69,7 +69,11 @@ class RainflowCounter:
     """Rainflow counter of a stress that comes in parts. It needs the package `rainflow`."""
 
     def __init__(self) -> None:
-        self._rainflow, self._open = _package(), np.zeros(0)
+        try:
+            self._rainflow = import_module("rainflow")
+        except ImportError:
+            raise UsageError("--fatigue: needs the package rainflow. Install it: pip install 'boom_twin[fatigue]'.") from None
+        self._open = np.zeros(0)
         self._closed: Counter[int] = Counter()  # by range in `BIN`
 
     def add(self, stress: Array) -> None:
@@ -86,7 +90,7 @@ class RainflowCounter:
         self._open = series[sorted(left)]
 
     def cycles(self) -> list[tuple[float, float]]:
-        """Return range (Pa) and count of all cycles so far above `SMALL`.
+        """Return range (Pa) and count of all cycles so far above `NOISE_RANGE`.
 
         A cycle that has not closed counts as a half.
         """
@@ -94,19 +98,13 @@ class RainflowCounter:
         series = self._open if len(self._open) != 2 else np.insert(self._open, 1, self._open.mean())  # of two it counts none
         for size, _, count, _, _ in self._rainflow.extract_cycles(series):
             found[round(size / BIN)] += count
-        return [(size * BIN, count) for size, count in sorted(found.items()) if size * BIN > SMALL]
+        return [(size * BIN, count) for size, count in sorted(found.items()) if size * BIN > NOISE_RANGE]
 
 
 class FatigueCounter:
     """Fatigue of all stations, added up over the blocks of a session.
 
-    Parameters
-    ----------
-    scene : Scene
-    category : float
-        Detail category of all stations, MPa.
-    heights : ndarray, shape (n,), optional
-        Outer heights of the sections, m; see `boom_twin.analysis.bending_stress.section_moduli`.
+    `category` is the detail category of all stations, MPa; for `heights` see `boom_twin.analysis.bending_stress`.
     """
 
     def __init__(self, scene: Scene, category: float, heights: Array | None = None) -> None:
@@ -121,7 +119,7 @@ class FatigueCounter:
         for counter, stress in zip(self._counters, (history.moments / self._moduli).T, strict=True):
             counter.add(stress)
 
-    def found(self) -> list[Fatigue]:
+    def results(self) -> list[Fatigue]:
         """Return the fatigue of every station, base to tip."""
         rows = []
         for station, counter in zip(self._stations, self._counters, strict=True):
@@ -129,10 +127,3 @@ class FatigueCounter:
             count, largest = sum(count for _, count in cycles), max((size for size, _ in cycles), default=0.0)
             rows.append(Fatigue(station, count, largest, damage_of(cycles, self.category)))
         return rows
-
-
-def _package() -> ModuleType:
-    try:
-        return import_module("rainflow")
-    except ImportError:
-        raise UsageError("--fatigue: needs the package rainflow. Install it: pip install 'boom_twin[fatigue]'.") from None

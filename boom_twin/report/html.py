@@ -23,6 +23,10 @@ td.n { text-align: right } img { width: 100%; height: auto; margin: .5em 0 }
 """
 
 
+class Html(str):
+    """Cell of a table that is HTML already."""
+
+
 def page(title: str, parts: Iterable[str]) -> str:
     """Return the whole document."""
     head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{escape(title)}</title>'
@@ -58,4 +62,4 @@ def _cell(value: object) -> str:
         return '<td class="n">-</td>'
     if isinstance(value, float | int):
         return f'<td class="n">{value:.4g}</td>' if isinstance(value, float) else f'<td class="n">{value}</td>'
-    return f"<td>{escape(str(value))}</td>"
+    return f"<td>{value if isinstance(value, Html) else escape(str(value))}</td>"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -15,17 +14,16 @@ from ..analysis.free_vibration import Vibration
 from ..health.sensor_monitor import noise_as_text
 from ..offline.recording import Recording
 from ..offline.replay import Replay
-from ..plots import AlarmSpan, History
+from ..plots import AlarmSpan
 from ..plots.health import frequency_picture, moment_picture, timeline_picture
-from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..twin.events import EVENTS
 from ..types import NANO, SECOND, SENSORS, Alarm, Stream
 from .evaluation import Evaluation
-from .fatigue import SMALL
+from .fatigue import NOISE_RANGE
 from .html import heading, image, page, paragraph, table
 from .quantities import Load
-from .vibration import LEAST, NEAR, course
+from .vibration import MODE_DISTANCE, SHORTEST_REST, course
 
 FILE_NAME = "report.html"
 NO_JUDGE = "The rig's health was not judged."
@@ -33,67 +31,29 @@ SHARES = "An estimate without unit is a share; of a stiffness (k, EI) by its com
 ASSUMED = f"Heights are not in the scene: assumed are {BOX:g} radii of gyration, as of thin-walled boxes; see --section-height."
 
 
-@dataclass(frozen=True)
-class Subject:
-    """Replay, evaluation and scene that a report is about.
-
-    Attributes
-    ----------
-    result : Replay
-    evaluation : Evaluation
-        Of the same replay.
-    scene : Scene
-    scene_name : str
-        Path, or what else it is called.
-    has_heights : bool
-        Whether the heights of the sections are known.
-    """
-
-    result: Replay
-    evaluation: Evaluation
-    scene: Scene
-    scene_name: str
-    has_heights: bool
-
-    @property
-    def history(self) -> History:
-        """History of the replay."""
-        return self.evaluation.history
-
-    @property
-    def name(self) -> str:
-        """Name of the session."""
-        return self.result.session.path.resolve().name
-
-    @property
-    def origin(self) -> str:
-        """Origin of the session; empty if it states none."""
-        return self.result.session.notes.get("origin", "")
-
-
-def write_report(subject: Subject, folder: Path) -> Path:
+def write_report(found: Evaluation, folder: Path) -> Path:
     """Write the report into `folder`, where the pictures of the replay are; returns its path."""
     parts = [
-        *_head(subject),
-        *_alarms(subject, folder),
+        *_head(found),
+        *_alarms(found, folder),
         *_residuals(folder),
-        *_vibration(subject, folder),
-        *_tip(subject, folder),
-        *_moments(subject, folder),
-        *_fatigue(subject.evaluation),
-        *_events(subject),
-        *_provenance(subject),
+        *_vibration(found, folder),
+        *_tip(found, folder),
+        *_moments(found, folder),
+        *_fatigue(found),
+        *_events(found),
+        *_provenance(found),
     ]
     path = folder / FILE_NAME
-    write_atomic(path, page(f"Session {subject.name}", parts))
+    write_atomic(path, page(f"Session {found.name}", parts))
     return path
 
 
 # -- head -------------------------------------------------------------------------------------------------------------
 
 
-def _head(subject: Subject) -> list[str]:
-    summary, recording = subject.result.summary, subject.result.recording
+def _head(found: Evaluation) -> list[str]:
+    summary, recording = found.result.summary, found.result.recording
     begin = datetime.fromtimestamp(recording.first // SECOND, UTC)
     rows: list[tuple[str, object]] = [
         ("first stamp", begin.strftime("%Y-%m-%d %H:%M:%S UTC")),
@@ -101,18 +61,18 @@ def _head(subject: Subject) -> list[str]:
         ("stroke samples used", summary["samples"]),
         ("samples left out", summary["dropped"]),
         ("largest tip acceleration, m/s²", summary["tip_acceleration_max_m_s2"]),
-        ("largest tip displacement, m", float(np.hypot(*subject.history.tip_displacement.T).max())),
+        ("largest tip displacement, m", float(np.hypot(*found.history.tip_displacement.T).max())),
         *_uncertainty(recording),
         *((name, summary[key]) for key, name in _AGAINST_TRUTH if key in summary),
         *([("load at the tip that the model does not know", summary["tip_load"])] if "tip_load" in summary else []),
         *(("noise", told) for told in noise_as_text(summary)),
     ]
-    scene = f"{subject.scene_name}: {len(subject.scene.sections)} sections. {subject.scene.description}".strip()
+    scene = f"{summary['scene']}: {len(found.scene.sections)} sections. {found.scene.description}".strip()
     return [
-        heading(f"Session {subject.name}", 1),
-        paragraph(subject.origin or "The session does not say where it comes from.", "origin"),
+        heading(f"Session {found.name}", 1),
+        paragraph(found.origin or "The session does not say where it comes from.", "origin"),
         paragraph(f"Scene {scene}"),
-        _verdict(subject.result),
+        _verdict(found.result),
         table((), rows),
         heading("Joint angles", 3),
         table(("joint", "residual, mrad rms", "mean / expected deviation", "spread / expected deviation"), _joints(summary)),
@@ -152,18 +112,18 @@ def _joints(summary: dict[str, Any]) -> list[tuple[object, ...]]:
 # -- alarms and residuals ---------------------------------------------------------------------------------------------
 
 
-def _alarms(subject: Subject, folder: Path) -> list[str]:
-    recording, history = subject.result.recording, subject.history
+def _alarms(found: Evaluation, folder: Path) -> list[str]:
+    recording, history = found.result.recording, found.history
     if not recording.is_judged:
         return [heading("Alarms"), paragraph(NO_JUDGE)]
     gaps = [AlarmSpan("cylinder_strokes", start, stop, "gap") for start, stop in history.gaps]
     spans = sorted([*gaps, *history.alarms], key=lambda alarm: alarm.start)
     path, end = folder / "timeline.png", float(history.stamps_s[-1])
-    timeline_picture(path, subject.name, end, spans, subject.origin)
+    timeline_picture(path, found.name, end, spans, found.origin)
     alarms = recording.alarms()
-    found = [_alarm(alarm, recording.first) for alarm in alarms] or [paragraph("None.")]
+    told = [_alarm(alarm, recording.first) for alarm in alarms] or [paragraph("None.")]
     note = [paragraph(SHARES, "note")] if any(alarm.ranked for alarm in alarms) else []
-    return [heading("Alarms"), *found, *note, image(path, "alarms over time")]
+    return [heading("Alarms"), *told, *note, image(path, "alarms over time")]
 
 
 def _alarm(alarm: Alarm, first: int) -> str:
@@ -194,30 +154,28 @@ def _residuals(folder: Path) -> list[str]:
 # -- vibration, tip, loads --------------------------------------------------------------------------------------------
 
 
-def _vibration(subject: Subject, folder: Path) -> list[str]:
-    peaks = [
-        (0.5 * (hold.start + hold.stop), each.frequency) for hold in subject.evaluation.still for each in hold.measured.values()
-    ]
+def _vibration(found: Evaluation, folder: Path) -> list[str]:
+    peaks = [(0.5 * (rest.start + rest.stop), each.frequency) for rest in found.rests for each in rest.measured.values()]
     path = folder / "frequencies.png"
-    frequency_picture(path, subject.name, *course(subject.history, subject.scene), peaks, subject.origin)
-    source = SENSORS[Stream.ANGLES if subject.history.imu is None else Stream.IMU].title
+    frequency_picture(path, found.name, *course(found.history, found.scene), peaks, found.origin)
+    source = SENSORS[Stream.ANGLES if found.history.imu is None else Stream.IMU].title
     told = (
         "Lines: the model, about the equilibrium in the posture of the moment. "
-        f"Dots: free vibration in the {source} while the boom stood still for {LEAST:g} s and more (eigensystem realisation), "
-        f"within {NEAR:.0%} of a mode, clear of the noise, and dying away."
+        f"Dots: free vibration in the {source} while the boom stood still for {SHORTEST_REST:g} s and more (eigensystem "
+        f"realisation), within {MODE_DISTANCE:.0%} of a mode, clear of the noise, and dying away."
     )
     rows = [
-        (f"{hold.start:.1f} to {hold.stop:.1f} s", mode + 1, hold.model[mode], *_measured(each, hold.model[mode]))
-        for hold in subject.evaluation.still
-        for mode, each in sorted(hold.measured.items())
+        (f"{rest.start:.1f} to {rest.stop:.1f} s", mode + 1, rest.model[mode], *_measured(each, rest.model[mode]))
+        for rest in found.rests
+        for mode, each in sorted(rest.measured.items())
     ]
     head = ("while still", "mode", "model, Hz", "measured, Hz", "apart, %", "damping, %")
-    found = table(head, rows) if rows else paragraph("Nothing was measured: no free vibration, or no standing still.")
-    shaken = ", ".join(f"{hold.start:.1f} to {hold.stop:.1f} s" for hold in subject.evaluation.still if hold.is_shaken)
+    measured = table(head, rows) if rows else paragraph("Nothing was measured: no free vibration, or no standing still.")
+    shaken = ", ".join(f"{rest.start:.1f} to {rest.stop:.1f} s" for rest in found.rests if rest.is_shaken)
     why = f"Still, but shaken by a load at the tip, so that lines are no natural frequencies: {shaken}."
     left_out = [paragraph(why, "note")] if shaken else []
     title = heading("Natural frequencies and damping")
-    return [title, paragraph(told, "note"), image(path, "natural frequencies"), found, *left_out]
+    return [title, paragraph(told, "note"), image(path, "natural frequencies"), measured, *left_out]
 
 
 def _measured(each: Vibration, model: float) -> tuple[str, str, str]:
@@ -236,21 +194,21 @@ _ESTIMATE = (
 )
 
 
-def _tip(subject: Subject, folder: Path) -> list[str]:
+def _tip(found: Evaluation, folder: Path) -> list[str]:
     parts = [heading("Tip")]
-    if subject.history.estimate is not None:
+    if found.history.estimate is not None:
         parts.append(paragraph(_ESTIMATE, "note"))
     parts.append(image(folder / "tip.png", "tip displacement and acceleration"))
     return parts + [image(folder / name, name) for name in ("spectrum.png", "posture.png") if (folder / name).is_file()]
 
 
-def _moments(subject: Subject, folder: Path) -> list[str]:
-    title, found = heading("Bending of the sections"), subject.evaluation.loads
-    if not found:
+def _moments(found: Evaluation, folder: Path) -> list[str]:
+    title = heading("Bending of the sections")
+    if not found.loads:
         return [title, paragraph("All sections of the scene are rigid: their bending is not in the model.")]
     path = folder / "moments.png"
-    rows = [(load.station.name, load.column) for load in found]
-    moment_picture(path, subject.name, subject.history, rows, subject.origin)
+    rows = [(load.station.name, load.column) for load in found.loads]
+    moment_picture(path, found.name, found.history, rows, found.origin)
     told = (
         "Moments are those of the model's bending coordinates (EI times curvature), static and dynamic together, at the ends "
         "and middles of the flexible parts; positive ones bend the outboard end up. Stress is M / W with W = 2 I / h, of "
@@ -258,17 +216,11 @@ def _moments(subject: Subject, folder: Path) -> list[str]:
         "static share, with the standard deviation of that share. VIBRATION THAT SUCH A LOAD EXCITES IS IN NEITHER: under a "
         "pump it can be several times as much; `boom_twin response --pump` tells it. "
     )
-    told += "Heights as given." if subject.has_heights else ASSUMED
+    told += "Heights as given." if found.has_heights else ASSUMED
     head = (
-        "station",
-        "largest moment, kN m",
-        "at, s",
-        "static part then, kN m",
-        "by unknown load, kN m",
-        "W, cm³",
-        "stress, MPa",
-    )
-    return [title, paragraph(told, "note"), table(head, map(_load, found)), image(path, "bending moments")]
+        "station", "largest moment, kN m", "at, s", "static part then, kN m", "by unknown load, kN m", "W, cm³", "stress, MPa",
+    )  # fmt: skip
+    return [title, paragraph(told, "note"), table(head, map(_load, found.loads)), image(path, "bending moments")]
 
 
 def _load(load: Load) -> tuple[object, ...]:
@@ -282,10 +234,10 @@ def _fatigue(found: Evaluation) -> list[str]:
     if found.category is None or not found.fatigue:
         return []
     told = (
-        f"Rainflow counts (ASTM E1049) of the predicted bending stress, ranges above {1e-6 * SMALL:g} MPa; damage by the S-N "
-        f"curve of EN 1993-1-9 for detail category {found.category:g} MPa, the same at all stations, without partial factors. "
-        "Damage grows with the third to fifth power of stress. What only sensors know of is NOT in it: of a boom that a pump "
-        "shakes this counts the moves alone, and the damage is more."
+        f"Rainflow counts (ASTM E1049) of the predicted bending stress, ranges above {1e-6 * NOISE_RANGE:g} MPa; damage by the "
+        f"S-N curve of EN 1993-1-9 for detail category {found.category:g} MPa, the same at all stations, without partial "
+        "factors. Damage grows with the third to fifth power of stress. What only sensors know of is NOT in it: of a boom that "
+        "a pump shakes this counts the moves alone, and the damage is more."
     )
     rows = [
         (row.station.name, row.cycles, 1e-6 * row.largest, row.damage, 1.0 / row.damage if row.damage else None)
@@ -298,9 +250,9 @@ def _fatigue(found: Evaluation) -> list[str]:
 # -- what else --------------------------------------------------------------------------------------------------------
 
 
-def _events(subject: Subject) -> list[str]:
-    gaps = [(f"{start:.3f} to {stop:.3f} s", stop - start) for start, stop in subject.history.gaps]
-    events = [(name, count, EVENTS.get(name, "seen in a message")) for name, count in subject.result.summary["events"].items()]
+def _events(found: Evaluation) -> list[str]:
+    gaps = [(f"{start:.3f} to {stop:.3f} s", stop - start) for start, stop in found.history.gaps]
+    events = [(name, count, EVENTS.get(name, "seen in a message")) for name, count in found.result.summary["events"].items()]
     return [
         heading("Gaps and events"),
         table(("gap of the strokes", "s"), gaps) if gaps else paragraph("No gap in the strokes."),
@@ -308,12 +260,12 @@ def _events(subject: Subject) -> list[str]:
     ]
 
 
-def _provenance(subject: Subject) -> list[str]:
-    summary = subject.result.summary
+def _provenance(found: Evaluation) -> list[str]:
+    summary = found.result.summary
     rows = [
         ("boom_twin", __version__),
         ("mapping", summary["mapping"]),
         ("sha256 of the result bag", summary["output_sha256"] or "no bag was written"),
-        *subject.result.session.notes.items(),
+        *found.result.session.notes.items(),
     ]
     return [heading("Where this comes from"), table((), rows)]

@@ -18,12 +18,11 @@ from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..plots import History
-from ..plots.health import slow_part
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..system.received_files import open_received
 from ..types import Array, Stream, sensor_kind, stream_of
-from .vibration import HoldInterval
+from .vibration import RestPeriod
 
 FILE_NAME = "quantities.json"
 BATCHES = 10
@@ -46,12 +45,7 @@ class Quantity:
 
 
 class QuantityBuilder:
-    """Computation of a session's quantities, block by block.
-
-    Parameters
-    ----------
-    scene : Scene
-    """
+    """Computation of a session's quantities, block by block."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -77,11 +71,11 @@ class QuantityBuilder:
         """Return the loads, see `SectionLoads.loads`."""
         return self._loads.loads(heights)
 
-    def quantities(self, tip_sigma: float | None, still: list[HoldInterval], settings: Settings) -> list[Quantity]:
+    def quantities(self, tip_sigma: float | None, rests: list[RestPeriod], settings: Settings) -> list[Quantity]:
         """Return all figures of the session; `tip_sigma` is the largest deviation of the predicted tip, m, if it is known."""
         return [
             *self._residuals(),
-            *_frequencies(still),
+            *_frequencies(rests),
             Quantity("tip_displacement_max", self._displacement, tip_sigma, "m"),
             Quantity("tip_acceleration_max", self._acceleration, None, "m/s^2"),
             *(
@@ -115,16 +109,10 @@ class QuantityBuilder:
 
 
 class BatchMeans:
-    """Mean of values that come in parts, and its standard deviation by the method of batch means.
-
-    Attributes
-    ----------
-    count : int
-        Values.
-    """
+    """Mean of values that come in parts, and its standard deviation by the method of batch means."""
 
     def __init__(self) -> None:
-        self.count = 0
+        self.count = 0  # values so far
         self._sums: list[tuple[float, int]] = []  # of each of `BATCHES` pieces of each part: sum and number of values
 
     def add(self, values: Array) -> None:
@@ -141,10 +129,10 @@ class BatchMeans:
         return total / self.count, float(means.std(ddof=1) / sqrt(len(means))) if len(means) > 1 else 0.0
 
 
-def _frequencies(still: list[HoldInterval]) -> Iterator[Quantity]:
+def _frequencies(rests: list[RestPeriod]) -> Iterator[Quantity]:
     """Yield measured over model frequency, and damping, of every mode that was seen."""
-    for mode in sorted({mode for hold in still for mode in hold.measured}):
-        seen = [(hold.model[mode], hold.measured[mode]) for hold in still if mode in hold.measured]
+    for mode in sorted({mode for rest in rests for mode in rest.measured}):
+        seen = [(rest.model[mode], rest.measured[mode]) for rest in rests if mode in rest.measured]
         ratios = np.array([(each.frequency / model, each.frequency_sigma / model) for model, each in seen])
         dampings = np.array([(each.damping, each.damping_sigma) for _, each in seen])
         yield _weighted(f"frequency_ratio_mode_{mode + 1}", ratios, FREQUENCY_ERROR)
@@ -218,30 +206,16 @@ def digest(scene: Scene) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """Most loaded station of a section.
-
-    Attributes
-    ----------
-    station : Station
-    column : int
-        Of `History.moments`.
-    moment, time, static : float
-        The largest moment in magnitude (N m), when (s), and the static part of it then (N m).
-    unknown, sigma : float
-        What the load at the tip that only sensors know of adds to it then, at rest, and the deviation of that, N m; NaN where
-        nothing but strokes was measured.
-    modulus : float
-        Of the section, m^3.
-    """
+    """Most loaded station of a section."""
 
     station: Station
-    column: int
-    moment: float
-    time: float
-    static: float
-    unknown: float
-    sigma: float
-    modulus: float
+    column: int  # of `History.moments`
+    moment: float  # N m, the largest in magnitude
+    time: float  # s, when
+    static: float  # N m, the static part of it then
+    unknown: float  # N m, by the load at the tip that only sensors know of, at rest; NaN where only strokes were measured
+    sigma: float  # N m, standard deviation of that
+    modulus: float  # m^3, of the section
 
     @property
     def stress(self) -> float:
@@ -265,7 +239,7 @@ class SectionLoads:
             column = columns[int(best)]
             moment = float(history.moments[row, column])
             if section not in self._largest or abs(moment) > abs(self._largest[section].moment):
-                when, static = float(history.stamps_s[row]), float(slow_part(history, column)[row])
+                when, static = float(history.stamps_s[row]), float(history.slow_moments[row, column])
                 about = (each[row].copy() for each in (history.strokes, history.joints, load, variance))
                 self._largest[section] = _Largest(column, moment, when, static, *about)
 
@@ -288,19 +262,16 @@ class SectionLoads:
 
 
 class _Largest(NamedTuple):
-    """Largest moment of a section so far: column, N m, when (s), its static part; and the state at that time.
-
-    Strokes (m), joint angles (rad), estimated load at the tip (N) and its variance (N^2).
-    """
+    """Largest moment of a section so far, as in `Load`, and the state at that time."""
 
     column: int
     moment: float
     time: float
     static: float
-    strokes: Array
-    joints: Array
-    load: Array
-    variance: Array
+    strokes: Array  # m
+    joints: Array  # rad
+    load: Array  # N, estimated at the tip
+    variance: Array  # N^2, of that
 
 
 def section_heights(text: str | None, scene: Scene) -> Array | None:

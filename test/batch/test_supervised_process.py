@@ -13,13 +13,13 @@ import pytest
 
 psutil = pytest.importorskip("psutil")
 
-from boom_twin.batch.supervised_process import Limits, Outcome, run_supervised  # noqa: E402
+from boom_twin.batch.supervised_process import Outcome, run_supervised  # noqa: E402
 
-PLENTY = Limits(120.0, 4_000_000_000)
+PLENTY = 120.0, 4_000_000_000
 
 
-def run(code: str, limits: Limits = PLENTY, *arguments: str) -> Outcome:
-    return run_supervised([sys.executable, "-c", code, *arguments], b"task\n", limits)
+def run(code: str, limits: tuple[float, int] = PLENTY, *arguments: str) -> Outcome:
+    return run_supervised([sys.executable, "-c", code, *arguments], b"task\n", *limits)
 
 
 def is_gone(pid: int) -> bool:
@@ -44,13 +44,13 @@ def test_one_that_hangs_is_ended_with_its_children(tmp_path: Path) -> None:
         "import subprocess, sys, time; child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)']); "
         "open(sys.argv[1], 'w').write(str(child.pid)); time.sleep(600)"
     )
-    found = run(code, Limits(3.0, PLENTY.memory), str(tmp_path / "pid"))
+    found = run(code, (3.0, PLENTY[1]), str(tmp_path / "pid"))
     assert found.reason == "takes longer than 3 s. Raise --timeout."
     assert is_gone(int((tmp_path / "pid").read_text()))
 
 
 def test_one_that_takes_too_much_memory_is_ended() -> None:
-    found = run("import time; held = bytearray(b'x') * 400_000_000; time.sleep(600)", Limits(600.0, 200_000_000))
+    found = run("import time; held = bytearray(b'x') * 400_000_000; time.sleep(600)", (600.0, 200_000_000))
     assert "more than 200 MB. Raise --memory." in found.reason and found.peak > 200_000_000
 
 
@@ -61,8 +61,8 @@ def test_it_ends_with_its_caller(tmp_path: Path) -> None:
         "end_with_caller(); open(sys.argv[1], 'w').write(str(os.getpid())); time.sleep(600)"
     )
     caller = (
-        "import sys; from boom_twin.batch.supervised_process import Limits, run_supervised; "
-        "run_supervised([sys.executable, '-c', sys.argv[1], sys.argv[2]], b'task\\n', Limits(600.0, 10**10))"
+        "import sys; from boom_twin.batch.supervised_process import run_supervised; "
+        "run_supervised([sys.executable, '-c', sys.argv[1], sys.argv[2]], b'task\\n', 600.0, 10**10)"
     )
     place = tmp_path / "pid"
     process = subprocess.Popen([sys.executable, "-c", caller, child, str(place)])

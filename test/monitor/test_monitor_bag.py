@@ -15,6 +15,7 @@ from monitor.conftest import read_all
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from boom_twin import statics
+from boom_twin.analysis.posture_modes import ModeList
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_session
 from boom_twin.bag.session_sheet import SessionSheet
@@ -26,8 +27,8 @@ from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.monitor.data.analyst import Analyst
 from boom_twin.monitor.data.bag_feed import ENOUGH, bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
-from boom_twin.monitor.data.present_posture import ModeList, ResponseCompiler, ResponseList
 from boom_twin.monitor.data.status import ListedAlarm, Severity, overall
+from boom_twin.monitor.data.tip_response import ResponseCompiler, ResponseList
 from boom_twin.monitor.protocol import dump, state
 from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene
@@ -36,7 +37,7 @@ from boom_twin.types import StrokeReading
 
 
 def test_rows_are_those_of_the_replay(feed: Feed, replayed: Path) -> None:
-    assert not feed.topic_rows.dropped.told()
+    assert not feed.topic_rows.dropped.losses()
     topic = load_topics().outputs[Output.TIP_ACCELERATION].absolute
     messages = [message for _, _, message in read(scan(replayed / "bag"), {topic: TYPES[Output.TIP_ACCELERATION]})]
     times, values = feed.store.tables["acceleration"].rows(0, len(messages))
@@ -245,4 +246,4 @@ def test_a_malformed_message_of_a_session_is_dropped_and_told(tmp_path: Path) ->
     feed = read_all(bag_feed(tmp_path / "bag", load_scene(), Settings()))
     assert not feed.trouble and feed.store.tables["acceleration"].count == 10
     told = {"topic": states.absolute, "count": 1, "reason": "1 names, but 1 of position, 0 of effort"}
-    assert feed.topic_rows.dropped.told() == [told]
+    assert feed.topic_rows.dropped.losses() == [told]

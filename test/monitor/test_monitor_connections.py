@@ -127,7 +127,7 @@ def test_a_thousand_half_open_connections_keep_no_page_out(server: Server, many_
                 link.sendall(HALVES[number % len(HALVES)])
         asyncio.run(visit(server))
         open_files = len(list(Path(f"/proc/{server.process.pid}/fd").iterdir()))
-        assert open_files < 2 * connections.MOST + 100
+        assert open_files < 2 * connections.MAX_CONNECTIONS + 100
         end = time.monotonic() + PATIENCE
         for link in links:  # all are cut off, the newest by their time
             link.settimeout(max(0.1, end - time.monotonic()))

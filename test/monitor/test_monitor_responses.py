@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from boom_twin.monitor.data import present_posture
-from boom_twin.monitor.data.present_posture import ResponseCompiler
+from boom_twin.monitor.data import tip_response
+from boom_twin.monitor.data.tip_response import ResponseCompiler
 
 COMPILER = "import pathlib, sys, time; time.sleep(0.6); open(sys.argv[1], 'a').write('compiled ')"
 
@@ -19,8 +19,8 @@ COMPILER = "import pathlib, sys, time; time.sleep(0.6); open(sys.argv[1], 'a').w
 def done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The file that a process writes in place of compiling."""
     file = tmp_path / "done"
-    monkeypatch.setattr(present_posture, "could_be_kept", lambda kernel: True)
-    monkeypatch.setattr(present_posture, "python_command", lambda module: [sys.executable, "-c", COMPILER, str(file)])
+    monkeypatch.setattr(tip_response, "could_be_kept", lambda kernel: True)
+    monkeypatch.setattr(tip_response, "python_command", lambda module: [sys.executable, "-c", COMPILER, str(file)])
     return file
 
 

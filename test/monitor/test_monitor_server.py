@@ -26,7 +26,7 @@ from boom_twin.monitor.data.bag_feed import BagFeed
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.session_list import SessionList, sessions_in
 from boom_twin.monitor.data.store import Store
-from boom_twin.monitor.server import MOST_VIEWERS, Server
+from boom_twin.monitor.server import MAX_VIEWERS, Server
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 
@@ -50,7 +50,7 @@ class Made(Feed):
 
     def tell(self, level: int) -> None:
         statuses = [status("boom_twin: model"), status("boom_twin: sensor joint_1", level, "frozen")]
-        self.store.set_statuses(self.now(), self.store.statuses(self.now()).told(self.now(), statuses, 0.0))
+        self.store.set_statuses(self.now(), self.store.statuses(self.now()).updated(self.now(), statuses, 0.0))
 
     def now(self) -> float:
         return self.store.newest if self.end is not None else 0.0
@@ -209,7 +209,7 @@ def test_a_thousand_connections_leave_room_for_nobody_more_and_harm_nobody() -> 
             opened = await asyncio.gather(*(connect(session, url) for _ in range(1000)), return_exceptions=True)
             sockets = [each for each in opened if isinstance(each, ClientWebSocketResponse)]
             refused = [each for each in opened if isinstance(each, WSServerHandshakeError)]
-            assert len(sockets) == MOST_VIEWERS - 1 and {each.status for each in refused} == {503}
+            assert len(sockets) == MAX_VIEWERS - 1 and {each.status for each in refused} == {503}
             await until(good, "state")
             await asyncio.gather(*(each.close() for each in sockets))
             async with connect(session, url) as another:

@@ -7,9 +7,10 @@ import pytest
 from scipy.signal import lfilter, welch
 
 from boom_twin import frequency_response
-from boom_twin.monitor.data.present_posture import FREQUENCIES as ASKED
-from boom_twin.monitor.data.present_posture import ModeList, ResponseList
+from boom_twin.analysis.posture_modes import ModeList
 from boom_twin.monitor.data.spectrum import FREQUENCIES, SEGMENT, spectrogram, spectrum
+from boom_twin.monitor.data.tip_response import FREQUENCIES as ASKED
+from boom_twin.monitor.data.tip_response import ResponseList
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 

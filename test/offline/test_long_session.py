@@ -57,9 +57,9 @@ def test_the_figures_are_those_of_the_whole(both: tuple) -> None:
     (summary, whole, (one,)), (again, parts, stretches), folder = both
     assert len(stretches) >= 5 and sum(len(each.predictions.stamps) for each in stretches) == len(one.predictions.stamps)
     assert numbers(again) == [pytest.approx(each, rel=1e-9) if isinstance(each, float) else each for each in numbers(summary)]
-    spans = [np.array([(hold.start, hold.stop) for hold in found.still]) for found in (parts, whole)]
+    spans = [np.array([(hold.start, hold.stop) for hold in found.rests]) for found in (parts, whole)]
     assert len(spans[1]) == 4 and spans[0] == pytest.approx(spans[1])
-    assert any(hold.measured for hold in whole.still)
+    assert any(hold.measured for hold in whole.rests)
     (_, wanted), (_, found) = read(folder / "whole"), read(folder / "parts")
     assert [each.name for each in found] == [each.name for each in wanted]
     assert [each.value for each in found] == pytest.approx([each.value for each in wanted], rel=1e-6)

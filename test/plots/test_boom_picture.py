@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from boom_twin.analysis.equilibrium import statics
-from boom_twin.plots.boom import boom_picture, undeformed_outline
+from boom_twin.analysis.undeflected import UndeflectedBoom
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.plots.boom import boom_picture
 from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.kinematics import posture_angles, skeleton, strokes_of_posture
 
@@ -43,7 +45,7 @@ def test_pins_agree_with_lengths_and_strokes(scene: Scene, name: str) -> None:
 
 def test_undeformed_outline_lies_on_the_sections(scene: Scene) -> None:
     angles = posture_angles(scene, "arch")
-    line, bones = undeformed_outline(scene, angles), skeleton(scene, angles)
+    line, bones = UndeflectedBoom(scene, compile_scene(scene)).at(angles), skeleton(scene, angles)
     assert line[-1] == pytest.approx(bones.pivots[-1], abs=1e-9)
     for point in line:
         away = []

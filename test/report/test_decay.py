@@ -11,7 +11,7 @@ import pytest
 from boom_twin import Twin, simulate, statics
 from boom_twin.offline.history import HistoryBuilder
 from boom_twin.offline.recording import Recording
-from boom_twin.report.vibration import SURE, HoldFinder, course, still, vibrations
+from boom_twin.report.vibration import CYCLE_SIGMA, RestFinder, course, still, vibrations
 from boom_twin.scene import load_scene
 from boom_twin.scene.edit import with_parameters
 from boom_twin.scene.kinematics import strokes_of_posture
@@ -60,7 +60,7 @@ def test_deviations_are_what_they_are_said_to_be(trials: list, frequency: float,
 def test_in_noise_alone_nothing_is_sure() -> None:
     for seed in range(5):
         found = vibrations(TIMES, np.random.default_rng(seed).normal(0.0, 0.05, (len(TIMES), 2)))
-        assert found and all(each.frequency_sigma * TIMES[-1] > 2.0 * SURE for each in found)
+        assert found and all(each.frequency_sigma * TIMES[-1] > 2.0 * CYCLE_SIGMA for each in found)
 
 
 def test_missing_values_are_bridged() -> None:
@@ -84,11 +84,11 @@ def test_where_a_load_shakes_the_boom_no_frequency_is_told(load: float, payload:
     scene = with_parameters(load_scene(), {"tip.payload": payload})
     imu = SimpleNamespace(stamps_s=TIMES, measured=measured(3))
     strokes = np.tile(strokes_of_posture(scene, "arch"), (len(TIMES), 1))
-    finder = HoldFinder(scene)
+    finder = RestFinder(scene)
     history = SimpleNamespace(stamps_s=TIMES, strokes=strokes, imu=imu)
     finder.add(history, load * np.sin(2.7 * TIMES)[:, None] * np.array([0.0, 1.0]))  # type: ignore[arg-type]
-    (hold,) = finder.finish()
-    assert hold.is_shaken == is_shaken and (0 in hold.measured) == (not is_shaken and not payload)
+    (rest,) = finder.finish()
+    assert rest.is_shaken == is_shaken and (0 in rest.measured) == (not is_shaken and not payload)
 
 
 @pytest.fixture(scope="module")
@@ -103,17 +103,17 @@ def swung():
 def test_a_boom_on_locked_drives_rests_with_the_frequencies_of_its_drives(swung, reads: StrokeReading) -> None:
     """Whatever the transducers read; lengths that are taken for drives never rest, and give other frequencies."""
     scene, found = load_scene(), []
-    twin, recording, finder = Twin(scene, reads=reads), Recording(4, found.append, reads=reads), HoldFinder(scene)
+    twin, recording, finder = Twin(scene, reads=reads), Recording(4, found.append, reads=reads), RestFinder(scene)
     for time, row in zip(swung.times, swung.strokes if reads is StrokeReading.DRIVE else swung.lengths, strict=True):
         recording.add(twin.update(Sample(Stream.STROKES, SECOND + round(SECOND * float(time)), row)))
     recording.close()
     (stretch,) = found
     finder.add(own := HistoryBuilder(scene).add(stretch), stretch.estimates.load)
-    (hold,) = finder.finish()
-    assert hold.start < 1.0 and hold.stop > 4.3
+    (rest,) = finder.finish()
+    assert rest.start < 1.0 and rest.stop > 4.3
     assert reads is StrokeReading.DRIVE or not still(own.stamps_s, stretch.predictions.strokes)
     expected = statics(scene, swung.strokes[-1]).frequencies
-    assert hold.model == pytest.approx(expected, rel=5e-4)
+    assert rest.model == pytest.approx(expected, rel=5e-4)
     resting = replace(own, stamps_s=own.stamps_s[400:], strokes=own.strokes[400:])
     assert course(resting, scene)[1] == pytest.approx(np.tile(expected, (60, 1)), rel=1e-3)
     assert statics(scene, statics(scene, swung.strokes[-1]).lengths).frequencies != pytest.approx(expected, rel=3e-3)

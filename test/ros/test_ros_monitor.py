@@ -200,4 +200,4 @@ def test_time_set_back_begins_anew(pair: tuple[Any, Rig]) -> None:
     rig.send(Output.TIP_DISPLACEMENT, 45_000_000, lambda message: None)  # one alone would be a stray stamp
     until(feed, lambda: feed.store.generation == 1)
     assert feed.store.newest == pytest.approx(0.005) and list(feed.store.tables) == ["displacement"]
-    assert feed.store.tables["displacement"].count == 2 and not feed.topic_rows.dropped.told()
+    assert feed.store.tables["displacement"].count == 2 and not feed.topic_rows.dropped.losses()

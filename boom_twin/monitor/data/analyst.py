@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from ...analysis.posture_modes import MOVED, ModeList
 from ...deviation.load_spectrum import tip_load
 from ..protocol import RESPONSE, SPECTROGRAM, SPECTRUM, pack
 from .feed import Feed
-from .present_posture import MOVED, ModeList, ResponseCompiler, ResponseList, TipResponses
-from .spectrum import SEGMENT, STEP, WINDOW, Spectrum, spectrogram, spectrum
+from .spectrum import SEGMENT, STEP, WINDOW, Peak, spectrogram, spectrum
+from .tip_response import ResponseCompiler, ResponseList, TipResponses
 from .topic_rows import ESTIMATE
 
 
@@ -36,21 +37,14 @@ SIGNALS = (
 """The best first: the prediction knows nothing of what shakes the boom."""
 UNKNOWN_SCENE = TipResponses(trouble="the model is not known: give --scene")
 UNKNOWN_POSTURE = TipResponses(trouble="the strokes are not known yet")
-KNOWN = 0.9
+KNOWN_SHARE = 0.9
 """Share of the rows of a signal that must have a value."""
-MATCH = 0.2
+MODE_DISTANCE = 0.2
 """Relative distance up to which a peak is taken for a mode of the model."""
 
 
 class Analyst:
-    """Analysis of one feed, one computation of a kind at a time, because the model's workspace is one.
-
-    Parameters
-    ----------
-    feed : Feed
-    compiler : ResponseCompiler
-        Common to all feeds.
-    """
+    """Analysis of one feed, one computation of a kind at a time, because the model's workspace is one."""
 
     def __init__(self, feed: Feed, compiler: ResponseCompiler) -> None:
         self._feed, self._compiler = feed, compiler
@@ -70,20 +64,19 @@ class Analyst:
                 return None
             end = table.until(time)
             key = (store.generation, end)
-            if self._known is None or self._known[0] != key:
-                times, values = table.rows(table.until(time - WINDOW), end)
-                found = await asyncio.to_thread(
-                    self._work_out, times, values[:, signal.columns].astype(float), self._feed.strokes(time)
-                )
-                if found is None:
-                    return None
-                natural, result = found
-                moved = self._moved(time)
-                number = list(store.tables).index(signal.table)
-                block = pack(SPECTRUM, number, result.frequencies, result.densities.astype("f4"))
-                peaks = [self._placed(asdict(peak), natural, time, moved > MOVED) for peak in result.peaks]
-                lines = {"kind": "lines", "natural": natural, "peaks": peaks, "source": signal.name, "axes": signal.axes}
-                self._known = key, ({**lines, "moved": moved if moved > MOVED else 0.0}, block)
+            if self._known is not None and self._known[0] == key:
+                return self._known[1]
+            times, values = table.rows(table.until(time - WINDOW), end)
+            found = await asyncio.to_thread(spectrum, times, values[:, signal.columns].astype(float))
+            if found is None:
+                return None
+            natural = await asyncio.to_thread(self._natural, self._feed.strokes(time))
+            moved = self._moved(time)
+            number = list(store.tables).index(signal.table)
+            block = pack(SPECTRUM, number, found.frequencies, found.densities.astype("f4"))
+            peaks = [self._placed(peak, natural, time, moved > MOVED) for peak in found.peaks]
+            lines = {"kind": "lines", "natural": natural, "peaks": peaks, "source": signal.name, "axes": signal.axes}
+            self._known = key, ({**lines, "moved": moved if moved > MOVED else 0.0}, block)
             return self._known[1]
 
     async def response_at(self, time: float) -> TipResponses:
@@ -131,7 +124,7 @@ class Analyst:
             table = self._feed.store.tables.get(signal.table)
             if table is not None:
                 _, values = table.rows(table.until(time - SEGMENT), table.until(time))
-                if len(values) and np.isfinite(values[:, signal.columns]).all(axis=1).mean() > KNOWN:
+                if len(values) and np.isfinite(values[:, signal.columns]).all(axis=1).mean() > KNOWN_SHARE:
                     return signal
         return PREDICTION
 
@@ -140,22 +133,19 @@ class Analyst:
         strokes = self._feed.strokes_between(time - WINDOW, time)
         return float(np.ptp(strokes, axis=0).max()) if len(strokes) else 0.0
 
-    def _work_out(self, times: Any, values: Any, strokes: list[float]) -> tuple[list[float], Spectrum] | None:
-        found = spectrum(times, values)
-        return None if found is None else (self._natural(strokes), found)
-
-    def _placed(self, peak: dict[str, Any], natural: list[float], time: float, has_moved: bool) -> dict[str, Any]:
+    def _placed(self, peak: Peak, natural: list[float], time: float, has_moved: bool) -> dict[str, Any]:
         """Return a peak with the number of its mode, its deviation from the model, and its drift since the first look.
 
         None of these is given if the boom has moved, because its frequencies do not belong to one posture.
         """
-        mode = None if has_moved else _mode(peak["frequency"], natural)
-        if mode is None:
-            return {**peak, "mode": None, "deviation": None, "drift": None}
-        ratio = peak["frequency"] / natural[mode - 1]
+        told: dict[str, Any] = {**asdict(peak), "mode": None, "deviation": None, "drift": None}
+        mode = int(np.argmin(np.abs(np.array(natural) - peak.frequency))) + 1 if natural and not has_moved else 0
+        if not mode or abs(natural[mode - 1] - peak.frequency) > MODE_DISTANCE * natural[mode - 1]:
+            return told
+        ratio = peak.frequency / natural[mode - 1]
         if mode not in self._firsts or time < self._firsts[mode][0]:
             self._firsts[mode] = time, ratio
-        return {**peak, "mode": mode, "deviation": ratio - 1.0, "drift": ratio / self._firsts[mode][1] - 1.0}
+        return told | {"mode": mode, "deviation": ratio - 1.0, "drift": ratio / self._firsts[mode][1] - 1.0}
 
     def _natural(self, strokes: list[float]) -> list[float]:
         scene = self._feed.scene()
@@ -169,9 +159,3 @@ def response_messages(found: TipResponses) -> tuple[dict[str, Any], bytes]:
     """Return text message ``loads`` and binary block of a response; the block is empty if there is no response."""
     text = {"kind": "loads", "names": found.loads, "trouble": found.trouble}
     return text, pack(RESPONSE, 0, found.frequencies, found.accelerations.astype("f4")) if found.loads else b""
-
-
-def _mode(frequency: float, natural: list[float]) -> int | None:
-    """Return the number, from 1, of the nearest natural frequency, if it is near."""
-    number = min(range(len(natural)), key=lambda i: abs(natural[i] - frequency), default=None)
-    return None if number is None or abs(natural[number] - frequency) > MATCH * natural[number] else number + 1

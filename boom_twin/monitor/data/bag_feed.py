@@ -32,8 +32,8 @@ from ...types import NANO, Stream
 from .feed import Feed
 from .store import Store
 
-LOOK = 1.0
-"""Seconds between looks at the state of the twin, as of the node."""
+LOOK_PERIOD = 1.0
+"""Seconds between two diagnoses of the twin, as of the node."""
 ENOUGH = Output.TIP_ACCELERATION
 """A session with this output is shown as its node published it."""
 TURN = 0.04
@@ -41,19 +41,9 @@ TURN = 0.04
 
 
 class BagFeed(Feed):
-    """Feed of a recorded session, read further at every `poll`.
+    """Feed of a recorded session, read further at every `poll`."""
 
-    Parameters
-    ----------
-    title, store, topics, scene
-        As of a `Feed`.
-    length : float
-        Seconds from its first message to the last.
-    """
-
-    def __init__(self, title: str, store: Store, topics: Topics, scene: Scene, length: float) -> None:
-        super().__init__(title, store, topics, scene, length)
-        self._steps: Generator[None] | None = None
+    _steps: Generator[None] | None = None
 
     def begin(self, steps: Generator[None]) -> None:
         """Start reading; every step of `steps` reads a part of the session."""
@@ -92,24 +82,10 @@ def bag_feed(
     window: TimeWindow = WHOLE,
     namespace: str = "",
 ) -> BagFeed:
-    """Open a session.
+    """Open a recording, or the result bag of a replay.
 
-    Parameters
-    ----------
-    path : Path
-        A recording, or the result bag of a replay.
-    scene : Scene or SessionScene, optional
-        Of the rig; None: the one that the session was made with, else the package's own.
-    settings : Settings
-        For the twin, where the session has no outputs.
-    mapping : Path, optional
-        How topics and sensors are read; as for `boom_twin.offline.replay.replay`.
-    baseline : Path, optional
-        What is known of this rig while all is well; likewise.
-    window : TimeWindow, optional
-        The part that is shown; a twin starts at rest where it begins.
-    namespace : str
-        Likewise.
+    The parameters are those of `boom_twin.offline.replay.replay`; `settings` are for the twin, where the session has no
+    outputs, and the twin starts at rest where the `window` begins.
 
     Raises
     ------
@@ -134,7 +110,7 @@ def bag_feed(
         feed.begin(_take_published(session, feed, topics, counts, window))
     else:
         twin = _Twin(feed, topics, scene, settings, usual)
-        feed.begin(_take_predicted(session, topics, counts, twin, window))
+        feed.begin(_take_predicted(session, feed, topics, counts, twin, window))
     return feed
 
 
@@ -162,7 +138,7 @@ def _take_published(
 
 
 def _take_predicted(
-    session: Session, topics: Topics, counts: dict[str, int], twin: _Twin, window: TimeWindow
+    session: Session, feed: Feed, topics: Topics, counts: dict[str, int], twin: _Twin, window: TimeWindow
 ) -> Generator[None]:
     """Run a twin on the recorded inputs and store its predictions, one sample a step."""
     wanted = [name for name in topics.heard if "/" + name.lstrip("/") in counts]
@@ -174,7 +150,7 @@ def _take_predicted(
                 twin.took(step)
             yield
         twin.finish()
-        if not twin.has_predicted:
+        if not feed.store.tables:
             raise BagError(f"{session.path}: no stroke could be used; they need names cylinder_1 .. in m, or a mapping.")
     finally:
         ahead.stop()
@@ -198,11 +174,6 @@ class _Twin:
         self._looked: float | None = None
         self.twin.warm_up()
 
-    @property
-    def has_predicted(self) -> bool:
-        """Return True if the twin has predicted anything yet."""
-        return bool(self._feed.store.tables)
-
     def took(self, step: Step) -> None:
         """Show the results of one sample."""
         sample, report, _ = step
@@ -217,7 +188,7 @@ class _Twin:
         for key, encoded in chain.from_iterable(map(self._encoder.fill, report.all)):
             if key in self._names:
                 self._feed.topic_rows.take_encoded(self._names[key], encoded, self._feed.now())
-        if self._time - self._looked >= LOOK or self._watch.is_urgent():
+        if self._time - self._looked >= LOOK_PERIOD or self._watch.is_urgent():
             self._look()
 
     def finish(self) -> None:
@@ -231,7 +202,7 @@ class _Twin:
     def _look(self) -> None:
         found = all_pieces(self._watch.look(self.twin.counts, True, self._peers, (), self._time))
         store, now = self._feed.store, self._feed.now()
-        store.set_statuses(now, store.statuses(now).told(now, map(_as_message, found), self._time))
+        store.set_statuses(now, store.statuses(now).updated(now, map(_as_message, found), self._time))
         self._looked = self._time
 
 

@@ -27,22 +27,16 @@ class Feed:
         What is shown, in words.
     store : Store
     topics : Topics
-        Their names, and how sensors are read.
     scene : Scene, optional
         By default the package's own, if the node says that it uses that. No file is opened that a message names.
     end : float, optional
         Length of a recorded session, s; None if it is live.
-
-    Attributes
-    ----------
-    trouble : str
-        Why there is not more to be had; empty as long as all is well.
     """
 
     def __init__(self, title: str, store: Store, topics: Topics, scene: Scene | None = None, end: float | None = None) -> None:
         self.title, self.store, self.end = title, store, end
         self.topic_rows = TopicRows(store, topics)
-        self.trouble = ""
+        self.trouble = ""  # why there is not more to be had
         self._scene, self._reads = scene, topics.stroke_reading
         self._plan: Plan | None = None
 
@@ -97,25 +91,12 @@ SLOWEST, FASTEST = 0.1, 10.0
 
 
 class Playback:
-    """Position in a recorded session. Unless held, it advances at a speed up to what has been read of the session.
-
-    Parameters
-    ----------
-    feed : Feed
-        Of a recorded session.
-
-    Attributes
-    ----------
-    position : float
-        s.
-    speed : float
-        Session time over real time.
-    is_held : bool
-    """
+    """Position (s) in a recorded session. Unless held, it advances at a speed up to what has been read of the session."""
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
-        self.position, self.speed, self.is_held = 0.0, 1.0, False
+        self.position, self.is_held = 0.0, False
+        self.speed = 1.0  # session time over real time
 
     def advance(self, span: float) -> float:
         """Advance by `span` (s) of real time and return the position; hold at the end."""
@@ -132,6 +113,12 @@ class Playback:
     def pace(self, speed: float) -> None:
         """Set the speed, limited to the permitted range."""
         self.speed = min(max(speed, SLOWEST), FASTEST)
+
+    def hold(self, is_held: float) -> None:
+        """Hold, or go on; from the end of the session that is from its beginning."""
+        if self.is_at_end and not is_held:
+            self.seek(0.0)
+        self.is_held = bool(is_held)
 
     def seek(self, position: float) -> None:
         """Move to `position` (s), limited to what has been read."""

@@ -18,23 +18,9 @@ def sessions_in(path: Path) -> list[Path]:
 
 
 class SessionList:
-    """Recorded sessions, of which one is open at a time.
+    """Recorded sessions, of which one is open at a time: its `index` among the `names`, and its `feed`.
 
-    Parameters
-    ----------
-    paths : sequence of Path
-        At least one; the first that can be read is opened at once.
-    open_feed : callable
-        Gives the feed of a path.
-
-    Attributes
-    ----------
-    names : list of str
-        What viewers choose from.
-    index : int
-        Of the one that is open.
-    feed : Feed
-        Of that.
+    The first of `paths` that can be read is opened at once; `open_feed` returns the feed of a path.
 
     Raises
     ------

@@ -9,26 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks, hilbert, welch
 
+from ...analysis.even_times import spacing
 from ...types import Array
 
 WINDOW = 40.0
-"""Seconds that are looked at."""
+"""Seconds before the time shown of which the spectrum is."""
 SEGMENT = 8.0
 """Seconds of one segment of Welch's method (Hann window, half overlapping, mean removed)."""
 HIGHEST = 30.0
 """Hz; no peak above it."""
 LOWEST = 0.3
-MOST = 5
+MAX_PEAKS = 5
 PROMINENCE = 6.0
 """dB by which a peak stands out."""
 BAND = 0.3
 """Half width of the band around a peak whose decay gives the damping, as a share of its frequency."""
-FALL = 0.3
-"""Share of its start down to which a decay is looked at."""
-
-
-MOST_POINTS = 40_000
-"""Evenly spaced points that rows are brought to at most: a millisecond apart in a `WINDOW`."""
+DECAY_FLOOR = 0.3
+"""Share of its initial value down to which a decay is evaluated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,18 +61,13 @@ def spectrum(times: Array, values: Array) -> Spectrum | None:
     return Spectrum(frequencies, densities, peaks)
 
 
-def spacing(times: Array) -> float:
-    """Return the usual step (s) of `times` (n,), at least their whole span divided by `MOST_POINTS`."""
-    return max(float(np.median(np.diff(times))), float(times[-1] - times[0]) / MOST_POINTS)
-
-
 def _peaks(frequencies: Array, density: Array, values: Array, rate: float) -> list[Peak]:
     """Return the highest peaks that stand out, their frequencies by a parabola through the decibels."""
     level = 10.0 * np.log10(np.maximum(density, 1e-30))
     found, _ = find_peaks(level, prominence=PROMINENCE)
     found = [i for i in found if LOWEST <= frequencies[i] <= min(HIGHEST, 0.4 * rate)]
     peaks = []
-    for i in sorted(found, key=lambda place: -level[place])[:MOST]:
+    for i in sorted(found, key=lambda place: -level[place])[:MAX_PEAKS]:
         below, top, above = level[i - 1 : i + 2]
         bend = below - 2.0 * top + above
         offset = 0.5 * (below - above) / bend if bend else 0.0
@@ -88,17 +80,7 @@ def damping(values: Array, rate: float, frequency: float) -> float:
     """Return the damping ratio of the mode at `frequency` (Hz), from the autocorrelation's decay in the band around it.
 
     The autocorrelation of a lightly damped mode under random excitation decays as its free vibration does, as
-    exp(-2 pi zeta f t) (Cole 1973). NaN where it does not decay.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n, c)
-        At `rate` (Hz).
-
-    Returns
-    -------
-    float
-        Damping ratio, 1 is critical; NaN where the vibration does not decay.
+    exp(-2 pi zeta f t) (Cole 1973). NaN where it does not decay. `values` (n, c) are at `rate` (Hz).
     """
     count = len(values)
     power = np.square(np.abs(np.fft.rfft(values - values.mean(axis=0), 2 * count, axis=0))).sum(axis=1)
@@ -110,7 +92,7 @@ def damping(values: Array, rate: float, frequency: float) -> float:
     if not envelope[start] > 0.0:
         return nan
     stop = min(start + round(12.0 * rate / frequency), count // 2)
-    low = np.flatnonzero(envelope[start:stop] < FALL * envelope[start])
+    low = np.flatnonzero(envelope[start:stop] < DECAY_FLOOR * envelope[start])
     stop = start + int(low[0]) if len(low) else stop
     if stop - start < rate / frequency:
         return nan
@@ -123,26 +105,16 @@ STEP = 2.0
 """Seconds of session time from one column to the next; columns end at its multiples."""
 FREQUENCIES = np.arange(0.0, 20.0 + 0.5 / SEGMENT, 1.0 / SEGMENT)
 """Hz, of every column."""
-FULL = 0.9
+COVERAGE = 0.9
 """Share of a segment that its rows must span."""
 
 
 def spectrogram(times: Array, values: Array, ends: Array) -> NDArray[np.float32]:
     """Return one-sided densities, (m/s^2)^2/Hz, of the segments before `ends`.
 
-    Each is a periodogram with Hann's window, both directions added; Welch's method averages such.
-
-    Parameters
-    ----------
-    times, values : ndarray, shapes (n,) and (n, c)
-        s, m/s^2.
-    ends : ndarray, shape (k,)
-        s.
-
-    Returns
-    -------
-    ndarray, shape (k, len(FREQUENCIES))
-        NaN where rows are missing, and above half the rate.
+    Each is a periodogram with Hann's window, both directions added; Welch's method averages such. `values` (n, c) in m/s^2 are
+    at `times` (n,) in s, `ends` (k,) are in s. A row has the densities at `FREQUENCIES`; NaN where rows are missing, and above
+    half the rate.
     """
     found = np.full((len(ends), len(FREQUENCIES)), np.nan, dtype=np.float32)
     finite = np.isfinite(values).all(axis=1)
@@ -150,7 +122,7 @@ def spectrogram(times: Array, values: Array, ends: Array) -> NDArray[np.float32]
     places = np.searchsorted(times, np.stack([ends - SEGMENT, ends]), side="right")
     for column, (first, stop) in enumerate(places.T):
         segment = times[first:stop]
-        if len(segment) > 32 and segment[-1] - segment[0] > FULL * SEGMENT:
+        if len(segment) > 32 and segment[-1] - segment[0] > COVERAGE * SEGMENT:
             density = _periodogram(segment, values[first:stop])[: len(FREQUENCIES)]
             found[column, : len(density)] = density
     return found

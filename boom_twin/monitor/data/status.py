@@ -10,12 +10,12 @@ from typing import Any
 
 from ...diagnostics.recorder_status import ENDED
 from ...types import Alarm
-from .message_checks import text
+from .received_messages import text
 
 SILENCE = 3.0
 """Seconds without a word from a node after which its lamps are stale."""
-MOST_NODES, FORGOTTEN = 200, 60.0
-"""Where more nodes than so many have told something, those that have been silent for so many seconds are forgotten."""
+MAX_NODES, FORGET_AFTER = 200, 60.0
+"""Number of nodes above which those that have been silent for so many seconds are deleted."""
 GROUPS = ("sensors", "model", "residuals", "timing", "recorder")
 HEALTH = "health"
 """The status that stands for all alarms of the rig's health."""
@@ -38,30 +38,17 @@ LEVELS = (Severity.OK, Severity.WARN, Severity.ERROR, Severity.STALE)
 
 @dataclass(frozen=True, slots=True)
 class StatusLamp:
-    """One status of a node.
-
-    Attributes
-    ----------
-    name, group, reason : str
-    level : Severity
-    quantity : str
-        What was judged, its unit at the end; empty if nothing was.
-    value, limit : float
-    age : float
-        Seconds that the level had lasted when it was told; NaN if not known.
-    is_last : bool
-        Whether its node said that no further one comes.
-    """
+    """One status of a node."""
 
     name: str
     group: str
     level: Severity
     reason: str
-    quantity: str = ""
+    quantity: str = ""  # that was judged, its unit at the end
     value: float = nan
     limit: float = nan
-    age: float = nan
-    is_last: bool = False
+    age: float = nan  # seconds that the level had lasted when it was reported
+    is_last: bool = False  # its node said that no further one comes
 
 
 @dataclass(frozen=True)
@@ -70,24 +57,15 @@ class StatusTable:
 
     nodes: Mapping[str, tuple[float, tuple[StatusLamp, ...]]] = field(default_factory=dict)
 
-    def told(self, now: float, statuses: Iterable[Any], clock: float) -> StatusTable:
-        """Return the table after one DiagnosticArray of one or more nodes.
-
-        Parameters
-        ----------
-        now : float
-            Time of its arrival, s, as given to `groups` later.
-        statuses : iterable of diagnostic_msgs/DiagnosticStatus
-        clock : float
-            Its stamp, s.
-        """
+    def updated(self, now: float, statuses: Iterable[Any], clock: float) -> StatusTable:
+        """Return the table after a DiagnosticArray with these `statuses` and the stamp `clock` (s), which came at `now` (s)."""
         found: dict[str, list[StatusLamp]] = {}
         for status in statuses:
             node, _, name = text(status.name).partition(": ")
             found.setdefault(node, []).append(_lamp(name or node, status, clock))
         nodes = {**self.nodes, **{node: (now, tuple(lamps)) for node, lamps in found.items()}}
-        if len(nodes) > MOST_NODES:
-            nodes = {node: told for node, told in nodes.items() if now - told[0] <= FORGOTTEN}
+        if len(nodes) > MAX_NODES:
+            nodes = {node: told for node, told in nodes.items() if now - told[0] <= FORGET_AFTER}
         return StatusTable(nodes)
 
     def groups(self, now: float) -> dict[str, list[StatusLamp]]:
@@ -159,7 +137,7 @@ def _number(text: str) -> float:
         return nan
 
 
-MOST = 500
+MAX_ALARMS = 500
 """Alarms that are kept."""
 
 
@@ -167,45 +145,25 @@ MOST = 500
 class ListedAlarm:
     """Alarm in the list: a lamp that was not well, or an alarm of the health monitor.
 
-    Attributes
-    ----------
-    number : int
-        By which it is acknowledged.
-    name, reason : str
-        The reason is that of the worst level; the judge's are as it told them last.
-    level : Severity
-        The worst; of the judge ERROR where the cause is named, else WARN.
-    begin : float
-        Session time, s.
-    end : float or None
-        None while it lasts.
-    is_acknowledged : bool
-    causes : tuple of (str, float)
-        Of the judge only: what may explain it, with a probability beside the others, the most probable first; NaN where the
-        sensor itself gives it away.
+    Only the health monitor's have `causes`, the most probable first, each with its probability (NaN where the sensor itself
+    gives it away).
     """
 
-    number: int
+    number: int  # by which it is acknowledged
     name: str
-    level: Severity
-    reason: str
-    begin: float
-    end: float | None = None
+    level: Severity  # the worst; of the health monitor ERROR where the cause is named, else WARN
+    reason: str  # of the worst level; of the health monitor the newest
+    begin: float  # s, session time
+    end: float | None = None  # None while it lasts
     is_acknowledged: bool = False
     causes: tuple[tuple[str, float], ...] = ()
 
 
 class AlarmList:
-    """List of alarms, which begin and end as the lamps leave and reach the level OK.
-
-    Attributes
-    ----------
-    all : list of ListedAlarm
-        The newest `MOST` of them, by their begin.
-    """
+    """List of alarms, which begin and end as the lamps leave and reach the level OK."""
 
     def __init__(self) -> None:
-        self.all: list[ListedAlarm] = []
+        self.all: list[ListedAlarm] = []  # the newest `MAX_ALARMS`, by their begin
         self._open: dict[str, ListedAlarm] = {}
         self._judged: dict[tuple[str, int], ListedAlarm] = {}
         self._number = 0
@@ -217,8 +175,11 @@ class AlarmList:
         for key in [key for key in self._open if key not in lamps or lamps[key].level <= Severity.OK]:
             self._open.pop(key).end = time
         for key, lamp in lamps.items():
-            if lamp.level > Severity.OK:
-                self._raise(key, lamp.name, lamp.level, lamp.reason, time)
+            alarm = self._open.get(key)
+            if alarm is None and lamp.level > Severity.OK:
+                self._open[key] = self.add(lamp.name, lamp.level, lamp.reason, time)
+            elif alarm is not None and lamp.level > alarm.level:
+                alarm.level, alarm.reason, alarm.is_acknowledged = lamp.level, lamp.reason, False
 
     def judge(self, now: float, told: Sequence[Alarm], time: Callable[[int], float]) -> None:
         """Update the alarms of the rig's health to those reported at `now` (s): active ones and those that have just ended.
@@ -247,7 +208,7 @@ class AlarmList:
         """Add an alarm, with its end (s) if it is over, such as a gap."""
         self._number += 1
         alarm = ListedAlarm(self._number, name, level, reason, begin, end)
-        self.all = [*self.all[-MOST + 1 :], alarm]
+        self.all = [*self.all[-MAX_ALARMS + 1 :], alarm]
         return alarm
 
     def acknowledge(self, number: int) -> ListedAlarm | None:
@@ -261,13 +222,6 @@ class AlarmList:
         """Acknowledge all ended health alarms, because the node has released them."""
         for alarm in self.all:
             alarm.is_acknowledged |= bool(alarm.causes) and alarm.end is not None
-
-    def _raise(self, key: str, name: str, level: Severity, reason: str, time: float) -> None:
-        alarm = self._open.get(key)
-        if alarm is None:
-            self._open[key] = self.add(name, level, reason, time)
-        elif level > alarm.level:
-            alarm.level, alarm.reason, alarm.is_acknowledged = level, reason, False
 
 
 def _renew(alarm: ListedAlarm, found: Alarm, time: Callable[[int], float]) -> None:

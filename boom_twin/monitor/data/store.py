@@ -10,37 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...types import NANO
-from .dropped_messages import MalformedError
-from .status import AlarmList, StatusTable
+from .received_messages import MalformedError
+from .status import AlarmList, Severity, StatusTable
 
-FIRST = 1024
+FIRST_ROOM = 1024
 """Rows that there is room for at first."""
 Rows = tuple[NDArray[np.float64], NDArray[np.float32]]
 
 
 class Table:
-    """Named columns and a time for every row; the oldest rows make room for new ones.
+    """Named columns (``x_m``) and a time for every row; of more than `capacity` rows the oldest make room for new ones.
 
     Memory is taken as rows come.
-
-    Parameters
-    ----------
-    name : str
-    columns : sequence of str
-        Their unit at the end: ``x_m``.
-    capacity : int
-        Rows that are kept.
-
-    Attributes
-    ----------
-    count : int
-        Rows that ever came; they are numbered from 0 on.
     """
 
     def __init__(self, name: str, columns: Sequence[str], capacity: int) -> None:
-        self.name, self.columns, self.count = name, tuple(columns), 0
-        self._capacity = capacity
-        self._times = np.zeros(min(capacity, FIRST))
+        self.name, self.columns, self._capacity = name, tuple(columns), capacity
+        self.count = 0  # rows that ever came; they are numbered from 0 on
+        self._times = np.zeros(min(capacity, FIRST_ROOM))
         self._values = np.zeros((len(self._times), len(columns)), dtype=np.float32)
 
     @property
@@ -77,58 +64,81 @@ class Table:
         return self._times[places], self._values[places]
 
 
-MOST_STATUSES = 100_000
+MAX_STATUSES = 100_000
 """Earlier states of the lamps that are kept: a day of them."""
+SET_BACK = 1_000_000_000
+"""A stamp earlier by more than this (ns) may be that of a clock that was set back; by less it is out of order."""
+LEAP_AHEAD = 60_000_000_000
+"""A stamp later by more than this (ns) may be an outlier; no table has its rows so far apart."""
+EVERY_STROKE, GAP = "displacement", 0.1
+"""Table with a row for every stroke sample; a longer pause (s) between its rows raises an alarm."""
 
 
 class Store:
-    """Data of a feed: tables, states of the lamps, and alarms.
-
-    Parameters
-    ----------
-    capacity : int
-        Rows kept of every table.
-    keeps_statuses : bool
-        Whether earlier states of the lamps are kept, as a replay needs them.
-
-    Attributes
-    ----------
-    epoch : int
-        Stamp (ns) that times count from: the first one.
-    generation : int
-        Raised when all is forgotten because time was set back.
-    tables : dict of str to Table
-        In order of their first row.
-    alarms : AlarmList
-    """
+    """Data of a feed: tables of at most `capacity` rows, states of the lamps (earlier ones too, for a recording), alarms."""
 
     def __init__(self, capacity: int, keeps_statuses: bool = False) -> None:
         self._capacity, self._keeps_statuses = capacity, keeps_statuses
-        self.generation, self.epoch = 0, 0
-        self.tables: dict[str, Table] = {}
+        self.generation = 0  # raised when all is deleted because time was set back
+        self.epoch = 0  # stamp (ns) that times count from: the first one
+        self.tables: dict[str, Table] = {}  # in the order of their first row
         self.alarms = AlarmList()
         self._statuses: list[tuple[float, StatusTable]] = []
+        self._last: dict[str, int] = {}  # stamp (ns) of the newest row of every table
+        self._held: dict[str, tuple[int, Sequence[float]]] = {}
 
     def clear(self) -> None:
         """Delete all rows and the epoch; keep the lamps."""
         self.generation += 1
         self.epoch = 0
-        self.tables = {}
+        self.tables, self._last, self._held = {}, {}, {}
 
     def time(self, stamp: int) -> float:
         """Return the seconds since the epoch, which the first stamp (ns) sets."""
         self.epoch = self.epoch or stamp
         return (stamp - self.epoch) * NANO
 
+    def receive(self, name: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
+        """Add a row to a table whatever its stamp is.
+
+        A row whose stamp leaps is held back until the next one of its table. If that goes on from it, time has leapt and both
+        are added; else it was an outlier. Time that was set back deletes all rows before.
+
+        Raises
+        ------
+        MalformedError
+            Its stamp is not after that of the row before, it has other columns, or the row held back was an outlier.
+        """
+        self._check(name, columns)
+        last, held = self._last.get(name, stamp - 1), self._held.get(name)
+        is_leap = not -SET_BACK <= stamp - last <= LEAP_AHEAD
+        if not is_leap and stamp <= last:
+            raise MalformedError(f"its stamp is not after the last one but {(last - stamp) * NANO:.9g} s before it")
+        self._held.pop(name, None)
+        if is_leap and held is not None and 0 < stamp - held[0] <= LEAP_AHEAD:
+            if stamp < last:
+                self.clear()
+            self.append(name, columns, *held)
+            held = None
+        elif is_leap:
+            self._held[name] = stamp, values
+        if name not in self._held:
+            self.append(name, columns, stamp, values)
+            self._last[name] = stamp
+        if held is not None:
+            raise MalformedError(f"its stamp leaps by {(held[0] - last) * NANO:.9g} s, and the next one's does not")
+
     def append(self, name: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
         """Add a row to a table; the first row creates the table."""
-        self.check(name, columns)
-        table = self.tables.get(name)
-        if table is None:
-            table = self.tables[name] = Table(name, columns, self._capacity)
-        table.append(self.time(stamp), values)
+        self._check(name, columns)
+        if name not in self.tables:
+            self.tables[name] = Table(name, columns, self._capacity)
+        table, time = self.tables[name], self.time(stamp)
+        if name == EVERY_STROKE and table.count and time - table.newest > GAP:
+            self.alarms.add("cylinder_strokes", Severity.WARN, f"gap of {time - table.newest:.2f} s", table.newest, time)
+        table.append(time, values)
 
-    def check(self, name: str, columns: Sequence[str]) -> None:
+    def _check(self, name: str, columns: Sequence[str]) -> None:
         """Raise MalformedError if a table has other columns than these."""
         table = self.tables.get(name)
         if table is not None and table.columns != tuple(columns):
@@ -144,8 +154,8 @@ class Store:
         if not self._keeps_statuses:
             self._statuses.clear()
         self._statuses.append((time, statuses))
-        if len(self._statuses) > MOST_STATUSES:
-            del self._statuses[: MOST_STATUSES // 2]
+        if len(self._statuses) > MAX_STATUSES:
+            del self._statuses[: MAX_STATUSES // 2]
         self.alarms.follow(self.newest, statuses)
 
     def statuses(self, time: float) -> StatusTable:

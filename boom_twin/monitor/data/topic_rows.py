@@ -5,8 +5,7 @@ Nothing is known of who sent a message. Here, and nowhere after it, one that can
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 from math import sqrt
 from operator import attrgetter
@@ -18,36 +17,56 @@ from ...messages.sample_decoder import SampleDecoder, stamp_of
 from ...messages.topic_table import Output, Topics
 from ...messages.type_store import decode
 from ...types import NANO, SENSORS, Sample, Stream, stream_of
-from . import message_checks as checks
-from .dropped_messages import DroppedMessages, MalformedError
-from .row_order import RowOrder, TableRow
-from .status import MOST_NODES, Severity
+from .received_messages import (
+    DroppedMessages,
+    MalformedError,
+    check_arrays,
+    check_count,
+    check_instant,
+    check_numbers,
+    check_residuals,
+    check_stamp,
+    text,
+)
+from .status import MAX_NODES, Severity
 from .store import Store
 
-Taker = Callable[[Any, float], None]
-
-LONGEST = 1_000_000
+MAX_BYTES = 1_000_000
 """Bytes of an encoded message; a longer one is not decoded."""
-MOST_STATUSES, MOST_CAUSES, MOST_MARKERS = 500, 100, 500
+MAX_STATUSES, MAX_CAUSES, MAX_MARKERS = 500, 100, 500
 """Statuses or alarms of one message, causes of one alarm, markers of one shape."""
-WAITING = 1000
-"""Measured samples, and residuals, that may wait for each other."""
-GAP = 0.1
-"""A longer pause between strokes (s) is told as an alarm."""
+MAX_COLUMNS = 1000
+"""Numbers of one row; a boom of nine sections has some two hundred."""
+MAX_WAITING = 1000
+"""Stamps of which parts may wait for the others."""
 COMPARED = Stream.IMU
 """The stream whose readings are shown beside the predicted ones; of all others the residuals are."""
 RESIDUALS = {stream: "joints" if stream is Stream.ANGLES else stream.value for stream in Stream if stream is not COMPARED}
 """Names of the tables of residuals."""
 NO_MEASUREMENT = "no measurement"
 """Oddity of `SampleDecoder` that is no fault here: an Imu states that it has no measurement."""
-PLANE = ("x_m", "z_m")
-VECTORS: dict[Output, tuple[str, tuple[str, str], Callable[[Any], Any]]] = {
-    Output.TIP_DISPLACEMENT: ("displacement", PLANE, attrgetter("vector")),
-    Output.TIP_POSITION: ("position", PLANE, attrgetter("point")),
-    Output.TIP_ACCELERATION: ("acceleration", ("x_m_s2", "z_m_s2"), attrgetter("accel.linear")),
-    Output.TIP_UNCERTAINTY: ("uncertainty", PLANE, attrgetter("vector")),
+VECTORS: dict[Output, Callable[[Any], Any]] = {
+    Output.TIP_DISPLACEMENT: attrgetter("vector"),
+    Output.TIP_POSITION: attrgetter("point"),
+    Output.TIP_ACCELERATION: attrgetter("accel.linear"),
+    Output.TIP_UNCERTAINTY: attrgetter("vector"),
+    Output.ESTIMATE_POSE: attrgetter("pose.pose.position"),
+    Output.ESTIMATE_ACCELERATION: attrgetter("accel.accel.linear"),
+    Output.ESTIMATE_LOAD: attrgetter("wrench.force"),
 }
-"""Outputs that are a vector in the plane of the boom: table, its columns, and where the vector is in a message."""
+"""Outputs that are a vector in the plane of the boom, and where it is in a message."""
+COVARIANCES = {
+    Output.ESTIMATE_POSE: attrgetter("pose.covariance"),
+    Output.ESTIMATE_ACCELERATION: attrgetter("accel.covariance"),
+}
+PLANE = ("x_m", "z_m")
+TABLES = {
+    Output.TIP_DISPLACEMENT: ("displacement", PLANE),
+    Output.TIP_POSITION: ("position", PLANE),
+    Output.TIP_ACCELERATION: ("acceleration", ("x_m_s2", "z_m_s2")),
+    Output.TIP_UNCERTAINTY: ("uncertainty", PLANE),
+}
+"""Tables of such outputs, with their columns."""
 ESTIMATE = "estimate"
 ESTIMATE_COLUMNS = (
     "x_m", "z_m", "sigma_x_m", "sigma_z_m", "x_m_s2", "z_m_s2", "sigma_x_m_s2", "sigma_z_m_s2", "load_x_N", "load_z_N",
@@ -57,6 +76,34 @@ JOINED = (
     Output.TIP_DISPLACEMENT, Output.TIP_POSITION, Output.ESTIMATE_POSE, Output.ESTIMATE_ACCELERATION, Output.ESTIMATE_LOAD,
 )  # fmt: skip
 """Outputs of which a row of estimates is made, those of one stamp together."""
+FORCE_COLUMNS = tuple(f"{kind}_{axis}_m_s2" for kind in ("measured", "predicted", "sigma") for axis in "xz")
+
+
+class PartsOfRows:
+    """Parts of rows that wait for the others of their stamp; the oldest are dropped when more than `MAX_WAITING` wait."""
+
+    def __init__(self, names: Sequence[Hashable]) -> None:
+        self._names = names
+        self._waiting: dict[int, dict[Hashable, Sequence[float]]] = {}
+
+    def put(self, name: Hashable, stamp: int, values: Sequence[float]) -> list[Sequence[float]] | None:
+        """Return all parts of the row at `stamp` (ns), in their order, if this is the last of them."""
+        if len(self._waiting) > MAX_WAITING:
+            del self._waiting[next(iter(self._waiting))]
+        parts = self._waiting.setdefault(stamp, {})
+        parts[name] = values
+        if len(parts) < len(self._names):
+            return None
+        del self._waiting[stamp]
+        return [parts[each] for each in self._names]
+
+    def clear(self) -> None:
+        """Drop all that wait."""
+        self._waiting.clear()
+
+    def __len__(self) -> int:
+        """Return the number of stamps that wait."""
+        return len(self._waiting)
 
 
 class TopicRows:
@@ -76,23 +123,16 @@ class TopicRows:
     ``shape``          x, z of the deflected line and of the undeflected one, four of every cylinder's pins, forces, strokes
     =================  ==================================================================================================
 
-    Attributes
-    ----------
-    names : frozenset of str
-        Absolute names of the topics that it takes.
-    dropped : DroppedMessages
-        What could not be used.
+    It takes the topics of the absolute `names`.
     """
 
     def __init__(self, store: Store, topics: Topics) -> None:
-        self._store, self._decoder, self._order = store, SampleDecoder(1, topics), RowOrder()
+        self._store, self._decoder = store, SampleDecoder(1, topics)
         self.dropped = DroppedMessages()
-        self._measured: OrderedDict[int, tuple[float, float]] = OrderedDict()
-        self._residuals: OrderedDict[int, tuple[list[float], list[float]]] = OrderedDict()
-        self._estimates: OrderedDict[int, dict[Output, list[float]]] = OrderedDict()
+        self._forces_felt, self._estimates = PartsOfRows((COMPARED, Output.RESIDUALS)), PartsOfRows(JOINED)
         self._forces: list[float] = []
         self._strokes: list[float] = []
-        self._scene = ""
+        self._scene, self._now = "", 0.0
         taken = [(topics.outputs[role], take) for role, take in self._by_role().items()]
         taken += [(topics.inputs[COMPARED], self._take_measured), (topics.events, self._take_event)]
         self._takers = {topic.absolute: take for topic, take in taken}
@@ -104,12 +144,9 @@ class TopicRows:
         """Name of the node's scene: a path, or the name of the package's own; empty until it is known."""
         return self._scene
 
-    def _by_role(self) -> dict[Output, Taker]:
+    def _by_role(self) -> dict[Output, Callable[[Any], None]]:
         return {
             **{role: partial(self._take_vector, role) for role in VECTORS},
-            Output.ESTIMATE_POSE: self._take_pose,
-            Output.ESTIMATE_ACCELERATION: self._take_acceleration_estimate,
-            Output.ESTIMATE_LOAD: self._take_load,
             Output.JOINT_STATES: self._take_cylinders,
             Output.RESIDUALS: self._take_residuals,
             Output.SHAPE: self._take_shape,
@@ -119,44 +156,30 @@ class TopicRows:
 
     def take(self, topic: str, message: Any, now: float) -> None:
         """Take a message of a topic (absolute name) that came at `now` (s, as lamps count); a malformed one is dropped."""
+        self._now = now
         with self.dropped.guard(topic):
-            self._takers[topic](message, now)
+            self._takers[topic](message)
 
     def take_encoded(self, topic: str, data: bytes, now: float) -> None:
         """Take a CDR-encoded message of a topic, as `take` does."""
+        self._now = now
         with self.dropped.guard(topic):
-            checks.count("bytes", len(data), LONGEST)
-            self._takers[topic](decode(data, self._types[topic]), now)
+            check_count("bytes", len(data), MAX_BYTES)
+            self._takers[topic](decode(data, self._types[topic]))
 
     def measure(self, sample: Sample) -> None:
         """Put the measured specific force beside its residual, whichever comes first; other samples are passed over."""
         if sample.stream is COMPARED:
-            self._measured[sample.stamp] = (float(sample.values[0]), float(sample.values[1]))
-            self._join(sample.stamp)
+            self._join_force(COMPARED, sample.stamp, sample.values.tolist())
 
     def _append(self, table: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
-        """Add a row, and the row that waited for its confirmation; start again if time was set back."""
-        self._store.check(table, columns)
-        step = self._order.put(table, TableRow(stamp, columns, values))
-        if step.is_set_back:
-            self._store.clear()
-            self._measured.clear()
-            self._residuals.clear()
+        generation = self._store.generation
+        self._store.receive(table, columns, stamp, values)
+        if self._store.generation != generation:  # time was set back
+            self._forces_felt.clear()
             self._estimates.clear()
-        for row in step.rows:
-            if table == "displacement":
-                self._tell_gap(row.stamp)
-            self._store.append(table, row.columns, row.stamp, row.values)
-        if step.stray:
-            raise MalformedError(step.stray)
 
-    def _tell_gap(self, stamp: int) -> None:
-        store, known = self._store, self._store.tables.get("displacement")
-        time = store.time(stamp)
-        if known is not None and time - known.newest > GAP:
-            store.alarms.add("cylinder_strokes", Severity.WARN, f"gap of {time - known.newest:.2f} s", known.newest, time)
-
-    def _take_measured(self, msg: Any, now: float) -> None:
+    def _take_measured(self, msg: Any) -> None:
         before = self._decoder.oddities.copy()
         sample = self._decoder.put(COMPARED, stamp_of(msg), msg)
         odd = self._decoder.oddities - before
@@ -165,74 +188,53 @@ class TopicRows:
         elif NO_MEASUREMENT not in odd:
             raise MalformedError(", ".join(odd))
 
-    def _take_vector(self, role: Output, msg: Any, now: float) -> None:
-        table, columns, vector_of = VECTORS[role]
-        vector, stamp = vector_of(msg), checks.stamp(msg)
-        values = checks.numbers((vector.x, vector.z))
-        self._append(table, columns, stamp, values)
+    def _take_vector(self, role: Output, msg: Any) -> None:
+        vector, stamp = VECTORS[role](msg), check_stamp(msg)
+        values = check_numbers((vector.x, vector.z))
+        if role in COVARIANCES:
+            values += _deviations(COVARIANCES[role](msg))
+        if role in TABLES:
+            self._append(*TABLES[role], stamp, values)
         if role in JOINED:
             self._join_estimate(role, stamp, values)
 
-    def _take_pose(self, msg: Any, now: float) -> None:
-        place, covariance = msg.pose.pose.position, msg.pose.covariance
-        self._join_estimate(Output.ESTIMATE_POSE, checks.stamp(msg), _with_deviations(place, covariance))
-
-    def _take_acceleration_estimate(self, msg: Any, now: float) -> None:
-        values = _with_deviations(msg.accel.accel.linear, msg.accel.covariance)
-        self._join_estimate(Output.ESTIMATE_ACCELERATION, checks.stamp(msg), values)
-
-    def _take_load(self, msg: Any, now: float) -> None:
-        force = msg.wrench.force
-        self._join_estimate(Output.ESTIMATE_LOAD, checks.stamp(msg), checks.numbers((force.x, force.z)))
-
     def _join_estimate(self, role: Output, stamp: int, values: list[float]) -> None:
-        """Add the row of an estimate as soon as all its parts are there; drop parts that have waited long."""
-        if len(self._estimates) > WAITING:
-            self._estimates.popitem(last=False)
-        parts = self._estimates.setdefault(stamp, {})
-        parts[role] = values
-        if len(parts) < len(JOINED):
+        """Add the row of an estimate as soon as all its parts are there."""
+        if (parts := self._estimates.put(role, stamp, values)) is None:
             return
-        displacement, position, pose, acceleration, load = (self._estimates[stamp][each] for each in JOINED)
-        del self._estimates[stamp]
+        displacement, position, pose, acceleration, load = parts
         if any(load):  # exactly zero before anything is measured
             shown = [d + e - p for d, e, p in zip(displacement, pose, position, strict=False)]
             self._append(ESTIMATE, ESTIMATE_COLUMNS, stamp, [*shown, *pose[2:], *acceleration, *load])
 
-    def _take_event(self, msg: Any, now: float) -> None:
-        time = self._store.time(checks.stamp(SimpleNamespace(header=msg)))
-        self._store.alarms.add("event", Severity.OK, checks.text(msg.msg), time, time)
+    def _take_event(self, msg: Any) -> None:
+        time = self._store.time(check_stamp(SimpleNamespace(header=msg)))
+        self._store.alarms.add("event", Severity.OK, text(msg.msg), time, time)
 
-    def _take_cylinders(self, msg: Any, now: float) -> None:
-        checks.named(msg, "position", "effort")
+    def _take_cylinders(self, msg: Any) -> None:
+        check_arrays(msg, "position", "effort")
         places = [place for place, name in enumerate(msg.name) if stream_of(name) is Stream.STROKES]
-        strokes = checks.numbers([msg.position[place] for place in places])
-        self._strokes, self._forces = strokes, checks.numbers([msg.effort[place] for place in places])
+        strokes = check_numbers([msg.position[place] for place in places])
+        self._strokes, self._forces = strokes, check_numbers([msg.effort[place] for place in places])
 
-    def _take_residuals(self, msg: Any, now: float) -> None:
-        checks.named(msg, "position", "velocity", "effort")
-        stamp, stream = checks.stamp(msg), checks.stream_of_residuals(msg.name)
-        values, ratios, sigmas = (checks.numbers(each, may_lack=True) for each in (msg.position, msg.velocity, msg.effort))
+    def _take_residuals(self, msg: Any) -> None:
+        check_arrays(msg, "position", "velocity", "effort")
+        stamp, stream = check_stamp(msg), check_residuals(msg.name)
+        values, ratios, sigmas = (check_numbers(each, may_lack=True) for each in (msg.position, msg.velocity, msg.effort))
         if stream is COMPARED:
-            self._residuals[stamp] = (values, sigmas)
-            self._join(stamp)
+            self._join_force(Output.RESIDUALS, stamp, values + sigmas)
         else:
             ends = (SENSORS[stream].unit_suffix, "normalised")
             self._append(RESIDUALS[stream], [f"{name}_{end}" for end in ends for name in msg.name], stamp, values + ratios)
 
-    def _join(self, stamp: int) -> None:
-        """Add the row of a measurement and its residual as soon as both are there; drop parts that have waited long."""
-        for waiting in (self._measured, self._residuals):
-            if len(waiting) > WAITING:
-                waiting.popitem(last=False)
-        if stamp in self._measured and stamp in self._residuals:
-            measured, (values, sigmas) = self._measured.pop(stamp), self._residuals.pop(stamp)
-            predicted = [m - v for m, v in zip(measured, values, strict=True)]
-            columns = [f"{kind}_{axis}_m_s2" for kind in ("measured", "predicted", "sigma") for axis in "xz"]
-            self._append("force", columns, stamp, [*measured, *predicted, *sigmas])
+    def _join_force(self, part: Hashable, stamp: int, values: list[float]) -> None:
+        """Add the row of a measurement and its residual as soon as both are there."""
+        if (parts := self._forces_felt.put(part, stamp, values)) is not None:
+            (x, z), (left_x, left_z, *sigmas) = parts
+            self._append("force", FORCE_COLUMNS, stamp, [x, z, x - left_x, z - left_z, *sigmas])
 
-    def _take_shape(self, msg: Any, now: float) -> None:
-        checks.count("markers", len(msg.markers), MOST_MARKERS)
+    def _take_shape(self, msg: Any) -> None:
+        check_count("markers", len(msg.markers), MAX_MARKERS)
         lines = {(marker.ns, marker.id): marker.points for marker in msg.markers}
         boom, straight = lines.get(("boom", 0)), lines.get(("boom_undeflected", 0))
         pins = [point for (kind, _), ends in lines.items() if kind == "cylinders" for point in ends]
@@ -246,33 +248,33 @@ class TopicRows:
         columns = [f"{name}_{i}_{axis}_m" for name, count in names for i in range(count) for axis in "xz"]
         columns += [f"force_{i + 1}_N" for i in range(len(self._forces))]
         columns += [f"stroke_{i + 1}_m" for i in range(len(self._strokes))]
-        checks.count("numbers of a shape", len(columns), checks.MOST_COLUMNS)
-        values = checks.numbers([number for point in (*boom, *straight, *pins) for number in (point.x, point.z)])
-        self._append("shape", columns, checks.stamp(msg.markers[0]), values + self._forces + self._strokes)
+        check_count("numbers of a shape", len(columns), MAX_COLUMNS)
+        values = check_numbers([number for point in (*boom, *straight, *pins) for number in (point.x, point.z)])
+        self._append("shape", columns, check_stamp(msg.markers[0]), values + self._forces + self._strokes)
 
-    def _take_health(self, msg: Any, now: float) -> None:
-        checks.count("alarms", len(msg.status), MOST_STATUSES)
+    def _take_health(self, msg: Any) -> None:
+        check_count("alarms", len(msg.status), MAX_STATUSES)
         store, found = self._store, decode_health(msg)
         for alarm in found:
-            checks.count("causes of an alarm", len(alarm.ranked), MOST_CAUSES)
-            checks.instant(alarm.since)
-            checks.instant(alarm.since if alarm.until is None else alarm.until)
-        store.alarms.judge(store.time(checks.stamp(msg)), found, store.time)
+            check_count("causes of an alarm", len(alarm.ranked), MAX_CAUSES)
+            check_instant(alarm.since)
+            check_instant(alarm.since if alarm.until is None else alarm.until)
+        store.alarms.judge(store.time(check_stamp(msg)), found, store.time)
 
-    def _take_state(self, msg: Any, now: float) -> None:
-        checks.count("statuses", len(msg.status), MOST_STATUSES)
+    def _take_state(self, msg: Any) -> None:
+        check_count("statuses", len(msg.status), MAX_STATUSES)
         store = self._store
-        statuses = store.statuses(now).told(now, msg.status, stamp_of(msg) * NANO)
-        checks.count("nodes on one topic", len(statuses.nodes), MOST_NODES)
+        statuses = store.statuses(self._now).updated(self._now, msg.status, stamp_of(msg) * NANO)
+        check_count("nodes on one topic", len(statuses.nodes), MAX_NODES)
         for status in msg.status:
             if str(status.name).endswith(": model"):
                 self._scene = next((pair.value for pair in status.values if pair.key == "scene"), self._scene)
-        store.set_statuses(now, statuses)
+        store.set_statuses(self._now, statuses)
 
 
-def _with_deviations(vector: Any, covariance: Any) -> list[float]:
-    """Return x and z of a vector, and their standard deviations from a covariance by rows (36,)."""
-    x, z, x2, z2 = checks.numbers((vector.x, vector.z, covariance[0], covariance[14]))
-    if min(x2, z2) < 0.0:
-        raise MalformedError(f"a variance is {min(x2, z2):g}; at least 0 is possible")
-    return [x, z, sqrt(x2), sqrt(z2)]
+def _deviations(covariance: Any) -> list[float]:
+    """Return the standard deviations of x and z from a covariance by rows (36,)."""
+    variances = check_numbers((covariance[0], covariance[14]))
+    if min(variances) < 0.0:
+        raise MalformedError(f"a variance is {min(variances):g}; at least 0 is possible")
+    return [sqrt(variance) for variance in variances]
