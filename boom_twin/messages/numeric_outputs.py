@@ -108,24 +108,8 @@ ESTIMATED = (
 """Outputs of an estimate in the order of a bag, after ``joint_states``."""
 
 
-class Selection(NamedTuple):
-    """Selection of numbers of a row: their places and their signs (1 or -1), both of shape (selected,)."""
-
-    places: Integers
-    signs: Array
-
-    @classmethod
-    def named(cls, names: Sequence[str], joints: int) -> Selection:
-        """Return the selection of `NumericOutput.numbers` for a boom with `joints` joints."""
-        places = {name: place for place, name in enumerate(number_names(joints))}
-        chosen = np.array([places[name.removeprefix("-")] for name in names], np.int64)
-        return cls(chosen, np.array([-1.0 if name.startswith("-") else 1.0 for name in names]))
-
-    @classmethod
-    def of_all(cls, width: int) -> Selection:
-        """Return the selection of all `width` numbers of a row, with unchanged signs."""
-        return cls(np.arange(width), np.ones(width))
-
-    def of(self, numbers: Array) -> Array:
-        """Return the selected numbers, shape (selected, k), from columns of numbers, shape (all, k)."""
-        return np.asarray(numbers[self.places] * self.signs[:, np.newaxis])
+def selection(names: Sequence[str], joints: int) -> tuple[Integers, Array]:
+    """Return the places and the signs (1 or -1) of `NumericOutput.numbers` in the row of a boom with `joints` joints."""
+    places = {name: place for place, name in enumerate(number_names(joints))}
+    chosen = np.array([places[name.removeprefix("-")] for name in names], np.int64)
+    return chosen, np.array([-1.0 if name.startswith("-") else 1.0 for name in names])
