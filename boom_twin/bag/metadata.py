@@ -6,16 +6,18 @@ import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from io import StringIO
 from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError
+from ruamel.yaml import YAML
 
 from ..config.yaml_text import plain, read_plain
 from ..errors import BagError
 from ..messages.topic_table import Qos
 from ..system.atomic_files import write_atomic
-from .block_yaml import dump
 
 FILE_NAME = "metadata.yaml"
 VERSION = 9
@@ -151,6 +153,15 @@ def read_metadata(path: Path) -> BagMetadata:
     return metadata
 
 
+def dump(document: Any) -> str:
+    """Return a document as YAML text in block style, as ROS tools write it, with keys in the given order."""
+    yaml, text = YAML(), StringIO()
+    yaml.default_flow_style = False
+    yaml.width = 4096
+    yaml.dump(document, text)
+    return text.getvalue()
+
+
 def write_metadata(path: Path, metadata: BagMetadata, sync: Callable[[int], None] = os.fsync) -> None:
     """Write `metadata` as Jazzy does, atomically (see `write_atomic`). Equal values give equal bytes."""
     write_atomic(path, dump({_ROOT: metadata.model_dump()}), sync)
@@ -241,9 +252,13 @@ class Recorded:
     @classmethod
     def offered(cls, topic: str, type_name: str, definition: str, qos: Qos, type_hash: str) -> Recorded:
         """Return a topic offered with `qos`. Its channel keeps the QoS and the hash of the type, as in rosbag2."""
-        profile = offered_qos(qos)
-        details = {"offered_qos_profiles": dump(profile), "topic_type_hash": type_hash}
-        return cls(topic, type_name, definition.encode(), details, profile, type_hash)
+        details = {"offered_qos_profiles": _profile_text(qos), "topic_type_hash": type_hash}
+        return cls(topic, type_name, definition.encode(), details, offered_qos(qos), type_hash)
+
+
+@cache
+def _profile_text(qos: Qos) -> str:
+    return dump(offered_qos(qos))
 
 
 def file_information(path: str, first: int, last: int, count: int) -> FileInformation:
