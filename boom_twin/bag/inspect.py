@@ -12,9 +12,8 @@ from ..messages.cdr_decoder import has_header, names_in, stamp_in
 from ..messages.topic_table import TYPES
 from ..messages.type_store import jazzy
 from ..types import NANO, Stream
-from .integrity import as_bag_error
 from .reader import Session, scan
-from .session_file import CDR, SessionFile, schema_of
+from .session_file import CDR, SessionFile, as_bag_error, schema_of
 from .time_window import WHOLE, TimeWindow
 
 VARIANTS = 100

@@ -18,9 +18,8 @@ from rosbags.typesys import TypesysError, get_types_from_msg
 from ..errors import BagError
 from ..messages.type_store import jazzy
 from ..system.received_files import open_received
-from .integrity import PARSE_ERRORS
 from .mcap_records import MOST_HELD
-from .session_file import CDR, SessionFile, channel_of, schema_of
+from .session_file import CDR, PARSE_ERRORS, SessionFile, channel_of, schema_of
 
 ENCODING = "ros1"
 """Encoding of a message that is not converted, because its type differs in Jazzy."""

@@ -22,8 +22,8 @@ from ..messages.type_store import jazzy
 from ..system.result_folder import UNFINISHED
 from ..twin.blocks import Integers
 from . import metadata as bagmeta
+from .mcap_file import NOTES, PROFILE
 from .mcap_records import MOST_HELD
-from .mcap_summary import NOTES, PROFILE
 from .mcap_writer import McapWriter
 from .metadata import Recorded, file_information, metadata_of
 
