@@ -181,10 +181,8 @@ def inspect(path: Path, window: TimeWindow = WHOLE) -> BagInfo:
     files = sorted(session.files, key=attrgetter("start"))
     for file in files:
         _count(file, tallies, window.bounds(session.start))
-    with as_bag_error(files[0].path):
-        library, compression = files[0].written_by()
     size = sum(file.path.stat().st_size for file in files)
-    return BagInfo(session, tuple(tallies.values()), library, compression, size, window)
+    return BagInfo(session, tuple(tallies.values()), files[0].library, files[0].compression, size, window)
 
 
 def _count(file: SessionFile, tallies: dict[str, Tally], bounds: tuple[int, int]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import BytesIO
 from itertools import pairwise
 from operator import attrgetter
@@ -15,7 +15,7 @@ import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.reader import NonSeekingReader, SeekingReader
+from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, ChunkIndex, DataEnd, Message, Metadata, Schema, Statistics
 from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
@@ -67,22 +67,9 @@ class McapFile(SessionFile):
     ----------
     pieces : list of ChunkIndex
         Chunks, and runs of messages outside chunks, in the order of the file.
-    compression : str
-        Compression of its first chunk, or a note that it has no index.
     """
 
-    pieces: list[ChunkIndex]
-    compression: str
-
-    @property
-    def storage(self) -> str:
-        """See `SessionFile`."""
-        return "mcap"
-
-    def written_by(self) -> tuple[str, str]:
-        """See `SessionFile`."""
-        with open_received(self.path) as stream:
-            return NonSeekingReader(stream, record_size_limit=LARGEST).get_header().library, self.compression
+    pieces: list[ChunkIndex] = field(default_factory=list)
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield messages as in `SessionFile`, in the order of the file, with one piece in memory."""
@@ -171,9 +158,12 @@ def summarise(path: Path) -> McapFile:
         if header.profile not in (PROFILE, ""):
             raise BagError(f"{path}: profile = {header.profile!r}: only {PROFILE!r} is read. Record the session with ROS 2.")
         if summary is None or (told := summary.statistics) is None or not _is_complete(summary, told):
-            return _walk(path)
+            return _walk(path, header.library)
         return McapFile(
             path=path,
+            storage="mcap",
+            library=header.library,
+            compression=summary.chunk_indexes[0].compression or "none",
             channels=summary.channels,
             schemas=summary.schemas,
             counts=dict(told.channel_message_counts),
@@ -182,7 +172,6 @@ def summarise(path: Path) -> McapFile:
             pieces=sorted(summary.chunk_indexes, key=attrgetter("chunk_start_offset")),
             checked=all(_has_checksum(file, index) for index in summary.chunk_indexes),
             notes=_notes(reader.iter_metadata()),
-            compression=summary.chunk_indexes[0].compression or "none",
         )
 
 
@@ -200,7 +189,7 @@ def _has_checksum(file: BinaryIO, chunk: ChunkIndex) -> bool:
     return any(file.read(4))
 
 
-def _walk(path: Path) -> McapFile:
+def _walk(path: Path, library: str) -> McapFile:
     """Return the content of a file from all of its records. Compare its statistics, if any, with the messages found."""
     channels: dict[int, Channel] = {}
     schemas: dict[int, Schema] = {}
@@ -237,10 +226,20 @@ def _walk(path: Path) -> McapFile:
                         is_summed = each.data_section_crc != 0
                     case Statistics():
                         told = each
-    start = min((piece.message_start_time for piece in pieces), default=0)
-    end = max((piece.message_end_time for piece in pieces), default=0)
-    checked = is_summed or (chunks_summed == {True} and told is not None)
-    held = McapFile(path, channels, schemas, dict(counts), start, end, checked, _notes(notes), pieces, "no index of chunks")
+    held = McapFile(
+        path=path,
+        storage="mcap",
+        library=library,
+        compression="no index of chunks",
+        channels=channels,
+        schemas=schemas,
+        counts=dict(counts),
+        start=min((piece.message_start_time for piece in pieces), default=0),
+        end=max((piece.message_end_time for piece in pieces), default=0),
+        checked=is_summed or (chunks_summed == {True} and told is not None),
+        notes=_notes(notes),
+        pieces=pieces,
+    )
     if told is not None:
         held.check_counts("statistics", told.channel_message_counts, "in the file", counts)
     return held

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
@@ -66,6 +66,10 @@ class SessionFile(ABC):
     Attributes
     ----------
     path : Path
+    storage : str
+        Storage of the file: ``mcap``, ``sqlite3``, ``ros1`` or ``csv``.
+    library, compression : str
+        Program that wrote the file, by its own name; compression of its first chunk, or a note that it has no chunks.
     channels : dict of int to Channel
     schemas : dict of int to Schema
     counts : dict of int to int
@@ -78,13 +82,16 @@ class SessionFile(ABC):
     """
 
     path: Path
+    storage: str
+    library: str
+    compression: str
     channels: dict[int, Channel]
     schemas: dict[int, Schema]
     counts: dict[int, int]
     start: int
     end: int
-    checked: bool
-    notes: dict[str, str]
+    checked: bool = False
+    notes: dict[str, str] = field(default_factory=dict)
 
     def check_counts(self, source: str, counts: Mapping[int, int], other: str, others: Mapping[int, int]) -> None:
         """Raise BagError, as `compare_counts`, if two counts by channel are not the same for every topic."""
@@ -98,15 +105,6 @@ class SessionFile(ABC):
         if parts[-2:-1] == ["dds_"]:
             parts = [*parts[:-2], parts[-1].removesuffix("_")]
         return "/".join([parts[0], "msg", parts[1]] if len(parts) == 2 else parts)
-
-    @property
-    @abstractmethod
-    def storage(self) -> str:
-        """Storage of the file: ``mcap``, ``sqlite3``, ``ros1`` or ``csv``."""
-
-    @abstractmethod
-    def written_by(self) -> tuple[str, str]:
-        """Return the program that wrote the file, by its own name, and the compression of its first chunk."""
 
     @abstractmethod
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
