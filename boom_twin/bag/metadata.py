@@ -255,6 +255,17 @@ class Recorded:
         details = {"offered_qos_profiles": _profile_text(qos), "topic_type_hash": type_hash}
         return cls(topic, type_name, definition.encode(), details, offered_qos(qos), type_hash)
 
+    @property
+    def metadata(self) -> TopicMetadata:
+        """Entry of the topic in ``metadata.yaml``."""
+        return TopicMetadata(
+            name=self.topic,
+            type=self.type,
+            serialization_format=self.encoding,
+            offered_qos_profiles=self.qos,
+            type_description_hash=self.type_hash,
+        )
+
 
 @cache
 def _profile_text(qos: Qos) -> str:
@@ -284,22 +295,11 @@ def metadata_of(
         duration=Duration(nanoseconds=last - first),
         starting_time=Start(nanoseconds_since_epoch=first),
         message_count=sum(file.message_count for file in files),
-        topics_with_message_count=[_topic_count(topic, counts[key]) for key, topic in enumerate(topics)],
+        topics_with_message_count=[
+            TopicCount(topic_metadata=topic.metadata, message_count=counts[key]) for key, topic in enumerate(topics)
+        ],
         relative_file_paths=[file.path for file in files],
         files=list(files),
         custom_data=dict(notes) or None,
         ros_distro=distro,
-    )
-
-
-def _topic_count(topic: Recorded, count: int) -> TopicCount:
-    return TopicCount(
-        topic_metadata=TopicMetadata(
-            name=topic.topic,
-            type=topic.type,
-            serialization_format=topic.encoding,
-            offered_qos_profiles=topic.qos,
-            type_description_hash=topic.type_hash,
-        ),
-        message_count=count,
     )
