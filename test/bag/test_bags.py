@@ -37,7 +37,7 @@ POINT = Topic(
 
 
 def write_points(directory: Path, count: int, compression: CompressionType = CompressionType.ZSTD) -> None:
-    with SessionWriter(directory, {"point": POINT}, {"origin": "synthetic"}, compression) as bag:
+    with SessionWriter(directory, {"point": POINT}, {"origin": "synthetic"}, compression=compression) as bag:
         for number in range(count):
             msg = new_message(POINT.type)
             msg.point.x = float(number)
