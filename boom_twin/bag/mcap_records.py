@@ -38,19 +38,9 @@ MESSAGE_HEAD = struct.Struct("<HIQQ")
 FOOTER = struct.Struct("<BQQQI8s")
 """The last record of a file, with the magic behind it."""
 KINDS: dict[int, Any] = {
-    Opcode.HEADER: mcap_records.Header,
-    Opcode.FOOTER: mcap_records.Footer,
-    Opcode.SCHEMA: mcap_records.Schema,
-    Opcode.CHANNEL: mcap_records.Channel,
-    Opcode.MESSAGE_INDEX: mcap_records.MessageIndex,
-    Opcode.CHUNK_INDEX: mcap_records.ChunkIndex,
-    Opcode.ATTACHMENT: mcap_records.Attachment,
-    Opcode.ATTACHMENT_INDEX: mcap_records.AttachmentIndex,
-    Opcode.STATISTICS: mcap_records.Statistics,
-    Opcode.METADATA: mcap_records.Metadata,
-    Opcode.METADATA_INDEX: mcap_records.MetadataIndex,
-    Opcode.SUMMARY_OFFSET: mcap_records.SummaryOffset,
-    Opcode.DATA_END: mcap_records.DataEnd,
+    int(opcode): getattr(mcap_records, opcode.name.title().replace("_", ""))
+    for opcode in Opcode
+    if opcode not in (Opcode.MESSAGE, Opcode.CHUNK)
 }
 """Classes of all records but messages and chunks."""
 

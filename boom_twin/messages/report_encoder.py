@@ -19,8 +19,7 @@ from .cdr_encoder import NumberFields, Template, stamped
 from .encoded_block import Bytes, EncodedBlock, EncodedBlockBuilder
 from .marker_encoder import ShapeMarkers
 from .message_fields import FRAME, fill_header
-from .numeric_outputs import ESTIMATED, PREDICTED, put_vector, selection
-from .prediction_numbers import JOINTS, TIP_JOINTS, Chain, number_rows
+from .numeric_outputs import ESTIMATED, JOINTS, PREDICTED, TIP_JOINTS, Chain, number_rows, put_vector, selection
 from .sample_decoder import stamp_of
 from .topic_table import TYPES, Output
 from .type_store import jazzy, new_message
