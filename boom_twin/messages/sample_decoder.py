@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from functools import lru_cache
 from math import inf, isnan, nan, tau
 from typing import Any
 
@@ -66,14 +65,18 @@ class _Channels:
                 if mount is None:
                     self.range[:, i] = 0.5 * (low + high), 0.5 * (high - low)
         self._topics, self._stream = topics, stream
-        self.look = lru_cache(KEPT)(self._look)
+        self._known: dict[tuple[str, ...], tuple[list[int], set[str], list[str]]] = {}
 
-    def _look(self, names: tuple[str, ...]) -> tuple[list[int], set[str], list[str]]:
+    def look(self, names: tuple[str, ...]) -> tuple[list[int], set[str], list[str]]:
         """Return the indices of the channels among `names` (-1: missing or repeated), repeated names, and `Topics.beyond`."""
-        counts = Counter(names)
-        places = [names.index(name) if name and counts[name] == 1 else -1 for name in self.names]
-        twice = {name for name in self.names if name and counts[name] > 1}
-        return places, twice, self._topics.beyond(self._stream, len(self.names), counts)
+        if names not in self._known:
+            counts = Counter(names)
+            places = [names.index(name) if name and counts[name] == 1 else -1 for name in self.names]
+            twice = {name for name in self.names if name and counts[name] > 1}
+            if len(self._known) >= KEPT:
+                self._known.clear()
+            self._known[names] = places, twice, self._topics.beyond(self._stream, len(self.names), counts)
+        return self._known[names]
 
     def quantities(self, readings: list[float]) -> list[float]:
         """Return readings in SI units. Absent channels stay absent."""
