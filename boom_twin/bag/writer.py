@@ -106,11 +106,6 @@ class BagWriter:
         self._open()
 
     @property
-    def has_messages(self) -> bool:
-        """Return True if a message was written to the open file."""
-        return self._span is not None
-
-    @property
     def file(self) -> Path:
         """Path of the open file."""
         return self.directory / file_name(len(self._files))

@@ -106,7 +106,7 @@ def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
     keys: dict[tuple[str, str, bytes], int] = {}
     try:
         for number, (file, definitions) in enumerate(zip(files, all_definitions, strict=True)):
-            if number and bag.has_messages:
+            if number and bag.first is not None:
                 bag.split()
             with as_bag_error(file):
                 _copy(file, definitions, bag, keys, outcome, metadata, unverified)
