@@ -150,9 +150,9 @@ def _joints(data: bytes, place: int, names: tuple[str, ...], field: str) -> Join
     """Return the fields of a JointState whose names end at `place`; None if it is not whole."""
     found, numbers = place, 0
     for each in _ARRAYS:
-        place += -(place - _ORIGIN) % 4 + 4
-        count = int.from_bytes(data[place - 4 : place], "little")
-        place += -(place - _ORIGIN) % 8 if count else 0
+        place += -place % 4 + 4
+        if count := int.from_bytes(data[place - 4 : place], "little"):
+            place += -(place - _ORIGIN) % 8
         if each == field:
             found, numbers = place, count
         place += 8 * count

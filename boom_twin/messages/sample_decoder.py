@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from math import inf, isnan, nan, tau
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -50,6 +50,20 @@ def in_range(values: Array, middle: Array, half: Array) -> Array:
     return np.where(outside & (np.abs(turned - middle) <= half), turned, values)
 
 
+class _Named(NamedTuple):
+    """Channels of one stream among the names of a message.
+
+    `places` are their indices, -1 for a missing or repeated name. `twice` are repeated names, `lacking` names without an index,
+    `beyond` those of `Topics.beyond`. `is_regular` is True if all sensors are named once.
+    """
+
+    places: list[int]
+    twice: set[str]
+    lacking: list[str]
+    beyond: list[str]
+    is_regular: bool
+
+
 class _Channels:
     """Channels of one stream: their places in a message, and the conversion of their readings."""
 
@@ -65,17 +79,19 @@ class _Channels:
                 if mount is None:
                     self.range[:, i] = 0.5 * (low + high), 0.5 * (high - low)
         self._topics, self._stream = topics, stream
-        self._known: dict[tuple[str, ...], tuple[list[int], set[str], list[str]]] = {}
+        self._known: dict[tuple[str, ...], _Named] = {}
 
-    def look(self, names: tuple[str, ...]) -> tuple[list[int], set[str], list[str]]:
-        """Return the indices of the channels among `names` (-1: missing or repeated), repeated names, and `Topics.beyond`."""
+    def look(self, names: tuple[str, ...]) -> _Named:
+        """Return the channels among `names`."""
         if names not in self._known:
             counts = Counter(names)
             places = [names.index(name) if name and counts[name] == 1 else -1 for name in self.names]
             twice = {name for name in self.names if name and counts[name] > 1}
             if len(self._known) >= KEPT:
                 self._known.clear()
-            self._known[names] = places, twice, self._topics.beyond(self._stream, len(self.names), counts)
+            lacking = [name for name, place in zip(self.names, places, strict=True) if name and place < 0]
+            beyond = self._topics.beyond(self._stream, len(self.names), counts)
+            self._known[names] = _Named(places, twice, lacking, beyond, not lacking and not beyond and max(places) >= 0)
         return self._known[names]
 
     def quantities(self, readings: list[float]) -> list[float]:
@@ -180,17 +196,18 @@ class SampleDecoder:
         """Return places of the channels among `end` readings (-1 without one), what is odd, and if all sensors are named."""
         if len(names) > LONGEST:
             return None, ["too many names"], True
-        channels, other = self._channels[stream], self._sharing.get(stream)
-        places, twice, beyond = channels.look(tuple(names))
+        places, twice, lacking, beyond, is_regular = self._channels[stream].look(tuple(names))
+        if is_regular and end == len(names):
+            return places, [], True
+        other = self._sharing.get(stream)
         if beyond:
             self.other_boom_names[stream] = beyond
             return None, ["names of another boom"], True
-        lacking = [name for name, place in zip(channels.names, places, strict=True) if name and place < 0]
         if lacking and stream not in self.strange_names and (other is None or max(places) >= 0):
             self._note_strange(stream, names, lacking)
         odd = ["name twice"] if twice else []
         if max(places) < 0 and not odd:
-            is_unknown = other is None or max(self._channels[other].look(tuple(names))[0]) < 0
+            is_unknown = other is None or max(self._channels[other].look(tuple(names)).places) < 0
             return None, ["unknown names only"] if is_unknown else [], True
         if end != len(names):
             odd.append("unequal arrays")
