@@ -39,15 +39,6 @@ NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}
 class CsvFile(SessionFile):
     """Content of one CSV file. Its log times are its stamps."""
 
-    @property
-    def storage(self) -> str:
-        """See `SessionFile`."""
-        return "csv"
-
-    def written_by(self) -> tuple[str, str]:
-        """See `SessionFile`."""
-        return "CSV", "none"
-
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield messages as in `SessionFile`, in the order of log times."""
         encode = jazzy().serialize_cdr
@@ -76,13 +67,14 @@ def summarise(path: Path) -> CsvFile:
     streams = [stream for stream in Stream if counts[stream]]
     return CsvFile(
         path=path,
+        storage="csv",
+        library="CSV",
+        compression="none",
         channels={NUMBERS[stream]: channel_of(NUMBERS[stream], topics[stream].absolute) for stream in streams},
         schemas={NUMBERS[stream]: schema_of(NUMBERS[stream], topics[stream].type) for stream in streams},
         counts={NUMBERS[stream]: counts[stream] for stream in streams},
         start=start,
         end=end,
-        checked=False,
-        notes={},
     )
 
 

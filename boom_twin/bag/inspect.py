@@ -12,9 +12,8 @@ from ..messages.cdr_decoder import has_header, names_in, stamp_in
 from ..messages.topic_table import TYPES
 from ..messages.type_store import jazzy
 from ..types import NANO, Stream
-from .integrity import as_bag_error
 from .reader import Session, scan
-from .session_file import CDR, SessionFile, schema_of
+from .session_file import CDR, SessionFile, as_bag_error, schema_of
 from .time_window import WHOLE, TimeWindow
 
 VARIANTS = 100
@@ -182,10 +181,8 @@ def inspect(path: Path, window: TimeWindow = WHOLE) -> BagInfo:
     files = sorted(session.files, key=attrgetter("start"))
     for file in files:
         _count(file, tallies, window.bounds(session.start))
-    with as_bag_error(files[0].path):
-        library, compression = files[0].written_by()
     size = sum(file.path.stat().st_size for file in files)
-    return BagInfo(session, tuple(tallies.values()), library, compression, size, window)
+    return BagInfo(session, tuple(tallies.values()), files[0].library, files[0].compression, size, window)
 
 
 def _count(file: SessionFile, tallies: dict[str, Tally], bounds: tuple[int, int]) -> None:

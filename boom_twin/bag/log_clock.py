@@ -58,7 +58,7 @@ class LogClock:
                 newest[channel] = own[-2:]
         known = {channel for channel, count in lasting.items() if count and steps[channel] < OUT_OF_ORDER * counts[channel]}
         is_set_back = sum(counts[channel] for channel in known) > MOST * counts.total()
-        return cls(*_steps(pieces(), known)) if is_set_back else NEVER_SET_BACK
+        return cls(*_steps(pieces())) if is_set_back else NEVER_SET_BACK
 
     @property
     def total(self) -> int:
@@ -78,32 +78,17 @@ class LogClock:
 NEVER_SET_BACK = LogClock(np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 
-def _steps(pieces: Iterable[Piece], known: set[int]) -> tuple[Integers, Integers]:
-    """Return places and shifts of all steps back. A step is at a message of a known channel before its previous one."""
+def _steps(pieces: Iterable[Piece]) -> tuple[Integers, Integers]:
+    """Return places and shifts of all steps back. A step is at a message before the one before it in its channel."""
     places, shifts, newest, shift = list[int](), list[int](), 0, 0
     last: dict[int, int] = {}
-    for at, channels, times in pieces:
-        shifted, row = times.astype(np.int64) + shift, 0
-        while row < len(shifted):
-            ends = [
-                row + _step_in(shifted[row:], channels[row:] == key, last.get(key, 0)) for key in set(channels[row:].tolist())
-            ]
-            end = min(ends)
-            for key in set(channels[row:end].tolist()):
-                last[key] = int(shifted[row:end][channels[row:end] == key][-1])
-            newest = max(newest, int(shifted[row:end].max(initial=0)))
-            if end < len(shifted):
-                step = newest - int(shifted[end])
-                shifted[end:] += step
-                shift += step
-                places.append(int(at[end]))
+    for piece in pieces:
+        for place, channel, time in zip(*(column.tolist() for column in piece), strict=True):
+            time += shift
+            if time < last.get(channel, 0):
+                shift += newest - time
+                time = newest
+                places.append(place)
                 shifts.append(shift)
-            row = end
+            last[channel], newest = time, max(newest, time)
     return np.array(places, np.int64), np.array(shifts, np.int64)
-
-
-def _step_in(times: Integers, is_own: NDArray[np.bool_], before: int) -> int:
-    """Return the row of the first of a channel's times that is less than the one before; the number of rows without."""
-    rows = np.flatnonzero(is_own)
-    back = np.flatnonzero(np.diff(times[rows], prepend=before) < 0)
-    return int(rows[back[0]]) if len(back) else len(times)

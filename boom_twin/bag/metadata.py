@@ -6,16 +6,18 @@ import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from io import StringIO
 from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError
+from ruamel.yaml import YAML
 
 from ..config.yaml_text import plain, read_plain
 from ..errors import BagError
 from ..messages.topic_table import Qos
 from ..system.atomic_files import write_atomic
-from .block_yaml import dump
 
 FILE_NAME = "metadata.yaml"
 VERSION = 9
@@ -151,6 +153,15 @@ def read_metadata(path: Path) -> BagMetadata:
     return metadata
 
 
+def dump(document: Any) -> str:
+    """Return a document as YAML text in block style, as ROS tools write it, with keys in the given order."""
+    yaml, text = YAML(), StringIO()
+    yaml.default_flow_style = False
+    yaml.width = 4096
+    yaml.dump(document, text)
+    return text.getvalue()
+
+
 def write_metadata(path: Path, metadata: BagMetadata, sync: Callable[[int], None] = os.fsync) -> None:
     """Write `metadata` as Jazzy does, atomically (see `write_atomic`). Equal values give equal bytes."""
     write_atomic(path, dump({_ROOT: metadata.model_dump()}), sync)
@@ -241,9 +252,24 @@ class Recorded:
     @classmethod
     def offered(cls, topic: str, type_name: str, definition: str, qos: Qos, type_hash: str) -> Recorded:
         """Return a topic offered with `qos`. Its channel keeps the QoS and the hash of the type, as in rosbag2."""
-        profile = offered_qos(qos)
-        details = {"offered_qos_profiles": dump(profile), "topic_type_hash": type_hash}
-        return cls(topic, type_name, definition.encode(), details, profile, type_hash)
+        details = {"offered_qos_profiles": _profile_text(qos), "topic_type_hash": type_hash}
+        return cls(topic, type_name, definition.encode(), details, offered_qos(qos), type_hash)
+
+    @property
+    def metadata(self) -> TopicMetadata:
+        """Entry of the topic in ``metadata.yaml``."""
+        return TopicMetadata(
+            name=self.topic,
+            type=self.type,
+            serialization_format=self.encoding,
+            offered_qos_profiles=self.qos,
+            type_description_hash=self.type_hash,
+        )
+
+
+@cache
+def _profile_text(qos: Qos) -> str:
+    return dump(offered_qos(qos))
 
 
 def file_information(path: str, first: int, last: int, count: int) -> FileInformation:
@@ -269,22 +295,11 @@ def metadata_of(
         duration=Duration(nanoseconds=last - first),
         starting_time=Start(nanoseconds_since_epoch=first),
         message_count=sum(file.message_count for file in files),
-        topics_with_message_count=[_topic_count(topic, counts[key]) for key, topic in enumerate(topics)],
+        topics_with_message_count=[
+            TopicCount(topic_metadata=topic.metadata, message_count=counts[key]) for key, topic in enumerate(topics)
+        ],
         relative_file_paths=[file.path for file in files],
         files=list(files),
         custom_data=dict(notes) or None,
         ros_distro=distro,
-    )
-
-
-def _topic_count(topic: Recorded, count: int) -> TopicCount:
-    return TopicCount(
-        topic_metadata=TopicMetadata(
-            name=topic.topic,
-            type=topic.type,
-            serialization_format=topic.encoding,
-            offered_qos_profiles=topic.qos,
-            type_description_hash=topic.type_hash,
-        ),
-        message_count=count,
     )

@@ -22,10 +22,9 @@ from ..errors import BagError
 from ..messages.type_store import jazzy
 from ..system.received_files import holds_file, sha256_of
 from ..types import NANO
-from .integrity import as_bag_error, compare_counts
 from .metadata import FILE_NAME, STORAGES, BagMetadata, read_metadata, refuse_packed
 from .session_blocks import SessionBlocks
-from .session_file import CDR, SessionFile
+from .session_file import CDR, SessionFile, as_bag_error, compare_counts
 from .session_sheet import incompleteness, kept_origin
 from .storages import summarise
 from .time_window import WHOLE, TimeWindow

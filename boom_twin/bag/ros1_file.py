@@ -18,9 +18,8 @@ from rosbags.typesys import TypesysError, get_types_from_msg
 from ..errors import BagError
 from ..messages.type_store import jazzy
 from ..system.received_files import open_received
-from .integrity import PARSE_ERRORS
 from .mcap_records import MOST_HELD
-from .session_file import CDR, SessionFile, channel_of, schema_of
+from .session_file import CDR, PARSE_ERRORS, SessionFile, channel_of, schema_of
 
 ENCODING = "ros1"
 """Encoding of a message that is not converted, because its type differs in Jazzy."""
@@ -32,24 +31,7 @@ _REMEDY = "The file is damaged or was cut off: `rosbag reindex` or `rosbag fix` 
 
 @dataclass(frozen=True, slots=True)
 class Ros1File(SessionFile):
-    """Content of one .bag file, which has no checksums.
-
-    Attributes
-    ----------
-    compression : str
-        Compression of its first chunk.
-    """
-
-    compression: str
-
-    @property
-    def storage(self) -> str:
-        """See `SessionFile`."""
-        return "ros1"
-
-    def written_by(self) -> tuple[str, str]:
-        """See `SessionFile`."""
-        return "ROS 1", self.compression
+    """Content of one .bag file, which has no checksums."""
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield messages as in `SessionFile`, in the order of log times."""
@@ -72,14 +54,14 @@ def summarise(path: Path) -> Ros1File:
         connections = reader.connections
         return Ros1File(
             path=path,
+            storage="ros1",
+            library="ROS 1",
+            compression=_compression(reader),
             channels={each.id: channel_of(each.id, each.topic, _encoding(each)) for each in connections},
             schemas={each.id: schema_of(each.id, each.msgtype) for each in connections},
             counts={each.id: each.msgcount for each in connections},
             start=reader.start_time if any(each.msgcount for each in connections) else 0,
             end=max(0, reader.end_time - 1),
-            checked=False,
-            notes={},
-            compression=_compression(reader),
         )
 
 

@@ -13,9 +13,8 @@ import numpy as np
 from ..errors import BagError
 from ..messages.message_block import MessageBlock, by_log_time, joined
 from ..messages.type_store import decode, jazzy
-from .integrity import PARSE_ERRORS, REMEDY, as_bag_error
 from .log_clock import LogClock
-from .session_file import SessionFile
+from .session_file import PARSE_ERRORS, REMEDY, SessionFile, as_bag_error
 from .time_window import WHOLE, TimeWindow
 
 

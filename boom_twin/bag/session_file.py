@@ -1,25 +1,62 @@
-"""One file of a session in any storage: its content, and its messages as CDR."""
+"""One file of a session in any storage: its content, its messages as CDR, and one kind of error for any damage."""
 
 from __future__ import annotations
 
+import struct
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Iterator, Mapping, Set
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
+from mcap.exceptions import McapError
 from mcap.records import Channel, Schema
+from rosbags.serde import SerdeError
+from zstandard import ZstdError
 
+from ..errors import BagError
 from ..messages.message_block import MessageBlock
 from ..messages.type_store import jazzy
-from .integrity import compare_counts
 from .log_clock import NEVER_SET_BACK, LogClock
-from .mcap_records import by_topic
 
 TOGETHER = 2000
 """Messages in one block of a file that is read message by message."""
 CDR = "cdr"
+REMEDY = "The file is damaged or was cut off: `boom_twin recover BAG --out DIR` saves what is whole."
+
+_LZ4 = (RuntimeError,)
+_PARSING = (struct.error, ValueError, KeyError, IndexError, OverflowError, MemoryError)
+PARSE_ERRORS = (McapError, SerdeError, ZstdError, *_LZ4, *_PARSING)
+"""Errors that the parsers raise on invalid bytes."""
+
+
+@contextmanager
+def as_bag_error(path: Path) -> Iterator[None]:
+    """Turn an error on reading `path` into a BagError that names it."""
+    try:
+        yield
+    except OSError as error:
+        raise BagError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions.") from error
+    except PARSE_ERRORS as error:
+        raise BagError(f"{path}: {str(error) or type(error).__name__}. {REMEDY}") from error
+
+
+def compare_counts(place: Path, source: str, counts: Mapping[str, int], other: str, others: Mapping[str, int]) -> None:
+    """Raise BagError that names each topic whose counts from two sources differ; a count of 0 is the same as none."""
+    pairs = [(topic, counts.get(topic, 0), others.get(topic, 0)) for topic in sorted({*counts, *others})]
+    if faults := "; ".join(f"{topic}: {source} {one}, {other} {two}" for topic, one, two in pairs if one != two):
+        raise BagError(f"{place}: message counts differ ({faults}). {REMEDY}")
+
+
+def by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> Counter[str]:
+    """Return counts by topic name from counts by channel."""
+    topics: Counter[str] = Counter()
+    for channel, count in counts.items():
+        topics[channels[channel].topic] += count
+    return topics
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +66,10 @@ class SessionFile(ABC):
     Attributes
     ----------
     path : Path
+    storage : str
+        Storage of the file: ``mcap``, ``sqlite3``, ``ros1`` or ``csv``.
+    library, compression : str
+        Program that wrote the file, by its own name; compression of its first chunk, or a note that it has no chunks.
     channels : dict of int to Channel
     schemas : dict of int to Schema
     counts : dict of int to int
@@ -41,13 +82,16 @@ class SessionFile(ABC):
     """
 
     path: Path
+    storage: str
+    library: str
+    compression: str
     channels: dict[int, Channel]
     schemas: dict[int, Schema]
     counts: dict[int, int]
     start: int
     end: int
-    checked: bool
-    notes: dict[str, str]
+    checked: bool = False
+    notes: dict[str, str] = field(default_factory=dict)
 
     def check_counts(self, source: str, counts: Mapping[int, int], other: str, others: Mapping[int, int]) -> None:
         """Raise BagError, as `compare_counts`, if two counts by channel are not the same for every topic."""
@@ -61,15 +105,6 @@ class SessionFile(ABC):
         if parts[-2:-1] == ["dds_"]:
             parts = [*parts[:-2], parts[-1].removesuffix("_")]
         return "/".join([parts[0], "msg", parts[1]] if len(parts) == 2 else parts)
-
-    @property
-    @abstractmethod
-    def storage(self) -> str:
-        """Storage of the file: ``mcap``, ``sqlite3``, ``ros1`` or ``csv``."""
-
-    @abstractmethod
-    def written_by(self) -> tuple[str, str]:
-        """Return the program that wrote the file, by its own name, and the compression of its first chunk."""
 
     @abstractmethod
     def heads(self) -> Iterator[tuple[int, int, bytes]]:

@@ -1,4 +1,8 @@
-"""Choose the scene and the baseline of a session: those given, else those of the session, else those of the package."""
+"""Choose scene, baseline, settings and mapping of a session: those given, else the session's, else those of the package.
+
+A file that was given and cannot be used is a UsageError (SceneError of a scene). What a session keeps and cannot be used is a
+BagError, whose remedy is the option that gives another.
+"""
 
 from __future__ import annotations
 
@@ -66,13 +70,7 @@ class Mapped:
 
 
 def scene_from(source: str | Path | None) -> SessionScene:
-    """Return the scene of a file, or that of the package if no file is given.
-
-    Raises
-    ------
-    SceneError
-        The file cannot be used, see `boom_twin.load_scene`.
-    """
+    """Return the scene of a file, or that of the package if no file is given; see `boom_twin.load_scene`."""
     name = DEFAULT_NAME if source is None else str(source)
     text = default_text() if source is None else read_text(Path(source))
     scene, oddities = examine_text(text, name)
@@ -80,15 +78,7 @@ def scene_from(source: str | Path | None) -> SessionScene:
 
 
 def scene_of(session: Path, given: str | Path | None = None) -> SessionScene:
-    """Return the scene of a session: from the file `given`, else from its ``session.yaml``, else from the package.
-
-    Raises
-    ------
-    SceneError
-        The file cannot be used.
-    BagError
-        What the session keeps cannot be used.
-    """
+    """Return the scene of a session: from the file `given`, else from its ``session.yaml``, else from the package."""
     own = kept(session, "scene", "--scene") if given is None else None
     if own is None:
         return scene_from(given)
@@ -103,7 +93,7 @@ def scene_of(session: Path, given: str | Path | None = None) -> SessionScene:
 def _changed(session: Path, own: KeptText) -> list[Fault]:
     """Return a fault if the text is not the one that was recorded."""
     digest = _recorded_sha256(session)
-    if digest is None or digest == sha256(own.text):
+    if digest in (None, sha256(own.text)):
         return []
     bound = f"{own.source} has {sha256(own.text)[:12]}..: it was changed since the session was made"
     return [Fault("scene_sha256", digest, bound, "Give the scene that is right by --scene.")]
@@ -116,15 +106,7 @@ def _recorded_sha256(session: Path) -> str | None:
 
 
 def baseline_of(session: Path, given: Path | None = None) -> SessionBaseline:
-    """Return the baseline (healthy state) of a session's rig, from the same sources as the scene in `scene_of`.
-
-    Raises
-    ------
-    UsageError
-        The file given cannot be used.
-    BagError
-        What the session keeps cannot be used.
-    """
+    """Return the baseline (healthy state) of a session's rig, from the same sources as the scene in `scene_of`."""
     own = kept(session, "baseline", "--baseline") if given is None else None
     if own is not None:
         try:
@@ -153,13 +135,6 @@ def settings_of(session: Path, given: Path | None = None, namespace: str = "") -
 
     The source is the parameter file `given` for the node in `namespace`. Without it, the source is the node that ran beside
     the recording, else the defaults of the package.
-
-    Raises
-    ------
-    UsageError
-        The file given cannot be used.
-    BagError
-        What the session keeps cannot be used.
     """
     if given is not None:
         return SessionSettings(load_settings(given, namespace), str(given))
@@ -183,17 +158,10 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
     namespace : str
         Namespace of the node, to which names without a leading slash are relative.
 
-    Returns
-    -------
-    Mapped
-        The mapping and its source.
-
     Raises
     ------
     UsageError
-        The mapping has faults, see `boom_twin.messages.mapping.load_mapping`.
-    BagError
-        ``session.yaml`` cannot be read.
+        The mapping has faults, also that of the session.
     """
     own = kept(session, "mapping", "--mapping") if given is None else None
     if own is None:
@@ -219,11 +187,6 @@ def strokes_of(session: Path | None, mapped: Mapped) -> SessionStrokes:
 
     The mapping's ``reads`` is taken first, then ``strokes`` of ``session.yaml``. The default is lengths; for the virtual rig
     before version 0.2 it is drives.
-
-    Raises
-    ------
-    BagError
-        ``session.yaml`` cannot be read, or says something else there.
     """
     if told := mapped.topics.inputs[Stream.STROKES].reads:
         return SessionStrokes(told, f"{mapped.source}, inputs.cylinder_strokes.reads")

@@ -18,7 +18,7 @@ from ..system.atomic_files import write_atomic
 from ..system.received_files import holds_file
 from ..system.result_folder import UNFINISHED, is_unfinished
 from ..types import StrokeReading
-from .block_yaml import dump
+from .metadata import dump
 
 FILE_NAME = "session.yaml"
 RIG_ORIGIN = "synthetic session of a virtual rig (Exudyn), surrogate parameters"

@@ -30,24 +30,7 @@ _REMEDY = "The file is damaged or no rosbag2 storage: try `sqlite3 FILE .recover
 
 @dataclass(frozen=True, slots=True)
 class SqliteFile(SessionFile):
-    """Content of one .db3 file, which has no checksums.
-
-    Attributes
-    ----------
-    distro : str
-        ROS distribution; empty if the file does not name it.
-    """
-
-    distro: str
-
-    @property
-    def storage(self) -> str:
-        """See `SessionFile`."""
-        return "sqlite3"
-
-    def written_by(self) -> tuple[str, str]:
-        """See `SessionFile`."""
-        return f"rosbag2_storage_sqlite3{f' ({self.distro})' if self.distro else ''}", "none"
+    """Content of one .db3 file, which has no checksums."""
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield messages as in `SessionFile`, in the order of `blocks`.
@@ -98,17 +81,17 @@ def summarise(path: Path) -> SqliteFile:
         if unknown := sorted(map(str, counts.keys() - {number for number, *_ in topics})):
             raise BagError(f"{path}: messages of topics {', '.join(unknown)}, which are not in its table topics. {_REMEDY}")
         start, end = database.execute("SELECT MIN(timestamp), MAX(timestamp) FROM messages").fetchone()
-        distro = _distro(database) if "schema" in tables else ""
+        distro = database.execute("SELECT ros_distro FROM schema").fetchone() if "schema" in tables else None
     return SqliteFile(
         path=path,
+        storage="sqlite3",
+        library=f"rosbag2_storage_sqlite3 ({distro[0]})" if distro else "rosbag2_storage_sqlite3",
+        compression="none",
         channels={number: channel_of(number, topic, encoding) for number, topic, _, encoding in topics},
         schemas={number: schema_of(number, kind, definitions.get(kind, "")) for number, _, kind, _ in topics},
         counts=counts,
         start=start or 0,
         end=end or 0,
-        checked=False,
-        notes={},
-        distro=distro,
     )
 
 
@@ -123,11 +106,6 @@ def _definitions(database: sqlite3.Connection) -> dict[str, str]:
     """Return the definitions of messages by type, for those in the language ``ros2msg``."""
     rows = database.execute("SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
     return {str(kind): str(text) for kind, encoding, text in rows if encoding == "ros2msg"}
-
-
-def _distro(database: sqlite3.Connection) -> str:
-    row = database.execute("SELECT ros_distro FROM schema").fetchone()
-    return str(row[0]) if row else ""
 
 
 @contextmanager

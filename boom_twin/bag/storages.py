@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from . import csv_file, mcap_summary, ros1_file, sqlite_file
+from . import csv_file, mcap_file, ros1_file, sqlite_file
 from .metadata import STORAGES, refuse_packed
 from .session_file import SessionFile
 
 SUMMARISE: dict[str, Callable[[Path], SessionFile]] = {
-    ".mcap": mcap_summary.summarise,
+    ".mcap": mcap_file.summarise,
     ".db3": sqlite_file.summarise,
     ".bag": ros1_file.summarise,
     ".csv": csv_file.summarise,

@@ -22,8 +22,8 @@ from ..messages.type_store import jazzy
 from ..system.result_folder import UNFINISHED
 from ..twin.blocks import Integers
 from . import metadata as bagmeta
+from .mcap_file import NOTES, PROFILE
 from .mcap_records import MOST_HELD
-from .mcap_summary import NOTES, PROFILE
 from .mcap_writer import McapWriter
 from .metadata import Recorded, file_information, metadata_of
 
@@ -104,11 +104,6 @@ class BagWriter:
         self._span: tuple[int, int, int] | None = None  # of the open file: first, last log time (ns), messages
         claim_directory(directory)
         self._open()
-
-    @property
-    def has_messages(self) -> bool:
-        """Return True if a message was written to the open file."""
-        return self._span is not None
 
     @property
     def file(self) -> Path:
@@ -267,38 +262,24 @@ class SessionWriter:
     Parameters
     ----------
     directory : Path
-        Made if it is not there.
     topics : dict of str to Topic
         Topics by any key, which `write` takes. Names are made absolute.
     notes : dict of str to str, optional
-        Kept in the file and in ``custom_data``; for instance that the session is synthetic, and its origin.
-    compression : CompressionType, optional
-        Compression of the chunks.
-    chunk_size : int, optional
-        Bytes of a chunk, before it is compressed.
-
-    Raises
-    ------
-    BagError
-        If `directory` holds anything, or cannot be made.
+        For instance that the session is synthetic, and its origin.
+    **options
+        As of `BagWriter`.
     """
 
     def __init__(
-        self,
-        directory: Path,
-        topics: Mapping[str, Topic],
-        notes: Mapping[str, str] | None = None,
-        compression: CompressionType = CompressionType.ZSTD,
-        chunk_size: int | None = None,
+        self, directory: Path, topics: Mapping[str, Topic], notes: Mapping[str, str] | None = None, **options: Any
     ) -> None:
-        self._topics = dict(topics)
-        self._encode = jazzy().serialize_cdr
-        self._bag = BagWriter(directory, notes, compression, chunk_size=chunk_size)
+        self._types = {key: topic.type for key, topic in topics.items()}
+        self._bag = BagWriter(directory, notes, **options)
         self._keys = dict(zip(topics, self._bag.add(*map(recorded, topics.values())), strict=True))
 
     def write(self, key: str, stamp_ns: int, msg: Any) -> None:
         """Append a message of rosbags to the topic `key`; `stamp_ns` becomes log time and publish time."""
-        self.write_encoded(key, stamp_ns, bytes(self._encode(msg, self._topics[key].type)))
+        self.write_encoded(key, stamp_ns, bytes(jazzy().serialize_cdr(msg, self._types[key])))
 
     def write_encoded(self, key: str, stamp_ns: int, data: bytes) -> None:
         """Append a message that is encoded as CDR."""

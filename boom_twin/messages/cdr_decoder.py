@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from functools import partial
 from typing import Any, NamedTuple
 
 from mcap.records import Schema
 
 from ..types import SECOND, Stream
 from .topic_table import TYPES
-from .type_store import decode, text_in
+from .type_store import PADDING, decode, text_in
 
 _ORIGIN = 4  # bytes of encapsulation, from after which CDR aligns
 _ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
@@ -70,9 +69,10 @@ def _string(data: bytes, place: int, length: struct.Struct) -> tuple[str, int]:
 
 
 _LITTLE = b"\x00\x01"
-_POSITION = "position"
-_TIME = 8  # bytes of a stamp
-_BEFORE_FORCE = 25  # doubles of an Imu before its linear acceleration
+_ARRAYS = ("position", "velocity", "effort")
+_HEAD = _ORIGIN + 8  # behind the stamp
+_IMU_NUMBERS, _BEFORE_FORCE = 37, 25  # doubles of an Imu, and those before its linear acceleration
+_FORCE = struct.Struct("<4d")
 
 
 class Joints(NamedTuple):
@@ -99,48 +99,26 @@ class Force(NamedTuple):
     linear_acceleration_covariance: tuple[float]
 
 
-class Layout(NamedTuple):
-    """Layout of a decoded message, which later messages may share."""
-
-    size: int
-    head: bytes
-    end: int
-    stamped: struct.Struct
-    later: tuple[tuple[int, bytes], ...]
-    make: Callable[[tuple[float, ...]], Joints | Force]
-
-    def is_of(self, data: bytes) -> bool:
-        """Return True if `data` has this layout."""
-        if len(data) != self.size or data[:2] != _LITTLE or data[_ORIGIN + _TIME : self.end] != self.head:
-            return False
-        return not self.later or all(data[at : at + len(part)] == part for at, part in self.later)
-
-    def read_stamped(self, data: bytes) -> tuple[int, Joints | Force]:
-        """Return stamp (ns) and fields of a message with this layout."""
-        seconds, nanoseconds, *_ = found = self.stamped.unpack_from(data, _ORIGIN)
-        return seconds * SECOND + nanoseconds, self.make(found[2:])
-
-
-MOST_LAYOUTS = 8
-"""Number of layouts kept for one topic: a bus may send every joint in a message of its own."""
+MOST_HEADS = 8
+"""Number of heads kept for one topic: a bus may send every joint in a message of its own."""
 
 
 class CdrDecoder:
-    """Decoder of the messages of one topic.
+    """Decoder of the messages of one topic. The frame and the names of a message are decoded when they are new.
 
     Parameters
     ----------
     type_name : str
         ``sensor_msgs/msg/JointState`` or ``sensor_msgs/msg/Imu``.
     decode : callable, optional
-        Decodes a message whose layout is not known yet.
+        Decodes a message with a new head, or one that is not whole.
     field : str
         Array of a JointState to read, ``position`` or ``effort``.
     """
 
-    def __init__(self, type_name: str, decode: Callable[[bytes, str], Any] = decode, field: str = _POSITION) -> None:
+    def __init__(self, type_name: str, decode: Callable[[bytes, str], Any] = decode, field: str = _ARRAYS[0]) -> None:
         self._type, self._decode, self._field = type_name, decode, field
-        self._layouts: list[Layout] = []
+        self._heads: list[tuple[bytes, int, Any]] = []  # bytes of frame and names, their end, and the names or the frame
 
     def read(self, data: bytes) -> tuple[int, Any]:
         """Return stamp (ns) and message with the fields that `boom_twin.messages.sample_decoder.SampleDecoder` reads.
@@ -150,59 +128,44 @@ class CdrDecoder:
         ValueError, or what `decode` raises
             The message is not whole.
         """
-        for layout in self._layouts:
-            if layout.is_of(data):
-                return layout.read_stamped(data)
-        msg = self._decode(data, self._type)
-        if (new := layout_of(data, self._type, self._field)) is not None:
-            self._layouts = [new, *self._layouts[: MOST_LAYOUTS - 1]]
+        is_little, is_imu = data[:2] == _LITTLE, self._type == TYPES[Stream.IMU]
+        found = None
+        if is_little:
+            for head, end, text in self._heads:
+                if data[_HEAD:end] == head:
+                    found = _force(data, end, text) if is_imu else _joints(data, end, text, self._field)
+                    break
+        msg = self._decode(data, self._type) if found is None else found
         stamp = stamp_in(data)
         if stamp is None:
             raise ValueError("the message is too short for a header")
+        if found is None and is_little:
+            frame, place = _string(data, _HEAD, _LENGTHS["<"])
+            text, end = (frame, place) if is_imu else names_in(data)
+            self._heads = [(data[_HEAD:end], end, text), *self._heads[: MOST_HEADS - 1]]
         return stamp, msg
 
 
-def layout_of(data: bytes, type_name: str, field: str) -> Layout | None:
-    """Return the layout of a message that was decoded, of a type that `CdrDecoder` reads; None if it is big-endian."""
-    if data[:2] != _LITTLE:
+def _joints(data: bytes, place: int, names: tuple[str, ...], field: str) -> Joints | None:
+    """Return the fields of a JointState whose names end at `place`; None if it is not whole."""
+    found, numbers = place, 0
+    for each in _ARRAYS:
+        place += -place % 4 + 4
+        if count := int.from_bytes(data[place - 4 : place], "little"):
+            place += -(place - _ORIGIN) % 8
+        if each == field:
+            found, numbers = place, count
+        place += 8 * count
+    if not place <= len(data) <= place + PADDING:
         return None
-    return _force_layout(data) if type_name == TYPES[Stream.IMU] else _joints_layout(data, field)
+    values = struct.unpack_from(f"<{numbers}d", data, found)
+    return Joints(names, values) if field == _ARRAYS[0] else Joints(names, (), values)
 
 
-def _joints_layout(data: bytes, field: str) -> Layout:
-    """Return the layout of a JointState: header, names, then positions, velocities and efforts, each after its length."""
-    names, place = names_in(data)
-    place += -(place - _ORIGIN) % 4
-    end, lengths, found = place + 4, list[tuple[int, bytes]](), {}
-    for each in (_POSITION, "velocity", "effort"):
-        length = data[place : place + 4]
-        if len(lengths) > 1 and lengths[-1][0] + len(lengths[-1][1]) == place:  # right behind the one before
-            lengths[-1] = lengths[-1][0], lengths[-1][1] + length
-        else:
-            lengths.append((place, length))
-        count = int.from_bytes(length, "little")
-        place += 4
-        at = place + (-(place - _ORIGIN) % 8 if count else 0)
-        found[each] = at, struct.Struct(f"<{count}d")
-        place = at + 8 * count
-    at, numbers = found[field]
-    head, make = data[_ORIGIN + _TIME : end], partial(Joints, names) if field == _POSITION else partial(Joints, names, ())
-    return Layout(len(data), head, end, _stamped(at, numbers), tuple(lengths[1:]), make)
-
-
-def _force_layout(data: bytes) -> Layout:
-    """Return the layout of an Imu, whose fields after the header have fixed offsets."""
-    end = _ORIGIN + _TIME + 4 + int.from_bytes(data[_ORIGIN + _TIME : _ORIGIN + _TIME + 4], "little")
-    at = end + -(end - _ORIGIN) % 8 + 8 * _BEFORE_FORCE
-    numbers, frame = struct.Struct("<4d"), _string(data, _ORIGIN + _TIME, _LENGTHS["<"])[0]
-    return Layout(len(data), data[_ORIGIN + _TIME : end], end, _stamped(at, numbers), (), partial(_force, frame))
-
-
-def _stamped(at: int, numbers: struct.Struct) -> struct.Struct:
-    """Return the structure of a stamp and of numbers at offset `at`, read from after the encapsulation."""
-    return struct.Struct(f"<iI{at - _ORIGIN - _TIME}x{numbers.format.removeprefix('<')}")
-
-
-def _force(frame: str, row: tuple[float, ...]) -> Force:
-    x, y, z, covariance = row
+def _force(data: bytes, place: int, frame: str) -> Force | None:
+    """Return the fields of an Imu whose frame ends at `place`, before numbers at fixed offsets; None if it is not whole."""
+    place += -(place - _ORIGIN) % 8
+    if not 0 <= len(data) - place - 8 * _IMU_NUMBERS <= PADDING:
+        return None
+    x, y, z, covariance = _FORCE.unpack_from(data, place + 8 * _BEFORE_FORCE)
     return Force(frame, Vector(x, y, z), (covariance,))

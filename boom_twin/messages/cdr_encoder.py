@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,7 +18,6 @@ ORIGIN = 4
 STAMP = 1_365_991_213
 """Seconds that stand for the stamp, in every header of a message."""
 
-_TIME = struct.Struct("<iI")
 _DOUBLE, _SINGLE = 0x7E37_E43C_8800_0000, 0x7E96_7600
 """Bits of the first placeholder of either width, about 1e300 and 1e38; the next ones count up. No constant comes near them."""
 
@@ -46,62 +44,60 @@ class NumberFields:
 
 
 class Template:
-    """Encoded message with places for stamps and numbers.
+    """One or more encoded messages with places for stamps and numbers, filled together.
 
     Parameters
     ----------
-    type_name : str
-    msg : message of rosbags
-        Message whose numbers are constants or from `fields`, and whose stamps are `STAMP` s.
+    messages : sequence of (str, message of rosbags)
+        Type and message. Its numbers are constants or from `fields`, and its stamps are `STAMP` s.
     fields : NumberFields
-        Placeholders in `msg`.
+        Placeholders in the messages.
 
     Attributes
     ----------
-    size : int
-        Size of a message, bytes.
-    double_places, stamp_places : ndarray of int64
-        Index of every field among the doubles, and of every stamp among the words of four bytes, after the encapsulation.
+    double_places : ndarray of int64
+        Index of every field among the doubles after the first encapsulation.
     """
 
-    def __init__(self, type_name: str, msg: Any, fields: NumberFields) -> None:
-        self._data = bytearray(jazzy().serialize_cdr(msg, type_name))
-        self.size = len(self._data)
-        size = self.size - ORIGIN
-        words = np.frombuffer(self._data, "<i4", size // 4, ORIGIN)
-        self._singles, self._doubles = words.view("<f4"), np.frombuffer(self._data, "<f8", size // 8, ORIGIN)
-        self.stamp_places = np.flatnonzero(words == STAMP)
-        self._stamps = [ORIGIN + 4 * place for place in self.stamp_places.tolist()]
+    def __init__(self, messages: Sequence[tuple[str, Any]], fields: NumberFields) -> None:
+        data, self._spans = bytearray(), list[slice]()
+        for type_name, msg in messages:
+            encoded = bytes(jazzy().serialize_cdr(msg, type_name))
+            self._spans.append(slice(len(data), len(data) + len(encoded)))
+            data += encoded + bytes(-len(encoded) % 8)
+        data += bytes(ORIGIN)  # so that a whole number of doubles follows the first encapsulation
+        self._blank = np.frombuffer(bytes(data), np.uint8)
+        words, doubles = (self._blank[ORIGIN:].view(kind) for kind in ("<i4", "<i8"))
+        seconds = np.flatnonzero(words == STAMP)
+        self._stamp_places, self._stamp_parts = np.concatenate([seconds, seconds + 1]), np.repeat([0, 1], len(seconds))
         self._single_places = _places(words, _SINGLE, fields.singles)
-        self.double_places = _places(self._doubles.view("<i8"), _DOUBLE, fields.doubles)
+        self.double_places = _places(doubles, _DOUBLE, fields.doubles)
 
     def byte_of(self, double: int) -> int:
-        """Return the offset of a field in the message, by its index among the doubles; -1 is the last field."""
+        """Return the offset of a field in the first message, by its index among the doubles; -1 is the last field."""
         return ORIGIN + 8 * int(self.double_places[double])
 
-    def put_into(self, data: Bytes) -> None:
-        """Copy the message, with its placeholders, to the beginning of an array of bytes."""
-        data[: self.size] = np.frombuffer(self._data, np.uint8)
+    def fill(self, stamps: Integers, doubles: Array, singles: Sequence[float] = ()) -> list[Bytes]:
+        """Return the bytes of each message, a row for each of the stamps.
 
-    def fill(self, stamp: int, doubles: Array | Sequence[float], singles: Sequence[float] = ()) -> bytes:
-        """Return the message with a stamp (ns) in all its headers, and with numbers in the order of the placeholders."""
-        time = divmod(stamp, SECOND)
-        for place in self._stamps:
-            _TIME.pack_into(self._data, place, *time)
-        self._doubles[self.double_places] = doubles
-        if singles:
-            self._singles[self._single_places] = singles
-        return bytes(self._data)
-
-    def fill_rows(self, stamps: Integers, doubles: Array | Sequence[Array]) -> Bytes:
-        """Return many messages, a row of bytes each, with stamps, shape (k,), and numbers, shape (d, k); see `fill`."""
-        rows = np.empty((len(stamps), len(self._data)), np.uint8)
-        rows[:] = np.frombuffer(self._data, np.uint8)
-        rows[:, ORIGIN : ORIGIN + self._doubles.nbytes].view("<f8")[:, self.double_places] = np.transpose(doubles)
+        Parameters
+        ----------
+        stamps : ndarray of int64, shape (k,)
+            Nanoseconds, for all headers.
+        doubles : ndarray, shape (k, d)
+            Numbers in the order of the placeholders.
+        singles : sequence of float
+            Numbers of ``float32``, the same in every row.
+        """
+        rows = np.empty((len(stamps), len(self._blank)), np.uint8)
+        rows[:] = self._blank
+        body = rows[:, ORIGIN:]
+        body.view("<f8")[:, self.double_places] = doubles
         times = np.column_stack(np.divmod(stamps, SECOND))
-        for place in self._stamps:
-            rows[:, place : place + _TIME.size].view("<i4")[:] = times
-        return rows
+        body.view("<i4")[:, self._stamp_places] = times[:, self._stamp_parts]
+        if singles:
+            body.view("<f4")[:, self._single_places] = singles
+        return [rows[:, span] for span in self._spans]
 
 
 def stamped(header: Any, frame: str = FRAME) -> None:

@@ -44,12 +44,6 @@ class EncodedBlock(NamedTuple):
     log_times: Integers
     rows: list[EncodedRows]
 
-    def data(self) -> list[bytes]:
-        """Return the bytes of each message, in order, of a block that is not empty."""
-        places = np.concatenate([rows.places for rows in self.rows])
-        found = [data.tobytes() for rows in self.rows for data in rows.data]
-        return [found[row] for row in np.argsort(places)]
-
 
 class EncodedBlockBuilder:
     """Builder of a block from groups of encoded messages, sorted by the samples that caused them."""

@@ -71,7 +71,8 @@ class ShapeMarkers:
         numbers = np.concatenate([part.ravel() for part in (line, large, label, straight, pins, prediction.tip_position)])
         colours = [value for force in prediction.cylinder_forces for value in force_colour(float(force) / self._scale)]
         self._extend_trace(prediction.stamp, prediction.tip_position)
-        return self._with_trace(self._template.fill(prediction.stamp, numbers, colours))
+        (data,) = self._template.fill(np.array([prediction.stamp]), numbers, colours)
+        return self._with_trace(data.tobytes())
 
     def _new_template(self, points: int, cylinders: int) -> Template:
         """Return the template of a message whose lines have `points` points and whose trace has one point."""
@@ -84,7 +85,7 @@ class ShapeMarkers:
             *(self._line("cylinders", i + 1, 0.09, None, fields, 2) for i in range(cylinders)),
             self._line("tip_trace", 0, 0.03, TIP, fields, 1),
         ]
-        return Template(TYPES[Output.SHAPE], msg, fields)
+        return Template([(TYPES[Output.SHAPE], msg)], fields)
 
     def _with_trace(self, data: bytes) -> bytes:
         """Return the message with all points of the trace. A point has 24 bytes, so the alignment after them is unchanged."""

@@ -1,29 +1,60 @@
-"""Outputs with numbers of a prediction and of its estimate, and the places of the numbers in the messages.
+"""Numbers of a prediction and of its estimate: their names, the messages that have them, and rows of them.
 
-The model's plane (x forward, y up) is the x-z plane of ``base_link``, so a positive turn is one about its -y (REP-103).
+Each number stands once in a row, by the names of `number_names`, in the axes of the model. The model's plane (x forward, y up)
+is the x-z plane of ``base_link``, so a positive turn is one about its -y (REP-103).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..deviation.estimate_row import MODES
-from ..twin.blocks import Integers
-from ..types import Array
+from ..deviation.estimate_row import FORCE_VARIANCE, MODES
+from ..twin.blocks import EstimateBlock, Integers, PredictionBlock, row_of
+from ..types import Array, Estimate, Prediction
 from .cdr_encoder import NumberFields
 from .message_fields import fill_xz
-from .prediction_numbers import COVARIANCE, ESTIMATED_NUMBERS, number_names
 from .topic_table import Output
+
+TIP_NUMBERS = (
+    "tip_x", "tip_y", "tip_angle",
+    "velocity_x", "velocity_y", "angular_velocity",
+    "acceleration_x", "acceleration_y", "angular_acceleration",
+    "displacement_x", "displacement_y",
+)  # fmt: skip
+TIP_JOINTS = ("tip_dx", "tip_dz", "tip_pitch")
+"""Displacement of the tip from that of rigid sections: along and across the last section, m, and its rotation, rad."""
+COVARIANCE = "variance_xx", "covariance_xy", "covariance_xa", "variance_yy", "covariance_ya", "variance_aa"
+"""Upper triangle of a covariance by rows, of x, y and angle."""
+ESTIMATED_NUMBERS = (
+    "estimate_x", "estimate_y", "estimate_angle",
+    "estimate_velocity_x", "estimate_velocity_y", "estimate_angular_velocity",
+    "estimate_acceleration_x", "estimate_acceleration_y", "estimate_angular_acceleration",
+    "load_x", "load_y",
+    *(f"{kind}_{j}" for kind in ("mode", "mode_rate") for j in range(1, MODES + 1)),
+    *(f"{kind}{entry}" for kind in ("", "velocity_", "acceleration_") for entry in COVARIANCE),
+)  # fmt: skip
+"""Numbers of an estimate's row, see `boom_twin.deviation.estimate_row.WIDTH`, up to its variances of the load."""
+TURN = ("sine_of_half", "cosine_of_half")
+"""Sine and cosine of half the angle of the estimate, for a quaternion."""
+
+JOINTS = len(TIP_NUMBERS)  # behind the joints' angles: strokes, cylinders' forces, the tip's joints, the estimate
+
+
+def number_names(joints: int) -> tuple[str, ...]:
+    """Return the names of the numbers (SI units) for a boom with `joints` joints, in the order of a row."""
+    own = [f"{kind}_{i}" for kind in ("joint", "stroke", "force") for i in range(1, joints + 1)]
+    return *TIP_NUMBERS, *own, *TIP_JOINTS, *ESTIMATED_NUMBERS, *TURN
 
 
 class NumericOutput(NamedTuple):
     """Output with one message for every prediction or estimate, and the numbers that its message has.
 
     ``put`` gets an empty message and places the fields for numbers in it. ``numbers`` names these numbers in that order, see
-    `boom_twin.messages.prediction_numbers.number_names`. A minus before a name reverses the sign in the message.
+    `number_names`. A minus before a name reverses the sign in the message.
     """
 
     output: Output
@@ -108,24 +139,60 @@ ESTIMATED = (
 """Outputs of an estimate in the order of a bag, after ``joint_states``."""
 
 
-class Selection(NamedTuple):
-    """Selection of numbers of a row: their places and their signs (1 or -1), both of shape (selected,)."""
+def selection(names: Sequence[str], joints: int) -> tuple[Integers, Array]:
+    """Return the places and the signs (1 or -1) of `NumericOutput.numbers` in the row of a boom with `joints` joints."""
+    places = {name: place for place, name in enumerate(number_names(joints))}
+    chosen = np.array([places[name.removeprefix("-")] for name in names], np.int64)
+    return chosen, np.array([-1.0 if name.startswith("-") else 1.0 for name in names])
 
-    places: Integers
-    signs: Array
 
-    @classmethod
-    def named(cls, names: Sequence[str], joints: int) -> Selection:
-        """Return the selection of `NumericOutput.numbers` for a boom with `joints` joints."""
-        places = {name: place for place, name in enumerate(number_names(joints))}
-        chosen = np.array([places[name.removeprefix("-")] for name in names], np.int64)
-        return cls(chosen, np.array([-1.0 if name.startswith("-") else 1.0 for name in names]))
+class Chain(NamedTuple):
+    """Geometry of the boom: pivot of its first joint, shape (2,), m, and lengths of its sections, shape (n,), m."""
 
-    @classmethod
-    def of_all(cls, width: int) -> Selection:
-        """Return the selection of all `width` numbers of a row, with unchanged signs."""
-        return cls(np.arange(width), np.ones(width))
+    pivot: Array
+    lengths: Array
 
-    def of(self, numbers: Array) -> Array:
-        """Return the selected numbers, shape (selected, k), from columns of numbers, shape (all, k)."""
-        return np.asarray(numbers[self.places] * self.signs[:, np.newaxis])
+
+def number_rows(chain: Chain, p: Prediction | PredictionBlock | None, e: Estimate | EstimateBlock | None, count: int) -> Array:
+    """Return the numbers of `count` predictions and their estimates, shape (count, all); NaN if missing."""
+    joints = len(chain.lengths)
+    at = JOINTS + 3 * joints
+    numbers = np.full((count, at + len(TIP_JOINTS) + len(ESTIMATED_NUMBERS) + len(TURN)), math.nan)
+    if p is not None:
+        tip = p.tip_position, p.tip_angle, p.tip_velocity, p.tip_angular_velocity
+        more = p.tip_acceleration, p.tip_angular_acceleration, p.tip_displacement
+        parts = (*tip, *more, p.joints, p.strokes, p.cylinder_forces)
+        numbers[:, :at] = np.concatenate([np.reshape(part, (count, -1)) for part in parts], axis=1)
+    if e is not None:
+        rows = e.rows if isinstance(e, EstimateBlock) else row_of(e)[np.newaxis]
+        numbers[:, at + 3 : -2] = rows[:, :FORCE_VARIANCE]
+    lengths, (x0, y0) = chain.lengths.tolist(), chain.pivot.tolist()
+    sections = slice(JOINTS, JOINTS + joints)
+    derived = [_derived(lengths, x0, y0, row[:3], row[sections], row[at + 5]) for row in numbers.tolist()]
+    numbers[:, [at, at + 1, at + 2, -2, -1]] = np.reshape(derived, (count, 5))
+    return numbers
+
+
+def _derived(
+    lengths: list[float], x0: float, y0: float, tip: list[float], joints: list[float], estimated: float
+) -> tuple[float, ...]:
+    """Return the joints of the tip (m, m, rad), and sine and cosine of half the angle (rad) of the estimate.
+
+    The deflected tip is x, y (m), angle (rad). Every NaN is `math.nan`, because the processor decides which of two NaN a sum
+    has.
+    """
+    angle, x, y = 0.0, 0.0, 0.0
+    along = across = math.nan
+    for length, joint in zip(lengths, joints, strict=True):
+        angle += joint
+        along, across = _turn(angle)
+        x, y = x + length * along, y + length * across
+    dx, dy = tip[0] - (x0 + x), tip[1] - (y0 + y)
+    cosine, sine = _turn(0.5 * estimated)
+    derived = along * dx + across * dy, along * dy - across * dx, tip[2] - angle, sine, cosine
+    return derived if all(each == each for each in derived) else tuple(each if each == each else math.nan for each in derived)
+
+
+def _turn(angle: float) -> tuple[float, float]:
+    """Return cosine and sine of an angle (rad) by the C library, for the same bits on every processor; NaN of infinity."""
+    return (math.cos(angle), math.sin(angle)) if math.isfinite(angle) else (math.nan, math.nan)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from math import nan
 from typing import Any
 
@@ -13,16 +13,13 @@ from ..errors import BagError, UsageError
 from ..health.alarms import alarm_of, values_of
 from ..scene.kinematics import PassiveJoints
 from ..scene.schema import Scene
-from ..twin.blocks import STREAMS, Integers, ReportBlock, ResidualBlock
-from ..twin.report_rows import ReportRows
-from ..types import Alarm, Array, Change, Health, Prediction, Report, Residuals, channels_of
+from ..twin.blocks import STREAMS, EstimateBlock, Integers, PredictionBlock, ReportBlock, ResidualBlock
+from ..types import Alarm, Array, Change, Estimate, Health, Prediction, Report, channels_of
 from .cdr_encoder import NumberFields, Template, stamped
 from .encoded_block import Bytes, EncodedBlock, EncodedBlockBuilder
 from .marker_encoder import ShapeMarkers
 from .message_fields import FRAME, fill_header
-from .numeric_outputs import ESTIMATED, PREDICTED, Selection, put_vector
-from .prediction_numbers import JOINTS, TIP_JOINTS, Chain, number_columns
-from .row_encoder import RowEncoder
+from .numeric_outputs import ESTIMATED, JOINTS, PREDICTED, TIP_JOINTS, Chain, number_rows, put_vector, selection
 from .sample_decoder import stamp_of
 from .topic_table import TYPES, Output
 from .type_store import jazzy, new_message
@@ -93,6 +90,7 @@ def decode_changes(msg: Any) -> Change:
 
 
 Messages = list[tuple[Output, bytes]]
+Placer = Callable[[Any, NumberFields], None]
 
 
 class ReportEncoder:
@@ -114,25 +112,20 @@ class ReportEncoder:
         self._chain = Chain(np.array(scene.base.pivot), np.array([section.length for section in scene.sections]))
         own = [f"{kind}_{number}" for kind in ("joint", "stroke", "force") for number in range(1, count + 1)]
         names = [f"{kind}_{number}" for kind in ("joint", "cylinder") for number in range(1, count + 1)]
-        joints = self._joint_states([*names, *TIP_JOINTS], count), Selection.named([*own, *TIP_JOINTS], count)
-        self._all_joints = self._joint_states([*names, *TIP_JOINTS, *self._passive.names], count)
-        predicted, self._estimated = (
-            [(row.output, self._template(row.output, row.put), Selection.named(row.numbers, count)) for row in table]
-            for table in (PREDICTED, ESTIMATED)
-        )
-        self._predicted = [*predicted, (Output.JOINT_STATES, *joints)]
-        self._uncertainty = self._template(Output.TIP_UNCERTAINTY, put_vector)
+        joints = (Output.JOINT_STATES, _joint_states([*names, *TIP_JOINTS], count), (*own, *TIP_JOINTS))
+        rows = [*PREDICTED, joints, *ESTIMATED]
+        self._predicted, self._outputs = len(PREDICTED) + 1, [output for output, _, _ in rows]
+        self._numeric = self._template([(output, put) for output, put, _ in rows])
+        self._chosen, self._signs = selection([name for _, _, names in rows for name in names], count)
+        self._joints, _ = selection(joints[2], count)
+        all_joints = _joint_states([*names, *TIP_JOINTS, *self._passive.names], count)
+        self._shaped_joints = self._template([(Output.JOINT_STATES, all_joints)])
+        self._uncertainty = self._template([(Output.TIP_UNCERTAINTY, put_vector)])
         self._channels = channels_of(count)
         self._residuals: dict[tuple[str, ...], Template] = {}
-        self._compiled: RowEncoder | None = None
         self._markers = ShapeMarkers(settings.exaggeration, settings.force_scale, frame)
         for output in Output:  # their encoders are compiled here, not when the first message waits
             jazzy().get_msgdef(TYPES[output])
-
-    def warm_up(self) -> None:
-        """Compile the encoder of single reports now; without this call, the first report compiles it."""
-        residuals = [(self._residual_template(names), 3 * len(names)) for names in self._channels.values()]
-        self._compiled = RowEncoder(self._chain, [*self._predicted, *self._estimated], residuals)
 
     def fill(self, report: Report, is_wanted: Callable[[Output], bool] = lambda output: True) -> Messages:
         """Return the messages of one report.
@@ -150,139 +143,105 @@ class ReportEncoder:
             ``residuals`` for each set of residuals. ``changes`` with a change. ``health`` and ``tip_uncertainty`` (m) with
             new health.
         """
-        rows: ReportRows | None = report.rows
-        if rows is None:
-            messages, has_shape = self._fill_numbers(report, is_wanted), _has_shape(report.prediction)
-        else:
-            messages, has_shape = self._fill_rows(rows, is_wanted), rows.outline is not None
+        p, e, messages = report.prediction, report.estimate, Messages()
+        if p is not None and any(map(is_wanted, self._outputs)):
+            stamps = np.array([p.stamp])
+            numbers, found = self._numbers(p, e, stamps)
+            for key, data in found if e is not None else found[: self._predicted]:
+                if not is_wanted(key):
+                    continue
+                if key is Output.JOINT_STATES and p.shape is not None:
+                    data = self._shaped_joint_states(stamps, numbers)
+                messages.append((key, data.tobytes()))
+        if report.residuals and is_wanted(Output.RESIDUALS):
+            for each in report.residuals:
+                data = self._fill_residuals(each.names, np.array([each.stamp]), each.values[np.newaxis], each.sigmas)
+                messages.append((Output.RESIDUALS, data.tobytes()))
         if report.change is not None and is_wanted(Output.CHANGES):
             messages.append((Output.CHANGES, encode_changes(report.change, self._frame)))
         if report.health is not None:
             messages += [each for each in self._fill_health(report.health) if is_wanted(each[0])]
-        if has_shape and is_wanted(Output.SHAPE):
-            assert report.prediction is not None
-            messages.append((Output.SHAPE, self._markers.fill(report.prediction)))
-        return messages
-
-    def _fill_rows(self, rows: ReportRows, is_wanted: Callable[[Output], bool]) -> Messages:
-        """Return the messages of prediction, estimate and residuals, encoded from the rows of the report by compiled code."""
-        if self._compiled is None:
-            self.warm_up()
-        assert self._compiled is not None
-        messages = [] if rows.row is None else self._compiled.fill(rows, is_wanted)
-        if rows.outline is not None:
-            numbers = self._compiled.numbers[:, np.newaxis]
-            messages = [
-                (key, self._fill_joint_states(rows.stamp, numbers, True) if key is Output.JOINT_STATES else message)
-                for key, message in messages
-            ]
-        if rows.streams and is_wanted(Output.RESIDUALS):
-            messages += [(Output.RESIDUALS, each) for each in self._compiled.fill_residuals(rows)]
-        return messages
-
-    def _fill_numbers(self, report: Report, is_wanted: Callable[[Output], bool]) -> Messages:
-        """Return the messages of prediction, estimate and residuals, encoded without compiled code."""
-        p, e, messages = report.prediction, report.estimate, Messages()
-        told = [(each.stamp, outputs) for each, outputs in ((p, self._predicted), (e, self._estimated)) if each is not None]
-        numbers = number_columns(self._chain, p, e, 1) if told else np.zeros((0, 1))
-        for stamp, outputs in told:
-            for key, template, chosen in outputs:
-                if key is Output.JOINT_STATES and is_wanted(key):
-                    messages.append((key, self._fill_joint_states(stamp, numbers, _has_shape(p))))
-                elif is_wanted(key):
-                    messages.append((key, template.fill(stamp, chosen.of(numbers)[:, 0])))
-        if report.residuals and is_wanted(Output.RESIDUALS):
-            messages += [(Output.RESIDUALS, self._fill_residuals(residuals)) for residuals in report.residuals]
+        if p is not None and p.shape is not None and is_wanted(Output.SHAPE):
+            messages.append((Output.SHAPE, self._markers.fill(p)))
         return messages
 
     def fill_block(self, block: ReportBlock) -> EncodedBlock:
         """Return the messages of many reports, equal to those of `fill` for one report after the other."""
         p, residuals, found = block.predictions, block.residuals, EncodedBlockBuilder()
-        turn = len(self._predicted)  # of estimates among the messages of one sample; residuals follow
-        first = turn + len(self._estimated)
+        first = len(self._outputs)  # turn of residuals among the messages of one sample
         last = first + len(residuals.at)  # of health; shape follows
         if len(p.at):
-            numbers = number_columns(self._chain, p, block.estimates, len(p.at))
             shaped = np.zeros(len(p.at), bool)
             shaped[list(p.outlines)] = True
-            for number, (output, template, chosen) in enumerate([*self._predicted, *self._estimated]):
-                rows = np.flatnonzero(~shaped) if output is Output.JOINT_STATES else slice(None)
-                found.add(output, p.at[rows], number, template.fill_rows(p.stamps[rows], chosen.of(numbers[:, rows])))
-            rows, data = np.flatnonzero(shaped), self._shaped_joint_states(p.stamps[shaped], numbers[:, shaped])
-            found.add(Output.JOINT_STATES, p.at[rows], turn - 1, data)
+            numbers, messages = self._numbers(p, block.estimates, p.stamps)
+            for turn, (output, data) in enumerate(messages):
+                rows = ~shaped if output is Output.JOINT_STATES else slice(None)
+                found.add(output, p.at[rows], turn, data[rows])
+            data = self._shaped_joint_states(p.stamps[shaped], numbers[shaped])
+            found.add(Output.JOINT_STATES, p.at[shaped], self._predicted - 1, data)
         for rows, data in self._residual_rows(residuals):
             found.add(Output.RESIDUALS, residuals.at[rows], first + rows, data)
         for row, health in block.health.items():
-            for number, (output, message) in enumerate(self._fill_health(health), start=last):
-                found.add_one(output, row, number, message)
+            for turn, (output, message) in enumerate(self._fill_health(health), start=last):
+                found.add_one(output, row, turn, message)
         for row in sorted(p.outlines):
             found.add_one(Output.SHAPE, int(p.at[row]), last + 2, self._markers.fill(p.one(row)))
         return found.block(block.stamps)
 
-    def _template(self, key: Output, put: Callable[[Any, NumberFields], None]) -> Template:
-        msg, fields = new_message(TYPES[key]), NumberFields()
-        stamped(msg.header, self._frame)
-        put(msg, fields)
-        return Template(TYPES[key], msg, fields)
-
-    def _joint_states(self, names: list[str], count: int) -> Template:
-        """Return a template with joints, cylinders, joints of the tip and passive joints. Only cylinders have an effort."""
-        others = len(names) - 2 * count
-
-        def put(msg: Any, fields: NumberFields) -> None:
-            own, efforts, more = (fields.row(number) for number in (2 * count, count, others))
-            msg.name, msg.position = names, np.array(own + more)
-            msg.effort = np.array([nan] * count + efforts + [nan] * others)
-
-        return self._template(Output.JOINT_STATES, put)
-
-    def _fill_joint_states(self, stamp: int, numbers: Array, is_shaped: bool) -> bytes:
-        """Return the joint states of numbers, shape (all, 1), with passive joints if `is_shaped`."""
-        _, template, chosen = self._predicted[-1]
-        own = chosen.of(numbers)[:, 0]
-        if not is_shaped:
-            return template.fill(stamp, own)
-        passive = self._passive.positions(numbers[JOINTS : JOINTS + len(self._chain.lengths), 0])
-        return self._all_joints.fill(stamp, [*own, *passive])
+    def _numbers(
+        self, p: Prediction | PredictionBlock, e: Estimate | EstimateBlock | None, stamps: Integers
+    ) -> tuple[Array, list[tuple[Output, Bytes]]]:
+        """Return the numbers of predictions and estimates, a row for each stamp, and their messages in the same rows."""
+        numbers = number_rows(self._chain, p, e, len(stamps))
+        data = self._numeric.fill(stamps, numbers[:, self._chosen] * self._signs)
+        return numbers, list(zip(self._outputs, data, strict=True))
 
     def _shaped_joint_states(self, stamps: Integers, numbers: Array) -> Bytes:
-        """Return joint states with passive joints, a row for each of the stamps (ns), from numbers, shape (all, k)."""
-        _, _, chosen = self._predicted[-1]
-        joints = numbers[JOINTS : JOINTS + len(self._chain.lengths)]
-        passive = np.array([self._passive.positions(column) for column in joints.T])
-        others = passive.reshape(len(stamps), len(self._passive.names)).T
-        return self._all_joints.fill_rows(stamps, np.concatenate([chosen.of(numbers), others]))
-
-    def _fill_residuals(self, residuals: Residuals) -> bytes:
-        """Return a message of residuals: ``position`` residual, ``velocity`` normalised, ``effort`` standard deviation."""
-        template = self._residual_template(residuals.names)
-        return template.fill(residuals.stamp, _residual_numbers(residuals.values, residuals.sigmas))
+        """Return joint states with passive joints, which come with a shape, from numbers, shape (k, all)."""
+        joints = numbers[:, JOINTS : JOINTS + len(self._chain.lengths)]
+        passive = np.array([self._passive.positions(row) for row in joints]).reshape(len(stamps), len(self._passive.names))
+        return self._shaped_joints.fill(stamps, np.concatenate([numbers[:, self._joints], passive], axis=1))[0]
 
     def _residual_rows(self, residuals: ResidualBlock) -> Iterator[tuple[Integers, Bytes]]:
         """Yield rows of the block and their messages of residuals, one stream after the other."""
         for code in set(residuals.streams.tolist()):
             rows, names = np.flatnonzero(residuals.streams == code), self._channels[STREAMS[code]]
             values, sigmas = (array[rows, : len(names)] for array in (residuals.values, residuals.sigmas))
-            yield rows, self._residual_template(names).fill_rows(residuals.stamps[rows], _residual_numbers(values, sigmas))
+            yield rows, self._fill_residuals(names, residuals.stamps[rows], values, sigmas)
 
-    def _residual_template(self, names: tuple[str, ...]) -> Template:
+    def _fill_residuals(self, names: tuple[str, ...], stamps: Integers, values: Array, sigmas: Array) -> Bytes:
+        """Return messages of residuals: ``position`` residual, ``velocity`` normalised, ``effort`` standard deviation."""
+
         def put(msg: Any, fields: NumberFields) -> None:
             msg.name = list(names)
             msg.position, msg.velocity, msg.effort = (np.array(fields.row(len(names))) for _ in range(3))
 
         if names not in self._residuals:
-            self._residuals[names] = self._template(Output.RESIDUALS, put)
-        return self._residuals[names]
+            self._residuals[names] = self._template([(Output.RESIDUALS, put)])
+        numbers = np.concatenate([values, values / sigmas, np.reshape(sigmas, values.shape)], axis=1)
+        return self._residuals[names].fill(stamps, numbers)[0]
 
     def _fill_health(self, health: Health) -> Messages:
-        uncertainty = self._uncertainty.fill(health.stamp, health.tip_sigmas)
-        return [(Output.HEALTH, encode_health(health, self._frame)), (Output.TIP_UNCERTAINTY, uncertainty)]
+        (uncertainty,) = self._uncertainty.fill(np.array([health.stamp]), health.tip_sigmas)
+        return [(Output.HEALTH, encode_health(health, self._frame)), (Output.TIP_UNCERTAINTY, uncertainty.tobytes())]
+
+    def _template(self, outputs: Sequence[tuple[Output, Placer]]) -> Template:
+        messages, fields = list[tuple[str, Any]](), NumberFields()
+        for output, put in outputs:
+            msg = new_message(TYPES[output])
+            stamped(msg.header, self._frame)
+            put(msg, fields)
+            messages.append((TYPES[output], msg))
+        return Template(messages, fields)
 
 
-def _has_shape(prediction: Prediction | None) -> bool:
-    return prediction is not None and prediction.shape is not None
+def _joint_states(names: list[str], count: int) -> Placer:
+    """Return the placer of joints, cylinders, joints of the tip and passive joints. Only cylinders have an effort."""
+    others = len(names) - 2 * count
 
+    def put(msg: Any, fields: NumberFields) -> None:
+        own, efforts, more = (fields.row(number) for number in (2 * count, count, others))
+        msg.name, msg.position = names, np.array(own + more)
+        msg.effort = np.array([nan] * count + efforts + [nan] * others)
 
-def _residual_numbers(values: Array, sigmas: Array) -> Array:
-    """Return residuals, normalised residuals and standard deviations of all channels; a column for each of many residuals."""
-    return np.concatenate([values.T, (values / sigmas).T, sigmas.T])
+    return put

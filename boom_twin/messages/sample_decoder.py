@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from math import inf, isnan, nan, tau
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,9 @@ LATEST = 2**31 * SECOND
 
 LONGEST = 1000
 """Limit for the number of names in a message; a machine has some tens of them."""
+
+KEPT = 16
+"""Number of lists of names that are remembered for one stream: a bus may send every joint in a message of its own."""
 
 NO_MEASUREMENT = -1.0
 """First element of a covariance where the quantity is not measured (REP-145)."""
@@ -47,6 +50,20 @@ def in_range(values: Array, middle: Array, half: Array) -> Array:
     return np.where(outside & (np.abs(turned - middle) <= half), turned, values)
 
 
+class _Named(NamedTuple):
+    """Channels of one stream among the names of a message.
+
+    `places` are their indices, -1 for a missing or repeated name. `twice` are repeated names, `lacking` names without an index,
+    `beyond` those of `Topics.beyond`. `is_regular` is True if all sensors are named once.
+    """
+
+    places: list[int]
+    twice: set[str]
+    lacking: list[str]
+    beyond: list[str]
+    is_regular: bool
+
+
 class _Channels:
     """Channels of one stream: their places in a message, and the conversion of their readings."""
 
@@ -61,20 +78,21 @@ class _Channels:
             for i, (mount, (low, high)) in enumerate(zip(topics.mounts(joints), topics.ranges, strict=False)):
                 if mount is None:
                     self.range[:, i] = 0.5 * (low + high), 0.5 * (high - low)
-        self.usual: tuple[Any, int, list[int]] = (), -1, []  # names, readings and places of a message without oddities
-        self._topics, self._stream, self._seen = topics, stream, list[str]()
-        self._places = [-1] * len(self.names)
-        self.beyond: list[str] = []  # names of the newest message, see `Topics.beyond`
-        self.twice: set[str] = set()  # names that it has more than once
+        self._topics, self._stream = topics, stream
+        self._known: dict[tuple[str, ...], _Named] = {}
 
-    def places(self, names: Sequence[str]) -> list[int]:
-        """Return the indices of the channels among `names`; -1 for a missing or repeated name."""
-        if list(names) != self._seen:
-            self._seen, counts = list(names), Counter(names)
-            self.twice = {name for name in self.names if name and counts[name] > 1}
-            self._places = [names.index(name) if name and counts[name] == 1 else -1 for name in self.names]
-            self.beyond = self._topics.beyond(self._stream, len(self.names), counts)
-        return self._places
+    def look(self, names: tuple[str, ...]) -> _Named:
+        """Return the channels among `names`."""
+        if names not in self._known:
+            counts = Counter(names)
+            places = [names.index(name) if name and counts[name] == 1 else -1 for name in self.names]
+            twice = {name for name in self.names if name and counts[name] > 1}
+            if len(self._known) >= KEPT:
+                self._known.clear()
+            lacking = [name for name, place in zip(self.names, places, strict=True) if name and place < 0]
+            beyond = self._topics.beyond(self._stream, len(self.names), counts)
+            self._known[names] = _Named(places, twice, lacking, beyond, not lacking and not beyond and max(places) >= 0)
+        return self._known[names]
 
     def quantities(self, readings: list[float]) -> list[float]:
         """Return readings in SI units. Absent channels stay absent."""
@@ -150,22 +168,7 @@ class SampleDecoder:
         return found
 
     def put(self, stream: Stream, stamp_ns: int, msg: Any) -> Sample | None:
-        """Return the sample that `msg` holds by itself.
-
-        Parameters
-        ----------
-        stream : Stream
-            Role of the topic of the message.
-        stamp_ns : int
-            Stamp of the message, ns, see `stamp_of`.
-        msg : sensor_msgs/JointState or sensor_msgs/Imu
-            Message of rclpy or of rosbags.
-
-        Returns
-        -------
-        Sample or None
-            The sample; None if no value of the message can be used.
-        """
+        """Return the sample that a message of rclpy or of rosbags holds by itself; None if no value of it can be used."""
         reading = self._reading(stream, stamp_ns, msg)
         return None if reading is None else reading.sample
 
@@ -193,22 +196,23 @@ class SampleDecoder:
         """Return places of the channels among `end` readings (-1 without one), what is odd, and if all sensors are named."""
         if len(names) > LONGEST:
             return None, ["too many names"], True
-        channels, other = self._channels[stream], self._sharing.get(stream)
-        places = channels.places(names)
-        if channels.beyond:
-            self.other_boom_names[stream] = channels.beyond
+        places, twice, lacking, beyond, is_regular = self._channels[stream].look(tuple(names))
+        if is_regular and end == len(names):
+            return places, [], True
+        other = self._sharing.get(stream)
+        if beyond:
+            self.other_boom_names[stream] = beyond
             return None, ["names of another boom"], True
-        lacking = [name for name, place in zip(channels.names, places, strict=True) if name and place < 0]
         if lacking and stream not in self.strange_names and (other is None or max(places) >= 0):
             self._note_strange(stream, names, lacking)
-        odd = ["name twice"] if channels.twice else []
+        odd = ["name twice"] if twice else []
         if max(places) < 0 and not odd:
-            is_unknown = other is None or max(self._channels[other].places(names)) < 0
+            is_unknown = other is None or max(self._channels[other].look(tuple(names)).places) < 0
             return None, ["unknown names only"] if is_unknown else [], True
         if end != len(names):
             odd.append("unequal arrays")
             places = [place if place < end else -1 for place in places]
-        return places, odd, channels.twice.issuperset(lacking)
+        return places, odd, twice.issuperset(lacking)
 
     def _note_strange(self, stream: Stream, names: Sequence[str], lacking: list[str]) -> None:
         """Keep names unknown to the scene beside the missing ones, which they may stand for."""
@@ -221,15 +225,10 @@ class SampleDecoder:
 
     def _by_name(self, msg: Any, stream: Stream) -> tuple[list[float] | None, bool]:
         """Return readings in the scene's order, `_ABSENT` where there is none, or None, and whether all names are there."""
-        found, channels = getattr(msg, SENSORS[stream].field), self._channels[stream]
-        names, end, usual = channels.usual
-        if msg.name is names and len(found) == end:  # the decoder hands out the same names again
-            return [float(found[place]) if place >= 0 else _ABSENT for place in usual], True
+        found = getattr(msg, SENSORS[stream].field)
         places, odd, is_whole = self._places(stream, msg.name, len(found))
         for name in odd:
             self.oddities[name] += 1
-        if places is not None and is_whole and not odd and isinstance(msg.name, tuple):
-            channels.usual = msg.name, len(found), places
         return None if places is None else [float(found[place]) if place >= 0 else _ABSENT for place in places], is_whole
 
     def _force(self, msg: Any, stream: Stream) -> list[float] | None:

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Iterator
 from itertools import repeat
 from pathlib import Path
 
-from ..bag.integrity import PARSE_ERRORS
 from ..bag.reader import Session, read, read_blocks, scan
+from ..bag.session_file import PARSE_ERRORS
 from ..bag.time_window import WHOLE, TimeWindow
 from ..errors import BoomTwinError
 from ..messages.cdr_decoder import CdrDecoder

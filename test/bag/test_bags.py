@@ -37,7 +37,7 @@ POINT = Topic(
 
 
 def write_points(directory: Path, count: int, compression: CompressionType = CompressionType.ZSTD) -> None:
-    with SessionWriter(directory, {"point": POINT}, {"origin": "synthetic"}, compression) as bag:
+    with SessionWriter(directory, {"point": POINT}, {"origin": "synthetic"}, compression=compression) as bag:
         for number in range(count):
             msg = new_message(POINT.type)
             msg.point.x = float(number)
@@ -104,7 +104,7 @@ def test_rosbags_reads_it(tmp_path: Path, compression: CompressionType) -> None:
 def test_every_compression_is_read_here(tmp_path: Path, compression: CompressionType) -> None:
     write_points(tmp_path / "bag", 3000, compression)
     session = scan(tmp_path / "bag")
-    assert len(session.files[0].chunks) > 2
+    assert len(session.files[0].pieces) > 2
     assert [msg.point.x for _, _, msg in read(session, {"/boom_twin/tip/position": POINT.type})] == list(range(3000))
 
 
@@ -227,5 +227,5 @@ def test_chunks_that_overlap_are_merged(tmp_path: Path) -> None:
         for time in times:
             bag.write("point", time, new_message(POINT.type))
     session = scan(tmp_path / "bag")
-    assert len(session.files[0].chunks) > 2
+    assert len(session.files[0].pieces) > 2
     assert [time for _, time, _ in read(session, {"boom_twin/tip/position": POINT.type})] == list(range(4000))

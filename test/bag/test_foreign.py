@@ -13,7 +13,7 @@ import zstandard
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
-from boom_twin.bag import chunk_reader, mcap_records, mcap_summary
+from boom_twin.bag import mcap_file
 from boom_twin.bag.reader import Session, read, scan
 from boom_twin.bag.writer import FILE_NAME
 from boom_twin.cli.main import main
@@ -142,7 +142,7 @@ def test_chunks_without_a_wanted_topic_are_passed_over(bag: Path, tmp_path: Path
 def test_a_chunk_that_memory_cannot_hold_is_refused_by_its_size(
     bag: Path, tmp_path: Path, content: Content, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mcap_records, "MOST_HELD", 10_000)
+    monkeypatch.setattr(mcap_file, "MOST_HELD", 10_000)
     path = write(tmp_path / "other.mcap", messages(bag), chunk_size=2**30)
     with pytest.raises(BagError, match=r"a chunk of \d+ bytes; at most 10000 are held in memory\. Write smaller chunks: `mcap"):
         content(scan(path))
@@ -152,8 +152,8 @@ def test_a_file_without_an_index_is_read_a_piece_at_a_time(
     bag: Path, rewritten: Callable[..., Path], content: Content, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, whole = rewritten(bag, use_chunking=False, index_types=IndexType.NONE), content(scan(bag))
-    monkeypatch.setattr(mcap_summary, "_RUN", 2000)
-    monkeypatch.setattr(chunk_reader, "MOST_TOGETHER", 20)
+    monkeypatch.setattr(mcap_file, "_RUN", 2000)
+    monkeypatch.setattr(mcap_file, "MOST_TOGETHER", 20)
     assert content(scan(path)) == whole
 
 

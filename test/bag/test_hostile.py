@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from boom_twin.bag import chunk_reader
+from boom_twin.bag import mcap_file
 from boom_twin.bag.metadata import FILE_NAME as METADATA
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.recovery.recover import recover
@@ -138,7 +138,7 @@ def test_lengths_beyond_the_message_are_refused(tmp_path: Path, kind: str, capsy
 
 def test_too_many_messages_out_of_order_are_not_held(bag: Path, monkeypatch: pytest.MonkeyPatch, rewritten: Any) -> None:
     file = rewritten(bag, backwards=True)
-    monkeypatch.setattr(chunk_reader, "MOST_TOGETHER", 3)
+    monkeypatch.setattr(mcap_file, "MOST_TOGETHER", 3)
     with pytest.raises(BagError, match="3 messages are out of order"):
         list(read(scan(file), {"cylinder_strokes": JOINT_STATE}))
 

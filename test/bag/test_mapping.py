@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from boom_twin.bag.block_yaml import dump
+from boom_twin.bag.metadata import dump
 from boom_twin.bag.session_model import DEFAULT_MAPPING, mapping_of, strokes_of
 from boom_twin.bag.session_sheet import FILE_NAME, RIG_ORIGIN, SessionSheet
 from boom_twin.errors import BagError, UsageError

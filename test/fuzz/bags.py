@@ -21,10 +21,9 @@ from mcap.opcode import Opcode
 from numpy.random import Generator
 
 from boom_twin import load_scene
-from boom_twin.bag.integrity import as_bag_error
-from boom_twin.bag.mcap_records import heads
 from boom_twin.bag.reader import Session, scan
 from boom_twin.bag.recovery.recover import recover
+from boom_twin.bag.session_file import as_bag_error
 from boom_twin.bag.session_files import write_session
 from boom_twin.errors import BagError, BoomTwinError
 from boom_twin.offline.replay import replay
@@ -80,7 +79,7 @@ def _messages(session: Session) -> list[Message]:
     found = []
     for file in session.files:
         with as_bag_error(file.path):
-            for channel, time, data in heads(file.path, file.chunks):
+            for channel, time, data in file.heads():
                 found.append((file.channels[channel].topic, time, data))
     return found
 

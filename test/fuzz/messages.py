@@ -18,7 +18,7 @@ import numpy as np
 from numpy.random import Generator
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.bag.integrity import PARSE_ERRORS
+from boom_twin.bag.session_file import PARSE_ERRORS
 from boom_twin.bag.session_files import sensor_message
 from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import load_baseline

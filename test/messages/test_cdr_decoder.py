@@ -68,7 +68,7 @@ def test_strokes_of_every_layout() -> None:
                 for effort in (0, 3):
                     for k in range(3):
                         same(wire, Stream.STROKES, joint_state(k, names + extra, random.normal(size=count), frame, effort))
-    assert len(calls) == 3 * 3 * 3 * 2
+    assert len(calls) == 3 * 3, "each frame with each list of names"
 
 
 def test_forces_behind_positions_of_every_layout() -> None:
@@ -81,7 +81,7 @@ def test_forces_behind_positions_of_every_layout() -> None:
                 for position in (0, 3):
                     for k in range(3):
                         same(wire, Stream.FORCES, forces(k, names + extra, random.normal(size=count), frame, position))
-    assert len(calls) == 2 * 2 * 3 * 2
+    assert len(calls) == 2 * 2
 
 
 def test_accelerations_of_every_frame() -> None:

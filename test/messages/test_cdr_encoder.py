@@ -24,12 +24,13 @@ def marker(fields: NumberFields) -> Any:
 
 
 def test_numbers_come_in_the_order_of_their_fields() -> None:
-    template = Template(MARKER, marker(fields := NumberFields()), fields)
+    template = Template([(MARKER, marker(fields := NumberFields()))], fields)
     for stamp, doubles, singles in (
         (1_999_999_999, [0.1, np.nan], [0.5, 0.25]),
         (2**31 * 10**9 - 1, [-np.inf, 5e-324], [1.0, 0.0]),
     ):
-        msg = jazzy().deserialize_cdr(template.fill(stamp, doubles, singles), MARKER)
+        (data,) = template.fill(np.array([stamp]), np.array([doubles]), singles)
+        msg = jazzy().deserialize_cdr(data.tobytes(), MARKER)
         assert (msg.header.stamp.sec, msg.header.stamp.nanosec) == divmod(stamp, 10**9)
         np.testing.assert_array_equal([msg.scale.z, msg.pose.position.y], doubles)
         assert [msg.color.g, msg.color.r] == singles
@@ -41,4 +42,4 @@ def test_a_placeholder_that_is_in_no_message_is_refused() -> None:
     msg = marker(fields)
     fields.double()
     with pytest.raises(ValueError, match="2 of 3 placeholders"):
-        Template(MARKER, msg, fields)
+        Template([(MARKER, msg)], fields)

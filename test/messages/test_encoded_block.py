@@ -26,8 +26,12 @@ def one_by_one(encoder: ReportEncoder, reports: list[Report]) -> Messages:
 
 def told(block: EncodedBlock) -> Messages:
     """The same of a block."""
-    keys = {place: rows.key for rows in block.rows for place in rows.places.tolist()}
-    return list(zip((keys[k] for k in range(len(keys))), block.log_times.tolist(), block.data() if keys else [], strict=True))
+    found = {
+        place: (rows.key, data.tobytes())
+        for rows in block.rows
+        for place, data in zip(rows.places.tolist(), rows.data, strict=True)
+    }
+    return [(found[place][0], log_time, found[place][1]) for place, log_time in enumerate(block.log_times.tolist())]
 
 
 def in_blocks(encoder: ReportEncoder, reports: list[Report], size: int, joints: int) -> Messages:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, IndexType, Writer
 
-from boom_twin.bag.integrity import REMEDY
+from boom_twin.bag.session_file import REMEDY
 from boom_twin.errors import BagError
 from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.report_encoder import decode_changes, encode_changes

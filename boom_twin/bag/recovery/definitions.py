@@ -11,10 +11,10 @@ from mcap.records import Channel, ChunkIndex, DataEnd, Header, Metadata, Schema,
 
 from ...errors import BagError
 from ...system.received_files import open_received
-from ..integrity import checksum_of, summary_start
-from ..mcap_records import LARGEST, by_topic, parts, record_of
-from ..mcap_summary import NOTES, PROFILE
+from ..mcap_file import NOTES, PROFILE
+from ..mcap_records import LARGEST, checksum_of, parts, record_of, summary_start
 from ..metadata import BagMetadata, Recorded, offered_qos, profiles
+from ..session_file import by_topic
 from .scanner import SoundRecords, scan_damaged
 
 _DEFINITIONS = {Opcode.CHANNEL, Opcode.SCHEMA}

@@ -15,10 +15,10 @@ from ...errors import BagError
 from ...system.atomic_files import write_atomic
 from ...system.received_files import holds_file, open_received
 from ...system.result_folder import RECOVER, result_folder
-from ..integrity import as_bag_error
-from ..mcap_records import message_of, parts
+from ..mcap_records import MESSAGE_HEAD, parts
 from ..metadata import BagMetadata, Recorded
 from ..reader import RECOVERED, scan, sources
+from ..session_file import as_bag_error
 from ..session_sheet import sheet_path
 from ..storages import SUMMARISE
 from ..writer import BagWriter
@@ -106,7 +106,7 @@ def _recover(path: Path, out: Path, unverified: bool) -> Recovery:
     keys: dict[tuple[str, str, bytes], int] = {}
     try:
         for number, (file, definitions) in enumerate(zip(files, all_definitions, strict=True)):
-            if number and bag.has_messages:
+            if number and bag.first is not None:
                 bag.split()
             with as_bag_error(file):
                 _copy(file, definitions, bag, keys, outcome, metadata, unverified)
@@ -144,15 +144,15 @@ def _copy(
         for opcode, body in parts(piece.content):
             if opcode != Opcode.MESSAGE:
                 continue
-            message = message_of(body)
-            if message.channel_id not in own:
-                topic = definitions.topic(message.channel_id, metadata)
+            channel, sequence, log_time, publish_time = MESSAGE_HEAD.unpack_from(body)
+            if channel not in own:
+                topic = definitions.topic(channel, metadata)
                 if topic is None:
                     outcome.nameless += 1
                     continue
-                own[message.channel_id] = _key(bag, keys, topic)
-            key = own[message.channel_id]
-            bag.write(key, message.log_time, message.data, message.publish_time, message.sequence)
+                own[channel] = _key(bag, keys, topic)
+            key = own[channel]
+            bag.write(key, log_time, body[MESSAGE_HEAD.size :], publish_time, sequence)
             if not (piece.vouched or definitions.is_summed):
                 outcome.unvouched[bag.topics[key].topic] += 1
 
@@ -163,12 +163,12 @@ def _is_copy(piece: SoundRecords, definitions: FileDefinitions, seen: Counter[by
     Equal messages within one chunk are recorded ones. Equal chunks, as from a clock that stands still, are recorded
     ones if the checksum of all data fits. Otherwise a sound index gives the number of recorded ones.
     """
-    head = piece.chunk
-    if head is None or definitions.is_summed:
+    chunk = piece.chunk
+    if chunk is None or definitions.is_summed:
         return False
     digest = sha256(piece.content).digest()
     seen[digest] += 1
-    return seen[digest] > max(1, definitions.listed[head.start, head.end, head.unpacked])
+    return seen[digest] > max(1, definitions.listed[chunk.message_start_time, chunk.message_end_time, chunk.uncompressed_size])
 
 
 def _key(bag: BagWriter, keys: dict[tuple[str, str, bytes], int], topic: Recorded) -> int:

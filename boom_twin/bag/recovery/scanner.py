@@ -3,21 +3,38 @@
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Container, Iterator
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from mcap.records import Chunk
 from mcap.writer import MCAP0_MAGIC
 
 from ...system.received_files import open_received
-from ..integrity import BLOCK, PARSE_ERRORS
-from ..mcap_records import KINDS, MESSAGE_HEAD, MOST_HELD, PREFIX, UnpackBudget, UnpackError, record_of, whole_parts
-from .chunk_head import ChunkHead, UnsoundError, head_at, sound_content, unverified_start
+from ..mcap_records import (
+    BLOCK,
+    KINDS,
+    MESSAGE_HEAD,
+    MOST_HELD,
+    PREFIX,
+    bounds,
+    record_of,
+    unpack,
+    unpack_start,
+    whole_parts,
+)
+from ..session_file import PARSE_ERRORS
 
 _START = re.compile(rb"(?=[\x05\x06\x0f].{5}\x00\x00\x00)", re.DOTALL)
 """Pattern of a possible start of a message, a chunk or the end of the data: opcode, and a length below 2^40."""
+_CHUNK_HEAD = struct.Struct("<BQQQQII")
+_SIZE = struct.Struct("<Q")
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,14 +47,14 @@ class SoundRecords:
     vouched : bool
         True if the checksum of their chunk fits.
     content : bytes
-    chunk : ChunkHead or None
-        Head of the chunk, if the records are its whole content.
+    chunk : Chunk or None
+        Their chunk, if the records are its whole content.
     """
 
     offset: int
     vouched: bool
     content: bytes
-    chunk: ChunkHead | None = None
+    chunk: Chunk | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,53 +79,66 @@ def scan_damaged(
     channels : container of int, optional
         Known channels. After damage, messages outside chunks are searched for in these channels only.
     """
-    size, budget = path.stat().st_size, UnpackBudget()
+    size = path.stat().st_size
     with open_received(path) as file:
         offset = len(MCAP0_MAGIC)
         if file.read(offset) != MCAP0_MAGIC:
             yield DamagedBytes(0, min(offset, size), "it does not begin as an MCAP file")
         while offset < size - len(MCAP0_MAGIC) or (offset < size and not _ends(file, offset)):
-            pieces, after = _next(file, offset, size, unverified, budget)
-            if after is None:
+            if (length := _chunk_length(file, offset)) is not None:
+                after = min(offset + length, size)
+                yield from _chunk_pieces(file, offset, length, size, unverified)
+            elif record := _whole_record(file, offset, size):
+                after = offset + len(record)
+                yield SoundRecords(offset, False, record)
+            else:
                 after = _behind(file, offset + 1, size, channels or ())
-                if not any(isinstance(piece, DamagedBytes) for piece in pieces):
-                    pieces = [*pieces, DamagedBytes(offset, after - offset, "no record that is whole begins here")]
-            yield from pieces
+                yield DamagedBytes(offset, after - offset, "no record that is whole begins here")
             offset = after
 
 
-def _next(
-    file: BinaryIO, offset: int, size: int, unverified: bool, budget: UnpackBudget
-) -> tuple[list[SoundRecords | DamagedBytes], int | None]:
-    """Return the pieces that begin at `offset`, and the offset of the next record (None if unknown)."""
-    head = head_at(file, offset)
-    if head is None:
-        record = _whole_record(file, offset, size)
-        return ([SoundRecords(offset, False, record)], offset + len(record)) if record else ([], None)
-    takes_start = head.crc == 0 or unverified  # no checksum denies it, or it is wanted all the same
-    if head.is_certain and head.after > size:
-        reason = f"cut off, {size - offset} of {head.after - offset} bytes are there"
-        start = b""
-        if takes_start:
-            try:
-                start = unverified_start(file, head, budget)
-            except UnpackError as error:
-                reason = str(error)
-        return _broken(head, size - offset, reason, start), size
+def _chunk_length(file: BinaryIO, offset: int) -> int | None:
+    """Return the bytes of the chunk record at `offset`; None if none is there, or if its two lengths do not agree."""
+    file.seek(offset)
+    raw = file.read(_CHUNK_HEAD.size + 4 + _SIZE.size)
+    if len(raw) < _CHUNK_HEAD.size + _SIZE.size:
+        return None
+    opcode, length, *_, letters = _CHUNK_HEAD.unpack_from(raw)
+    if opcode != Opcode.CHUNK or letters > 4 or len(raw) < (head := _CHUNK_HEAD.size + letters + _SIZE.size):
+        return None
+    (packed,) = _SIZE.unpack_from(raw, head - _SIZE.size)
+    return PREFIX.size + length if PREFIX.size + length == head + packed else None
+
+
+def _chunk_pieces(
+    file: BinaryIO, offset: int, length: int, size: int, unverified: bool
+) -> Iterator[SoundRecords | DamagedBytes]:
+    """Yield the content of a chunk, or the whole records at its start, if they are wanted, and the damaged bytes."""
+    chunk, start = None, b""
+    file.seek(offset + PREFIX.size)
     try:
-        content, after = sound_content(file, head, size, budget)
-        return [SoundRecords(offset, head.crc != 0, content, head)], after
-    except UnsoundError as error:
-        if not head.is_certain:
-            return [], None
-        start = whole_parts(error.start) if takes_start else b""
-        return _broken(head, head.after - offset, str(error), start), head.after
-
-
-def _broken(head: ChunkHead, length: int, reason: str, start: bytes) -> list[SoundRecords | DamagedBytes]:
-    """Return a damaged chunk as damaged bytes, preceded by the whole records at its start, if any."""
-    fault = DamagedBytes(head.offset, length, f"{head}: {reason}")
-    return [SoundRecords(head.offset, False, start), fault] if start else [fault]
+        chunk = Chunk.read(ReadDataStream(BytesIO(file.read(min(length, MOST_HELD)))))
+        span = f"chunk with log times {chunk.message_start_time} to {chunk.message_end_time} ns"
+        if length > MOST_HELD:
+            raise McapError(f"{span}: {length} bytes: at most {MOST_HELD} are read")
+        if offset + length > size:
+            raise McapError(f"{span}: cut off, {size - offset} of {length} bytes are there")
+        content = unpack(chunk)
+        if chunk.uncompressed_crc == 0:
+            for _ in bounds(content):  # refuses records that are not whole
+                pass
+        yield SoundRecords(offset, chunk.uncompressed_crc != 0, content, chunk)
+        return
+    except PARSE_ERRORS as error:
+        reason = str(error)
+    if chunk is not None and (chunk.uncompressed_crc == 0 or unverified):
+        try:
+            start = whole_parts(unpack_start(chunk))
+        except PARSE_ERRORS as error:
+            reason = f"{reason}; {error}"
+    if start:
+        yield SoundRecords(offset, False, start)
+    yield DamagedBytes(offset, min(length, size - offset), reason)
 
 
 def _whole_record(file: BinaryIO, offset: int, size: int) -> bytes:
@@ -171,8 +201,7 @@ def _is_start(file: BinaryIO, offset: int, size: int, channels: Container[int]) 
     raw = file.read(PREFIX.size + MESSAGE_HEAD.size)
     opcode, length = PREFIX.unpack_from(raw)
     if opcode == Opcode.CHUNK:
-        head = head_at(file, offset)
-        return head is not None and head.is_certain
+        return _chunk_length(file, offset) is not None
     if opcode == Opcode.DATA_END:
         return bool(length == 4)
     if length < MESSAGE_HEAD.size or len(raw) < PREFIX.size + MESSAGE_HEAD.size or offset + length > size:

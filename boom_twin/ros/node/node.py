@@ -182,7 +182,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         import_module("scipy.special")  # of the first alarm and the first pause, whose samples would wait for it for 0.3 s
         self._twin, self._decoder, self._preparation = twin, SampleDecoder(joints, topics), ModelPreparation(twin)
         self._encoder = ReportEncoder(scene, settings, frame_of(self, topics))
-        self._encoder.warm_up()
         texts = {"scene": found.text} | baseline_text(self)
         self._diagnostics.configure(twin, self._decoder, name)
         acknowledge, is_active = self._diagnostics.watch.acknowledge, lambda: bool(self._subscriptions_in)

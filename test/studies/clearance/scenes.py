@@ -8,7 +8,7 @@ from typing import Literal
 from ruamel.yaml import YAML
 
 <<<<<<< HEAD:test/studies/clearance/scenes.py
-from boom_twin.scene.checks.clearance import names_of
+from boom_twin.scene.checks.pins import names_of
 from boom_twin.scene.load import clearance_text
 from boom_twin.scene.schema import Clearance, Pin, Scene
 =======
