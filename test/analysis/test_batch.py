@@ -73,14 +73,7 @@ def test_a_boom_that_fails_leaves_the_others_alone():
     assert np.array_equal(rows[0], rows[2]) and np.isfinite(rows[0]).all()
 
 
-def test_other_structures_are_refused():
-    rigid = compile_scene(SCENE.model_copy(update={"modes": 0}))
-    with pytest.raises(UsageError, match=r"plans\[1\]: another structure"):
-        Batch([compile_scene(SCENE), rigid])
-    with pytest.raises(UsageError, match=r"plans\[1\]: another structure"):
-        Batch([compile_scene(SCENE), compile_scene(with_pins(booms.document(), RODS))])
-    with pytest.raises(UsageError, match="at least one"):
-        Batch([])
+def test_strokes_that_are_not_whole_rows_are_refused():
     batch = Batch([compile_scene(SCENE)])
     with pytest.raises(UsageError, match="not a multiple of every = 7"):
         batch.run(STEP, *drive(STEP * np.arange(1, STEPS + 1)), every=7)
