@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import UsageError
 from ..scene.kinematics import posture_angles, stroke_curve, strokes_of_posture
 from ..scene.load import load_scene
+from ..scene.pump_pulses import ease
 from ..scene.schema import Scene
 from ..types import Array
 
@@ -202,11 +203,6 @@ def halt(scene: Scene, posture: str | None, brake: float, only: int | None = Non
     lasting = STOP - 0.5 * RAMP + 0.5 * brake
     speed = np.sign(travel) * np.minimum(full, np.abs(travel) / lasting)
     return StopMotion(own.angles, own.first, speed, brake)
-
-
-def ease(x: Array) -> Array:
-    """Quintic from 0 to 1 over x in [0, 1] with zero slope and curvature at both ends, any shape."""
-    return x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
 
 
 def ease_integral(x: Array) -> Array:

@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ....analysis.methods import Drive
-from ....analysis.motions import FULL_STROKE, Motion, ease, ease_integral, motion_of
+from ....analysis.motions import FULL_STROKE, Motion, ease_integral, motion_of
 from ....scene.edit import scaled
 from ....scene.kinematics import joint_angles_of_strokes, stroke_curve, stroke_range
 from ....scene.oil_spring import middle_stiffness
+from ....scene.pump_pulses import ease
 from ....scene.schema import Cylinder, CylinderPart, Joint, Scene, Section, Tip
 from ....scene.summary import explain
 from ....types import Array
