@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from ..compiler.plan import Plan, first_row, width_of
-from ..errors import UsageError
 from ..kernels.integrators import GENERALISED_ALPHA
 from ..kernels.tables import OK, SENTENCES
 from ..kernels.transfer.time_step import run
@@ -53,42 +52,36 @@ class Batch:
             settle(plan, state, work, *where)
         return np.array([first_row(plan, state) for plan, state in zip(self.plans, self._states, strict=True)])
 
-    def run(self, step: float, strokes: Array, rates: Array, every: int = 1, rho: float = RHO) -> Array:
-        """Step all booms along their strokes.
+    def run(self, step: float, strokes: Array, rates: Array) -> Array:
+        """Step all booms along their strokes; a row of results for every step.
 
         Parameters
         ----------
         step : float
             s.
         strokes, rates : ndarray, shape (steps, n) for all booms or (booms, steps, n)
-            m and m/s at the end of every step; `steps` is a multiple of `every`.
-        every : int
-            Steps to a row of results.
+            m and m/s at the end of every step.
 
         Returns
         -------
-        ndarray, shape (booms, steps/every, width_of(plan))
+        ndarray, shape (booms, steps, width_of(plan))
             See `compiler.plan`. NaN from where a boom's step failed; see `failures`.
         """
-        count, n = len(self.plans), self.plans[0].joints
-        total = np.shape(strokes)[-2]
-        if total % every:
-            raise UsageError(f"strokes = {total} steps: not a multiple of every = {every}. Give whole rows.")
-        rows = total // every
-        strokes, rates = (np.broadcast_to(each, (count, total, n)) for each in (strokes, rates))
-        steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
-        out = np.full((count, rows, width_of(self.plans[0])), np.nan)
+        shape = len(self.plans), np.shape(strokes)[-2], self.plans[0].joints
+        strokes, rates = np.broadcast_to(strokes, shape), np.broadcast_to(rates, shape)
+        steps, counts = np.full(shape[1], step), np.ones(shape[1], dtype=np.int64)
+        out = np.full((*shape[:2], width_of(self.plans[0])), np.nan)
 
         def run_one(i: int) -> int:
             plan = self.plans[i]
             status, *_ = run(
                 plan.tables, self._states[i], self._works[i], steps, counts, plan.closed_lengths + strokes[i],
-                np.ascontiguousarray(rates[i]), GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, out[i],
+                np.ascontiguousarray(rates[i]), GENERALISED_ALPHA, RHO, TOLERANCE, PASSES, None, out[i],
             )  # fmt: skip
             return int(status)
 
         with ThreadPoolExecutor(self.cores) as pool:
-            self._statuses = list(pool.map(run_one, range(count)))
+            self._statuses = list(pool.map(run_one, range(len(self.plans))))
         return out
 
     def failures(self) -> dict[int, str]:
