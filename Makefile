@@ -14,7 +14,7 @@ unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE _ROS_WHEELS_BOOTSTRAP_COM
 WORKERS ?= 3
 PARALLEL = -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
-.PHONY: help setup warm demo demo-live test lint test-extra ament client study soak fuzz session figures docs clean
+.PHONY: help setup warm demo demo-live test lint test-extra ament client study gate soak fuzz session figures docs clean
 
 help:
 	@echo "make demo        play two recorded sessions, a quiet one and one with pump and wind, through the live node, show what it predicted"
@@ -22,6 +22,7 @@ help:
 	@echo "make test        linters and tests"
 	@echo "make test-extra  slow tests, colcon, linters of ament, and checks that need more than PyPI"
 	@echo "make study       error against run time, stability, what every part costs, play in pins: docs/study (20 minutes)"
+	@echo "make gate        hashes of sessions, commands and studies, speed as ratios; BEFORE=gate.json of an earlier run compares (5 minutes)"
 	@echo "make soak        the live node for an hour at 200 Hz and 10 minutes at 1 kHz, 10 of the live page, a hold of 24 simulated hours, a million steps with contact, 1000 kills"
 	@echo "make fuzz        broken and hostile scenes, sessions, messages and pages at random, 10 minutes: SECONDS=600 SEED=1"
 	@echo "make session     make the bundled sessions anew on the virtual rig, into out/arch_session and out/pump_session"
@@ -65,6 +66,10 @@ study: warm
 	for kind in error stability parts; do $(BIN)/boom_twin study $$kind --out out/study/$$kind || exit 1; done
 	for kind in papers clearance roundoff; do PYTHONPATH=test $(BIN)/python -m studies $$kind --out out/study/$$kind || exit 1; done
 	mkdir -p docs/study && cp out/study/*/*.md out/study/*/*.png docs/study/
+
+BEFORE ?=
+gate: warm
+	$(BIN)/python test/gate.py $(if $(BEFORE),--before $(BEFORE))
 
 soak: warm
 	$(BIN)/python test/bench/soak.py --duration 3600

@@ -17,7 +17,8 @@ from ..errors import BoomTwinError, UsageError
 from ..scene.schema import Scene
 from ..types import Array, Estimate, Prediction, StrokeReading
 from .bending_moments import Station, increments_by_tip_force, moments_by_unknowns, stations
-from .equilibrium import drives_as_read, settle
+from .cylinder_drives import drives_as_read
+from .equilibrium import settle
 
 BOX = 2.4
 """Height over radius of gyration of a thin-walled box, for sections whose height is not given."""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,11 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan, first_row, taken_apart
 from ..errors import SolverError, UsageError
-from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.elements.linkage import link_angles
 from ..kernels.elements.pin_contact import APPROACH, CLOSED, DAMPER, FORCE, NEAR, SEAT_X, SEAT_Y, SLOWEST, SPRING, penetration
 from ..kernels.integrators import REST, X, prepare
-from ..kernels.jit import kernel
 from ..kernels.tables import OK, Z_LINK_L, Z_LINK_R, Z_SECTION, State, Work
 from ..kernels.transfer.clearance_pins import axis_of
 from ..kernels.transfer.time_step import ANEW, advance
@@ -26,7 +22,8 @@ from ..scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton
 from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
 from ..system.summary_display import SummaryDisplay, numbers
-from ..types import Array, StrokeReading
+from ..types import Array
+from .cylinder_drives import spring_free
 from .modal import Mode, constraints, natural_modes, negative_pivots
 
 CLAMP = 1e12  # N/m, a pin that is as good as ideal
@@ -124,7 +121,6 @@ def motion_beyond_validity(scene: Scene, strokes: Array, tip: Array, angles: Arr
 
 TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
 PASSES = 60
-CLOSE = 1e-13  # m, change of a drive in the last pass
 LONGEST_INCREMENT = 0.1  # rad in one pass
 FIRST_LOAD, LEAST_LOAD = 0.05, 1e-3  # of gravity: first step where the full load at once fails, and the smallest that is tried
 LEAST_SHARE = 1e-3  # of the clearances, likewise
@@ -278,45 +274,6 @@ def drives_at_rest(scene: Scene, lengths: Array, angles: Array) -> Array:
     """
     struts, state, _ = rest_at(with_rigid_cylinders(scene), lengths, angles)
     return spring_free(compile_scene(scene), lengths, taken_apart(struts, first_row(struts, state)).cylinder_forces)
-
-
-def spring_free(plan: Plan, lengths: Array, forces: Array) -> Array:
-    """Return the drives (m), shape (n,), of cylinders that are `lengths` (m) long at rest under `forces` (N)."""
-    drives = drives_as_read(plan, lengths, forces, StrokeReading.LENGTH)
-    if np.isfinite(drives).all():
-        return drives
-    raise SolverError(f"no drives for cylinder forces of {numbers(forces)} N: the oil gives too much. Check bulk_modulus.")
-
-
-def drives_as_read(plan: Plan, strokes: Array, forces: Array, reads: StrokeReading) -> Array:
-    """Return the drives (m) where transducers read `strokes` (m) under `forces` (N), all (.., n); NaN if there are none.
-
-    At work lengths swing with the forces in the oil. Drives show how the boom is driven, and in which posture it would rest.
-    The oil's damping is left out: its lag is some milliseconds.
-    """
-    drives = np.array(strokes)
-    if reads is StrokeReading.LENGTH:
-        write_drives(
-            plan.tables.cylinders, plan.tables.oils, np.ascontiguousarray(np.atleast_2d(forces)), np.atleast_2d(drives)
-        )
-    return drives
-
-
-@kernel
-def write_drives(cylinders: Any, oils: Any, forces: Array, lengths: Array) -> None:
-    """Turn lengths (m) of cylinders under `forces` (N), both (k, n), into their drives; NaN if there are none.
-
-    The compliance of `oil` is that at the drive. A pass leaves the share of the error that the oil's pressure is of its bulk
-    modulus, a few percent.
-    """
-    for i in range(cylinders.shape[0]):
-        closed = cylinders[i].closed_length
-        for row in range(lengths.shape[0]):
-            drive, change, passes = lengths[row, i], 1.0, 0
-            while abs(change) >= CLOSE and passes < PASSES:
-                change = lengths[row, i] - compliance_and_lag(cylinders[i], oils, closed + drive)[0] * forces[row, i] - drive
-                drive, passes = drive + change, passes + 1
-            lengths[row, i] = drive if abs(change) < CLOSE else math.nan
 
 
 def travel_words(i: int, most: float) -> str:

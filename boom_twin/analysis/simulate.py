@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiler.compile import compile_scene
-from ..compiler.plan import Plan
 from ..errors import SolverError, UsageError
 from ..kernels.tables import OK, SENTENCES
 from ..scene.edit import with_rigid_cylinders
@@ -20,8 +19,9 @@ from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
 from ..system.summary_display import SummaryDisplay, data_frame, numbers
 from ..types import Array
+from .cylinder_drives import drives_of
 from .drive import DriveCourse, Run
-from .equilibrium import motion_beyond_validity, rest_at, spring_free, travel_words
+from .equilibrium import motion_beyond_validity, rest_at, travel_words
 from .error_estimate import EstimatedError, ringing, row_errors, step_errors, too_fast, warnings_of
 from .initial_state import InitialState, started, state_now
 
@@ -219,23 +219,6 @@ def course_of(
         else started(scene, start, times, strokes)
     )
     return DriveCourse(plan, begin, work, times, strokes, rho)
-
-
-def drives_of(plan: Plan, times: Array, lengths: Array, forces: Array) -> Array:
-    """Return the drives (m), shape (m, n), of cylinders with these lengths (m) and forces (N) at `times` (s), at rest at first.
-
-    The extension x of an oil spring follows d x' + k x = F. The solution is exact for forces that are linear from row to row.
-    """
-    drives = [spring_free(plan, lengths[0], forces[0])]
-    for span, now, before, after in zip(np.diff(times), lengths[1:], forces, forces[1:], strict=False):
-        extension = lengths[len(drives) - 1] - drives[-1]
-        compliance, lag = plan.compliances_and_lags(plan.closed_lengths + now - extension)
-        with np.errstate(divide="ignore"):
-            kept = np.exp(-span / lag)
-        start, end = compliance * before, compliance * after
-        lead = (end - start) / span * lag
-        drives.append(now - (end - lead + (extension - start + lead) * kept))
-    return np.array(drives)
 
 
 def _doubts(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -136,18 +135,6 @@ class Plan:
             corrections=np.zeros((CORRECTIONS, len(self.names))), kept_z=np.zeros(len(self.names)), kept=np.zeros(4),
             cut=np.zeros(SLOTS),
         )  # fmt: skip
-
-
-def stacked(parts: Sequence[Any]) -> Any:
-    """Named tuples of arrays as one, a leading axis over them; what is not an array is common."""
-    columns = zip(*parts, strict=True)
-    return type(parts[0])(*(_stack(column) if isinstance(column[0], np.ndarray) else column[0] for column in columns))
-
-
-def _stack(column: Sequence[np.ndarray]) -> np.ndarray:
-    """Record arrays stay such, for kernels that run as plain Python."""
-    found = np.stack(column)
-    return found.view(np.recarray) if isinstance(column[0], np.recarray) else found
 
 
 def width_of(plan: Plan) -> int:

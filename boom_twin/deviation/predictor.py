@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.bending_moments import moments_by_unknowns
-from ..analysis.equilibrium import outline, settle, spring_free
+from ..analysis.cylinder_drives import spring_free
+from ..analysis.equilibrium import outline, settle
 from ..analysis.modal import natural_modes
 from ..analysis.undeflected import UndeflectedBoom
 from ..compiler.compile import compile_scene

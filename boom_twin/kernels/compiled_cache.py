@@ -25,7 +25,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 KERNEL_SOURCES = (
-    "kernels", "analysis/equilibrium.py", "deviation", "twin/update.py",
+    "kernels", "analysis/cylinder_drives.py", "analysis/equilibrium.py", "deviation", "twin/update.py",
     "twin/state.py", "twin/stamp_check.py", "twin/sample_check.py", "twin/blocks.py",
     "twin/health_rows.py",
     "calibration/load_filter.py",

@@ -30,9 +30,6 @@ LAYOUT = 0x1 | 0x2 | 0x100 | 0x400
 """Flags of an array that its type depends on: C and Fortran order, aligned, writeable."""
 CONFIG_FILE = ".numba_config.yaml"
 """numba takes its settings from this file in the working directory, which may be a received session's."""
-LANES = "lanes"
-"""Name of the only field of a record that holds one number of each of several booms, see `boom_twin.kernels.lanes`."""
-
 _BY_REFERENCE: set[type] = set()
 _UNREGISTERED: list[type] = []
 
@@ -235,13 +232,7 @@ class _Intrinsic:
         return cpu_target.typing_context.resolve_value_type(function)
 
 
-referenced = _Intrinsic(".references", "referenced", lambda fields: fields)
-"""A named tuple made in a kernel, as one that came `by_reference`; Python gets it back as it is."""
 _copy_fields = _Intrinsic(".references", "copy_fields", lambda fields, room: 0)
-some = _Intrinsic(".lanes", "some", bool)
-"""Return True if a condition holds; for one of `boom_twin.kernels.lanes`, if it holds in any lane."""
-select = _Intrinsic(".lanes", "select", lambda condition, a, b: a if condition else b)
-"""`a` where a condition holds, else `b`: of `boom_twin.kernels.lanes`, in each lane by itself."""
 
 
 class StackArray:

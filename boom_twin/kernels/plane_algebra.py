@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from .jit import inner, select, some
+from .jit import inner
 
 COS, SIN = 0, 1  # rows of a table of turns
 
@@ -49,11 +49,10 @@ def cosine_and_sine(x):
     c, s = near_zero(((x - quarters * HALF_PI[0]) - quarters * HALF_PI[1]) - quarters * HALF_PI[2])
     quadrant = quarters - 4.0 * np.floor(0.25 * quarters)
     odd, behind = (quadrant == 1.0) | (quadrant == 3.0), quadrant >= 2.0
-    c, s = select(odd, -s, c), select(odd, c, s)
-    c, s = select(behind, -c, c), select(behind, -s, s)
-    far = abs(x) >= FAR
-    if some(far):
-        return select(far, math.cos(x), c), select(far, math.sin(x), s)
+    c, s = (-s, c) if odd else (c, s)
+    c, s = (-c, -s) if behind else (c, s)
+    if abs(x) >= FAR:
+        return math.cos(x), math.sin(x)
     return c, s
 
 
@@ -63,7 +62,7 @@ def cosines(angles, count, turn):
     largest = 0.0
     for j in range(count):
         largest = max(largest, abs(angles[j]))
-    if not some(largest >= QUARTER):
+    if not largest >= QUARTER:
         for j in range(count):
             turn[COS, j], turn[SIN, j] = near_zero(angles[j])
         return
@@ -95,9 +94,9 @@ def condense(s, p, coupling, block, force, m, n):
     negative = 0
     for k in range(n - 1, -1, -1):
         pivot = block[k, k]
-        if not some(abs(pivot) > SMALLEST_PIVOT):
+        if not abs(pivot) > SMALLEST_PIVOT:
             return -1
-        if some(pivot.real < 0.0):
+        if pivot.real < 0.0:
             negative += 1
         inverse = 1.0 / pivot
         for j in range(k):
@@ -148,15 +147,11 @@ def condense_forces(p, coupling, block, force, m, n):
 
 
 @inner
-def exchange(a, k, best, n, first, last):
-    """Exchange row k of a with row `best`, one from k to n - 1, in columns `first` .. `last - 1`."""
-    if not some(best != k):
-        return
-    for i in range(k + 1, n):
-        here = best == i
-        if some(here):
-            for j in range(first, last):
-                a[k, j], a[i, j] = select(here, a[i, j], a[k, j]), select(here, a[k, j], a[i, j])
+def exchange(a, k, best, first, last):
+    """Exchange rows k and `best` of a in columns `first` .. `last - 1`."""
+    if best != k:
+        for j in range(first, last):
+            a[k, j], a[best, j] = a[best, j], a[k, j]
 
 
 @inner
@@ -169,16 +164,17 @@ def factorise(a, n, order):
         best, largest = k, abs(a[k, k])
         for i in range(k + 1, n):
             size = abs(a[i, k])
-            best, largest = select(size > largest, i, best), select(size > largest, size, largest)
-        if not some(largest > SMALLEST_PIVOT):
+            if size > largest:
+                best, largest = i, size
+        if not largest > SMALLEST_PIVOT:
             return False
         order[k] = best
-        exchange(a, k, best, n, k, n)
+        exchange(a, k, best, k, n)
         inverse = 1.0 / a[k, k]
         a[k, k] = inverse
         for i in range(k + 1, n):
             factor = a[i, k] * inverse
-            if some(factor != 0.0):
+            if factor != 0.0:
                 for j in range(k + 1, n):
                     a[i, j] -= factor * a[k, j]
     return True
@@ -188,10 +184,10 @@ def factorise(a, n, order):
 def substitute(a, order, b, n, columns):
     """Solve with what `factorise` left in `a` and `order`: b, shape (>= n, >= columns), becomes the solution."""
     for k in range(n):
-        exchange(b, k, order[k], n, 0, columns)
+        exchange(b, k, order[k], 0, columns)
         for i in range(k + 1, n):
             factor = a[i, k] * a[k, k]
-            if some(factor != 0.0):
+            if factor != 0.0:
                 for j in range(columns):
                     b[i, j] -= factor * b[k, j]
     for k in range(n - 1, -1, -1):

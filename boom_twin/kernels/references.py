@@ -24,7 +24,6 @@ from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import NativeValue, intrinsic, models, register_model, typeof_impl, unbox
 
 from .jit import HeldFields
-from .lanes import laned
 
 TUPLE_FLAG = 1 << 26  # Py_TPFLAGS_TUPLE_SUBCLASS
 
@@ -112,18 +111,6 @@ def _is_tuple(c: Any, value: Any) -> Any:
 
 
 @intrinsic
-def referenced(_: Any, fields: Any) -> Any:
-    """The named tuple `fields`, made in a kernel, by reference."""
-
-    def write(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        room = cgutils.alloca_once(builder, context.get_value_type(fields))
-        builder.store(arguments[0], room)
-        return _written(builder, room)
-
-    return Reference(fields)(fields), write
-
-
-@intrinsic
 def copy_fields(_: Any, fields: Any, room: Any) -> Any:
     """Copy the fields of a named tuple by reference to the array `room` of bytes, if it has room; gives how many these are."""
 
@@ -142,7 +129,7 @@ def register(kind: type) -> None:
 
     @typeof_impl.register(kind)
     def type_of(value: Any, c: Any) -> Reference:
-        return Reference(NamedTuple([laned(typeof_impl(field, c)) for field in value], kind))
+        return Reference(NamedTuple([typeof_impl(field, c) for field in value], kind))
 
 
 @typeof_impl.register(HeldFields)

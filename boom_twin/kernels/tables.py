@@ -154,7 +154,7 @@ class Condensed(NamedTuple):
     gains : (operations, rows, SLOTS) decrements of the condensed unknowns by increments of the cut, and
     free : (operations, rows) those that do not depend on it.
     factors : (operations, rows, rows) of what an operation condenses, and order : (operations, rows) of its rows, see
-    `kernels.plane_algebra`: a beam's L D L^T, a joint's L U. For booms side by side `order` is of lanes, too.
+    `kernels.plane_algebra`: a beam's L D L^T, a joint's L U.
     blocks : (joints, inner, inner) H_qq of what a joint condenses, inner: most unknowns of a joint.
     ends : (clearances, 2, 2) the same of the end of a cylinder. end_gains : (clearances, 2, 5), end_free : (clearances, 2).
     """

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.equilibrium import drives_as_read
+from ..analysis.cylinder_drives import drives_as_read
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..deviation.estimate_row import VARIANCES

@@ -6,13 +6,14 @@ and line fill are loads, not parts of the model, and stay.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ..scene.edit import Edit, edited
 from ..scene.schema import Scene
 
 MOST_MODES = 6  # bending coordinates per flexible part that are tried
+Edits = Callable[[Scene, int], tuple[Edit, ...]]
 
 
 @dataclass(frozen=True)
@@ -24,62 +25,8 @@ class Variant:
     edits: tuple[Edit, ...]
 
     def of(self, scene: Scene) -> Scene:
-        """The scene after the edits."""
+        """Return the scene after the edits."""
         return edited(scene, self.edits)
-
-
-def _rigid(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return _section(i, "modes", 0) if scene.is_flexible(i) else ()
-
-
-def _axial(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return _section(i, "axial", False) if scene.is_flexible(i) and scene.has_axial(i) else ()
-
-
-def _geometric(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return _section(i, "geometric", False) if scene.is_flexible(i) and scene.has_geometric(i) else ()
-
-
-def _rotary(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return _section(i, "rho_I", None) if scene.sections[i].rho_I else ()
-
-
-def _beam_damping(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return _section(i, "beta", None) if scene.is_flexible(i) and scene.sections[i].beta else ()
-
-
-def _compliance(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return _cylinder(scene, i, "k", "oil", "d") if scene.joints[i].cylinder.is_compressible else ()
-
-
-def _oil_damping(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return _cylinder(scene, i, "d") if scene.joints[i].cylinder.d else ()
-
-
-def _links(scene: Scene, i: int) -> tuple[Edit, ...]:
-    joint = scene.joints[i]
-    return tuple(Edit(("joints", i, key), None) for key in ("mL", "mR") if getattr(joint, key))
-
-
-def _barrel(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return _cylinder(scene, i, "barrel")
-
-
-def _rod(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return _cylinder(scene, i, "rod")
-
-
-def _section(i: int, key: str, value: bool | int | None) -> tuple[Edit, ...]:
-    return (Edit(("sections", i, key), value),)
-
-
-def _cylinder(scene: Scene, i: int, *keys: str) -> tuple[Edit, ...]:
-    present = [key for key in keys if getattr(scene.joints[i].cylinder, key) is not None]
-    return tuple(Edit(("joints", i, "cylinder", key), None) for key in present)
-
-
-def _fewer_modes(scene: Scene, i: int) -> tuple[Edit, ...]:
-    return _section(i, "modes", scene.modes_of(i) - 1) if scene.is_flexible(i) else ()
 
 
 @dataclass(frozen=True)
@@ -92,64 +39,90 @@ class VariantKind:
     name: str
     owner: str
     phrase: str
-    edits: Callable[[Scene, int], tuple[Edit, ...]]
+    edits: Edits
     singly: bool
 
 
+def _section(key: str, value: bool | int | None, is_there: Callable[[Scene, int], object]) -> Edits:
+    """Return edits that set a key of a section where the part is there."""
+    return lambda scene, i: (Edit(("sections", i, key), value),) if is_there(scene, i) else ()
+
+
+def _beam(key: str, is_there: Callable[[Scene, int], object]) -> Edits:
+    """Return edits that turn off a key of a flexible section."""
+    return _section(key, False, lambda scene, i: scene.is_flexible(i) and is_there(scene, i))
+
+
+def _cylinder(*keys: str) -> Edits:
+    """Return edits that remove keys of a cylinder, those that are there."""
+    return lambda scene, i: tuple(
+        Edit(("joints", i, "cylinder", key), None) for key in keys if getattr(scene.joints[i].cylinder, key) is not None
+    )
+
+
+def _links(scene: Scene, i: int) -> tuple[Edit, ...]:
+    return tuple(Edit(("joints", i, key), None) for key in ("mL", "mR") if getattr(scene.joints[i], key))
+
+
+def _fewer_modes(scene: Scene, i: int) -> tuple[Edit, ...]:
+    return (Edit(("sections", i, "modes"), scene.modes_of(i) - 1),) if scene.is_flexible(i) else ()
+
+
+_rotary = _section("rho_I", None, lambda scene, i: scene.sections[i].rho_I)
+_damping = _section("beta", None, lambda scene, i: scene.is_flexible(i) and scene.sections[i].beta)
+
+
+def _oil_damping(scene: Scene, i: int) -> tuple[Edit, ...]:
+    return _cylinder("d")(scene, i) if scene.joints[i].cylinder.d else ()
+
+
 KINDS = (
-    VariantKind("bending", "section", "rigid", _rigid, True),
-    VariantKind("axial coordinate", "section", "without axial coordinate", _axial, True),
-    VariantKind("geometric stiffness", "section", "without geometric stiffness", _geometric, True),
+    VariantKind("bending", "section", "rigid", _section("modes", 0, Scene.is_flexible), True),
+    VariantKind("axial coordinate", "section", "without axial coordinate", _beam("axial", Scene.has_axial), True),
+    VariantKind("geometric stiffness", "section", "without geometric stiffness", _beam("geometric", Scene.has_geometric), True),
     VariantKind("rotary inertia", "section", "without rotary inertia (rho_I)", _rotary, False),
-    VariantKind("beam damping", "section", "without beam damping (beta)", _beam_damping, False),
-    VariantKind("cylinder compliance", "cylinder", "incompressible", _compliance, True),
+    VariantKind("beam damping", "section", "without beam damping (beta)", _damping, False),
+    VariantKind("cylinder compliance", "cylinder", "incompressible", _cylinder("k", "oil", "d"), True),
     VariantKind("cylinder damping", "cylinder", "without oil damping (d)", _oil_damping, False),
     VariantKind("link masses", "joint", "with massless links", _links, False),
-    VariantKind("barrel masses", "cylinder", "with a massless barrel", _barrel, False),
-    VariantKind("rod masses", "cylinder", "with a massless rod", _rod, False),
+    VariantKind("barrel masses", "cylinder", "with a massless barrel", _cylinder("barrel"), False),
+    VariantKind("rod masses", "cylinder", "with a massless rod", _cylinder("rod"), False),
 )
 FEWER_MODES = VariantKind("modes", "section", "with one shape less", _fewer_modes, True)
 
 
 def without(scene: Scene, kind: VariantKind, where: Sequence[int]) -> Variant | None:
-    """The scene without a kind of part in the sections or joints `where` (from 0); None if there is none to leave out."""
+    """Return the scene without a kind of part in the sections or joints `where` (from 0); None if there is none there."""
     edits = tuple(edit for i in where for edit in kind.edits(scene, i))
-    if not edits:
-        return None
-    return Variant(f"{_named(kind.owner, where, len(scene.sections))} {kind.phrase}", kind.name, edits)
+    return Variant(f"{_named(kind.owner, where, len(scene.sections))} {kind.phrase}", kind.name, edits) if edits else None
 
 
 def with_modes(scene: Scene, count: int, where: Sequence[int]) -> Variant | None:
-    """The scene with `count` bending coordinates per flexible part of the sections `where`; None if that is no change."""
-    changed = [i for i in where if scene.is_flexible(i) and scene.modes_of(i) != count]
-    if not changed:
-        return None
-    name = f"{_named('section', where, len(scene.sections))} with modes: {count}"
-    return Variant(name, "modes", tuple(edit for i in changed for edit in _section(i, "modes", count)))
+    """Return the scene with `count` bending coordinates a flexible part in sections `where`; None if that is no change."""
+    edits = tuple(Edit(("sections", i, "modes"), count) for i in where if scene.is_flexible(i) and scene.modes_of(i) != count)
+    return Variant(f"{_named('section', where, len(scene.sections))} with modes: {count}", "modes", edits) if edits else None
 
 
 def variants(scene: Scene) -> tuple[Variant, ...]:
-    """All that a study of a scene's parts compares: everywhere at once first, then one by one where that is of use."""
+    """Return all that a study of parts compares: everywhere at once first, then one by one where that is of use.
+
+    A variant that edits what an earlier one edits is left out: "all sections" where only one has the part.
+    """
     everywhere = range(len(scene.sections))
     wheres: list[Sequence[int]] = [everywhere, *([i] for i in everywhere if len(everywhere) > 1)]
     found = [without(scene, kind, where) for kind in KINDS for where in (wheres if kind.singly else wheres[:1])]
     found += [with_modes(scene, count, where) for where in wheres for count in range(1, MOST_MODES + 1)]
     if scene.clearance is not None and scene.clearance.pins:
         found.insert(0, Variant("all pins ideal", "clearance", (Edit(("clearance",), None),)))
-    return tuple(_distinct(variant for variant in found if variant is not None))
-
-
-def _distinct(found: Iterator[Variant]) -> Iterator[Variant]:
-    """Yield variants, but none that edits what an earlier one edits: "all sections" where only one has the part."""
-    seen = set()
+    distinct: dict[tuple[Edit, ...], Variant] = {}
     for variant in found:
-        if variant.edits not in seen:
-            seen.add(variant.edits)
-            yield variant
+        if variant is not None:
+            distinct.setdefault(variant.edits, variant)
+    return tuple(distinct.values())
 
 
 def _named(owner: str, where: Sequence[int], count: int) -> str:
-    """`section 2`, `sections 3 to 5` or `all sections`."""
+    """Return `section 2`, `sections 3 to 5` or `all sections`."""
     if len(where) == 1:
         return f"{owner} {where[0] + 1}"
     return f"all {owner}s" if len(where) == count else f"{owner}s {where[0] + 1} to {where[-1] + 1}"

@@ -11,7 +11,6 @@ from boom_twin.analysis.batch import Batch
 from boom_twin.analysis.methods import integrate_with
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.compiler.plan import taken_apart
-from boom_twin.errors import UsageError
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
@@ -37,10 +36,10 @@ def test_each_boom_is_stepped_as_it_is_alone(cores):
     scenes = [softer(factor) for factor in (1.0, 0.5, 0.9, 1.3, 2.0)]
     batch = Batch([compile_scene(scene) for scene in scenes], cores)
     first = batch.settle(START, ANGLES)
-    rows = batch.run(STEP, *drive(STEP * np.arange(1, STEPS + 1)), every=3)
-    assert rows.shape[:2] == (5, STEPS // 3) and not batch.failures()
+    rows = batch.run(STEP, *drive(STEP * np.arange(1, STEPS + 1)))
+    assert rows.shape[:2] == (5, STEPS) and not batch.failures()
     for i, scene in enumerate(scenes):
-        alone = integrate_with(scene, drive, STEP * STEPS, STEP, every=3, angles=ANGLES)
+        alone = integrate_with(scene, drive, STEP * STEPS, STEP, angles=ANGLES)
         assert np.array_equal(rows[i][:, :4], alone.joints[1:])
         assert np.array_equal(rows[i][:, 8:10], alone.tip[1:])
         assert np.array_equal(first[i][8:10], alone.tip[0])
@@ -53,10 +52,10 @@ def test_booms_on_worn_pins_are_stepped_as_each_is_alone():
     scenes = [softer(factor, worn) for factor in (1.0, 0.6, 1.7)]
     batch = Batch([compile_scene(scene) for scene in scenes], 2)
     batch.settle(START, ANGLES)
-    rows = batch.run(STEP, *drive(STEP * np.arange(1, STEPS + 1)), every=3)
-    assert rows.shape[:2] == (3, STEPS // 3) and not batch.failures()
+    rows = batch.run(STEP, *drive(STEP * np.arange(1, STEPS + 1)))
+    assert rows.shape[:2] == (3, STEPS) and not batch.failures()
     for i, scene in enumerate(scenes):
-        alone = integrate_with(scene, drive, STEP * STEPS, STEP, every=3, angles=ANGLES)
+        alone = integrate_with(scene, drive, STEP * STEPS, STEP, angles=ANGLES)
         assert np.array_equal(rows[i][:, 8:10], alone.tip[1:])
         assert np.array_equal(taken_apart(batch.plans[i], rows[i]).pins, alone.pins[1:])
 
@@ -71,16 +70,3 @@ def test_a_boom_that_fails_leaves_the_others_alone():
     assert list(batch.failures()) == [1] and "not finite" in batch.failures()[1]
     assert np.isnan(rows[1, STEPS // 2 :]).all() and np.isfinite(rows[1, : STEPS // 2]).all()
     assert np.array_equal(rows[0], rows[2]) and np.isfinite(rows[0]).all()
-
-
-def test_other_structures_are_refused():
-    rigid = compile_scene(SCENE.model_copy(update={"modes": 0}))
-    with pytest.raises(UsageError, match=r"plans\[1\]: another structure"):
-        Batch([compile_scene(SCENE), rigid])
-    with pytest.raises(UsageError, match=r"plans\[1\]: another structure"):
-        Batch([compile_scene(SCENE), compile_scene(with_pins(booms.document(), RODS))])
-    with pytest.raises(UsageError, match="at least one"):
-        Batch([])
-    batch = Batch([compile_scene(SCENE)])
-    with pytest.raises(UsageError, match="not a multiple of every = 7"):
-        batch.run(STEP, *drive(STEP * np.arange(1, STEPS + 1)), every=7)

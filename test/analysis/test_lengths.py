@@ -7,7 +7,7 @@ import pytest
 from oracle import booms
 
 from boom_twin import load_scene, simulate, statics
-from boom_twin.analysis.equilibrium import drives_as_read
+from boom_twin.analysis.cylinder_drives import drives_as_read, drives_of
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.errors import SolverError, UsageError
 from boom_twin.scene.edit import with_rigid_cylinders
@@ -79,7 +79,6 @@ def test_a_motion_of_drives_gives_the_lengths_that_give_these_drives(make):
 
 def test_coarse_rows_give_the_drives_of_forces_that_are_linear_between_them():
     """A ramp of force: the extension of the oil spring lags by d / k."""
-    from boom_twin.analysis.simulate import drives_of
 
     scene, times = load_scene(), np.array([0.0, 0.01, 0.05, 2.0])
     k, d = (np.array([getattr(joint.cylinder, key) for joint in scene.joints]) for key in ("k", "d"))

@@ -15,7 +15,7 @@ import pytest
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.deviation.posture import Posture
 from boom_twin.deviation.states import Filters
-from boom_twin.kernels.jit import HeldFields, _kind, by_reference, hold, kernel, referenced
+from boom_twin.kernels.jit import HeldFields, _kind, by_reference, hold, kernel
 from boom_twin.kernels.tables import Condensed, State, Tables, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.scene import load_scene
@@ -58,14 +58,6 @@ def total(fields):
 
 
 @kernel
-def totals(tables, values, pair, out):
-    """`total` of tuples that are made here, another one in every turn."""
-    for i in range(out.shape[0]):
-        inside = referenced(Inside(values=values[i]))
-        out[i] = total(referenced(Fields(flag=i % 2 == 1, pair=pair, inside=inside, table=tables[i])))
-
-
-@kernel
 def other(fields):
     return fields.nothing
 
@@ -78,13 +70,6 @@ def test_a_kernel_reads_fields_of_every_kind():
     assert total(fields()) == 96.0 + 1.5
     assert total(fields(flag=False)) == 96.0
     assert total(fields()._replace(table=np.ones((1, 2)))) == 11.0 + 1.5
-
-
-def test_tuples_made_in_a_loop_are_told_apart():
-    rng = np.random.default_rng(1)
-    tables, values, out = rng.normal(size=(50, 3, 2)), rng.normal(size=(50, 2)), np.zeros(50)
-    totals(tables, values, Pair(0.5, 3), out)
-    assert out == pytest.approx(np.einsum("ijk,ik->i", tables, values) + 1.5 * (np.arange(50) % 2), rel=1e-12)
 
 
 def test_fields_that_were_written_once_are_read_where_they_stand():

@@ -29,7 +29,7 @@ strokes = found.strokes + np.outer(times**2, [8.0, -4.0, 6.0, 4.0])
 moved = simulate(scene, times, strokes, dt=2e-3)
 rows = [found.tip, found.joints, found.cylinder_forces, found.frequencies]
 rows += [moved.tip[-1], moved.tip_velocity[-1], moved.tip_acceleration[-1], moved.cylinder_forces[-1], moved.pins[-1].ravel()]
-count = min(count, 10)  # steps of several booms, side by side where that is possible
+count = min(count, 10)
 batch = Batch([compile_scene(scene)] * 2)
 batch.settle(found.strokes, found.joints)
 rows += list(batch.run(2e-3, strokes[1 : count + 1], np.diff(strokes, axis=0)[:count] / 2e-3)[:, -1])

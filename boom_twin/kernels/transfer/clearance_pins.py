@@ -41,7 +41,7 @@ from ..elements.pin_contact import (
     remember,
 )
 from ..integrators import A, V
-from ..jit import inner, some
+from ..jit import inner
 from ..tables import (
     HEAD_TURN,
     LINK_L_TURN,
@@ -72,7 +72,7 @@ def set_turn(t, work, owner, place, angle):
     """Note the journal's angle in the bush (rad) of the pin `place`, if it has friction."""
     for k in range(owner.first_clearance, owner.first_clearance + owner.clearances):
         row = t.clearances[k]
-        if row.place == place and some(row.friction > 0.0):
+        if row.place == place and row.friction > 0.0:
             work.position[row.turn] = angle
 
 
@@ -157,7 +157,7 @@ def condense_ends(t, state, work, condensed, cylinder, g, h):
     torque = 0.0
     for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
         torque += work.hold[k, TORQUE]
-    if some(torque != 0.0):
+    if torque != 0.0:
         _turn_back(g, h, torque / work.position[cylinder.history])
     for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
         at, hold, block = end_of(t.clearances[k]), work.hold[k], condensed.ends[k]

@@ -9,7 +9,7 @@ from ..elements.cylinder import END_C, END_R, near, place_cylinder
 from ..elements.linkage import LINK_L
 from ..elements.pin_contact import BARREL_END_PIN, LINK_L_PIN, LINK_R_PIN, PIVOT, Q_PIN, ROD_END_PIN
 from ..integrators import X
-from ..jit import inner, kernel, some
+from ..jit import inner, kernel
 from ..plane_algebra import COS, SIN, cosine_and_sine, rotated
 from ..tables import (
     BEAM,
@@ -102,7 +102,7 @@ def place_rod(t, state, work, index, x, y, theta):
     )
     for k in range(cylinder.first_clearance, cylinder.first_clearance + cylinder.clearances):
         row = t.clearances[k]
-        if some(row.friction > 0.0):
+        if row.friction > 0.0:
             bush = theta if row.place == ROD_END_PIN else -work.position[row.turn]
             angle = math.atan2(pins[END_R + 1] - pins[END_C + 1], pins[END_R] - pins[END_C])
             work.position[row.turn] = near(angle - bush, state.history[X, row.turn])

@@ -28,7 +28,7 @@ the corrections of three steps. Without it an error of one sign was left in ever
 from __future__ import annotations
 
 from ..integrators import A
-from ..jit import inner, select, some
+from ..jit import inner
 from ..tables import CORRECTIONS
 
 LEAD = 4.0  # at first
@@ -116,11 +116,9 @@ def is_converged(t, state, work, size, before, renewed, tolerance, gain):
     way += detuning(work, gain)
     if is_rough(tolerance):
         way += NEAR
-    shows = (before > SEEN) & (way > 0.0)
-    if some(shows):
+    if before > SEEN and way > 0.0:
         lead, seen = work.kept[SHARE_LEAD], size / before / way
-        more = max(max(LEAST_LEAD, 0.5 * lead), SAFE * seen) if is_rough(tolerance) else max(lead, seen)
-        work.kept[SHARE_LEAD] = select(shows, more, lead)
+        work.kept[SHARE_LEAD] = max(max(LEAST_LEAD, 0.5 * lead), SAFE * seen) if is_rough(tolerance) else max(lead, seen)
     rounding = (size > ROUNDING * before) & (before > 0.0)
     share = min(STEP_SHARE * tolerance * min(1.0, LONG_GAIN / gain), LARGEST_SHARE)
     left = max(CLOSER * tolerance * tolerance, LEAST_ERROR, share * step_error(t, state, work, gain))
@@ -133,11 +131,11 @@ def correct_guess(state, work):
     known, c = work.kept[CORRECTED], work.corrections
     for i in range(state.z.shape[0]):
         work.guess[i] = state.z[i]
-        if some(known == 1.0):
+        if known == 1.0:
             state.z[i] += c[0, i]
-        elif some(known == 2.0):
+        elif known == 2.0:
             state.z[i] += 2.0 * c[0, i] - c[1, i]
-        elif some(known == 3.0):
+        elif known == 3.0:
             state.z[i] += 3.0 * (c[0, i] - c[1, i]) + c[2, i]
 
 

@@ -1,4 +1,4 @@
-"""Time step of the boom: Newton passes of one step, many steps in one call, many booms in one call."""
+"""Time step of the boom: Newton passes of one step, many steps in one call."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 
 from ..elements.pin_contact import CLOSED, Journal, pin_force
 from ..integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
-from ..jit import inner, kernel, referenced, select, some
+from ..jit import inner, kernel
 from ..result_row import results_in
-from ..tables import FRAME_ANGLE, JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Z_SECTION, Motion, State, Tables
+from ..tables import FRAME_ANGLE, JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Z_SECTION, Motion
 from .clearance_pins import axis_of, coarseness, load_pins, note_contacts, shorten
 from .forward_kinematics import place
 from .kept_tangent import (
@@ -92,7 +92,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
                 solved = plain_pass(t, state, work, motion, work.drive, work.drive_rate, product)
             if solved == OK:
                 shorten(t, state, work)
-                size = add_increments(t, state, work, longest, True)
+                size = add_increments(t, state, work, longest)
                 place(t, state, work)
             left -= 1
             if keep:
@@ -176,7 +176,7 @@ def predict(t, state, reach):
     """First guess of the unknowns `reach` s ahead: x + h v + h^2 a/2 for coordinates, forces as they were."""
     x, v, a = state.history[X], state.history[V], state.history[A]
     for i in range(state.z.shape[0]):
-        if some(t.moving[i] > 0.0):
+        if t.moving[i] > 0.0:
             state.z[i] = x[i] + reach * (v[i] + 0.5 * reach * a[i])
 
 
@@ -194,31 +194,22 @@ def newton_status(work, solved, size, tolerance, passes):
 
 
 @inner
-def add_increments(t, state, work, longest, going):
-    """Add increments to the unknowns, where a step is `going` on, unless one of them is not finite.
-
-    Returns the largest as an angle (rad), or NaN.
-    """
-    z, dz, size, finite = state.z, work.dz, 0.0, going
+def add_increments(t, state, work, longest):
+    """Add increments to the unknowns, unless one of them is not finite; return the largest as an angle (rad), or NaN."""
+    z, dz, size = state.z, work.dz, 0.0
     for i in range(z.shape[0]):
-        finite = finite & math.isfinite(dz[i])
+        if not math.isfinite(dz[i]):
+            return math.nan
         size = max(size, t.scale[i] * abs(dz[i]))
-    share = select(size > longest, longest / size, 1.0)
+    share = longest / size if size > longest else 1.0
     for i in range(z.shape[0]):
-        z[i] = select(finite, z[i] + share * dz[i], z[i])
-    return select(finite, size, math.nan)
+        z[i] += share * dz[i]
+    return size
 
 
 @kernel
 def observe(t, state, out):
     """Write the instant in `state` into a row, shape (row_width or more,); see `kernels.result_row.Results`."""
-    found = observe_boom(t, state, out)
-    observe_pins(t, state, found.pins)
-
-
-@inner
-def observe_boom(t, state, out):
-    """Write what `observe` does, but not what the pins do; returns the row as `Results`."""
     n, at = t.joints.shape[0], 0
     found = results_in(out, n, t.clearances.shape[0])
     for k in range(t.operations.shape[0]):
@@ -233,7 +224,7 @@ def observe_boom(t, state, out):
     for j in range(3):
         found.tip[0, j], found.tip[1, j] = state.history[X, t.tip + j], state.history[V, t.tip + j]
         found.tip[2, j] = state.history[A, t.tip + j]
-    return found
+    observe_pins(t, state, found.pins)
 
 
 @inner
@@ -298,39 +289,3 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
             shake += steps[row] * steps[row] * math.hypot(a[t.tip], a[t.tip + 1])
         observe(t, state, out[row])
     return OK, steps.shape[0], total, jolt, shake
-
-
-@inner
-def tables_of(b, i):
-    """Tables of boom `i` of a stack; they differ in numbers only, so `tip` is common."""
-    return Tables(
-        operations=b.operations[i], joints=b.joints[i], linkages=b.linkages[i], links=b.links[i], offsets=b.offsets[i],
-        bodies=b.bodies[i], beams=b.beams[i], psi=b.psi[i], weights=b.weights[i], stiffness=b.stiffness[i],
-        point_mass=b.point_mass[i], point_rotary=b.point_rotary[i], outlets=b.outlets[i], cylinders=b.cylinders[i],
-        parts=b.parts[i], oils=b.oils[i], clearances=b.clearances[i],
-        gravity=b.gravity[i], moving=b.moving[i], scale=b.scale[i], tip=b.tip,
-    )  # fmt: skip
-
-
-@inner
-def state_of(b, i):
-    """State of boom `i` of a stack."""
-    return State(
-        z=b.z[i], history=b.history[i], frames=b.frames[i], turns=b.turns[i], pins=b.pins[i], contacts=b.contacts[i],
-        drives=b.drives[i], pace=b.pace[i],
-    )  # fmt: skip
-
-
-@kernel
-def run_each(tables, states, work, first, last, steps, counts, drives, rates, family, parameter, tolerance, passes, out, ends):
-    """`run` for booms `first` .. `last - 1` of a stack, one after the other in the same `work`.
-
-    drives, rates : (booms, steps in all, n), m and m/s. out : (booms, rows, row_width), see `run`.
-    ends : ndarray of int, shape (booms, 3): status, row, passes of each, see `run`.
-    """
-    for i in range(first, last):
-        status, row, total, _, _ = run(
-            referenced(tables_of(tables, i)), referenced(state_of(states, i)), work, steps, counts, drives[i], rates[i],
-            family, parameter, tolerance, passes, None, out[i],
-        )  # fmt: skip
-        ends[i, 0], ends[i, 1], ends[i, 2] = status, row, total

@@ -1,31 +1,10 @@
 """Faults of the virtual rig: how they are written, and what those of sensors do to readings.
 
-==============================  =========  ======================================================================
-cause                           kind       size
-==============================  =========  ======================================================================
-``cylinder_i.k``                softer     share of the oil spring that is lost
-``section_i.EI``                softer     share of the bending stiffness that is lost
-``tip.payload``                 more,      kg, gained or lost
-..                              less
-``line_fill``                   more,      kg/m, gained or lost
-..                              less
-``cylinder_i.rod.clearance``    play       radial clearance of the rod pin, m
-``cylinder_i.drive``            drift      m/s by which the drive creeps out, by a leak
-``joint_i.sensor``              bias       rad (of a ``cylinder_i.sensor``: m, of a ``cylinder_force_i.sensor``: N)
-(``cylinder_i.sensor``,         drift      rad/s (m/s, N/s)
-``cylinder_force_i.sensor``)    scale      share by which it reads too much
-..                              stuck      none: it repeats the last reading before the onset
-..                              noisy      factor on the noise
-..                              spikes     rad (m, N), up or down, of one reading in fifty
-..                              dropout    share of readings without a value
-``joint_angles.delay``          late       s by which stamps come after the reading
-``joint_angles.dropout``        missing    share of messages that are not there (``cylinder_strokes.dropout`` too)
-==============================  =========  ======================================================================
-
-Faults down to the clearance are physical: they are in the boom that is simulated, see `faulty_boom`. One of a drive is in the
-motion that the boom follows, and what has leaked by its end stays. The others are of sensors, and act on readings that are
-rounded already, as a fault behind the sensor does. Each begins at its onset, grows
-linearly to its size over its ramp, and goes over as long a time from its end on; a pin has its play from the start.
+`listing` names every cause with its kinds and what their sizes are, in SI units. Those of stiffnesses, loads and clearance
+are physical: they are in the boom that is simulated, see `faulty_boom`. One of a drive is in the motion that the boom follows,
+and what has leaked by its end stays. The others are of sensors, and act on readings that are rounded already, as a fault
+behind the sensor does. Each begins at its onset, grows linearly to its size over its ramp, and goes over as long a time from
+its end on; a pin has its play from the start.
 """
 
 from __future__ import annotations
@@ -34,6 +13,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -95,7 +75,7 @@ def _words(form: str, number: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class RigFault:
-    """One fault: its cause, kind and size as in the table above; its onset and end (s after the start), and its ramp (s).
+    """One fault: its cause, kind and size as in `listing`; its onset and end (s after the start), and its ramp (s).
 
     Raises
     ------
@@ -294,13 +274,8 @@ def _with_one(session: RigSession, fault: RigFault, rng: np.random.Generator) ->
         column, there = fault.number - 1, share > 0.0
         true = session.truth[name][:, column]
         values[there, column] = _spoiled(fault, session.truth["t"], values[:, column], true, share, rng)[there]
-    match name:
-        case "joints":
-            return replace(session, joints=values)
-        case "forces":
-            return replace(session, forces=values)
-        case _:
-            return replace(session, strokes=values)
+    changed: dict[str, Any] = {name: values}
+    return replace(session, **changed)
 
 
 def _readings(cause: str) -> str:

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import UsageError
-from ...scene.schema import Point
 from ...types import SECOND, Array
 
 RATE = 200.0  # Hz
@@ -71,7 +70,7 @@ def read(true: Array, sigma: float, resolution: float, rng: np.random.Generator)
     return noisy if resolution == 0.0 else np.asarray(np.rint(noisy / resolution) * resolution)
 
 
-def specific_force(acceleration: Array, angle: Array, gravity: Point) -> Array:
+def specific_force(acceleration: Array, angle: Array, gravity: Array) -> Array:
     """Return the reading of an ideal accelerometer on the tip: acceleration minus gravity in the tip's axes.
 
     Parameters
@@ -80,7 +79,7 @@ def specific_force(acceleration: Array, angle: Array, gravity: Point) -> Array:
         Of the point, without gravity, in the base's axes (m/s^2).
     angle : ndarray, shape (m,)
         Of the last head to the base's x axis (rad).
-    gravity : tuple of float
+    gravity : ndarray, shape (2,)
         In the base's axes (m/s^2).
 
     Returns

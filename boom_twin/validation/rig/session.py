@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from ...scene.kinematics import gravity_in_base
 from ...scene.schema import Scene
 from ...system.atomic_files import write_atomic
 from ...types import SECOND, Array
 from .exudyn.solve import Change, Drive, TipLoad, simulate
-from .exudyn.system import gravity_in_base
 from .sensors import Sensors, read, sampling_stamps, specific_force
 
 EPOCH = 1_700_000_000 * SECOND

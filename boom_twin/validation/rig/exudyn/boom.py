@@ -17,16 +17,16 @@ from itertools import pairwise
 import numpy as np
 
 from ....errors import UsageError
+from ....scene.kinematics import gravity_in_base
 from ....scene.schema import Cylinder, CylinderPart, Pin, Scene
 from ....types import Array
 from . import masses
 from .lumped_masses import lump_masses
 from .masses import Lump, Lumps
 from .module import exudyn, items
-from .oil import oil_stiffness
 from .pin_clearance import Bush, contact_of, pin_with_play, refuse_other_pins
 from .six_bar import Link, six_bar
-from .system import Boom, BuiltSection, Frame, Station, gravity_in_base, section_frames
+from .system import Boom, BuiltSection, Frame, Station, oil_stiffness, section_frames
 
 SAME_PLACE = 1e-9  # m
 SHEAR_OVER_AXIAL = 10.0  # GA = 10 EA: Euler-Bernoulli in effect; of the default boom's tip, shear is then 0.02 mm
@@ -256,7 +256,7 @@ def build(
     ground = int(system.AddObject(items.ObjectGround()))
     frames = section_frames(scene, strokes)
     lumps = lump_masses(scene, frames, strokes) if lumped else None
-    gravity = [*gravity_in_base(scene), 0.0]
+    gravity = [*gravity_in_base(scene).tolist(), 0.0]
     boom = Boom(scene, container, system, gravity, ground, nodally_exact, shear_over_axial, elements, lumps)
     for index, frame in enumerate(frames):
         boom.sections.append(add_section(boom, frame, index, elements))

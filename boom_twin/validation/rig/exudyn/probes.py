@@ -34,10 +34,7 @@ def attach(boom: Boom) -> Probes:
     kind, last = exudyn.OutputVariableType, boom.sections[-1].head
     return Probes(
         tip=(_at_tip(boom, kind.Position), _at_tip(boom, kind.Acceleration)),
-        head=(
-            _on_node(boom, last, kind.Coordinates_t),
-            _on_node(boom, last, kind.Coordinates_tt),
-        ),
+        head=(_on_node(boom, last, kind.Coordinates_t), _on_node(boom, last, kind.Coordinates_tt)),
         roots=tuple(_on_node(boom, section.root, kind.Coordinates) for section in boom.sections),
         heads=tuple(_on_node(boom, section.head, kind.Coordinates) for section in boom.sections),
         forces=tuple(_on_drive(boom, drive, _FORCE[name]) for drive, name in boom.drives),
@@ -101,23 +98,21 @@ def _force(boom: Boom, index: int, number: int, at_rest: bool) -> Array:
 
 def _at_tip(boom: Boom, kind: Any) -> int:
     head, length = boom.sections[-1].head, boom.scene.sections[-1].length
-    sensor = items.SensorBody(bodyNumber=head.body, localPosition=[length - head.x, 0.0, 0.0], **_inside(kind))
-    return int(boom.system.AddSensor(sensor))
+    return _sensor(boom, kind, items.SensorBody, bodyNumber=head.body, localPosition=[length - head.x, 0.0, 0.0])
 
 
 def _on_node(boom: Boom, station: Station, kind: Any) -> int:
-    return int(boom.system.AddSensor(items.SensorNode(nodeNumber=station.node, **_inside(kind))))
+    return _sensor(boom, kind, items.SensorNode, nodeNumber=station.node)
 
 
 def _on_marker(boom: Boom, marker: int) -> int:
-    place = exudyn.OutputVariableType.Position
-    return int(boom.system.AddSensor(items.SensorMarker(markerNumber=marker, **_inside(place))))
+    return _sensor(boom, exudyn.OutputVariableType.Position, items.SensorMarker, markerNumber=marker)
 
 
 def _on_drive(boom: Boom, drive: int, kind: Any) -> int:
-    return int(boom.system.AddSensor(items.SensorObject(objectNumber=drive, **_inside(kind))))
+    return _sensor(boom, kind, items.SensorObject, objectNumber=drive)
 
 
-def _inside(kind: Any) -> dict[str, Any]:
-    """Keep values in memory, write no file."""
-    return {"outputVariableType": kind, "storeInternal": True, "writeToFile": False}
+def _sensor(boom: Boom, kind: Any, item: Any, **where: Any) -> int:
+    """Add a sensor that keeps its values in memory and writes no file."""
+    return int(boom.system.AddSensor(item(outputVariableType=kind, storeInternal=True, writeToFile=False, **where)))

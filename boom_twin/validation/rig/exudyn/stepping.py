@@ -14,9 +14,8 @@ from ....errors import SolverError
 from ....scene.schema import Cylinder
 from ....types import Array
 from .module import exudyn
-from .oil import oil_stiffness
 from .parameter_changes import ParameterChanges
-from .system import Boom
+from .system import Boom, oil_stiffness
 
 STEP_FORCE = 1e-6  # N, absolute tolerance of a step
 FEW = 3  # passes with a kept tangent, below which tangents are many

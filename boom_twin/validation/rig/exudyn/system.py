@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ....scene.kinematics import joint_angles_of_strokes
-from ....scene.schema import Point, Scene
+from ....scene.schema import Cylinder, Point, Scene
 from ....types import Array
 from .masses import Gathered, LumpedMasses
 from .module import items
@@ -160,13 +160,6 @@ class Frame:
         return np.array([c * x + s * y, c * y - s * x])
 
 
-def gravity_in_base(scene: Scene) -> Point:
-    """Gravity (m/s^2) in the axes of the base, which its inclination turns anticlockwise."""
-    c, s = math.cos(scene.base.inclination), math.sin(scene.base.inclination)
-    gx, gy = scene.gravity
-    return c * gx + s * gy, -s * gx + c * gy
-
-
 def section_frames(scene: Scene, strokes: Array) -> list[Frame]:
     """Frames of the straight sections on incompressible cylinders at absolute `strokes` (m)."""
     angles = np.cumsum(joint_angles_of_strokes(scene, strokes))
@@ -175,3 +168,15 @@ def section_frames(scene: Scene, strokes: Array) -> list[Frame]:
         frames.append(Frame(float(origin[0]), float(origin[1]), float(angle)))
         origin = frames[-1].point((section.length, 0.0))
     return frames
+
+
+def oil_stiffness(cylinder: Cylinder, strokes: Array) -> Array:
+    """Stiffness (N/m) of a compressible cylinder with its drive at `strokes` (m), shape as `strokes`."""
+    if cylinder.oil is None:
+        assert cylinder.k is not None
+        return np.full(strokes.shape, cylinder.k)
+    oil = cylinder.oil
+    piston, ring = np.pi * (oil.bore / 2) ** 2, np.pi * ((oil.bore / 2) ** 2 - (oil.rod / 2) ** 2)
+    inside = np.clip(strokes, 0.0, cylinder.max_stroke)
+    per_metre = [piston / (oil.cap_line / piston + inside), ring / (oil.rod_line / ring + cylinder.max_stroke - inside)]
+    return np.asarray(oil.bulk_modulus * sum(per_metre))
