@@ -2,7 +2,10 @@
 
 A transducer reads the length of its cylinder, oil compressed. Its drive, the length with unloaded oil, is a state:
 
-    length_i = d_i + c_i F_i - tau_i (length_i' - d_i'),    F_i, its force, linear in drives, load and modes (`posture`).
+    length_i = d_i + x_i,    x_i = c_i E_i,    F_i = E_i + tau_i E_i',
+
+with the oil's compression x_i (tension positive), the elastic force E_i, linear in drives, load and modes (`posture`), and the
+force F_i on the pins, which has that of the damping d_i = k_i tau_i too.
 
 Recordings of drives themselves are the case c_i = 0 of that reading; the boom keeps its oil.
 
