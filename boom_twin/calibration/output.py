@@ -147,7 +147,11 @@ def as_text(found: Calibration) -> list[str]:
     lines += ["", f"held out: {found.held_out}; residual rms over what is expected (1 is right)"]
     channels = zip(found.before.names, found.before.spread.tolist(), found.after.spread.tolist(), strict=True)
     lines += [f"  {name:10s} {before:8.2f} before  {after:6.2f} now" for name, before, after in channels]
-    return [*lines, f"fit: residuals {found.misfit:.2f} of what noise explains, {found.passes} passes", *found.remarks]
+    return [
+        *lines,
+        f"fit: innovations at most {found.misfit:.2f} times as large as noise explains, {found.passes} passes",
+        *found.remarks,
+    ]
 
 
 def as_object(found: Calibration) -> dict[str, Any]:

@@ -11,24 +11,21 @@ import numpy as np
 from ..bag.session_model import Mapped, mapping_of, strokes_of
 from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
-from ..errors import BagError, SolverError, UsageError
+from ..errors import BagError, UsageError
 from ..scene.edit import with_parameters
 from ..scene.schema import Scene
-from ..types import NANO, SENSORS, Mount, Stream, StrokeReading
-from .forward_model import READINGS, CalibrationProblem
-from .least_squares import Fit, InseparableUnknowns, fitted, groups_of
-from .noise_model import ResidualBlocks, block_length, blocks_of, channel_names
-from .sessions import MeasuredSession, SessionCourse, course_of, read_sessions, refuse_short
-from .unknown_load import LENGTH, SAMPLES, fitted_under_load, is_plausible
-from .unknowns import Unknown, unknowns_of, usual_names
+from ..types import SENSORS, Stream, StrokeReading
+from .fit import Fit, InseparableUnknowns, fitted, groups_of
+from .problem import CalibrationProblem
+from .rest_periods import STREAMS, Rigging, rest_periods
+from .sessions import MeasuredSession, read_sessions
+from .unknowns import Unknown, assumed_of, unknowns_of, usual_names
 from .validation import HeldOutResult, judged
 
 KEPT = 2.0 / 3.0  # of a single session is fitted, the rest held out
-MOVED = 0.01  # m, least travel of some stroke
-LOADED = 1.2  # misfit from which on an unknown load is looked for, and up to which it explains the residuals
-MISFIT = 1.5  # from which on the fit is remarked on
+BEYOND = 0.01  # m, by which a stroke may be beyond the travel of its cylinder
+MISFIT = 1.5  # of a channel, from which on it is remarked on
 GROWN = 1.1  # of residuals on what was held out, likewise
-AT_BOUND = 1e-6  # deviations of the prior, within which an estimate is at its bound
 BETWEEN = 1.96  # deviations, of a normal distribution's 95 %
 
 Progress = Callable[[float, str], None]
@@ -73,7 +70,7 @@ class Calibration:
     groups : tuple of InseparableUnknowns
         What the sessions do not tell.
     misfit : float
-        Root mean square of the white residuals of the fit; 1 where the model explains all but noise.
+        Root mean square of the normalised innovations, of the channel where it is largest; 1 where noise alone is left.
     passes : int
     sessions : tuple of MeasuredSession
     held_out : str
@@ -143,15 +140,17 @@ def calibrate(
     progress(0.0, "reading")
     paths, joints = [Path(bag) for bag in bags], len(scene.joints)
     mapped = common_mapping(paths, Path(mapping) if mapping else None, joints)
-    refuse_lengths(paths, mapped)
+    rigging = Rigging(settings, tuple(mapped.topics.mounts(joints)), common_reading(paths, mapped))
     sessions = read_sessions(paths, mapped.topics.of_joints(joint.range_deg for joint in scene.joints), joints, window)
-    streams = (Stream.STROKES, *_compared(sessions))
-    names = choice.names or usual_names(scene, streams, choice.load, choice.damping, choice.stiffness, choice.zeros)
+    _refuse_other_boom(scene, sessions)
+    present = [stream for stream in Stream if any(stream in session.series for session in sessions)]
+    names = choice.names or usual_names(scene, present, choice.load, choice.damping, choice.stiffness, choice.zeros)
     unknowns = unknowns_of(scene, names)
-    parts, kept_from = _parts(scene, sessions, mapped, settings)
-    progress(0.1, "fit, holds")
-    problem, fit = _fitted(scene, unknowns, parts, settings, progress)
-    progress(0.75, "what can be told apart")
+    kept_from, fitting = _parts(sessions)
+    progress(0.05, "rests")
+    periods = [period for each, until in fitting for period in rest_periods(each, scene, rigging, until)]
+    problem, passes = CalibrationProblem(scene, unknowns, periods, rigging), iter(range(1, 1000))
+    fit = fitted(problem, assumed_of(scene, names), lambda: _tell_pass(progress, next(passes)))
     groups = groups_of(problem, fit)
     estimates = _estimates(problem, fit, groups)
     told = {estimate.unknown.name: estimate.value for estimate in estimates if estimate.told}
@@ -160,54 +159,30 @@ def calibrate(
     zeros = {name.removesuffix(".zero"): value for name, value in told.items() if name.endswith(".zero")}
     better = with_parameters(scene, {name: value for name, value in told.items() if not name.endswith(".zero")})
     progress(0.8, "held out, before")
-    mounts = mapped.topics.mounts(joints)
-    before = judged(scene, settings, mounts, sessions[-1], {}, kept_from)
+    before = judged(scene, rigging, sessions[-1], {}, kept_from)
     progress(0.9, "held out, after")
-    after = judged(better, settings, mounts, sessions[-1], zeros, kept_from)
+    after = judged(better, rigging, sessions[-1], zeros, kept_from)
     progress(1.0, "done")
     held_out = sessions[-1].name if len(sessions) > 1 else f"the last third of {sessions[-1].name}"
-    return Calibration(
-        better, zeros, estimates, tuple(groups), fit.misfit, fit.passes, tuple(sessions), held_out, before, after, mapped,
-        tuple(_remarks(problem, fit, estimates, sessions, mounts) + ([] if fit.load else _worse(before, after))),
-    )  # fmt: skip
-
-
-def _fitted(
-    scene: Scene, unknowns: Sequence[Unknown], parts: FittedParts, settings: Settings, progress: Progress
-) -> tuple[CalibrationProblem, Fit]:
-    """Return the problem and its fit; under an unknown load at the tip, if more than noise is left and the load explains it."""
-    passes = iter(range(1, 1000))
-
-    def tell() -> None:
-        _tell_pass(progress, next(passes))
-
-    problem = CalibrationProblem(scene, unknowns, parts.in_blocks(parts.length), parts.channels, settings)
-    quiet = fitted(problem, tell)
-    if quiet.misfit <= LOADED:
-        return problem, quiet
-    blocks = [(course.held(settings.stroke_variance), each) for course, each in parts.in_blocks(parts.loaded_length, 0.5)]
-    finer = CalibrationProblem(scene, unknowns, blocks, parts.channels, settings)
-    try:
-        loaded = fitted_under_load(finer, quiet, tell)
-    except SolverError:  # then the misfit stays, and is remarked on
-        return problem, quiet
-    return problem, loaded if loaded.misfit <= LOADED and is_plausible(loaded.load, scene) else quiet
+    remarks = tuple(_remarks(fit, problem.names, estimates, sessions) + _worse(before, after))
+    misfit, judgements = float(fit.misfits.max()), (held_out, before, after, mapped, remarks)
+    return Calibration(better, zeros, estimates, tuple(groups), misfit, fit.passes, tuple(sessions), *judgements)
 
 
 def _tell_pass(progress: Progress, number: int) -> None:
     progress(0.15 + 0.6 * (1.0 - 0.85**number), f"fit, pass {number}")
 
 
-def refuse_lengths(paths: Sequence[Path], mapped: Mapped) -> None:
-    """Raise a UsageError for a session whose stroke transducers read lengths, which the fit would take for drives."""
-    for path in paths:
-        strokes = strokes_of(path, mapped)
-        if strokes.reading is StrokeReading.LENGTH:
+def common_reading(paths: Sequence[Path], mapped: Mapped) -> StrokeReading:
+    """Return what the stroke transducers of all sessions read; UsageError if it differs."""
+    found = [strokes_of(path, mapped).reading for path in paths]
+    for path, reading in zip(paths, found, strict=True):
+        if reading is not found[0]:
             raise UsageError(
-                f"{path}: its stroke transducers read lengths ({strokes.source}), and the fit knows drives only: it would "
-                "count the oil's compression twice. If they do read drives, say reads: drive under inputs.cylinder_strokes of "
-                "a mapping (--mapping)."
+                f"{path}: its stroke transducers read {reading.value}s, those of {paths[0]} {found[0].value}s. "
+                "Calibrate the two apart."
             )
+    return found[0]
 
 
 def common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int) -> Mapped:
@@ -222,71 +197,23 @@ def common_mapping(paths: Sequence[Path], mapping: Path | None, joints: int) -> 
     return found[0]
 
 
-@dataclass(frozen=True)
-class FittedParts:
-    """Parts of the sessions that are fitted.
-
-    `length` and `loaded_length` (s) are those of blocks without and with a load, `streams` are compared, `mounts` tell how
-    their sensors are mounted.
-    """
-
-    sessions: tuple[tuple[MeasuredSession, SessionCourse], ...]
-    length: float
-    loaded_length: float
-    streams: tuple[Stream, ...]
-    mounts: tuple[Mount | None, ...]
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Names of the streams' channels."""
-        return channel_names(self.sessions[0][1].strokes.shape[1], self.streams)
-
-    def in_blocks(self, length: float, lead: float = 0.0) -> list[tuple[SessionCourse, ResidualBlocks]]:
-        """Return each course with its averages over blocks of `length` (s).
-
-        The first block begins before the course, by the share `lead` of the time between samples.
-        """
-        return [
-            (course, blocks_of(session, course, length, self.streams, self.mounts, lead * course.interval))
-            for session, course in self.sessions
-        ]
+def _parts(sessions: Sequence[MeasuredSession]) -> tuple[int, list[tuple[MeasuredSession, int | None]]]:
+    """Return the stamp from which the last session is held out, and the sessions to fit, each up to a stamp (None: whole)."""
+    strokes = sessions[-1].series[Stream.STROKES].stamps
+    if len(sessions) > 1:
+        return int(strokes[0]), [(session, None) for session in sessions[:-1]]
+    until = int(strokes[0] + KEPT * (strokes[-1] - strokes[0]))
+    return until, [(sessions[0], until)]
 
 
-def _parts(scene: Scene, sessions: Sequence[MeasuredSession], mapped: Mapped, settings: Settings) -> tuple[FittedParts, int]:
-    """Return the parts to fit, and the stamp from which the last session is held out."""
-    joints, streams = len(scene.joints), _compared(sessions)
-    courses = [course_of(session, settings) for session in sessions]
-    _refuse_other_boom(scene, sessions, courses)
-    kept_from = courses[-1].start
-    if len(sessions) == 1:
-        used = KEPT * courses[0].duration
-        refuse_short(sessions[0].name, used, "left for the fit, the last third being held out")
-        kept_from += round(used / NANO)
-        courses = [courses[0].until(used)]
-    fitting = list(zip(sessions, courses, strict=True))[: max(1, len(sessions) - 1)]
-    travel = max(float(np.ptp(course.strokes, axis=0).max()) for _, course in fitting)
-    between = np.ptp([course.strokes.mean(axis=0) for _, course in fitting], axis=0).max()
-    if max(travel, float(between)) < MOVED:
-        raise BagError(
-            f"{', '.join(session.name for session, _ in fitting)}: no stroke moves by more than {1e3 * MOVED:g} mm, so loads "
-            "do not change and stiffness looks like a zero. Record moves of every cylinder, with holds between them."
-        )
-    lengths = block_length(sessions, streams), block_length(sessions, streams, LENGTH, SAMPLES)
-    return FittedParts(tuple(fitting), *lengths, streams, tuple(mapped.topics.mounts(joints))), kept_from
-
-
-def _compared(sessions: Sequence[MeasuredSession]) -> tuple[Stream, ...]:
-    """Return the streams to compare; a stream that one session lacks is left out of all."""
-    return tuple(stream for stream in READINGS if all(stream in session.series for session in sessions))
-
-
-def _refuse_other_boom(scene: Scene, sessions: Sequence[MeasuredSession], courses: Sequence[SessionCourse]) -> None:
+def _refuse_other_boom(scene: Scene, sessions: Sequence[MeasuredSession]) -> None:
     """Raise BagError where strokes are beyond the travel of the scene's cylinders."""
-    for session, course in zip(sessions, courses, strict=True):
+    for session in sessions:
+        strokes = session.series[Stream.STROKES].values
         for i, joint in enumerate(scene.joints):
-            low, high = float(course.strokes[:, i].min()), float(course.strokes[:, i].max())
+            low, high = np.nanquantile(strokes[:, i], [0.01, 0.99]).tolist()
             most = joint.cylinder.max_stroke
-            if low < -MOVED or high > most + MOVED:
+            if low < -BEYOND or high > most + BEYOND:
                 raise BagError(
                     f"{session.name}: cylinder_{i + 1} reads {low:.3f} to {high:.3f} m, the scene's travels 0 to {most:g} m. "
                     "Give a session of this boom, or a mapping with its unit and zero."
@@ -306,7 +233,9 @@ def _estimates(problem: CalibrationProblem, fit: Fit, groups: Sequence[Inseparab
 
 
 def _worse(before: HeldOutResult, after: HeldOutResult) -> list[str]:
-    worse = [name for name, old, new in zip(before.names, before.spread, after.spread, strict=True) if new > GROWN * old]
+    worse = [
+        name for name, old, new in zip(before.names, before.spread, after.spread, strict=True) if new > GROWN * max(old, 1.0)
+    ]
     if not worse:
         return []
     return [
@@ -315,37 +244,24 @@ def _worse(before: HeldOutResult, after: HeldOutResult) -> list[str]:
     ]
 
 
-def _remarks(
-    problem: CalibrationProblem, fit: Fit, estimates: Sequence[Estimate], sessions: Sequence[MeasuredSession],
-    mounts: Sequence[object],
-) -> list[str]:  # fmt: skip
+def _remarks(fit: Fit, names: Sequence[str], estimates: Sequence[Estimate], sessions: Sequence[MeasuredSession]) -> list[str]:
     found = []
-    for each in estimates:
+    for each, pull in zip(estimates, fit.pull / np.sqrt(np.diag(fit.precision)), strict=True):
         bound = each.unknown.value(each.unknown.least)
-        if each.told and each.value <= bound + AT_BOUND * each.unknown.kind.prior:
+        if each.told and pull < -BETWEEN:
             found.append(
                 f"{each.unknown.name} is at its lower bound of {bound:g} {each.unknown.kind.unit}: the sessions fit best with "
                 "less, which no boom has. Check the zeros of the sensors and the other loads of the scene."
             )
-    if fit.misfit > MISFIT:
-        found.append(
-            f"The residuals of the fit are {fit.misfit:.1f} times what noise explains: the sessions hold something that the "
-            "parameters cannot make (a fault, another boom, a load that changed). Intervals are widened by it."
-        )
-    if fit.load is not None:
-        found.append(
-            f"A load at the tip that the scene does not know was taken into account: {fit.load.text}. The residuals on "
-            "what was held out hold it, too."
-        )
+    for name, misfit in zip(names, fit.misfits, strict=True):
+        if misfit > MISFIT:
+            found.append(
+                f"The readings of {name} are {misfit:.1f} times as far from the fit as its noise explains. The sessions hold "
+                "something that the parameters cannot make, as a fault of the sensor or another boom. It has the less weight."
+            )
     if any(session.changed for session in sessions):
         found.append("A load or a zero was changed while a session was recorded; the fit takes no account of it.")
-    if any(mounts):
-        found.append("Inclinometers are not used by the fit, only encoders.")
-    compared = _compared(sessions)
-    for stream in READINGS:
-        if stream not in compared and any(stream in session.series for session in sessions):
-            found.append(f"Not every session has a {SENSORS[stream].title}, so none is used.")
-    lacking = [name for name in channel_names(len(problem.scene.joints), compared) if name not in problem.channels]
-    if lacking:
-        found.append(f"Not measured throughout, and left out: {', '.join(lacking)}.")
+    for stream in STREAMS:
+        if len({stream in session.series for session in sessions}) > 1:
+            found.append(f"Not every session has a {SENSORS[stream].title}.")
     return found

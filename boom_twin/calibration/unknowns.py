@@ -52,12 +52,22 @@ ZEROS = {
 """Kinds of the sensors' zeros, by stream, in the order in which they are estimated."""
 
 
+ASSUMED = {
+    "EI": UnknownKind("N m^2", 0.02, 0.0, relative=True),
+    "mass": UnknownKind("kg", 0.02, 0.0, relative=True),
+    "d": UnknownKind("N s/m", 0.2, 0.0, relative=True),
+    "beta": UnknownKind("s", 0.2, 0.0, relative=True),
+}
+"""How far parameters that are not estimated may be wrong, by the last word of their names: tolerances, and damping."""
+
+
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """Parameter to be estimated, with its present value (SI)."""
+    """Parameter to be estimated, with its present value (SI); `assumed`: one that is not, see `ASSUMED`."""
 
     name: str
     present: float
+    assumed: bool = False
 
     @property
     def channel(self) -> str | None:
@@ -70,7 +80,7 @@ class Unknown:
         """Unit and likely deviations of the parameter's kind."""
         if self.channel is not None and (stream := stream_of(self.channel)) is not None:
             return ZEROS[stream]
-        return KINDS[self.name if self.name in KINDS else self.name.rpartition(".")[2]]
+        return (ASSUMED if self.assumed else KINDS)[self.name if self.name in KINDS else self.name.rpartition(".")[2]]
 
     @property
     def least(self) -> float:
@@ -136,3 +146,9 @@ def unknowns_of(scene: Scene, names: Sequence[str]) -> tuple[Unknown, ...]:
             raise UsageError(f"{name}: named {names.count(name)} times. Name it once.")
     zeros = set(zero_names(scene))
     return tuple(Unknown(name, 0.0 if name in zeros else parameter(scene, name)) for name in names)
+
+
+def assumed_of(scene: Scene, names: Sequence[str]) -> tuple[Unknown, ...]:
+    """Return the parameters of the scene that are taken to be known but may be wrong, beside those of `names`."""
+    others = [name for name in parameter_names(scene) if name.rpartition(".")[2] in ASSUMED and name not in names]
+    return tuple(Unknown(name, at, True) for name in others if (at := parameter(scene, name)) > 0.0)

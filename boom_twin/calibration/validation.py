@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..config.settings import Settings
 from ..errors import BagError
 from ..scene.schema import Scene
 from ..twin.driver import drive
 from ..twin.twin import Twin
-from ..types import NANO, Array, Mount, Residuals, Stream, StrokeReading
+from ..types import NANO, Array, Residuals, Stream
+from .rest_periods import Rigging
 from .sessions import MeasuredSession
 
 
@@ -42,8 +42,7 @@ class HeldOutResult:
 
 def judged(
     scene: Scene,
-    settings: Settings,
-    mounts: Sequence[Mount | None],
+    rigging: Rigging,
     session: MeasuredSession,
     zeros: Mapping[str, float],
     start: int,
@@ -60,7 +59,7 @@ def judged(
     BagError
         The twin predicts nothing there.
     """
-    twin = Twin(scene, settings, mounts, reads=StrokeReading.DRIVE)
+    twin = Twin(scene, rigging.settings, rigging.mounts, reads=rigging.reads)
     found: dict[Stream, list[Residuals]] = {stream: [] for stream in Stream}
     for step in drive(twin, session.samples(zeros)):
         for residuals in (each for report in step.report.all for each in report.residuals):

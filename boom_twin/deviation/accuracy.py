@@ -80,7 +80,7 @@ def settle_covariance(t, boom, live, work, p, f, row, lengths, gravity, counts, 
 
     `counts` and `first` (streams,): how many sensors each stream has, and its first channel. Their residuals are `zeros`.
     """
-    usual2 = f.load2[0]
+    usual2 = f.load2[0, 0]
     results = results_in(row, lengths.shape[0], t.clearances.shape[0])
     for k in range(steps):
         stamp = k * span

@@ -8,7 +8,7 @@ from ..kernels.jit import inner
 from .rows import spread_of
 from .states import all_states, drive_place, force_place, zero_place
 
-FAST, SLOW = 0.25, 60.0  # s, correlation times of the two parts of the load
+FAST, SLOW = 0.1, 60.0  # s, time constants of the two parts of the load
 DRIVE_TIME = 0.12  # s, correlation time of a drive's acceleration
 LEAK = 1e-14  # m^2/s, random walk of a drive
 IMU_ZERO, IMU_DRIFT = 0.3, 3e-3  # m/s^2; m/s^2 in a root second
@@ -45,12 +45,17 @@ def make_transition(p, f, h):
             for b in range(2):
                 put_weight(f, j, load + 2 * b + a, still * motion)
                 put_weight(f, m + j, load + 2 * b + a, moving * motion)
+            put_weight(f, j, load + 4 + a, 0.5 * h * still * motion)
+            put_weight(f, m + j, load + 4 + a, 0.5 * h * moving * motion)
         for i in range(n):
             push = -p.forces[2 + n + j, i] / omega2
             put_weight(f, j, drive + 2 * n + i, still * push)
             put_weight(f, m + j, drive + 2 * n + i, moving * push)
     for a in range(2):
-        put_weight(f, load + a, load + a, math.exp(-h / FAST))
+        put_weight(f, load + a, load + a, (1.0 + h / FAST) * math.exp(-h / FAST))
+        put_weight(f, load + a, load + 4 + a, h * math.exp(-h / FAST))
+        put_weight(f, load + 4 + a, load + a, -h / (FAST * FAST) * math.exp(-h / FAST))
+        put_weight(f, load + 4 + a, load + 4 + a, (1.0 - h / FAST) * math.exp(-h / FAST))
         put_weight(f, load + 2 + a, load + 2 + a, math.exp(-h / SLOW))
     kept = math.exp(-h / DRIVE_TIME)
     for i in range(n):
@@ -72,8 +77,11 @@ def make_transition(p, f, h):
 
 
 @inner
-def transit(p, f, k, size, h, load2):
-    """Propagate the first `size` states of model `k` over the transition; its fast load has the variance `load2` (N^2)."""
+def transit(p, f, k, size, h, loads, least2):
+    """Propagate the first `size` states of model `k` over the transition.
+
+    The variances of its fast load are `loads` (2,) along x and y, or `least2` where they are less; N^2.
+    """
     x, covariance, load = f.x[k], f.p[k], force_place(p)
     for i in range(size):
         total = 0.0
@@ -89,10 +97,17 @@ def transit(p, f, k, size, h, load2):
     multiply(f, f.turned, covariance, size)
     for i in range(size):
         covariance[i, i] += f.variances[i]
-    slow2 = f.noise.least_load * f.noise.least_load + load2
+    u, left = h / FAST, math.exp(-2.0 * h / FAST)
+    force, both = 1.0 - left * ((1.0 + u) * (1.0 + u) + u * u), 2.0 / FAST * left * u * u
+    rate = (1.0 - left * ((1.0 - u) * (1.0 - u) + u * u)) / (FAST * FAST)
     for a in range(2):
-        covariance[load + a, load + a] += load2 * (1.0 - math.exp(-2.0 * h / FAST))
-        covariance[load + 2 + a, load + 2 + a] += slow2 * (1.0 - math.exp(-2.0 * h / SLOW))
+        fast2, at = max(loads[a], least2), load + a
+        slow2 = f.noise.least_load * f.noise.least_load + fast2
+        covariance[at, at] += force * fast2
+        covariance[at + 4, at + 4] += rate * fast2
+        covariance[at, at + 4] += both * fast2
+        covariance[at + 4, at] += both * fast2
+        covariance[at + 2, at + 2] += slow2 * (1.0 - math.exp(-2.0 * h / SLOW))
 
 
 @inner

@@ -73,12 +73,11 @@ def learn_load(p, f, h):
     """Learn the variance of the fast load, of the prediction and of the estimate."""
     for k in range(2):
         if k == ESTIMATE and f.status[FED] == 0:
-            f.load2[ESTIMATE] = f.load2[PREDICTION]
+            f.load2[ESTIMATE, 0], f.load2[ESTIMATE, 1] = f.load2[PREDICTION, 0], f.load2[PREDICTION, 1]
             return
-        shown = 0.0
-        for at in range(force_place(p), force_place(p) + 2):
-            shown += 0.5 * (f.mean[k, at] * f.mean[k, at] + f.spread[k, at, at])
-        f.load2[k] = learnt(f, f.load2[k], shown, h)
+        for a in range(2):
+            at = force_place(p) + a
+            f.load2[k, a] = learnt(f, f.load2[k, a], f.mean[k, at] * f.mean[k, at] + f.spread[k, at, at], h)
 
 
 @inner

@@ -2,7 +2,10 @@
 
 A transducer reads the length of its cylinder, oil compressed. Its drive, the length with unloaded oil, is a state:
 
-    length_i = d_i + c_i F_i - tau_i (length_i' - d_i'),    F_i, its force, linear in drives, load and modes (`posture`).
+    length_i = d_i + x_i,    x_i = c_i E_i,    F_i = E_i + tau_i E_i',
+
+with the oil's compression x_i (tension positive), the elastic force E_i, linear in drives, load and modes (`posture`), and the
+force F_i on the pins, which has that of the damping d_i = k_i tau_i too.
 
 Recordings of drives themselves are the case c_i = 0 of that reading; the boom keeps its oil.
 
@@ -24,7 +27,7 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .kalman import ANGLE_ZERO, FORCE_ZERO, IMU_ZERO, correct, make_transition, transit
+from .kalman import ANGLE_ZERO, FAST, FORCE_ZERO, IMU_ZERO, correct, make_transition, transit
 from .learning import learn_jerk, learn_length_noise, learn_load, watch_valves
 from .mixture import copy_model, interact, mix, weigh_models
 from .rows import clear, column_row, length_of, length_row, read, variance_of
@@ -62,14 +65,15 @@ def start_models(p, f, speed, swing):
         x[i] = 0.0
         for k in range(f.x.shape[1]):
             covariance[i, k] = 0.0
-    f.load2[0] = f.load2[1] = noise.usual_load * noise.usual_load
+    f.load2[:] = noise.usual_load * noise.usual_load
     for a in range(2):
-        covariance[load + a, load + a] = f.load2[0]
+        covariance[load + a, load + a] = f.load2[0, a]
         covariance[load + 2 + a, load + 2 + a] = noise.first_load * noise.first_load
+        covariance[load + 4 + a, load + 4 + a] = f.load2[0, a] / (FAST * FAST)
     for j in range(m):
         motion2 = p.readings[2 + n + j, n] ** 2 + p.readings[2 + n + j, n + 1] ** 2
         omega2 = p.omega[j] * p.omega[j]
-        off2 = 0.1 * motion2 * f.load2[0] / (omega2 * omega2)
+        off2 = 0.1 * motion2 * f.load2[0, 0] / (omega2 * omega2)
         if j == 0 and motion2 > 0.0:
             off2 += swing * swing / motion2
         for i in range(n):
@@ -96,8 +100,7 @@ def step_models(p, f, h, y):
     """Step all models by `h` (s) to lengths `y` (n, m; NaN = missing)."""
     size, every = zero_place(p), all_states(p)
     learn_length_noise(f, h, y)
-    usual2 = f.load2[0]
-    burst2 = max(f.noise.burst_load * f.noise.burst_load, usual2)
+    burst2 = f.noise.burst_load * f.noise.burst_load
     if h > 0.0:
         steps = max(1, math.ceil(h / LONGEST_STEP - 1e-6))
         interact(f, PREDICTION, size, h)
@@ -106,11 +109,10 @@ def step_models(p, f, h, y):
         make_transition(p, f, h / steps)
         for _ in range(steps):
             for k in range(3):
-                transit(p, f, k, size, h / steps, burst2 if k == BURST else usual2)
+                transit(p, f, k, size, h / steps, f.load2[PREDICTION], burst2 if k == BURST else 0.0)
             if f.status[FED] == 1:
-                all2 = f.load2[1] + f.chances[BURST] * (burst2 - f.load2[1])
                 for k in range(2):
-                    transit(p, f, ALL_VALVES + k, every, h / steps, all2)
+                    transit(p, f, ALL_VALVES + k, every, h / steps, f.load2[ESTIMATE], f.chances[BURST] * burst2)
         hold_still(p, f, VALVES, size)
         hold_still(p, f, BURST, size)
         if f.status[FED] == 1:

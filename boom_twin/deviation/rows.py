@@ -65,12 +65,21 @@ def column_row(p, columns, at, scale, row):
 
 @inner
 def length_row(p, i, row):
-    """Write the row of the stroke transducer of cylinder `i`."""
-    n, m = p.drives.shape[0], p.modes[0]
+    """Write the row of the stroke transducer of cylinder `i`: its drive, and the oil's compression by the elastic force."""
     column_row(p, p.forces, i, p.oil_read[i], row)
     row[drive_place(p) + i] += 1.0
+
+
+@inner
+def force_row(p, i, row):
+    """Write the row of the force of cylinder `i`: the elastic force, and that of the oil's damping, d x' = (d/k) (k x)'."""
+    n, m = p.drives.shape[0], p.modes[0]
+    column_row(p, p.forces, i, 1.0, row)
+    drive = drive_place(p)
+    for k in range(n):
+        row[drive + n + k] = p.lag[i] * p.forces[2 + k, i]
     for j in range(m):
-        row[m + j] = -p.lag[i] * p.oil_read[i] * p.forces[2 + n + j, i]
+        row[m + j] = p.lag[i] * p.forces[2 + n + j, i]
 
 
 @inner

@@ -8,7 +8,7 @@ from ..kernels.jit import inner, kernel
 from .kalman import correct
 from .learning import SURPRISE
 from .mixture import mix, weigh_models
-from .rows import angle_row, column_row, specific_force_row, variance_of
+from .rows import angle_row, force_row, specific_force_row, variance_of
 from .states import (
     ALL_OPEN,
     ALL_VALVES,
@@ -69,7 +69,7 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
             inexact2 = INEXACT * INEXACT * f.shaking[0]
             take_reading(p, f, first + i, residuals[i], zero + i, f.noise.acceleration2 + inexact2, age)
         else:
-            column_row(p, p.forces, i, 1.0, f.row)
+            force_row(p, i, f.row)
             take_reading(p, f, first + i, residuals[i], zero + 4 + n + i, f.noise.force2, age)
     weigh_models(f, ESTIMATE)
     mix(f, ESTIMATE, all_states(p))

@@ -13,6 +13,7 @@ from ..types import Array, Stream
 VALVES, OPEN, BURST, ALL_VALVES, ALL_OPEN = range(5)  # models: three of the prediction, two of the estimate
 ANGLES, IMU, FORCES = map(list(Stream).index, (Stream.ANGLES, Stream.IMU, Stream.FORCES))  # codes of these streams
 PREDICTION, ESTIMATE = range(2)  # mixtures of these
+LOADS = 6  # states of the load at the tip: along x and y its fast part (2), its slow part (2), rates of the fast part (2)
 FED, FED_STAMP = range(2)  # of `status`
 
 
@@ -34,7 +35,8 @@ class Filters(NamedTuple):
     """Filters of one boom; n cylinders, m modes at most, s states, p of them of the prediction (zeros behind).
 
     x, p : (5, s), (5, s, s) states and covariances of the models. chances : (5,) of them, in each mixture one in all.
-    mean, spread : (2, s), (2, s, s) of the mixtures. load2 : (2,) variance of the fast load, N^2, of prediction and estimate.
+    mean, spread : (2, s), (2, s, s) of the mixtures. load2 : (2, 2) variances of the fast load, N^2, of prediction and
+    estimate, along x and y.
     jerk : (n,) m^2/s^5. is_open : (n,) 1 where a valve is believed open. still : (n,) s since its drive began to stand still.
     status : (2,) whether the estimate has readings of its own, stamp of the newest of these.
     masked, deaf : (c,), (n,) measured channels, and strokes, that the estimate is not to use. noise : variances.
@@ -92,14 +94,14 @@ class Filters(NamedTuple):
 
 def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> Filters:
     """Return filters of a boom with so many joints, modes at most, and measured channels."""
-    n, states = joints, 2 * modes + 4 + 3 * joints + 4 + 2 * joints
+    n, states = joints, 2 * modes + LOADS + 3 * joints + 4 + 2 * joints
     return Filters(
         x=np.zeros((5, states)), p=np.zeros((5, states, states)), chances=np.zeros(5), mean=np.zeros((2, states)),
-        spread=np.zeros((2, states, states)), load2=np.zeros(2), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
+        spread=np.zeros((2, states, states)), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
         still=np.zeros(n), status=np.zeros(2, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(4 + 2 * joints),
         length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(1), noise=noise,
-        places=np.zeros((states, 6 + n), np.int64), weights=np.zeros((states, 6 + n)), counts=np.zeros(states, np.int64),
+        places=np.zeros((states, 8 + n), np.int64), weights=np.zeros((states, 8 + n)), counts=np.zeros(states, np.int64),
         variances=np.zeros(states), felt=np.zeros(2), pulls=np.zeros(n), evidence=np.zeros(1), half=np.zeros((states, states)),
         turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)), mixed_p=np.zeros((3, states, states)),
         row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((9, states)), likely=np.zeros(5),
@@ -110,20 +112,20 @@ def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> F
 
 @inner
 def force_place(p):
-    """Return the first place of the fast load (2), behind the modes' coordinates and rates; the slow one (2) follows."""
+    """Return the first place of the load's states, see `LOADS`; coordinates and rates of the modes stand before."""
     return 2 * p.modes[0]
 
 
 @inner
 def drive_place(p):
     """Return the first place of the drives (n); their rates (n) and accelerations (n) follow."""
-    return 2 * p.modes[0] + 4
+    return 2 * p.modes[0] + LOADS
 
 
 @inner
 def zero_place(p):
     """Return how many states the prediction has; zeros (2), mount, scale of the IMU, zeros of angles and forces follow."""
-    return 2 * p.modes[0] + 4 + 3 * p.drives.shape[0]
+    return 2 * p.modes[0] + LOADS + 3 * p.drives.shape[0]
 
 
 @inner

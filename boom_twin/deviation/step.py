@@ -26,9 +26,11 @@ from .estimate_row import TIP as TIP_AT
 from .models import step_models
 from .posture import WIDEST, linearise
 from .rows import (
+    about_rest,
     acceleration_row,
     angle_row,
     column_row,
+    force_row,
     length_of,
     length_row,
     rate_row,
@@ -133,12 +135,14 @@ def write_prediction(t, live, p, f, h, gravity, out):
     for i in range(n):
         root = p.roots[i]
         found.joints[i] = live.frames[root, FRAME_ANGLE] - live.frames[root - 1, FRAME_ANGLE]
-        f.pulls[i] = found.cylinder_forces[i] = live.z[t.cylinders[i].z]
+        elastic = live.z[t.cylinders[i].z]
+        force_row(p, i, f.row)
+        f.pulls[i] = found.cylinder_forces[i] = p.pulled[i] + about_rest(p, f.row, f.mean[PREDICTION], size)
         length_row(p, i, f.row)
         estimates.strokes[i] = length_of(p, i, f.row, f.mean[PREDICTION], size)
         estimates.variances[i] = variance_of(f.row, f.spread[PREDICTION], f.gain, size)
         f.strokes[i, 0], f.strokes[i, 1] = estimates.strokes[i], stroke_rate(p, f, i)
-        found.lengths[i] = estimates.strokes[i] + (p.compliance[i] - p.oil_read[i]) * f.pulls[i]
+        found.lengths[i] = estimates.strokes[i] + (p.compliance[i] - p.oil_read[i]) * elastic
         f.strokes[i, 2] = f.mean[PREDICTION, drive_place(p) + 2 * n + i]
     for k in range(pins):
         row = t.clearances[k]
@@ -233,7 +237,7 @@ def write_expected_readings(p, f, live, results, inclination, values, sigmas):
         sigmas[at + axis] = math.sqrt(f.noise.acceleration2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
     for i in range(n):
         values[at + 2 + i] = results.cylinder_forces[i]
-        column_row(p, p.forces, i, 1.0, f.row)
+        force_row(p, i, f.row)
         sigmas[at + 2 + i] = math.sqrt(f.noise.force2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
 
 

@@ -28,7 +28,7 @@ KERNEL_SOURCES = (
     "kernels", "analysis/cylinder_drives.py", "analysis/equilibrium.py", "deviation", "twin/update.py",
     "twin/state.py", "twin/stamp_check.py", "twin/sample_check.py", "twin/blocks.py",
     "twin/health_rows.py",
-    "calibration/load_filter.py",
+    "calibration/rest_filter.py",
     "health/sensor_survey.py", "health/sensor_findings.py", "types.py",
 )  # fmt: skip
 """Folders and modules of the package that kernels, or the constants in them, come from."""

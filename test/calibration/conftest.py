@@ -28,5 +28,5 @@ def two_sections() -> Scene:
 
 @pytest.fixture(scope="session")
 def short(two_sections: Scene, made_once: MadeOnce) -> Made:
-    """30 s of two sections with other stiffnesses."""
-    return made_once.value("short", lambda: made(off(two_sections, 0.92, 1.1), "arch", 30.0, 4))
+    """30 s of two sections with other stiffnesses, under a pump."""
+    return made_once.value("short", lambda: made(off(two_sections, 0.92, 1.1), "arch", 30.0, 4, ("pump:0.5:150",)))

@@ -13,6 +13,7 @@ from boom_twin.bag.session_files import write_session
 from boom_twin.scene.edit import parameter, with_parameters
 from boom_twin.scene.schema import Scene
 from boom_twin.validation import rig
+from boom_twin.validation.rig.loads import parse, tip_load
 
 ENCODERS = np.radians([0.1, -0.1, 0.1, -0.1])
 
@@ -24,19 +25,22 @@ class Made(NamedTuple):
     programme: rig.Programme
     rows: dict[str, np.ndarray]
 
-    def write(self, path: Path, seed: int, zeros=0.0, imu=True, cut=slice(None)) -> Path:
+    def write(self, path: Path, seed: int, zeros=0.0, imu=True, cut=slice(None), drives=False) -> Path:
         """A session of it with the sensors' noise of `seed`, encoders reading `zeros` (rad) too much."""
         seen = rig.observe(self.truth, self.programme, self.rows, rig.Sensors(), seed)
         force, joints = seen.imu[cut] if imu else None, seen.joints[cut] + zeros
-        write_session(path, seen.stamps[cut], drive_readings(seen)[cut], joints, force, {"origin": "synthetic, a test"})
-        note_drives(path)
+        strokes = drive_readings(seen) if drives else seen.strokes
+        write_session(path, seen.stamps[cut], strokes[cut], joints, force, {"origin": "synthetic, a test"})
+        if drives:
+            note_drives(path)
         return path
 
 
-def made(truth: Scene, posture: str, duration: float, seed: int) -> Made:
+def made(truth: Scene, posture: str, duration: float, seed: int, loads: tuple[str, ...] = ()) -> Made:
     """Random moves; steps of 1 ms and 12 elements a section leave less error than the sensors' noise."""
     programme = rig.random_programme(truth, posture, duration, seed)
-    return Made(truth, programme, rig.simulate(truth, programme, duration, 1e-3, 2e-3, 12))
+    pushes = tip_load(truth, [parse(load) for load in loads], duration, seed) if loads else None
+    return Made(truth, programme, rig.simulate(truth, programme, duration, 1e-3, 2e-3, 12, pushes))
 
 
 def off(scene: Scene, *factors: float, **others: float) -> Scene:

@@ -129,7 +129,7 @@ def test_json_is_one_flat_object_and_goes_on_from_a_mapping(ran, capsys, tmp_pat
     told = json.loads(capsys.readouterr().out)
     assert not any(isinstance(value, dict) for value in told.values())
     assert told["cylinder_2.k_low"] < told["cylinder_2.k"] < told["cylinder_2.k_high"]
-    assert told["held_out_after_joint_1"] == pytest.approx(1.0, abs=0.2) and told["not_told"] == []
+    assert told["held_out_after_joint_1"] == pytest.approx(1.0, abs=0.2) and all("tip_imu" in text for text in told["not_told"])
     assert told["files"] == [str(out), str(out.with_suffix(".mapping.yaml"))]
     text = out.with_suffix(".mapping.yaml").read_text()
     assert "# mine" in text and "unit: deg" in text

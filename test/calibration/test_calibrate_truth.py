@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from calibration.sessions import ENCODERS, Made, cut_to, made, off
+from calibration.sessions import ENCODERS, cut_to, made, off
 
 from boom_twin import load_scene
 from boom_twin.calibration import Choice, calibrate
 from boom_twin.calibration.output import write_scene
 from boom_twin.scene.edit import anew, parameter
 from boom_twin.scene.schema import Oil
-from boom_twin.validation import rig
 
 
 def expected(name, truth, zeros):
@@ -51,25 +50,40 @@ def two_sessions(wrong_boom, tmp_path_factory):
 def test_stiffness_payload_and_encoders_when_transducers_are_right(wrong_boom, two_sessions):
     found = calibrate(two_sessions, load_scene(), Choice(load="payload", zeros="angles"))
     wrong = errors(found, wrong_boom.truth, ENCODERS)
-    for i, bound in enumerate((0.02, 0.02, 0.02, 0.08), start=1):
+    for i, bound in enumerate((0.02, 0.02, 0.02, 0.05), start=1):
         assert abs(wrong[f"cylinder_{i}.k"]) < bound * parameter(wrong_boom.truth, f"cylinder_{i}.k")
         assert abs(wrong[f"joint_{i}.zero"]) < np.radians(0.01)
     assert abs(wrong["tip.payload"]) < 2.0
     assert share_covered(found, wrong_boom.truth, ENCODERS, 2.0) == 1.0
-    assert not found.groups
     judge(found, 4)
 
 
 @pytest.mark.slow
-def test_everything_at_once_keeps_to_its_intervals(wrong_boom, two_sessions):
-    found = calibrate(two_sessions, load_scene(), Choice(load="payload"))
+@pytest.mark.parametrize("drives", [False, True])
+def test_everything_at_once_keeps_to_its_intervals(wrong_boom, drives, tmp_path):
+    bags = [wrong_boom.write(tmp_path / f"s{seed}", seed, ENCODERS, drives=drives) for seed in (5, 6)]
+    found = calibrate(bags, load_scene(), Choice(load="payload"))
     wrong = errors(found, wrong_boom.truth, ENCODERS)
     for i, bound in enumerate((0.03, 0.02, 0.02, 0.08), start=1):
         assert abs(wrong[f"cylinder_{i}.k"]) < bound * parameter(wrong_boom.truth, f"cylinder_{i}.k")
     assert abs(wrong["tip.payload"]) < 2.0
-    assert share_covered(found, wrong_boom.truth, ENCODERS) >= 0.6
-    assert share_covered(found, wrong_boom.truth, ENCODERS, 2.0) == 1.0
+    assert share_covered(found, wrong_boom.truth, ENCODERS) >= 0.8
     judge(found, 4)
+
+
+@pytest.mark.slow
+def test_under_a_pump_and_wind_that_nobody_told(tmp_path):
+    scene = load_scene()
+    truth = off(scene, 1.06, 0.92, 1.08, 0.9, **{"tip.payload": 12.0})
+    bag = made(truth, "arch", 60.0, 9, ("pump:0.43:130", "wind:15")).write(tmp_path / "bag", 3, ENCODERS)
+    found = calibrate([bag], scene, Choice(load="payload", zeros="angles"))
+    wrong = errors(found, truth, ENCODERS)
+    for i, bound in enumerate((0.02, 0.02, 0.02, 0.05), start=1):
+        assert abs(wrong[f"cylinder_{i}.k"]) < bound * parameter(truth, f"cylinder_{i}.k")
+        assert abs(wrong[f"joint_{i}.zero"]) < np.radians(0.01)
+    assert abs(wrong["tip.payload"]) < 2.0
+    assert share_covered(found, truth, ENCODERS) >= 0.8
+    assert 0.9 < found.misfit < 1.15
 
 
 @pytest.mark.slow
@@ -95,7 +109,7 @@ def test_two_sections_without_an_imu(short, two_sections, tmp_path):
     found = calibrate([short.write(tmp_path / "bag", 1, imu=False)], two_sections, Choice(zeros="angles"))
     wrong = errors(found, short.truth, np.zeros(2))
     for i in (1, 2):
-        assert abs(wrong[f"cylinder_{i}.k"]) < 0.02 * parameter(short.truth, f"cylinder_{i}.k")
+        assert abs(wrong[f"cylinder_{i}.k"]) < 0.04 * parameter(short.truth, f"cylinder_{i}.k")
         assert abs(wrong[f"joint_{i}.zero"]) < np.radians(0.01)
     judge(found, 2)
 
@@ -107,9 +121,7 @@ def test_oil_gets_another_bulk_modulus(two_sections, tmp_path):
     cylinder = first.cylinder.model_copy(update={"k": None, "oil": oil})
     scene = two_sections.model_copy(update={"joints": (first.model_copy(update={"cylinder": cylinder}), *rest)})
     truth = off(scene, 0.9, 1.1)
-    programme = rig.random_programme(truth, "arch", 24.0, 4)
-    rows = rig.simulate(truth, programme, 24.0, 2e-3, 2e-3, 6)
-    bag = Made(truth, programme, rows).write(tmp_path / "bag", 1, imu=False)
+    bag = made(truth, "arch", 30.0, 4, ("pump:0.5:150",)).write(tmp_path / "bag", 1)
     found = calibrate([bag], scene, Choice(zeros="angles"))
     write_scene(found, scene, anew(scene), tmp_path / "new.yaml", "by a test")
     now = load_scene(tmp_path / "new.yaml").joints[0].cylinder

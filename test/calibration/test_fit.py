@@ -1,18 +1,19 @@
-"""What is taken over of a fit, where a part of its unknowns could not be told."""
+"""A fit: unknowns that are left out, bounds, and the covariance of what may be wrong with the model."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from boom_twin.calibration.least_squares import Fit, bounded_minimum
+from boom_twin.calibration.fit import Fit, bounded_minimum
 
 
-def fit_of(slopes: np.ndarray, measured: np.ndarray) -> Fit:
+def fit_of(slopes: np.ndarray, measured: np.ndarray, by_model: np.ndarray | None = None) -> Fit:
     """Of white residuals `measured` that deviations change by `slopes`, with the priors."""
-    information = slopes.T @ slopes
-    best = np.linalg.solve(information + np.eye(slopes.shape[1]), slopes.T @ measured)
-    return Fit(best, information, information, 1.0, 1, None)  # type: ignore[arg-type] # the whitening has no part in this
+    information, unknowns = slopes.T @ slopes, slopes.shape[1]
+    best = np.linalg.solve(information + np.eye(unknowns), slopes.T @ measured)
+    none = np.zeros((unknowns, 0)) if by_model is None else by_model
+    return Fit(best, information, information, np.zeros(unknowns), none, np.ones(0), 1, None)  # type: ignore[arg-type] # no noise here
 
 
 @pytest.mark.parametrize("left_out", [[1], [0, 3], []])
@@ -40,3 +41,14 @@ def test_a_payload_is_not_taken_over_below_its_bound() -> None:
     found = bounded_minimum(precision, pull, least)
     slope = precision @ found - pull
     assert found[1] == pytest.approx(-0.1) and slope[1] > 0.0 and slope[[0, 2]] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_covariance_allows_for_what_may_be_wrong_with_the_model() -> None:
+    """Monte Carlo: readings with noise, and with a parameter that the fit does not know, of deviation 1."""
+    random = np.random.default_rng(6)
+    slopes, other = 5.0 * random.normal(size=(80, 2)), 3.0 * random.normal(size=80) + 2.0
+    fit = fit_of(slopes, np.zeros(80), slopes.T @ other[:, None])
+    readings = random.normal(size=(20000, 80)) + random.normal(size=(20000, 1)) * other
+    errors = np.linalg.solve(fit.precision, slopes.T @ readings.T)
+    np.testing.assert_allclose(fit.covariance(), np.cov(errors) + np.linalg.inv(fit.precision) @ np.linalg.inv(fit.precision),
+                               rtol=0.06, atol=2e-5)  # fmt: skip
