@@ -16,7 +16,6 @@ import numpy as np
 from ..errors import UsageError
 from ..scene.kinematics import posture_angles, stroke_curve, strokes_of_posture
 from ..scene.load import load_scene
-from ..scene.pump_pulses import ease
 from ..scene.schema import Scene
 from ..types import Array
 

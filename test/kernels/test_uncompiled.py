@@ -13,10 +13,8 @@ import pytest
 PROGRAM = """
 import json, sys
 import numpy as np
-from boom_twin.analysis.batch import Batch
 from boom_twin.analysis.simulate import simulate
 from boom_twin.analysis.equilibrium import statics
-from boom_twin.compiler.compile import compile_scene
 from boom_twin.scene import load_scene
 from boom_twin.scene.schema import Clearance, ContactLaw, Pin
 scene, count, pins = load_scene(), int(sys.argv[1]), sys.argv[2:]
@@ -29,10 +27,6 @@ strokes = found.strokes + np.outer(times**2, [8.0, -4.0, 6.0, 4.0])
 moved = simulate(scene, times, strokes, dt=2e-3)
 rows = [found.tip, found.joints, found.cylinder_forces, found.frequencies]
 rows += [moved.tip[-1], moved.tip_velocity[-1], moved.tip_acceleration[-1], moved.cylinder_forces[-1], moved.pins[-1].ravel()]
-count = min(count, 10)
-batch = Batch([compile_scene(scene)] * 2)
-batch.settle(found.strokes, found.joints)
-rows += list(batch.run(2e-3, strokes[1 : count + 1], np.diff(strokes, axis=0)[:count] / 2e-3)[:, -1])
 json.dump([float(x) for row in rows for x in row], sys.stdout)
 """
 WORN = ("cylinder_1.rod", "joint_1.pivot", "cylinder_3.barrel", *(f"joint_3.{at}" for at in ("pivot", "link_L", "link_R", "Q")))

@@ -7,15 +7,9 @@ from typing import Literal
 
 from ruamel.yaml import YAML
 
-<<<<<<< HEAD:test/studies/clearance/scenes.py
 from boom_twin.scene.checks.pins import names_of
 from boom_twin.scene.load import clearance_text
 from boom_twin.scene.schema import Clearance, Pin, Scene
-=======
-from ....scene.checks.pins import names_of
-from ....scene.load import clearance_text
-from ....scene.schema import Clearance, Pin, Scene
->>>>>>> scene:boom_twin/validation/study/clearance/scenes.py
 
 Treatment = Literal["contact", "spring-damper"]
 
