@@ -12,7 +12,7 @@ from boom_twin.deviation.kalman import DRIVE_TIME, FAST, SLOW, correct, make_tra
 from boom_twin.deviation.mixture import mix
 from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.deviation.rows import length_row
-from boom_twin.deviation.states import PREDICTION
+from boom_twin.deviation.states import LOADS, PREDICTION
 from boom_twin.scene.kinematics import strokes_of_posture
 
 SCENE = load_scene()
@@ -31,8 +31,8 @@ def boom() -> BoomPredictor:
 
 def test_transition_is_that_of_the_continuous_system_with_inputs_held(boom: BoomPredictor) -> None:
     p, f, m, h = boom.posture, boom.filters, int(boom.posture.modes[0]), 0.005
-    size = 2 * m + 4 + 3 * N
-    load, drive = 2 * m, 2 * m + 4
+    size = 2 * m + LOADS + 3 * N
+    load, drive = 2 * m, 2 * m + LOADS
     a = np.zeros((size, size))
     for j in range(m):
         a[j, m + j], a[m + j, j], a[m + j, m + j] = 1.0, -(p.omega[j] ** 2), -p.decay[j]
@@ -41,8 +41,11 @@ def test_transition_is_that_of_the_continuous_system_with_inputs_held(boom: Boom
     for i in range(N):
         a[drive + i, drive + N + i] = a[drive + N + i, drive + 2 * N + i] = 1.0
     expected = expm(a * h)
-    for k, time in ((load, FAST), (load + 1, FAST), (load + 2, SLOW), (load + 3, SLOW)):
-        expected[k, k] = np.exp(-h / time)
+    smooth = expm(h * np.array([[0.0, 1.0], [-1.0 / FAST**2, -2.0 / FAST]]))  # critically damped
+    for k in (load, load + 1):
+        expected[: 2 * m, k + 4] = 0.5 * h * expected[: 2 * m, k]  # the mean of a load with this rate over the step
+        expected[np.ix_([k, k + 4], [k, k + 4])] = smooth
+        expected[k + 2, k + 2] = np.exp(-h / SLOW)
     for i in range(N):
         expected[drive + 2 * N + i, drive + 2 * N + i] = np.exp(-h / DRIVE_TIME)
     make_transition.py_func(p, f, h)
@@ -85,7 +88,7 @@ def test_mixture_has_mean_and_covariance_of_its_models(boom: BoomPredictor) -> N
 
 def test_length_row_is_the_compression_of_the_oil(boom: BoomPredictor) -> None:
     # length = drive + c F: the length that statics has at another drive
-    p, step, drive = boom.posture, 1e-5, 2 * int(boom.posture.modes[0]) + 4
+    p, step, drive = boom.posture, 1e-5, 2 * int(boom.posture.modes[0]) + LOADS
     for i in range(N):
         row = np.zeros(boom.filters.x.shape[1])
         length_row.py_func(p, i, row)
