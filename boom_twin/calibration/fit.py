@@ -107,7 +107,7 @@ def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Tell) 
         step = bounded_minimum(precision, pull, problem.least - at)
         step /= max(1.0, float(np.abs(step).max()) / LARGEST)
         step = _shortened(problem, at, step, noise, base)
-        at, furthest = at + step, float((np.abs(step) * np.sqrt(np.diag(precision))).max())
+        at, furthest = at + step, float((np.abs(step) / np.sqrt(np.diag(np.linalg.inv(precision)))).max())
         if learning and furthest < NEAR:
             noise = problem.noise(at, np.maximum(stated, stated * _mean_squares(problem, base)))
             learning = False

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
-from ..deviation.kalman import IMU_ZERO
+from ..deviation.kalman import ANGLE_ZERO, IMU_ZERO
 from ..deviation.predictor import BoomPredictor
 from ..scene.edit import with_parameters
 from ..scene.kinematics import gravity_in_base
@@ -59,7 +59,8 @@ class CalibrationProblem:
         joints, zeroed = len(scene.joints), {unknown.channel: unknown.kind.prior for unknown in unknowns}
         self._zeroed = (*self.names[2 * joints : 2 * joints + 2], *self.names[joints : 2 * joints])
         self._prior2 = np.array([zeroed.get(name, 0.0) ** 2 for name in self._zeroed])
-        self._zero2 = np.array([IMU_ZERO**2 if name not in zeroed and i < 2 else 0.0 for i, name in enumerate(self._zeroed)])
+        axes2 = [0.0 if name in zeroed else IMU_ZERO**2 for name in self._zeroed[:2]]
+        self._zero2 = np.array(axes2 + joints * [ANGLE_ZERO**2])  # of angles: the error of the model's statics
         self._gravity, self._weight = gravity_in_base(scene), weight_of(scene)
 
     @property

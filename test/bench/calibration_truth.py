@@ -1,6 +1,6 @@
 """A calibration with truth: the figures and pictures of docs/calibrate.md.
 
-Run ``python test/bench/calibration.py``. The virtual rig's default boom has stiffnesses 8 to 10 % off, 15 kg at the tip and
+Run ``python test/bench/calibration_truth.py``. The virtual rig's default boom has stiffnesses 8 to 10 % off, 15 kg at the tip and
 encoders 0.1 deg off; a session of 60 s is fitted, another motion is held out.
 """
 
