@@ -8,6 +8,8 @@ from typing import Any
 from ..types import SECOND, Array
 
 FRAME = "base_link"
+TIP_JOINTS = ("tip_dx", "tip_dz", "tip_pitch")
+"""Displacement of the tip from that of rigid sections: along and across the last section, m, and its rotation, rad."""
 
 
 def fill_header(header: Any, stamp: int, frame: str = FRAME) -> None:

@@ -16,7 +16,7 @@ from ..deviation.estimate_row import FORCE_VARIANCE, MODES
 from ..twin.blocks import EstimateBlock, Integers, PredictionBlock, row_of
 from ..types import Array, Estimate, Prediction
 from .cdr_encoder import NumberFields
-from .message_fields import fill_xz
+from .message_fields import TIP_JOINTS, fill_xz
 from .topic_table import Output
 
 TIP_NUMBERS = (
@@ -25,8 +25,6 @@ TIP_NUMBERS = (
     "acceleration_x", "acceleration_y", "angular_acceleration",
     "displacement_x", "displacement_y",
 )  # fmt: skip
-TIP_JOINTS = ("tip_dx", "tip_dz", "tip_pitch")
-"""Displacement of the tip from that of rigid sections: along and across the last section, m, and its rotation, rad."""
 COVARIANCE = "variance_xx", "covariance_xy", "covariance_xa", "variance_yy", "covariance_ya", "variance_aa"
 """Upper triangle of a covariance by rows, of x, y and angle."""
 ESTIMATED_NUMBERS = (

@@ -18,8 +18,8 @@ from ..types import Alarm, Array, Change, Estimate, Health, Prediction, Report, 
 from .cdr_encoder import NumberFields, Template, stamped
 from .encoded_block import Bytes, EncodedBlock, EncodedBlockBuilder
 from .marker_encoder import ShapeMarkers
-from .message_fields import FRAME, fill_header
-from .numeric_outputs import ESTIMATED, JOINTS, PREDICTED, TIP_JOINTS, Chain, number_rows, put_vector, selection
+from .message_fields import FRAME, TIP_JOINTS, fill_header
+from .numeric_outputs import ESTIMATED, JOINTS, PREDICTED, Chain, number_rows, put_vector, selection
 from .sample_decoder import stamp_of
 from .topic_table import TYPES, Output
 from .type_store import jazzy, new_message

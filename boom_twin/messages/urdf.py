@@ -10,8 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 from ..kernels.elements.linkage import LINK_L
 from ..scene.kinematics import CYLINDER, LEFT, RIGHT, linkage
 from ..scene.schema import Cylinder, Scene, section_depth
-from .message_fields import FRAME
-from .numeric_outputs import TIP_JOINTS
+from .message_fields import FRAME, TIP_JOINTS
 
 NAME = "boom"
 TIP, TIP_RIGID, TIP_ALONG, TIP_ACROSS, IMU = "tip", "tip_rigid", "tip_along", "tip_across", "imu_link"

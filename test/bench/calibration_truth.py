@@ -1,7 +1,7 @@
 """A calibration with truth: the figures and pictures of docs/calibrate.md.
 
-Run ``python test/bench/calibration_truth.py``. The virtual rig's default boom has stiffnesses 8 to 10 % off, 15 kg at the tip and
-encoders 0.1 deg off; a session of 60 s is fitted, another motion is held out.
+Run ``python test/bench/calibration_truth.py``. The virtual rig's default boom has stiffnesses 8 to 10 % off, 15 kg at the tip
+and encoders 0.1 deg off; a session of 60 s is fitted, another motion is held out.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from boom_twin import Sample, Stream, Twin, load_scene, replay
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_samples
+from boom_twin.calibration.rest_periods import Rigging
 from boom_twin.calibration.sessions import read_sessions
 from boom_twin.calibration.validation import judged
 from boom_twin.config.settings import Settings, Thresholds
@@ -28,7 +29,7 @@ from boom_twin.offline.history import history_of
 from boom_twin.plots.residuals import residual_picture
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.load import default_text
-from boom_twin.types import channels_of
+from boom_twin.types import StrokeReading, channels_of
 
 CHANNEL, WRONG, SLOPE, NANO = "tip_inclination", 0.05, 0.02, 1e-9
 INCLINATION, count = Stream.TIP_INCLINATION, 400
@@ -112,5 +113,6 @@ for sample in samples:
         alarms |= {(alarm.kind, alarm.cause) for alarm in (health.alarms if health else ())}
 assert alarms == {("dropout", f"{CHANNEL}.sensor")}
 (session,) = read_sessions([Path("session")], topics, 4)
-compared = judged(scene, Settings(), [None] * 4, session, {}, 0)
+rigging = Rigging(Settings(), (None,) * 4, StrokeReading.LENGTH)
+compared = judged(scene, rigging, session, {}, 0)
 assert compared.names[-1] == CHANNEL and compared.spread[-1] > 5.0
