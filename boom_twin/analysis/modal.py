@@ -43,7 +43,7 @@ class Mode:
     frequency : float
         Hz.
     increments : ndarray, shape (unknowns,)
-        Of the unknowns, in the order of `Plan.names`, per unit of the modal coordinate (m sqrt(kg)).
+        Increments of the unknowns, in the order of `Plan.names`, per unit of the modal coordinate (m sqrt(kg)).
     motion : ndarray, shape (histories,)
         Displacement of every mass point and angle.
     drives : ndarray, shape (n,)
@@ -62,7 +62,7 @@ def constraints(plan: Plan) -> int:
 
 
 def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
-    """Return the negative pivots of K - omega^2 M at the present state; SolverError if it cannot be condensed."""
+    """Return the number of negative pivots of K - omega^2 M at the present state; SolverError if it cannot be condensed."""
     return _AtRest(plan, state, work).count_below(omega)
 
 
@@ -77,7 +77,7 @@ class _AtRest:
         self._scratch, self._hat = np.zeros((inner + 1, inner)), np.zeros_like(position)
 
     def count_below(self, omega: float) -> int:
-        """Return the natural frequencies below `omega` (rad/s), plus forces among the unknowns."""
+        """Return the number of natural frequencies below `omega` (rad/s) plus that of forces among the unknowns."""
         place(*self._boom[:3])
         _, count = _checked(*count_below(*self._boom, omega, self._scratch))
         return count

@@ -31,7 +31,7 @@ def write_session(
     angle_stamps_ns: NDArray[np.int64] | None = None,
     forces: Array | None = None,
 ) -> None:
-    """Write the bag of one session in the order of its stamps. They are the log times.
+    """Write the bag of one session in the order of its stamps. Log times are the stamps.
 
     Parameters
     ----------

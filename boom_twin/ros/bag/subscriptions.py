@@ -51,7 +51,7 @@ def full_name(kind: Any) -> str:
 
 
 def definition_of(kind: Any) -> str:
-    """Return the definition of a class and all its types. Those outside ROS 2 Jazzy's own packages have fields only."""
+    """Return the definition of a class and all its types. Types outside ROS 2 Jazzy's own packages have fields only."""
     name = full_name(kind)
     if name in jazzy().types:
         return str(jazzy().generate_msgdef(name, ros_version=2)[0])

@@ -218,8 +218,8 @@ def _zeros_text(found: PapersStudy) -> list[str]:
     return [
         "## Boundary zeros by bisection",
         f"[R] bisects the boundary residual to 1e-7. So found, the rest angle of section 1 in {len(found.zeros)} postures "
-        f"differs from Newton's by at most {angle:.1e} rad. {len(found.bisected)} natural frequencies differ from the counted "
-        f"ones by at most {share:.1e}, relative.",
+        f"differs from Newton's by at most {angle:.1e} rad. {len(found.bisected)} natural frequencies differ from those "
+        f"by Wittrick-Williams counting by at most {share:.1e}, relative.",
     ]
 
 
