@@ -1,9 +1,8 @@
 """Natural frequencies and modes about an equilibrium by Wittrick-Williams counting.
 
-The sweep at A = -omega^2 condenses the dynamic stiffness K - omega^2 M with its full tangent. By Sylvester's law the number
-of negative pivots of all that is condensed, less the number of forces among the unknowns, is the number of natural
-frequencies below omega (the counting of Wittrick and Williams 1971). Bisection on that integer misses no mode and needs no
-starting guess; a mode follows by inverse iteration with the same sweep.
+The sweep at A = -omega^2 condenses the dynamic stiffness K - omega^2 M with its full tangent. Its negative pivots, less the
+forces among the unknowns, are as many as the natural frequencies below omega (Sylvester's law; Wittrick and Williams 1971).
+Bisection on that integer misses no mode and needs no starting guess. A mode follows by inverse iteration with the same sweep.
 """
 
 from __future__ import annotations
@@ -27,12 +26,12 @@ from ..kernels.transfer.natural_frequency import (
 )
 from ..types import Array
 
-HIGHEST = 1e7  # rad/s; no mode is looked for above
-RELATIVE_WIDTH = 1e-11  # of the last bracket
-SHIFT = 1e-6  # relative distance from the frequency at which a mode is iterated
-LOAD = 1e-9  # m, displacement whose inertia forces load the boom for that
+HIGHEST = 1e7  # rad/s, upper limit of the search
+RELATIVE_WIDTH = 1e-11  # relative width of the last bracket
+SHIFT = 1e-6  # relative shift from the frequency, for inverse iteration
+LOAD = 1e-9  # m, displacement whose inertia forces are the load there
 ABSURD = "Look for values in the scene that are too large or too small by many orders of magnitude."
-NUDGE = 1e-6  # rad, for the derivative of positions by unknowns
+NUDGE = 1e-6  # rad, step of the derivative of positions by unknowns
 
 
 @dataclass(frozen=True)
@@ -44,9 +43,9 @@ class Mode:
     frequency : float
         Hz.
     increments : ndarray, shape (unknowns,)
-        Of the unknowns, in the order of `Plan.names`, per unit of the modal coordinate (m sqrt(kg)).
+        Increments of the unknowns, in the order of `Plan.names`, per unit of the modal coordinate (m sqrt(kg)).
     motion : ndarray, shape (histories,)
-        Of every mass point and angle.
+        Displacement of every mass point and angle.
     drives : ndarray, shape (n,)
         Lengths of the drives at the equilibrium, m.
     """
@@ -58,17 +57,17 @@ class Mode:
 
 
 def constraints(plan: Plan) -> int:
-    """Number of forces among the unknowns."""
+    """Return the number of forces among the unknowns."""
     return int(np.sum(plan.tables.moving == 0.0))
 
 
 def negative_pivots(plan: Plan, state: State, work: Work, omega: float) -> int:
-    """Negative pivots of K - omega^2 M at the present state; SolverError if it cannot be condensed."""
+    """Return the number of negative pivots of K - omega^2 M at the present state; SolverError if it cannot be condensed."""
     return _AtRest(plan, state, work).count_below(omega)
 
 
 class _AtRest:
-    """A boom in equilibrium, as `boom_twin.kernels.transfer.natural_frequency` takes it, with scratch."""
+    """Boom in equilibrium: arguments of `boom_twin.kernels.transfer.natural_frequency`, with scratch."""
 
     def __init__(self, plan: Plan, state: State, work: Work) -> None:
         place(plan.tables, state, work)
@@ -78,7 +77,7 @@ class _AtRest:
         self._scratch, self._hat = np.zeros((inner + 1, inner)), np.zeros_like(position)
 
     def count_below(self, omega: float) -> int:
-        """Natural frequencies below `omega` (rad/s), plus forces among the unknowns."""
+        """Return the number of natural frequencies below `omega` (rad/s) plus that of forces among the unknowns."""
         place(*self._boom[:3])
         _, count = _checked(*count_below(*self._boom, omega, self._scratch))
         return count
@@ -94,8 +93,8 @@ class _AtRest:
     def response(self, omega: float, load: Array) -> Array:
         """Solve (K - omega^2 M) dz = M load, up to a factor.
 
-        Half the difference of two small loads: the tangent holds forces too, so a large one would change K, and what the
-        state lacks to equilibrium cancels.
+        This is half the difference of two small loads. K depends on forces, so a large load would change it. The residual
+        of the state cancels.
         """
         found = np.zeros_like(self._boom[1].z)
         inertia_response(*self._boom, omega, load, LOAD, self._hat, found)
@@ -103,7 +102,7 @@ class _AtRest:
 
 
 def _checked(status: int, count: int, omega: float) -> tuple[float, int]:
-    """A frequency (rad/s), and the count there; SolverError if it could not be counted."""
+    """Return frequency (rad/s) and count; SolverError if counting failed."""
     if status != OK:
         told = f"vibration at {omega / (2.0 * math.pi):.6g} Hz cannot be computed"
         raise SolverError(f"{told}: {SENTENCES[status]}. {ABSURD}")
@@ -113,7 +112,7 @@ def _checked(status: int, count: int, omega: float) -> tuple[float, int]:
 
 
 def drive_at_rest(plan: Plan, state: State, work: Work) -> Array:
-    """Drive lengths (m) at which the present state is in equilibrium: its own, less the oil's compression."""
+    """Return the drive lengths (m) of the equilibrium: cylinder lengths less the oil's deformation."""
     cylinders, (compliances, _) = plan.tables.cylinders, plan.compliances_and_lags(state.drives[0])
     return np.asarray(work.position[cylinders.history] - compliances * state.z[cylinders.z])
 
@@ -121,9 +120,9 @@ def drive_at_rest(plan: Plan, state: State, work: Work) -> Array:
 def natural_modes(
     plan: Plan, state: State, work: Work, count: int, width: float = RELATIVE_WIDTH, highest: float = HIGHEST
 ) -> tuple[Mode, ...]:
-    """The lowest `count` modes below `highest` (rad/s) about the equilibrium in `state`, or all if there are fewer.
+    """Return the lowest `count` modes below `highest` (rad/s) about the equilibrium in `state`, or all if fewer.
 
-    `width` is the relative accuracy of the frequencies. The state stays as it is.
+    `width` is the relative accuracy of the frequencies. The state is unchanged.
     """
     boom, modes = _AtRest(plan, state, work), list[Mode]()
     for omega in boom.lowest(count, width, highest):
@@ -133,7 +132,7 @@ def natural_modes(
 
 
 def _mode(plan: Plan, state: State, work: Work, boom: _AtRest, omega: float, lower: list[Mode]) -> Mode:
-    """Inverse iteration from a random inertial load, a little beside `omega`, free of the `lower` modes."""
+    """Return a mode by inverse iteration close to `omega`, from a random load orthogonal to the `lower` modes."""
     rng = np.random.default_rng(1)
     motion = rng.standard_normal(len(plan.masses)) * (plan.masses > 0.0)
     increments = np.zeros(len(plan.names))
@@ -150,12 +149,12 @@ def _mode(plan: Plan, state: State, work: Work, boom: _AtRest, omega: float, low
 
 
 def joint_increments(plan: Plan, state: State, work: Work, increments: Array) -> Array:
-    """Change of the joint angles, shape (n,), rad, with `increments` of the unknowns."""
+    """Return the change of the joint angles, shape (n,), rad, by `increments` of the unknowns."""
     return along(plan, state, work, increments, lambda: taken_apart(plan, first_row(plan, state)).joints)
 
 
 def along(plan: Plan, state: State, work: Work, increments: Array, read: Callable[[], Array]) -> Array:
-    """Derivative of what `read` returns along `increments` of the unknowns, by central differences."""
+    """Return the derivative of `read()` along `increments` of the unknowns, by central differences."""
     z = state.z.copy()
     size, sides = _nudge(plan, increments), []
     for sign in (1.0, -1.0):
@@ -173,7 +172,7 @@ def _nudge(plan: Plan, increments: Array) -> float:
 
 
 def damping_ratio(plan: Plan, mode: Mode) -> float:
-    """Return the damping ratio, by the power that oil dampers and beams take from the mode at its own frequency."""
+    """Return the damping ratio from the power that oil and beams dissipate at the mode's frequency."""
     t, omega = plan.tables, 2.0 * np.pi * mode.frequency
     compliances, lags = plan.compliances_and_lags(mode.drives)
     loss = sum((lags * compliances * mode.increments[t.cylinders.z] ** 2).tolist())

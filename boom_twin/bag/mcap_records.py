@@ -1,4 +1,4 @@
-"""Read single records of an .mcap file within memory limits, every checksum verified."""
+"""Reader of single records of an .mcap file, with memory limits and checksums."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from .session_file import REMEDY
 LARGEST = 64 * 2**20
 """Size limit of one record of a summary, and of all definitions together, bytes."""
 MOST_HELD = 2**30
-"""Size limit of one message, and of one unpacked chunk, in memory, bytes."""
+"""Size limit of one message or one unpacked chunk in memory, bytes."""
 MOST_TOGETHER = 2**22
-"""Limit for the number of messages in memory: an empty one takes ten times its bytes."""
+"""Limit of messages in memory. An empty message takes ten times its bytes there."""
 BLOCK = 2**20
 """Number of bytes read at a time from a file of any size."""
 
@@ -36,7 +36,7 @@ PREFIX = struct.Struct("<BQ")
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 """Channel, sequence, log time (ns), publish time (ns) of a message."""
 FOOTER = struct.Struct("<BQQQI8s")
-"""The last record of a file, with the magic behind it."""
+"""Last record of a file and the magic after it."""
 KINDS: dict[int, Any] = {
     int(opcode): getattr(mcap_records, opcode.name.title().replace("_", ""))
     for opcode in Opcode
@@ -44,7 +44,7 @@ KINDS: dict[int, Any] = {
 }
 """Classes of all records but messages and chunks."""
 
-_WINDOW = 2**27  # of zstd, as its command line allows without --long
+_WINDOW = 2**27  # window limit of zstd, as on its command line without --long
 
 
 def _zstd(data: bytes, limit: int) -> bytes:
@@ -80,7 +80,7 @@ def unpack(chunk: Chunk) -> bytes:
 
 
 def unpack_start(chunk: Chunk) -> bytes:
-    """Return what unpacks of a chunk that may be cut off, at most one byte above its stated size. Nothing is verified."""
+    """Return the readable content of a possibly truncated chunk, at most one byte above its stated size, unverified."""
     if chunk.compression not in _UNPACK:
         raise McapError(f"compression = {chunk.compression!r}: only zstd, lz4 and none are known")
     content = _UNPACK[chunk.compression](chunk.data, min(chunk.uncompressed_size, MOST_HELD) + 1)
@@ -119,7 +119,7 @@ def parts(content: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def whole_parts(content: bytes) -> bytes:
-    """Return the start of `content` up to the end of its last whole record."""
+    """Return `content` up to the end of its last whole record."""
     end = 0
     try:
         for _, _, place in bounds(content):
@@ -130,7 +130,7 @@ def whole_parts(content: bytes) -> bytes:
 
 
 def record_of(opcode: int, body: bytes) -> McapRecord:
-    """Return a record of one of `KINDS` from its body. Raise McapError if it does not fill the body."""
+    """Return a record of one of `KINDS` from its body. Raise McapError if their lengths differ."""
     stream = ReadDataStream(BytesIO(body))
     record: McapRecord = KINDS[opcode].read(stream)
     if stream.count != len(body):
@@ -157,14 +157,14 @@ def check_ends(path: Path, file: BinaryIO) -> None:
 
 
 def summary_start(path: Path) -> int | None:
-    """Return the offset of the summary of a file; None if it is not whole or fails its checksum."""
+    """Return the offset of a file's summary; None if it is incomplete or corrupt."""
     with open_received(path) as file:
         ends = _footer(file, path.stat().st_size)
     return ends[0] if ends and ends[1] else None
 
 
 def _footer(file: BinaryIO, size: int) -> tuple[int, bool] | None:
-    """Return the offset of the summary, and True if it is in the file and passes any checksum. None without a whole footer."""
+    """Return the summary's offset, and True if offset and checksum (if any) are valid. None without a whole footer."""
     file.seek(max(0, size - FOOTER.size))
     tail = file.read()
     if len(tail) < FOOTER.size or not tail.endswith(MCAP0_MAGIC) or tail[0] != Opcode.FOOTER:

@@ -1,6 +1,6 @@
-"""Write an .mcap file: messages one by one or many at once as arrays, in chunks with an index each, a summary at its end.
+"""Writer of an .mcap file from single messages or arrays of messages.
 
-The bytes are those of `mcap.writer.Writer`, which takes messages one by one only.
+Every chunk has an index. A summary ends the file. The bytes equal those of `mcap.writer.Writer`, which takes no arrays.
 """
 
 from __future__ import annotations
@@ -38,23 +38,23 @@ from .mcap_records import MESSAGE_HEAD, PREFIX
 
 Pack = Callable[[bytearray], bytes]
 
-_INDEX_HEAD = struct.Struct("<HI")  # of the messages of one channel in one chunk: channel, bytes of entries
+_INDEX_HEAD = struct.Struct("<HI")  # index of one channel in one chunk: channel, bytes of entries
 _INDEX_ENTRY = struct.Struct("<QQ")  # log time (ns), place in the chunk
 _HEADS = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")
-"""`PREFIX` and `MESSAGE_HEAD` of many messages."""
+"""Array type of `PREFIX` and `MESSAGE_HEAD`."""
 
 
 class McapWriter:
-    """Writer of one .mcap file; `finish` writes its end and its summary.
+    """Writer of one .mcap file. `finish` writes its summary.
 
     Parameters
     ----------
     stream : BinaryIO
-        Empty stream, written by this object only from now on and not closed.
+        Empty stream. Nothing else may write to it. It is not closed.
     profile, library : str
         Fields of the file's header.
     chunk_size : int
-        Bytes of records beyond which a chunk is complete.
+        Size above which a chunk is complete, bytes of records.
     compression : CompressionType
         Compression of the chunks.
 
@@ -70,14 +70,14 @@ class McapWriter:
         self._chunk = _OpenChunk()
         self._schemas: list[Schema] = []
         self._channels: list[Channel] = []
-        self._chunks = bytearray()  # the index of chunks, encoded: that of a day is long
+        self._chunks = bytearray()  # encoded chunk index, long for a day
         self._chunk_count, self._span = 0, (2**64, 0)  # of all chunks: first and last log time, ns
         self._metadata: list[MetadataIndex] = []
         self._counts: Counter[int] = Counter()
         stream.write(MCAP0_MAGIC + _encoded(Header(profile, library)))
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Write a metadata record at once, before messages that wait for their chunk."""
+        """Write a metadata record at once, ahead of messages in the open chunk."""
         record, start = _encoded(Metadata(name, dict(values))), self._stream.tell()
         self._stream.write(record)
         self._metadata.append(MetadataIndex(start, len(record), name))
@@ -147,7 +147,7 @@ class McapWriter:
             checksum, place = zlib.crc32(group, checksum), place + len(group)
             self._stream.write(group)
         footer, last = Footer(start, place, 0), _encoded(*offsets)
-        footer.summary_crc = zlib.crc32(_encoded(footer)[:-4], zlib.crc32(last, checksum))  # of all but itself
+        footer.summary_crc = zlib.crc32(_encoded(footer)[:-4], zlib.crc32(last, checksum))  # covers all but itself
         self._stream.write(last + _encoded(footer) + MCAP0_MAGIC)
 
     def _statistics(self) -> Statistics:
@@ -258,7 +258,7 @@ def _heads(channels: Integers, sequences: Integers, log_times: Integers, lengths
 
 def _scatter(rows: Bytes, target: Bytes, starts: Integers) -> None:
     """Copy every row into `target` at its start."""
-    kind = np.dtype((np.void, rows.shape[1]))  # so a row is one element, and copied as a whole
+    kind = np.dtype((np.void, rows.shape[1]))  # one element per row, copied as a whole
     places = np.ndarray(len(target) - kind.itemsize + 1, kind, target, strides=(1,))
     places[starts] = rows.view(kind)[:, 0]
 

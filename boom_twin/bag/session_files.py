@@ -31,26 +31,26 @@ def write_session(
     angle_stamps_ns: NDArray[np.int64] | None = None,
     forces: Array | None = None,
 ) -> None:
-    """Write the bag of one session in the order of its stamps, which are the log times.
+    """Write the bag of one session in the order of its stamps. Log times are the stamps.
 
     Parameters
     ----------
     directory : Path
-        New or empty.
+        New or empty folder.
     stamps_ns : ndarray of int, shape (k,)
-        Nanoseconds.
+        Stamps, ns.
     strokes : ndarray, shape (k, n)
-        m.
+        Strokes, m.
     joints : ndarray, shape (k, n), optional
-        rad.
+        Joint angles, rad.
     imu : ndarray, shape (k, 2), optional
         Specific force along x and z of the tip, m/s^2.
     description : dict of str to str
-        Kept as notes of the bag: say here what the session is, and that it is synthetic if it is.
+        Notes of the bag. Describe the session, and state if it is synthetic.
     angle_stamps_ns : ndarray of int, shape (k,), optional
-        Of the joint angles, where they are not those of the strokes.
+        Stamps of the joint angles, if other than the strokes'.
     forces : ndarray, shape (k, n), optional
-        Of the cylinders, N, positive in tension.
+        Cylinder forces, N, positive in tension.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def write_session(
 def write_samples(
     directory: Path, samples: Iterable[Sample], streams: Iterable[Stream], description: Mapping[str, str]
 ) -> None:
-    """Write the bag of one session from `samples` in their order, with the topics of `streams`; else as `write_session`."""
+    """Write the bag of one session from ordered `samples`, with the topics of `streams`. Else as `write_session`."""
     inputs = load_topics().inputs
     with SessionWriter(directory, {stream.value: inputs[stream] for stream in streams}, description) as bag:
         for sample in samples:
@@ -105,7 +105,7 @@ def samples_of(
 
 
 def sensor_message(sample: Sample) -> Any:
-    """Return the message as a sensor of a rig sends it. An Imu has only the acceleration in the plane."""
+    """Return the message that a rig's sensor sends. An Imu has only the acceleration in the plane."""
     kind = SENSORS[sample.stream]
     msg = new_message(kind.message)
     if kind.is_imu:

@@ -1,7 +1,7 @@
-"""Choose scene, baseline, settings and mapping of a session: those given, else the session's, else those of the package.
+"""Choose scene, baseline, settings and mapping of a session: a given file, else the session's, else the package's.
 
-A file that was given and cannot be used is a UsageError (SceneError of a scene). What a session keeps and cannot be used is a
-BagError, whose remedy is the option that gives another.
+An invalid given file raises UsageError (a scene: SceneError). An invalid text of the session raises BagError, with the
+option that gives another.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .session_sheet import KeptText, kept, kept_parameters, rig_version, sha256
 DEFAULT_BASELINE = "default baseline"
 DEFAULT_MAPPING = "default mapping"
 DEFAULT_PARAMETERS = "default parameters"
-LENGTHS_SINCE = 0, 2  # version from which the virtual rig's transducers read lengths
+LENGTHS_SINCE = 0, 2  # first version of the virtual rig whose transducers read lengths
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class SessionBaseline:
 
 @dataclass(frozen=True, slots=True)
 class Mapped:
-    """Topics and sensors, and their source."""
+    """Mapping of topics and sensors, and its source."""
 
     topics: Topics
     source: str
@@ -91,7 +91,7 @@ def scene_of(session: Path, given: str | Path | None = None) -> SessionScene:
 
 
 def _changed(session: Path, own: KeptText) -> list[Fault]:
-    """Return a fault if the text is not the one that was recorded."""
+    """Return a fault if the text differs from the recorded one."""
     digest = _recorded_sha256(session)
     if digest in (None, sha256(own.text)):
         return []
@@ -133,13 +133,13 @@ class SessionSettings:
 def settings_of(session: Path, given: Path | None = None, namespace: str = "") -> SessionSettings:
     """Return the settings of a session's twin.
 
-    The source is the parameter file `given` for the node in `namespace`. Without it, the source is the node that ran beside
-    the recording, else the defaults of the package.
+    The source is the parameter file `given` for the node in `namespace`, else the node that ran during the recording, else the
+    package.
     """
     if given is not None:
         return SessionSettings(load_settings(given, namespace), str(given))
     values, source = kept_parameters(session)
-    own = {name: value for name, value in values.items() if name in Settings.model_fields}  # others are of the node alone
+    own = {name: value for name, value in values.items() if name in Settings.model_fields}  # the rest belongs to the node
     try:
         return SessionSettings(checked(Settings, own, source), source if own else DEFAULT_PARAMETERS)
     except UsageError as error:
@@ -161,7 +161,7 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
     Raises
     ------
     UsageError
-        The mapping has faults, also that of the session.
+        The mapping, given or the session's, has faults.
     """
     own = kept(session, "mapping", "--mapping") if given is None else None
     if own is None:
@@ -183,10 +183,10 @@ class SessionStrokes:
 
 
 def strokes_of(session: Path | None, mapped: Mapped) -> SessionStrokes:
-    """Return the quantity that the stroke transducers of a session read; `session` is None for a running rig.
+    """Return the quantity that the stroke transducers of a session read. `session` is None for a running rig.
 
-    The mapping's ``reads`` is taken first, then ``strokes`` of ``session.yaml``. The default is lengths; for the virtual rig
-    before version 0.2 it is drives.
+    The mapping's ``reads`` comes first, then ``strokes`` of ``session.yaml``. The default is lengths. It is drives for the
+    virtual rig before version 0.2.
     """
     if told := mapped.topics.inputs[Stream.STROKES].reads:
         return SessionStrokes(told, f"{mapped.source}, inputs.cylinder_strokes.reads")

@@ -1,4 +1,4 @@
-"""`boom_twin check`: validates a scene and tells in words and numbers what its model consists of."""
+"""`boom_twin check`: validate a scene and describe its model in words and numbers."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from ..deviation.accuracy import TipAccuracy
 
 PNG = b"\x89PNG"
-"""How a picture begins; one that is there is replaced."""
+"""First bytes of a picture; only such a file is replaced."""
 SENSOR_NAMES = {"angles": Stream.ANGLES, "imu": Stream.IMU, "forces": Stream.FORCES}
 SIZE_A = "angle of the section, cylinder force"
 SIZE_B = "angles of section and two links, pin force (2), cylinder force"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the scene, ``--json``, and the options of a search for the leanest model."""
+    """Declare the scene, ``--json``, and the options of a search for the smallest model."""
     add_scene(parser)
     add_json(parser)
     parser.add_argument("--strict", action="store_true", help="warnings are errors: the exit code is 1 if there are any")
@@ -48,7 +48,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Check and explain; a scene that cannot be used raises `SceneError`."""
+    """Check and describe the scene; an invalid one raises `SceneError`."""
     need.refuse_misuse(args)
     if args.picture is not None:
         check_target(args.picture, files_of(args, "scene"), PNG)
@@ -84,7 +84,7 @@ def _draw(path: Path, scene: Scene, name: str) -> Path:
 
 
 def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str, Any]:
-    """Return the account as one flat object."""
+    """Return the description of the scene as one flat object."""
     sections, joints = account.sections, account.joints
     return {
         "scene": name,
@@ -118,7 +118,7 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
 
 
 def _restitutions(scene: Scene) -> dict[str, float]:
-    """Return the restitution asked of the contact law, and the one that it gives; empty without clearance."""
+    """Return the requested restitution and that of the contact law; empty without clearance."""
     if scene.clearance is None:
         return {}
     law = scene.clearance.contact
@@ -256,7 +256,7 @@ def _unknowns(account: Account) -> list[str]:
 
 
 def _table(rows: list[list[str]], left: int = 1) -> list[str]:
-    """Return aligned and indented columns, the first `left` of them to the left, the others to the right."""
+    """Return indented columns. The first `left` are left-aligned, the others right-aligned."""
     return [f"  {line}" for line in columns(rows, range(left))] if rows else []
 
 
@@ -276,7 +276,7 @@ def _sets_of(sensors: list[Stream]) -> list[tuple[Stream, ...]]:
 
 
 def _sensor_words(chosen: tuple[Stream, ...]) -> str:
-    """Return a selection as it is written on the command line."""
+    """Return a selection as written on the command line."""
     names = {stream: name for name, stream in SENSOR_NAMES.items()}
     return ",".join(names[stream] for stream in chosen) or "strokes only"
 

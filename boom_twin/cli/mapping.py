@@ -11,7 +11,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Print the file."""
+    """Print the default mapping."""
     from ..messages.topic_table import DEFAULT_FILE
 
     sys.stdout.write(DEFAULT_FILE.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""Status of a recording: whether it is complete, on the disk, and has room."""
+"""Status of a recording: lost messages, delay to the disk, disk space."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from .levels import Bounds, ComponentJudge, Level, Status
 
 ENDED = "ended"
-"""Key of a status that says of itself, by 1, that it is the last one: silence after it is no news."""
+"""Key with value 1 in the last status of a recording."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,11 +18,11 @@ class DiskState:
     Attributes
     ----------
     lag : float
-        Age of the oldest message that a loss of power would cost, s.
+        Age of the oldest message that a power failure would lose, s.
     waiting, written, free : int
-        Bytes of messages in memory, of all files, and left on the disk.
+        Bytes of messages in memory, of all files, and free on the disk.
     left : float
-        Time until the disk is full at the pace of this recording so far, s.
+        Time until the disk is full at this recording's mean rate, s.
     """
 
     lag: float
@@ -41,7 +41,7 @@ class TopicCount:
     topic : str
     received, written : int
     missed : int or None
-        Published but never received, by the publisher's numbers, or left out; None where there were several publishers or none.
+        Messages left out, or not received (by sequence numbers). None unless there was one publisher.
     """
 
     topic: str
@@ -51,7 +51,7 @@ class TopicCount:
 
 
 def recording_status(judge: ComponentJudge, counts: Sequence[TopicCount], disk: DiskState, end: str | None) -> Status:
-    """Return the status of a recording; `end`: why it ended too early, empty if in order, None while it runs."""
+    """Return the status of a recording. `end` is the fault that ended it; empty if none, None while it runs."""
     thresholds, missed = judge.at.thresholds, sum(count.missed or 0 for count in counts)
     if end:
         judge.fault(Level.ERROR, end)

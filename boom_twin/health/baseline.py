@@ -1,4 +1,4 @@
-"""Baseline of a healthy rig: bias and spread of parameters, sensors and model error. It switches health on."""
+"""Baseline of a healthy rig: bias and spread of parameters, sensors and model error. A twin with a baseline judges health."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Row = list[Finite]
 
 
 class Baseline(BaseModel):
-    """A baseline as its file has it; SI units."""
+    """Content of a baseline file, SI units."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -41,13 +41,13 @@ class Baseline(BaseModel):
 
 
 def load_baseline(path: Path | None = None) -> Baseline:
-    """Return a baseline from its file (YAML), by default the package's own; UsageError names every value that cannot be."""
+    """Return the baseline of a YAML file, by default the package's own. UsageError names every invalid value."""
     path = DEFAULT_FILE if path is None else path
     return baseline_from(read_plain(path, UsageError, REMEDY), str(path))
 
 
 def baseline_from(content: object, source: str) -> Baseline:
-    """Return a baseline from the plain values of its file; UsageError, with the name of the source, as `load_baseline`."""
+    """Return a baseline from the plain values of its file. UsageError names `source` and every invalid value."""
     if not isinstance(content, dict):
         raise UsageError(f"{source}: not a baseline. {REMEDY}")
     return checked(Baseline, {str(key): value for key, value in content.items()}, source)

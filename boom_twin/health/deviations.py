@@ -1,4 +1,4 @@
-"""Monitor lasting deviations of a stream from the prediction, each in its own unit; no cause is inferred from them."""
+"""Monitor of lasting deviations of a stream from the prediction, in the stream's unit. It infers no cause."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from ..types import SENSORS, Alarm, Array, Stream, channels_of
 from .blocks import Block
 from .stream_readings import ENOUGH, StreamReadings
 
-KIND = "deviation"  # of all its alarms
+KIND = "deviation"  # kind of all its alarms
 SIGMAS = {Stream.ANGLES: 3.0, Stream.FORCES: 10.0}
-"""Stated deviations by which a mean residual has to be off beside its limit; of forces they lack the error of a model."""
-LAG = 0.4  # s; a residual that stamps explain which are late by less is no deviation, see `delay_monitor`
-LASTING = 3_000_000_000  # ns for which a deviation has to last: in haste a mean is off for two seconds
-GONE = 0.5  # share of the limit below which a deviation is over
-SETTLED = 5_000_000_000  # ns for which it has to be below
+"""Standard deviations that a mean residual has to exceed, beside its limit. Deviations of forces lack the model error."""
+LAG = 0.4  # s; a residual explained by a smaller delay of stamps is no deviation, see `delay_monitor`
+LASTING = 3_000_000_000  # ns, debounce time: in fast motion a mean is off for two seconds
+GONE = 0.5  # share of the limit below which a deviation ends
+SETTLED = 5_000_000_000  # ns below that share before it ends
 REMEDY = {
     Stream.ANGLES: "its sensor, a stroke transducer, or the scene is off. Compare both at rest",
     Stream.FORCES: "its sensor, the load, or the scene is off. Check payload and line fill, then the sensor's zero",
@@ -30,7 +30,7 @@ REMEDY = {
 @dataclass
 class _Deviation:
     alarm: Alarm
-    seen: int  # ns, newest end of a block in which it was there
+    seen: int  # ns, end of the newest block that has it
 
 
 class DeviationMonitor:
@@ -41,20 +41,20 @@ class DeviationMonitor:
     stream : Stream
     scene : Scene
     settings : Settings
-        With the limits.
+        Settings with the limits.
     """
 
     def __init__(self, stream: Stream, scene: Scene, settings: Settings) -> None:
         self._stream, self._names = stream, channels_of(len(scene.joints))[stream]
         lengths = np.array([section.length for section in scene.sections])
-        self._reach = np.cumsum(lengths[::-1])[::-1] if stream is Stream.ANGLES else None  # m; outboard of each joint
+        self._reach = np.cumsum(lengths[::-1])[::-1] if stream is Stream.ANGLES else None  # m, boom outboard of each joint
         force = np.full(len(self._names), settings.force_deviation)
         self._limits = force if self._reach is None else settings.tip_deviation / self._reach
         self._since, self._last = np.full(len(self._names), -1), dict[int, _Deviation]()
 
     @property
     def alarms(self) -> Sequence[Alarm]:
-        """Alarms that last."""
+        """Active alarms."""
         return [each.alarm for each in self._last.values()]
 
     def take(self, readings: StreamReadings, masked: NDArray[np.bool_], block: Block) -> list[Alarm]:
@@ -67,7 +67,7 @@ class DeviationMonitor:
             return []
         is_known = (readings.counts > 0.0) & (slow.weight > ENOUGH) & ~masked
         least = np.maximum(self._limits, SIGMAS[self._stream] * np.sqrt(slow.variance / weight))
-        late = -LAG * slow.rate / weight  # residual of readings so late
+        late = -LAG * slow.rate / weight  # residual of readings late by `LAG`
         is_far, is_near = is_known & (np.abs(off) > least), is_known & (np.abs(off) < GONE * self._limits)
         is_explained = (off < np.maximum(late, 0.0) + least) & (off > np.minimum(late, 0.0) - least)
         self._since = np.where(is_far, np.where(self._since < 0, block.start, self._since), -1)
@@ -84,7 +84,7 @@ class DeviationMonitor:
         return news
 
     def _told(self, i: int, off: Array) -> str:
-        """Return what channel `i` reads too much, and what may be the matter."""
+        """Return the deviation of channel `i` and its possible reasons in words."""
         factor, unit = SENSORS[self._stream].shown_unit
         tip = "" if self._reach is None else f", up to {1e3 * abs(off) * self._reach[i]:.0f} mm at the tip"
         size = f"{float(f'{factor * off:.3g}'):+g} {unit}"

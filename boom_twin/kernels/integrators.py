@@ -1,13 +1,13 @@
 """Time integrators as tables of weights: acceleration and velocity of a scalar as affine functions of its new position.
 
-    a' = A (x' - x_hat),   v' = C x' + D,   x_hat and D linear in the scalar's history,
+    a' = A (x' - x_hat),   v' = C x' + D,   x_hat and D linear in the scalar's history.
 
-a prime marking the time that is solved for. Every scheme here is that pattern; it is written down once, as weights, and the
-loops over all scalars do not know which scheme they run. A history is a column of
+A prime marks the instant that is solved for. Every scheme is such a table of weights, so all schemes share the loops over
+scalars. A history is a column of
 
     [ x, v two steps ago; x, v one step ago; ]  x, v, p, a  now            (the last four are X, V, P, A)
 
-and a step makes every row of it from the new x', v', a' and the old rows at or behind its own place, in that order.
+A step computes every row from the new x', v', a' and the old rows from its own index on, in that order.
 
 Generalised-alpha (Chung and Hulbert 1993; with the auxiliary acceleration p of [AB] in `boom_twin.scene.notation`)
 
@@ -16,9 +16,9 @@ Generalised-alpha (Chung and Hulbert 1993; with the auxiliary acceleration p of 
 
 rho is the spectral radius at infinite frequency: 1 keeps every frequency, 0 kills the highest within one step. Positions of
 constrained points are integrated directly (index 3), which needs rho < 1. Newmark is am = af = 0, beta = (gamma + 1/2)^2/4.
-Wilson-theta takes the acceleration as linear up to t + theta h, solves there, and falls back to t + h. Houbolt: cubic through
-four positions; Park 1975: mean of the two- and three-step backward differences, for x and again for v. The scheme of rest has
-A = C = 0, which is statics, and leaves a history without motion.
+Wilson-theta has linear acceleration up to t + theta h, solves there, and returns to t + h. Houbolt: cubic through four
+positions. Park 1975: mean of the two- and three-step backward differences, for x and again for v. `REST` has A = C = 0
+(statics) and writes a history without motion.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ DEPTH, LONG_DEPTH = 4, 8
 class Scheme(NamedTuple):
     """One scheme at one step size.
 
-    family, parameter : what `prepare` was given.
+    family, parameter : arguments of `prepare`.
     reach : time from the newest history to the instant that is solved for, s.
     gain, rate : A (1/s^2) and C (1/s).
     weights : (2 + depth, 3 + depth), see the module's constants.
@@ -55,18 +55,18 @@ class Scheme(NamedTuple):
 
 
 def depth_of(family: int) -> int:
-    """Rows of a history that the family needs."""
+    """Return the number of history rows of the family."""
     return LONG_DEPTH if family in (HOUBOLT, PARK) else DEPTH
 
 
 def new_weights(depth: int) -> Array:
-    """Room for a scheme's weights."""
+    """Return an array for a scheme's weights."""
     return np.zeros((ROWS + depth, OLD + depth))
 
 
 @inner
 def prepare(family, parameter, step, weights):
-    """Scheme of `family` for `step` (s); `parameter` is rho, Newmark's gamma, or theta. Fills `weights`."""
+    """Return the scheme of `family` for `step` (s). `parameter` is rho, Newmark's gamma or theta. Fills `weights`."""
     family = np.int64(family)
     for k in range(weights.shape[0]):
         for j in range(weights.shape[1]):
@@ -83,7 +83,7 @@ def prepare(family, parameter, step, weights):
         return one_step(family, parameter, 0.0, 0.0, parameter, step, weights)
     if family == WILSON:
         return wilson(family, parameter, step, weights)
-    for k in range(4):  # x, v of two steps ago, and of one step ago
+    for k in range(4):  # x, v two steps and one step ago
         weights[ROWS + k, OLD + k + 2] = 1.0
     if family == HOUBOLT:
         return houbolt(family, parameter, step, weights)
@@ -92,7 +92,7 @@ def prepare(family, parameter, step, weights):
 
 @inner
 def one_step(family, parameter, am, af, gamma, h, weights):
-    """Generalised-alpha with its four coefficients."""
+    """Return generalised-alpha; beta follows from gamma."""
     beta = 0.25 * (gamma + 0.5) ** 2
     gain, rate = (1.0 - am) / ((1.0 - af) * beta * h * h), gamma / (beta * h)
     share = 1.0 / ((1.0 - af) * gain)
@@ -112,9 +112,9 @@ def wilson(family, theta, h, weights):
 
         v' = v + r/2 (a + a'),    x' = x + r v + r^2/6 (2 a + a').
 
-    The second, solved for a', is a' = 6/r^2 (x' - x_hat) with x_hat = x + r v + r^2/3 a; in the first it leaves
-    v' = 3/r x' + D with D = -3/r x - 2 v - r/2 a. The step itself ends at h, the share 1/theta of the way: the same integrals
-    over h with the acceleration a + (a' - a)/theta at its end, which are the weights of the new X, V, A.
+    The second gives a' = 6/r^2 (x' - x_hat) with x_hat = x + r v + r^2/3 a. With this a', the first is
+    v' = 3/r x' + D with D = -3/r x - 2 v - r/2 a. The step itself ends at h = r/theta with the acceleration
+    a + (a' - a)/theta. The same integrals over h give the weights of the new X, V, A.
     """
     reach, part = theta * h, 1.0 / theta
     weights[HAT, X], weights[HAT, V], weights[HAT, A] = 1.0, reach, reach * reach / 3.0
@@ -141,11 +141,11 @@ def park(family, parameter, h, weights):
 
     With x1, x2 one and two steps before x, the differences over two and over three steps are
 
-        h v' = 3/2 x' - 2 x + 1/2 x1,    h v' = 11/6 x' - 3 x + 3/2 x1 - 1/3 x2,    their mean
+        h v' = 3/2 x' - 2 x + 1/2 x1,    h v' = 11/6 x' - 3 x + 3/2 x1 - 1/3 x2.    Their mean is
 
         v' = C x' + D,    C = 10/(6 h),    D = (-5/2 x + x1 - 1/6 x2)/h.
 
-    The same formula for v gives a' = C v' + D_v, D_v made of v, v1, v2 as D of x, x1, x2. With v' from above that is
+    The same formula for v gives a' = C v' + D_v, with D_v of v, v1, v2 as D of x, x1, x2. With v' from above,
     a' = C^2 (x' - x_hat), x_hat = -D/C - D_v/C^2 = 3/2 x - 3/5 x1 + 1/10 x2 + h (0.9 v - 0.36 v1 + 0.06 v2).
     """
     weights[HAT, X], weights[HAT, OLD + 2], weights[HAT, OLD] = 1.5, -0.6, 0.1
@@ -169,7 +169,7 @@ def start_step(scheme, history, hat, offset):
 
 @inner
 def weigh_newest(weights, history, total):
-    """Weighted sum of the newest four rows; a loop that writes one array only is vectorised, one that writes two is not."""
+    """Write the weighted sum of the newest four rows. Only a loop that writes a single array is vectorised."""
     x, v, p, a = history[X], history[V], history[P], history[A]
     for_x, for_v, for_p, for_a = weights[X], weights[V], weights[P], weights[A]
     for i in range(total.shape[0]):
@@ -180,12 +180,12 @@ def weigh_newest(weights, history, total):
 def finish_step(scheme, position, hat, offset, v, a, history):
     """Write velocities, accelerations and the new history of all scalars from their `position` at the instant solved for.
 
-    `hat` and `offset` as `start_step` filled them; `v` and `a` are written; all of shape (n,).
+    `hat` and `offset` are those of `start_step`. `v` and `a` are written. All have shape (n,).
     """
     for i in range(position.shape[0]):
         a[i] = scheme.gain * (position[i] - hat[i])
         v[i] = scheme.rate * position[i] + offset[i]
-    if scheme.family == WILSON:  # ends before the instant that is solved for
+    if scheme.family == WILSON:  # the step ends before the instant solved for
         renew_rows(scheme.weights, position, v, a, history, history.shape[0])
         return
     renew_rows(scheme.weights, position, v, a, history, history.shape[0] - DEPTH)
@@ -200,14 +200,14 @@ def finish_step(scheme, position, hat, offset, v, a, history):
 
 @inner
 def weigh(weight, of, row):
-    """`row` becomes `of` times a number."""
+    """Write `weight` times `of` into `row`."""
     for i in range(of.shape[0]):
         row[i] = weight * of[i]
 
 
 @inner
 def renew_rows(weights, position, v, a, history, rows):
-    """Make the first `rows` rows of `history` anew, each from the old ones at or behind its own place."""
+    """Update the first `rows` rows of `history`, each from old rows at or after its own index."""
     for k in range(rows):
         row, own = history[k], weights[ROWS + k]
         for_x, for_v, for_a, keep = own[NEW_X], own[NEW_V], own[NEW_A], own[OLD + k]

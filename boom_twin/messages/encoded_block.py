@@ -1,4 +1,4 @@
-"""Encoded messages, many of them at once, as arrays of bytes."""
+"""Blocks of encoded messages as arrays of bytes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class EncodedBlock(NamedTuple):
     log_times : ndarray of int64, shape (n,)
         Log time of each message, ns.
     rows : list of EncodedRows
-        Groups that hold every index from 0 to n - 1 once.
+        Groups that together have every index from 0 to n - 1 once.
     """
 
     log_times: Integers
@@ -46,7 +46,7 @@ class EncodedBlock(NamedTuple):
 
 
 class EncodedBlockBuilder:
-    """Builder of a block from groups of encoded messages, sorted by the samples that caused them."""
+    """Builder of a block from groups of encoded messages, sorted by their samples."""
 
     def __init__(self) -> None:
         self._groups: list[tuple[str, Integers, Integers, Bytes]] = []

@@ -116,5 +116,5 @@ def test_the_page_and_its_pictures(zero, speeds, stop, tmp_path, monkeypatch):
     written = report.write(SCENE, tmp_path / "out", quick=True, posture="arch")
     assert sorted(path.name for path in written) == sorted(path.name for path in (tmp_path / "out").iterdir())
     text = (tmp_path / "out" / "papers.md").read_text(encoding="utf-8")
-    assert "not public" in text and "surrogates" in text and "1 frequencies are within" in text
+    assert "not public" in text and "surrogates" in text and "1 natural frequencies differ" in text
     assert f"power {report.slope(found):.2f}" in text

@@ -34,9 +34,9 @@ class FileDefinitions:
     told : Counter or None
         Number of messages by topic from a sound summary.
     is_summed : bool
-        True if a checksum over all bytes up to the end of the data fits.
+        True if the checksum of all bytes up to the end of the data fits.
     listed : Counter of (int, int, int)
-        Chunks in the index of a sound summary, by first and last log time (ns) and size of the content.
+        Chunks in a sound summary's index, by first and last log time (ns) and content size.
     """
 
     channels: dict[int, Channel] = field(default_factory=dict)
@@ -70,13 +70,13 @@ class FileDefinitions:
 def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
     """Return the definitions, notes and counts of a file from one walk through it.
 
-    A definition is used if the checksum of its chunk or of the summary fits, or if there is no checksum. With `unverified`,
-    a definition at the start of a chunk that is cut off or fails its checksum is used too.
+    A definition is used if the checksum of its chunk or of the summary fits or is missing. With `unverified`, definitions at
+    the start of a truncated or corrupt chunk are used too.
 
     Raises
     ------
     BagError
-        The file is of another profile than ros2.
+        The profile is ros1 or px4, or definitions exceed `LARGEST`.
     """
     definitions, unvouched = FileDefinitions(), FileDefinitions()
     statistics: Statistics | None = None

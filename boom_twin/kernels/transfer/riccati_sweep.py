@@ -1,4 +1,4 @@
-"""Riccati form of the transfer-matrix method, the two sweeps of one Newton pass: forces in, tip to base; increments out."""
+"""Riccati form of the transfer-matrix method: one Newton pass sweeps forces from tip to base, then increments back."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from .forward_kinematics import beam_part
 from .six_bar import close_loop, open_loop
 from .slider_crank import close_base, join_rod
 
-# The first operation; slots of a cut with nothing carried: x, y, theta. Typed, because numba compiles once more for literals.
+# First operation; degrees of freedom (x, y, theta) of a cut without cylinders. Typed: numba compiles again for literals.
 ROOT, FREE = np.int64(0), np.int64(3)
 
 
@@ -55,7 +55,7 @@ def transfer_body(t, work, motion, row, c, sn):
 
 @inner
 def beam_operation(t, state, work, condensed, motion, row, operation, c, sn, m):
-    """Carry the cut through beam part `row`, keeping its gains; returns the number of negative pivots or -1."""
+    """Transfer the cut through beam part `row` and keep its gains. Return the number of negative pivots or -1."""
     beam, part, s, p = t.beams[row], beam_part(t, work, row), work.s, work.p
     gains, factors, free = condensed.gains[operation], condensed.factors[operation], condensed.free[operation]
     if is_usual(beam):
@@ -76,15 +76,15 @@ def clear_cut(work, m):
 
 @kernel
 def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m, condensed):
-    """Carry the cut in `work`, m slots wide, from the end of operation `last - 1` inwards through operation `first`.
+    """Transfer the cut in `work` (m degrees of freedom) inwards, from the end of operation `last - 1` through `first`.
 
     condensed : Condensed
-        Written: what `sweep_out`, `clearance_pins.coarseness` and the count of natural frequencies are given.
+        Output for `sweep_out`, `clearance_pins.coarseness` and the count of natural frequencies.
 
     Returns
     -------
     status, negative, m : int
-        OK or SINGULAR; the number of negative pivots in the beams (joints: see `Condensed.blocks`); slots of the cut now.
+        OK or SINGULAR; negative pivots of the beams (joints: see `Condensed.blocks`); the cut's new degrees of freedom.
     """
     s, p, negative = work.s, work.p, 0
     for k in range(last - 1, first - 1, -1):
@@ -125,9 +125,9 @@ def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m, condense
 
 @kernel
 def sweep_out(t, state, work, condensed, first, last, m):
-    """Increments of the unknowns of operations `first` .. `last - 1` from the cut before them, m slots in `work.cut`.
+    """Write the increments to ADD to the unknowns of operations `first` .. `last - 1` into `work.dz`.
 
-    `condensed` is what `sweep_in` wrote. What to ADD to the unknowns is written into `work.dz`.
+    The cut before them has m degrees of freedom in `work.cut`. `condensed` is from `sweep_in`.
     """
     cut, dz = work.cut, work.dz
     for k in range(first, last):
@@ -165,7 +165,7 @@ def sweep_out(t, state, work, condensed, first, last, m):
 
 @inner
 def out_beam(beam, part, gains, free, c, sn, m, cut, dz):
-    """Increments of a beam part's coordinates, and of its output end."""
+    """Write the increments of a beam part's coordinates, and update the cut to its output end."""
     psi, rho, drho, end = part.psi, part.rho, part.drho, beam.points
     dx, dy, turn = -rho[end, 1] * cut[2], rho[end, 0] * cut[2], 0.0  # in the axes of the input end
     for a in range(beam.bending + beam.axial):

@@ -13,19 +13,19 @@ from ...analysis.even_times import spacing
 from ...types import Array
 
 WINDOW = 40.0
-"""Seconds before the time shown of which the spectrum is."""
+"""Time span of the spectrum, up to the shown time, s."""
 SEGMENT = 8.0
-"""Seconds of one segment of Welch's method (Hann window, half overlapping, mean removed)."""
+"""Segment of Welch's method, s (Hann window, half overlapping, mean removed)."""
 HIGHEST = 30.0
-"""Hz; no peak above it."""
+"""Highest frequency of a peak, Hz."""
 LOWEST = 0.3
 MAX_PEAKS = 5
 PROMINENCE = 6.0
-"""dB by which a peak stands out."""
+"""Lowest prominence of a peak, dB."""
 BAND = 0.3
-"""Half width of the band around a peak whose decay gives the damping, as a share of its frequency."""
+"""Half width of the band around a peak for its damping, as a share of its frequency."""
 DECAY_FLOOR = 0.3
-"""Share of its initial value down to which a decay is evaluated."""
+"""Lowest evaluated value of a decay, as a share of its first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ def spectrum(times: Array, values: Array) -> Spectrum | None:
 
 
 def _peaks(frequencies: Array, density: Array, values: Array, rate: float) -> list[Peak]:
-    """Return the highest peaks that stand out, their frequencies by a parabola through the decibels."""
+    """Return the highest prominent peaks. Their frequency is from a parabola through the decibels."""
     level = 10.0 * np.log10(np.maximum(density, 1e-30))
     found, _ = find_peaks(level, prominence=PROMINENCE)
     found = [i for i in found if LOWEST <= frequencies[i] <= min(HIGHEST, 0.4 * rate)]
@@ -80,7 +80,7 @@ def damping(values: Array, rate: float, frequency: float) -> float:
     """Return the damping ratio of the mode at `frequency` (Hz), from the autocorrelation's decay in the band around it.
 
     The autocorrelation of a lightly damped mode under random excitation decays as its free vibration does, as
-    exp(-2 pi zeta f t) (Cole 1973). NaN where it does not decay. `values` (n, c) are at `rate` (Hz).
+    exp(-2 pi zeta f t) (Cole 1973). NaN if it does not decay. `values` (n, c) are at `rate` (Hz).
     """
     count = len(values)
     power = np.square(np.abs(np.fft.rfft(values - values.mean(axis=0), 2 * count, axis=0))).sum(axis=1)
@@ -102,18 +102,18 @@ def damping(values: Array, rate: float, frequency: float) -> float:
 
 
 STEP = 2.0
-"""Seconds of session time from one column to the next; columns end at its multiples."""
+"""Session time between columns, s. Columns end at its multiples."""
 FREQUENCIES = np.arange(0.0, 20.0 + 0.5 / SEGMENT, 1.0 / SEGMENT)
-"""Hz, of every column."""
+"""Frequencies of every column, Hz."""
 COVERAGE = 0.9
-"""Share of a segment that its rows must span."""
+"""Smallest share of a segment that its rows span."""
 
 
 def spectrogram(times: Array, values: Array, ends: Array) -> NDArray[np.float32]:
     """Return one-sided densities, (m/s^2)^2/Hz, of the segments before `ends`.
 
-    Each is a periodogram with Hann's window, both directions added; Welch's method averages such. `values` (n, c) in m/s^2 are
-    at `times` (n,) in s, `ends` (k,) are in s. A row has the densities at `FREQUENCIES`; NaN where rows are missing, and above
+    Each is a periodogram with Hann window, summed over the directions; Welch's method averages these. `values` (n, c) in m/s^2
+    are at `times` (n,) in s, `ends` (k,) are in s. A row has the densities at `FREQUENCIES`. It is NaN without data, and above
     half the rate.
     """
     found = np.full((len(ends), len(FREQUENCIES)), np.nan, dtype=np.float32)

@@ -1,4 +1,4 @@
-"""Subscriptions of the recorder: which topics, with which QoS, and the definitions of their types."""
+"""Subscriptions of the recorder: topics, QoS and type definitions."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _BASE = {"double": "float64", "float": "float32", "boolean": "bool", "octet": "b
 _ARRAY = re.compile(r"^(?P<element>.+)\[(?P<count>\d+)\]$")
 _SEQUENCE = re.compile(r"^sequence<(?P<element>[^,]+)(?:, (?P<bound>\d+))?>$")
 _STRING = re.compile(r"^(?P<kind>w?string)<(?P<bound>\d+)>$")
-_EMPTY = "uint8 structure_needs_at_least_one_member\n"  # what an empty message holds in CDR
+_EMPTY = "uint8 structure_needs_at_least_one_member\n"  # field of an empty message in CDR
 _RULE = "=" * 80
 
 
 def installed_class(type_name: str) -> Any:
-    """Return the class of ``package/msg/Name`` (``package/Name`` will do).
+    """Return the class of ``package/msg/Name`` or ``package/Name``.
 
     Raises
     ------
     UsageError
-        It is not installed, or is no message type.
+        The type is not installed or not a message type.
     """
     parts = type_name.split("/")
     full = f"{parts[0]}/msg/{parts[1]}" if len(parts) == 2 else type_name
@@ -51,7 +51,7 @@ def full_name(kind: Any) -> str:
 
 
 def definition_of(kind: Any) -> str:
-    """Return the definition of a class and of all types in it; only its fields if ROS 2 Jazzy's own packages do not have it."""
+    """Return the definition of a class and all its types. Types outside ROS 2 Jazzy's own packages have fields only."""
     name = full_name(kind)
     if name in jazzy().types:
         return str(jazzy().generate_msgdef(name, ros_version=2)[0])
@@ -99,21 +99,21 @@ def _short(name: str) -> str:
 
 
 DEPTH = 4000
-"""Messages that may wait for the recorder, for every topic: seconds of a session."""
+"""Queue of every topic, messages: some seconds of a session."""
 
 
 @dataclass(frozen=True, slots=True)
 class RequestedTopic:
-    """Topic that is to be recorded.
+    """Topic to record.
 
     Attributes
     ----------
     name : str
-        Absolute.
+        Absolute name.
     type : str or None
-        None: that of its first publisher.
+        None for the type of its first publisher.
     topic : Topic or None
-        Where ``topics.yaml`` has it.
+        Entry of ``topics.yaml``, if any.
     """
 
     name: str
@@ -142,7 +142,7 @@ def requested_topics(names: Sequence[str], known: Mapping[str, Topic]) -> list[R
     ----------
     names : sequence of str
     known : dict of str to Topic
-        By absolute name.
+        Topics by absolute name.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def requested_topics(names: Sequence[str], known: Mapping[str, Topic]) -> list[R
 def resolved(wanted: RequestedTopic, node: Any) -> RequestedTopic:
     """Return a requested topic by its name in the namespace of `node`, with the node's remappings.
 
-    A name private to the twin is taken to be that of the node ``boom_twin`` there.
+    A name private to the twin belongs to the node ``boom_twin`` there.
     """
     if wanted.topic is None:
         return replace(wanted, name=node.resolve_topic_name(wanted.name))
@@ -185,7 +185,7 @@ def resolved_topics(topics: Topics, node: Any) -> Topics:
 
 
 def resolved_mapping(text: str, topics: Topics, node: Any) -> str:
-    """Return the text of a mapping equal to `text`, but with all names of `topics` resolved by `resolved_topic`."""
+    """Return the mapping `text` with all names of `topics` resolved by `resolved_topic`."""
     places: dict[tuple[str, ...], Topic] = {("inputs", stream.value): topic for stream, topic in topics.inputs.items()}
     places |= {("outputs", key.value): topic for key, topic in topics.outputs.items()} | {("events",): topics.events}
     for place, topic in places.items():
@@ -201,12 +201,12 @@ def with_mapped(text: str, place: tuple[str, ...], value: str) -> str:
 
 
 def subscription_of(node: Any, wanted: RequestedTopic) -> TopicSubscription | None:
-    """Return how to subscribe to a topic; None as long as its type is not known.
+    """Return the subscription of a topic, or None while its type is unknown.
 
     Raises
     ------
     UsageError
-        The type is not installed, or its publishers have several.
+        The type is not installed, or publishers differ in type.
     """
     if wanted.topic is not None:
         topic = wanted.topic

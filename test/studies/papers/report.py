@@ -195,7 +195,7 @@ def as_markdown(found: PapersStudy) -> str:
     parts = [
         "# The method's papers",
         "[Z] Zhang et al. 2016, *Research on the rigid-flexible multibody dynamics of concrete placing boom*; [R] Ren et al. "
-        "2014, doi 10.1155/2014/943847. Their rigs and data are not public: no curve of theirs can be laid over one of ours.",
+        "2014, doi 10.1155/2014/943847. Their rigs and data are not public, so curves cannot be compared.",
         *_matrices_text(found), *_zeros_text(found), *_bases_text(found), *_low_speed_text(found), *_stops_text(found),
         provenance(),
     ]  # fmt: skip
@@ -206,8 +206,8 @@ def _matrices_text(found: PapersStudy) -> list[str]:
     rows = [(1e3 * one.step, max(one.differences), one.base_error) for one in found.matrices]
     return [
         "## Transfer matrices",
-        "Matrices of A and B1 to B3, assembled as in the papers, beside those that the Riccati sweep "
-        "condenses: largest relative difference. The product of all, solved for the force at the base, loses digits.",
+        "Transfer matrices of A and B1 to B3 are assembled as in the papers. The difference is the largest relative one from "
+        "the Riccati sweep. The product of all matrices, solved for the base force, loses digits.",
         table(("step, ms", "difference", "error of the product"), rows),
     ]
 
@@ -217,8 +217,9 @@ def _zeros_text(found: PapersStudy) -> list[str]:
     share = max(abs(near / right - 1.0) for near, right in found.bisected)
     return [
         "## Boundary zeros by bisection",
-        f"[R] bisects the boundary's residual to 1e-7. So found, section 1 at rest in {len(found.zeros)} postures is within "
-        f"{angle:.1e} rad of Newton's angle; {len(found.bisected)} frequencies are within {share:.1e} of those counted.",
+        f"[R] bisects the boundary residual to 1e-7. So found, the rest angle of section 1 in {len(found.zeros)} postures "
+        f"differs from Newton's by at most {angle:.1e} rad. {len(found.bisected)} natural frequencies differ from those "
+        f"by Wittrick-Williams counting by at most {share:.1e}, relative.",
     ]
 
 
@@ -228,7 +229,8 @@ def _bases_text(found: PapersStudy) -> list[str]:
     ]
     return [
         "## Three cantilever modes a part",
-        "They are too stiff: parts end in torques and shear forces, which no sum of cantilever modes has.",
+        "Cantilever modes are too stiff: no sum of them has the bending moment and shear force at a part's end. The last "
+        "column is the relative error of f1.",
         table(("posture", "sag, mm", "f1, Hz", "cantilever, %"), rows),
     ]
 
@@ -239,8 +241,8 @@ def _low_speed_text(found: PapersStudy) -> list[str]:
         "## Without velocity terms",
         f"[R] leaves out Coriolis and centrifugal accelerations. The error grows as speed to the power {slope(found):.2f}.",
         table(("fastest tip, m/s", "largest error, mm"), found.speeds[:, :2] * [1.0, 1e3]),
-        f"Let go undeflected, the tip falls to {held.height.min():.0f} mm. Lifted meanwhile, it falls to "
-        f"{lifted.height.min():.0f} mm, then rises to {lifted.rest:.0f} mm, as [R] says.",
+        f"If an undeflected boom is released, its tip falls to {held.height.min():.0f} mm. If the drives lift it meanwhile, it "
+        f"falls to {lifted.height.min():.0f} mm, then rises to {lifted.rest:.0f} mm, as [R] says.",
         "![Tip of a boom let go; error of the low-speed form](papers_low_speed.png)",
     ]
 
@@ -254,8 +256,8 @@ def _stops_text(found: PapersStudy) -> list[str]:
     ]  # fmt: skip
     return [
         "## Stops in four postures",
-        "Differences from Exudyn, rms, until a journal first flies; all but the first column with worn rod pins. Why "
-        "accelerations differ by several per cent in two postures was not sought.",
+        "Rms differences from Exudyn (penetration: largest) until a pin first loses contact. Rod pins are worn, except in "
+        '"tip, ideal". The reason for acceleration differences of several per cent is unknown.',
         table(("posture", "tip, ideal, mm", "tip, worn, mm", "acceleration, %", "forces, %", "penetration, %"), rows),
         "![Stops in four postures](papers_postures.png)",
     ]

@@ -1,4 +1,4 @@
-"""Masses of the Exudyn boom: rigid parts gathered about a reference point of their section."""
+"""Masses of the Exudyn boom: rigid parts merged about a reference point of their section."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ....scene.schema import Point, RigidPart, Scene, Section
 
 @dataclass(frozen=True, slots=True)
 class Lump:
-    """A rigid mass: kg, centre (m), inertia about that centre (kg m^2)."""
+    """Rigid mass (kg) with centre (m) and inertia about that centre (kg m^2)."""
 
     mass: float
     com: Point
@@ -18,7 +18,7 @@ class Lump:
 
 @dataclass(frozen=True, slots=True)
 class Gathered:
-    """Mass (kg), centre from the reference point (m), inertia about the REFERENCE POINT (kg m^2)."""
+    """Merged mass (kg) with centre from, and inertia about, the REFERENCE POINT (m, kg m^2)."""
 
     mass: float
     com: Point
@@ -27,27 +27,27 @@ class Gathered:
 
 @dataclass(slots=True)
 class Lumps:
-    """Lumps that a body bears for its neighbours: those that resist acceleration, and those that weigh."""
+    """Lumps of neighbours on one body: `inertia` resists acceleration, `weight` has weight."""
 
     inertia: list[Lump] = field(default_factory=list)
     weight: list[Lump] = field(default_factory=list)
 
     def both(self, lump: Lump) -> None:
-        """Add a lump that does both."""
+        """Add a lump with inertia and weight."""
         self.inertia.append(lump)
         self.weight.append(lump)
 
 
 @dataclass(frozen=True, slots=True)
 class LumpedMasses:
-    """Lumps that bodies bear for cylinders and links that are no bodies.
+    """Lumps that replace cylinders and links without a body of their own.
 
     Attributes
     ----------
     sections : list of dict
-        Of every section, by the place x (m) of the pin; in the section's axes.
+        Lumps of every section by the pin's x (m), in the section's axes.
     links : list of Lumps
-        On the bearing link of every joint, in its axes.
+        Lumps on the bearing link of every joint, in its axes.
     """
 
     sections: list[dict[float, Lumps]]
@@ -64,7 +64,7 @@ class LumpedMasses:
 
 
 def gather(lumps: list[Lump], reference_x: float) -> Gathered:
-    """One rigid mass for many, about the point (`reference_x`, 0) of the section's axes."""
+    """Return all lumps as one rigid mass about the point (`reference_x`, 0) of the section's axes."""
     mass = sum(lump.mass for lump in lumps)
     if mass == 0.0:
         return Gathered(0.0, (0.0, 0.0), sum(lump.inertia for lump in lumps))
@@ -75,7 +75,7 @@ def gather(lumps: list[Lump], reference_x: float) -> Gathered:
 
 
 def rod(start: float, end: float, per_length: float, rotary: float = 0.0) -> Lump:
-    """Uniform straight rod on the section's axis: kg/m, and rotary inertia per length (kg m)."""
+    """Return a uniform rod on the section's axis: kg/m, and rotary inertia per length (kg m)."""
     length = end - start
     mass = per_length * length
     return Lump(mass, ((start + end) / 2, 0.0), mass * length**2 / 12 + rotary * length)
@@ -86,14 +86,14 @@ def _part(part: RigidPart | None) -> list[Lump]:
 
 
 def _tip(scene: Scene, index: int) -> list[Lump]:
-    """The payload, if section `index` is the last one."""
+    """Return the payload if section `index` is the last one."""
     if scene.tip is None or not scene.tip.payload or index != len(scene.sections) - 1:
         return []
     return [Lump(scene.tip.payload, (scene.sections[index].length, 0.0), 0.0)]
 
 
 def rigid_section(scene: Scene, index: int) -> list[Lump]:
-    """All of a section that does not bend, its beam included if it has one."""
+    """Return all lumps of a rigid section, including its beam."""
     section = scene.sections[index]
     beam = [] if section.beam is None else [rod(*section.beam, section.rho_A or 0.0, section.rho_I or 0.0)]
     fill = rod(0.0, section.length, scene.line_fill or 0.0)
@@ -101,12 +101,12 @@ def rigid_section(scene: Scene, index: int) -> list[Lump]:
 
 
 def flexible_root(scene: Scene, section: Section) -> list[Lump]:
-    """Inboard of the beam: the root with its concrete."""
+    """Return the lumps inboard of the beam: root and concrete."""
     return [*_part(section.root), rod(0.0, _beam(section)[0], scene.line_fill or 0.0)]
 
 
 def flexible_head(scene: Scene, index: int) -> list[Lump]:
-    """Outboard of the beam: the head with its concrete and the payload."""
+    """Return the lumps outboard of the beam: head, concrete and payload."""
     section = scene.sections[index]
     fill = rod(_beam(section)[1], section.length, scene.line_fill or 0.0)
     return [*_part(section.head), fill, *_tip(scene, index)]

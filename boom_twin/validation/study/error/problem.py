@@ -1,4 +1,4 @@
-"""Problem of the error study: the motion all programs step, the references, and the virtual rig to compare with."""
+"""Problem of the error study: motion, references and virtual rig."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from .cases import STEPS
 
 
 def load_rig() -> tuple[ModuleType | None, str]:
-    """Return `boom_twin.validation.rig`, or None and the reason; load Exudyn's build without range checks if none is loaded."""
+    """Return `boom_twin.validation.rig`, or None and the reason. Prefer Exudyn's build without range checks."""
     if "exudyn" not in sys.modules:
-        sys.exudynFast = True  # type: ignore[attr-defined]  # where Exudyn looks
+        sys.exudynFast = True  # type: ignore[attr-defined]  # read by Exudyn
     try:
         with contextlib.redirect_stdout(io.StringIO()):
             return import_module("boom_twin.validation.rig"), ""
@@ -33,14 +33,14 @@ def load_rig() -> tuple[ModuleType | None, str]:
 
 
 def build() -> str:
-    """Return the build of Exudyn that is loaded, in words."""
+    """Return the loaded build of Exudyn in words."""
     return "without range checks" if "exudyn.exudynCPPfast" in sys.modules else "with range checks"
 
 
-ROW = STEPS[-1]  # s between the instants that are compared
+ROW = STEPS[-1]  # s between compared instants
 OWN_MODES, OWN_STEP = (6, 8), (2.5e-4, 1.25e-4)
 ELEMENTS, EXUDYN_STEP = (16, 32), (5e-4, 2.5e-4)
-SHEAR_OVER_AXIAL = 160.0  # as good as none yields in shear, as the scene has it
+SHEAR_OVER_AXIAL = 160.0  # nearly rigid in shear, as in the scene
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,13 @@ class Path:
     acceleration: Array
 
     def away(self, other: Path) -> tuple[float, float]:
-        """Return the root mean square over the motion: of the tip (mm), of its acceleration over that of `other`."""
+        """Return rms differences from `other`: tip (mm), acceleration (over that of `other`)."""
         return 1e3 * rms(self.tip - other.tip), rms(self.acceleration - other.acceleration) / rms(other.acceleration)
 
 
 @dataclass(frozen=True)
 class Reference:
-    """A path, and what is left in it: errors of the tip (mm) and of the acceleration (relative), as estimated."""
+    """Path with its estimated errors: tip (mm), acceleration (relative)."""
 
     path: Path
     tip_mm: float
@@ -67,7 +67,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Problem:
-    """A scene in motion; `exudyn` is None where Exudyn is missing, and `missing` says so."""
+    """A scene in motion with its references. `exudyn` may be None; `missing` is the reason."""
 
     scene: Scene
     motion: Motion
@@ -77,7 +77,7 @@ class Problem:
 
     @property
     def apart(self) -> tuple[float, float] | None:
-        """Return the distance of the references from each other: tip (mm), acceleration (relative)."""
+        """Return the difference of the references: tip (mm), acceleration (relative)."""
         return None if self.exudyn is None else self.own.path.away(self.exudyn.path)
 
     def errors(self, path: Path) -> tuple[tuple[float, float], tuple[float, float] | None]:
@@ -91,7 +91,7 @@ def rms(vectors: Array) -> float:
 
 
 def pose(scene: Scene, motion: Motion, quick: bool) -> Problem:
-    """Compute the references. Quick ones take fewer elements and longer steps."""
+    """Return the problem with its references. If `quick`, they have fewer elements and longer steps."""
     rig, missing = load_rig()
     independent = None
     if rig is not None:
@@ -103,12 +103,12 @@ def pose(scene: Scene, motion: Motion, quick: bool) -> Problem:
 
 
 def every(step: float) -> int:
-    """Return the steps between the compared instants."""
+    """Return the number of steps between compared instants."""
     return round(ROW / step)
 
 
 def _own(scene: Scene, motion: Motion, quick: bool) -> Reference:
-    """Take many bending shapes and a fine step; estimate its error by fewer shapes and a step twice as long."""
+    """Return the reference of boom_twin. Its error is estimated by fewer modes and a doubled step."""
     coarse, fine = OWN_STEP if not quick else (1e-3, 5e-4)
     paths = []
     for modes, step in ((OWN_MODES[1], fine), (OWN_MODES[0], fine), (OWN_MODES[1], coarse)):
@@ -120,9 +120,9 @@ def _own(scene: Scene, motion: Motion, quick: bool) -> Reference:
 
 
 def _independent(rig: Any, scene: Scene, motion: Motion, quick: bool) -> Reference:
-    """Extrapolate Exudyn in elements and in steps, both of second order.
+    """Return the reference of Exudyn, extrapolated in elements and steps (both of second order).
 
-    What this adds is the error of the finer runs. A tenth of it is taken as what is left.
+    The extrapolation adds the error of the finer runs. A tenth of it is taken as the remaining error.
     """
     (few, many), (coarse, fine) = (ELEMENTS, EXUDYN_STEP) if not quick else ((8, 16), (2e-3, 1e-3))
     paths = {}
@@ -142,17 +142,17 @@ def _independent(rig: Any, scene: Scene, motion: Motion, quick: bool) -> Referen
 
 
 def at_rest(rig: Any, scene: Scene, strokes: Array, elements: int, lumped: bool) -> Any:
-    """Return Exudyn's boom at rest without shear, with beams that are exact at their nodes; see `rig.at_rest`."""
+    """Return Exudyn's boom at rest without shear, with nodally exact beams; see `rig.at_rest`."""
     return rig.at_rest(scene, strokes, elements, nodally_exact=True, lumped=lumped, shear_over_axial=SHEAR_OVER_AXIAL)
 
 
 def _extrapolated(coarse: Array, finer: Array, longer: Array) -> Array:
-    """Extrapolate by Richardson, twice: `finer` halves the step of `coarse`, `longer` doubles its elements."""
+    """Return the Richardson extrapolation: `finer` halves the step of `coarse`, `longer` doubles its elements."""
     return longer + (longer - coarse) / 3.0 + 4.0 * (finer - coarse) / 3.0
 
 
 def path_of(rows: dict[str, Array]) -> Path:
-    """Return the path in the columns of a simulation of Exudyn."""
+    """Return the path from the columns of an Exudyn simulation."""
     return Path(
         np.column_stack([rows["tip_x_m"], rows["tip_y_m"]]), np.column_stack([rows["tip_ax_m_s2"], rows["tip_ay_m_s2"]])
     )
