@@ -1,4 +1,4 @@
-"""Step a boom along a smooth drive by a chosen integration method, timed, for comparisons of methods."""
+"""Timed integration of a boom along a smooth drive by a chosen method, to compare methods."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Drive = Callable[[Array], tuple[Array, Array]]
 
 @dataclass(frozen=True)
 class Method:
-    """Method by which a step is made; UsageError if there is no such method.
+    """Integration method; UsageError if it is unknown.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Method:
     parameter : float
         rho of generalised-alpha, gamma of Newmark, theta of Wilson; Houbolt and Park have none.
     passes : int
-        Most Newton passes in a step; 1 is the papers' single linearised pass.
+        Largest number of Newton passes in a step; 1 is the papers' linearised pass.
     tolerance : float
         rad, see `kernels.transfer.time_step.advance`.
     product : str
@@ -68,13 +68,13 @@ class Method:
 
     @property
     def reach(self) -> float:
-        """Steps from the start of a step to the instant it solves for."""
+        """Time from the start of a step to the instant it solves for, in steps."""
         return self.parameter if self.integrator == "wilson" else 1.0
 
 
 @dataclass(frozen=True)
 class MethodRun:
-    """Rows of a motion. Rows after a failure are NaN.
+    """Motion in rows. Rows after a failure are NaN.
 
     Attributes
     ----------
@@ -90,11 +90,11 @@ class MethodRun:
         CPU time of the stepping alone, fastest of the repeats.
     steps : int
     passes : float
-        Newton passes per step, mean.
+        Mean Newton passes per step.
     status : str
         "ok", or why the motion ended.
     doubt : str
-        What the motion itself gives reason to doubt: too coarse a step, ringing; see `analysis.error_estimate`.
+        Warning of a coarse step or of ringing, see `analysis.error_estimate`; empty if none.
     """
 
     times: Array
@@ -121,28 +121,28 @@ def integrate_with(
     angles: Array | None = None,
     repeats: int = 1,
 ) -> MethodRun:
-    """Start at rest in the equilibrium of the drive at t = 0 and follow it in equal steps.
+    """Integrate a drive in equal steps, from static equilibrium at t = 0.
 
     Parameters
     ----------
     duration, step : float
         s; a row after every `every` steps.
     angles : ndarray, shape (n,), optional
-        Joint angles (rad) next to which the equilibrium is looked for.
+        Joint angles (rad) near the equilibrium.
     repeats : int
-        How often the motion is stepped, for the time.
+        Number of runs; the fastest gives the time.
 
     Returns
     -------
     MethodRun
-        Rows of the motion, the status of its steps, and the time that they took.
+        Motion, status and CPU time.
 
     Raises
     ------
     UsageError
-        Duration is not a multiple of `every` steps; the plain product for a scene with clearance, which it does not know.
+        Duration is no multiple of `every` steps, or the scene has clearance and the product is plain.
     SolverError
-        No equilibrium at t = 0. A step that fails is a status, not an error.
+        No equilibrium at t = 0. A failed step sets `status`.
     """
     method, rows = method or Method(), _row_count(duration, step, every)
     plan = compile_scene(scene, basis)
@@ -172,7 +172,7 @@ def integrate_with(
 
 
 def _row_count(duration: float, step: float, every: int) -> int:
-    """Rows of a motion after its first."""
+    """Return the number of rows after the first."""
     rows = round(duration / (step * every))
     if rows < 1 or abs(rows * step * every - duration) > 1e-6 * step:
         raise UsageError(f"duration = {duration:g} s: not a multiple of {every} steps of {step:g} s. Choose one that is.")
@@ -180,7 +180,7 @@ def _row_count(duration: float, step: float, every: int) -> int:
 
 
 class _Run(NamedTuple):
-    """Rows, what `kernels.transfer.time_step.run` returns, and the CPU time, s."""
+    """Rows, results of `kernels.transfer.time_step.run`, and CPU time (s)."""
 
     out: Array
     status: int
@@ -194,7 +194,7 @@ class _Run(NamedTuple):
 def _stepped(
     plan: Plan, start: State, work: Work, method: Method, step: float, every: int, strokes: Array, rates: Array
 ) -> _Run:
-    """Step a copy of `start` along its strokes (m) and their rates (m/s), shape (steps, n)."""
+    """Integrate a copy of `start` along strokes (m) and rates (m/s), shape (steps, n)."""
     rows, state = len(strokes) // every, State(*(array.copy() for array in start))
     out = np.full((rows + 1, width_of(plan)), np.nan)
     out[0] = first_row(plan, state)

@@ -18,26 +18,26 @@ from .session_file import CDR
 from .session_model import mapping_of
 
 SKEW = 0.05
-"""Clock difference of two streams that is reported, s. A boom moves by centimetres in that time."""
+"""Threshold (s) for a reported clock difference. A boom moves by centimetres in that time."""
 
 JOINT_STATES = tuple(stream for stream, kind in SENSORS.items() if not kind.is_imu)
 
 
 def names_missing(info: BagInfo, topics: Topics, joints: int) -> list[str]:
-    """Return a sentence for each channel of a scene with `joints` joints whose name is missing from some or all messages."""
+    """Return a sentence for each channel (of `joints` joints) that is missing from some or all messages."""
     found: list[str] = []
     for stream, tally in _joint_states(info, topics):
         own = [name for name in _names(topics, stream, joints) if name not in topics.absent]
         its = {names: count for names, count in tally.names.items() if not topics.is_shared or set(own) & set(names)}
         has = {name: sum(count for names, count in its.items() if name in names) for name in own}
-        most = max(has.values(), default=0) or sum(its.values())  # messages, or cycles where each name has one of its own
+        most = max(has.values(), default=0) or sum(its.values())  # messages, or cycles of separate messages
         lacking = [(name, most - count) for name, count in has.items() if count < most]
         found += [f"{name} is not in {count} of {most} messages of {tally.name}" for name, count in lacking]
     return found
 
 
 def names_extra(info: BagInfo, topics: Topics, joints: int) -> list[str]:
-    """Return a sentence for each name in the messages that a replay with `joints` joints does not use."""
+    """Return a sentence for each name in the messages that a replay does not use."""
     used: dict[str, set[str]] = {}
     for stream, tally in _joint_states(info, topics):
         used.setdefault(tally.name, set()).update(_names(topics, stream, joints))
@@ -50,7 +50,7 @@ def names_extra(info: BagInfo, topics: Topics, joints: int) -> list[str]:
 
 
 def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list[str]:
-    """Return a sentence for each thing that a replay needs and the session lacks, the worst first.
+    """Return a sentence for each input of a replay that the session lacks, the worst first.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
     joints : int
         Number of joints of the scene.
     scene : str
-        Source of the scene, for the sentences.
+        Source of the scene, named in the sentences.
     """
     names = {stream: [name for names in tally.names for name in names] for stream, tally in _joint_states(info, topics)}
     found = list(other_names(topics, names, joints, scene))
@@ -83,7 +83,7 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
 
 
 def remarks(info: BagInfo, topics: Topics) -> list[str]:
-    """Return a sentence for each remark on checksums, origin, clocks and messages that are not read."""
+    """Return remarks on checksums, origin, clocks and messages that are not read."""
     found: list[str] = []
     if not info.session.checked:
         found.append("No checksums: a flipped bit cannot be noticed. Record with `boom_twin record`.")
@@ -111,7 +111,7 @@ def remarks(info: BagInfo, topics: Topics) -> list[str]:
 
 
 def _passed_over(session: Session, topic: Topic) -> Iterator[str]:
-    """Yield a sentence for each channel of a topic whose messages have another type or encoding than the one that is read."""
+    """Yield a sentence for each channel of the topic with an unread message type or encoding."""
     for file in session.files:
         for channel in file.channels.values():
             kind, encoding = file.type_of(channel), channel.message_encoding
@@ -159,14 +159,12 @@ class Publishable:
 
 
 def publishable(session: Session, names: Sequence[str] | None = None) -> list[Publishable]:
-    """Return the topics with these names; without names, the session's inputs that have messages.
-
-    The strokes are always among the inputs.
+    """Return the topics with these names; without names, strokes and all inputs with messages.
 
     Raises
     ------
     BagError
-        One of them is not there, empty, or an input of another type.
+        A topic is missing, is empty, or is an input of another type.
     """
     topics = mapping_of(session.path).topics
     if names is None:
@@ -178,7 +176,7 @@ def publishable(session: Session, names: Sequence[str] | None = None) -> list[Pu
 
 
 def _inputs(session: Session, topics: Topics) -> dict[str, TopicInfo]:
-    """Return the input topics by their names in the mapping. A relative name can be put into a namespace."""
+    """Return the input topics by their names in the mapping, which may be relative to a namespace."""
     found: dict[str, TopicInfo] = {}
     for stream, topic in topics.inputs.items():
         info = session.find(topic.name)
@@ -188,7 +186,7 @@ def _inputs(session: Session, topics: Topics) -> dict[str, TopicInfo]:
 
 
 def _type(session: Session, name: str) -> str:
-    """Return the type of a topic; empty for a missing topic, for which `check_topic` raises the error."""
+    """Return the type of a topic; empty if it is missing (`check_topic` raises the error)."""
     info = session.find(name)
     if info is not None and info.type.count("/") != 2:
         raise BagError(f"{session.path}: topic {info.name} has type {info.type!r}: no message of ROS 2. Leave it out.")
@@ -196,7 +194,7 @@ def _type(session: Session, name: str) -> str:
 
 
 def _qos(session: Session, topic: TopicInfo, topics: Topics) -> Qos:
-    """Return the strongest QoS that the metadata, else the channels, offer; without an offer, that of the mapping."""
+    """Return the strongest QoS offered in the metadata, or else in the channels; by default the mapping's."""
     offered = [qos for value in _values(session, topic.name) for qos in profiles(value)]
     if not offered:
         known = (each for each in topics.inputs.values() if each.absolute == topic.name)

@@ -1,4 +1,4 @@
-"""Inspect a session: counts, rates, gaps, clocks and names of every topic, and how it was stored."""
+"""Inspection of a session: counts, rates, gaps, clocks and names of every topic, and storage."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from .session_file import CDR, SessionFile, as_bag_error, schema_of
 from .time_window import WHOLE, TimeWindow
 
 VARIANTS = 100
-"""Limit for the number of different lists of names that are counted in one topic."""
+"""Largest number of different name lists counted in one topic."""
 
 
 @dataclass(slots=True)
 class Tally:
     """Statistics of one topic.
 
-    Steps are between stamps if the messages begin with a header, else between log times. A stamp of 0 is left out.
+    Steps are between stamps; without a header, between log times. A stamp of 0 is left out.
 
     Attributes
     ----------
     name, type : str
     stamped, named : bool
-        True if its messages begin with a header, and if they are joint states.
+        True for messages with a header; True for joint states.
     count : int
     first, last : int
         Log times, ns.
     gap, gap_after : int
-        Largest step between two stamps, ns, and log time of the message before it.
+        Largest step between two stamps; log time of the message before it; ns.
     not_increasing : int
         Number of messages whose stamp is not after that of the message before.
     unset : int
@@ -104,7 +104,7 @@ class Tally:
         self.skewed += 1
 
     def _read_names(self, data: bytes) -> None:
-        """Count the joint names of a message. Bytes equal to those of the message before are not read again."""
+        """Count the joint names of a message. Unchanged bytes are not decoded again."""
         if self._known is None or not data.startswith(self._known[0], 12):
             try:
                 names, end = names_in(data)
@@ -148,7 +148,7 @@ class BagInfo:
 
     @property
     def span(self) -> tuple[int, int]:
-        """Log times (ns) of the first and the last message in the window; twice its beginning if it has no message."""
+        """Log times (ns) of the first and last message in the window; its beginning for both if empty."""
         if self.window == WHOLE:
             return self.session.start, self.session.end
         seen = [tally for tally in self.tallies if tally.count]
@@ -162,7 +162,7 @@ class BagInfo:
         return None if origin is None else "synthetic" in origin.lower()
 
     def tally(self, name: str) -> Tally | None:
-        """Return the tally of a topic, whose name may lack its leading slash."""
+        """Return the tally of a topic; the leading slash is optional."""
         return next((each for each in self.tallies if each.name.lstrip("/") == name.lstrip("/")), None)
 
 
@@ -186,7 +186,7 @@ def inspect(path: Path, window: TimeWindow = WHOLE) -> BagInfo:
 
 
 def _count(file: SessionFile, tallies: dict[str, Tally], bounds: tuple[int, int]) -> None:
-    """Add the messages of one file within the `bounds` of log time to the tallies, and check the counts of the whole file."""
+    """Count the messages of a file within the `bounds` of log time; check the counts of the whole file."""
     own = {key: tallies[channel.topic] for key, channel in file.channels.items()}
     passed_over = set()
     for key, channel in file.channels.items():

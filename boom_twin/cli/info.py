@@ -1,4 +1,4 @@
-"""``boom_twin info``: what a recorded session holds, and what it lacks for a replay."""
+"""``boom_twin info``: content of a recorded session, and data missing for a replay."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Read the session once and print what it holds."""
+    """Read the session once and print its content."""
     from ..bag.inspect import inspect
     from ..bag.session_model import mapping_of, strokes_of
 
@@ -39,7 +39,7 @@ def run(args: Namespace) -> int:
 
 
 def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: SessionStrokes) -> dict[str, Any]:
-    """Return all that is known of a session; lists have one entry for each of ``topics``."""
+    """Return the facts of a session. Lists of figures have an entry for each of ``topics``."""
     from ..bag.advice import missing, names_extra, names_missing, remarks
 
     session, metadata, tallies = info.session, info.session.metadata, info.tallies
@@ -100,7 +100,7 @@ def _skew(tally: Tally, which: int) -> float | None:
 
 
 def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[str]:
-    """Return the lines of text for `values` of `as_json`. A line break in a name or note makes no line of its own."""
+    """Return the lines of text for `values` of `as_json`. Line breaks in names and notes are escaped."""
     made = {True: "synthetic", False: "not said to be synthetic", None: "not noted"}[values["synthetic"]]
     files = f"{len(values['files'])} {'file' if len(values['files']) == 1 else 'files'}"
     distro = values["distro"] or "distribution not noted"

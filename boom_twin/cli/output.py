@@ -1,4 +1,4 @@
-"""Scenes and sessions that commands open, and what they print: results on stdout, news and warnings on stderr."""
+"""Input and output of commands: scenes and sessions; results on stdout, notes and warnings on stderr."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def tell(text: str) -> None:
-    """Print a line on stderr; ``--quiet`` leaves it out unless it is a warning."""
+    """Print a line on stderr. ``--quiet`` keeps only warnings."""
     print(text, file=sys.stderr, flush=True)
 
 
@@ -29,17 +29,17 @@ def warn(text: str) -> None:
 
 
 KEPT = ("warning", "boom_twin ", "usage:", "open ")
-"""How lines begin that ``--quiet`` leaves; the last one is the address of the live page."""
+"""Prefixes of lines that ``--quiet`` keeps; the last one is the live page's address."""
 
 
 class QuietStream(TextIOBase):
-    """Text stream that passes on to `stream` only lines that begin with one of `KEPT`."""
+    """Text stream that passes only lines with a beginning in `KEPT` on to `stream`."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream, self._begun = stream, ""
 
     def write(self, text: str) -> int:
-        """Take text in; a line is passed on when it is complete."""
+        """Buffer text and pass on complete lines."""
         *lines, self._begun = (self._begun + text).replace("\r", "\n").split("\n")
         for line in lines:
             if line.startswith(KEPT):
@@ -47,12 +47,12 @@ class QuietStream(TextIOBase):
         return len(text)
 
     def flush(self) -> None:
-        """Pass on what was written so far, as far as it is complete."""
+        """Flush the complete lines."""
         self._stream.flush()
 
 
 def open_scene(source: str | None) -> Scene:
-    """Return the scene of an argument; its warnings go to stderr, one line each."""
+    """Return the scene of an argument; print its warnings on stderr."""
     from ..scene.load import examine
 
     scene, oddities = examine(source)
@@ -63,7 +63,7 @@ def open_scene(source: str | None) -> Scene:
 
 
 def open_session_scene(session: str | Path, source: str | None) -> SessionScene:
-    """Return the scene of a session, see `boom_twin.bag.session_model.scene_of`; its source and warnings go to stderr."""
+    """Return the scene of a session, see `boom_twin.bag.session_model.scene_of`; print source and warnings on stderr."""
     from ..bag.session_model import scene_of
 
     found = scene_of(Path(session), source)
@@ -73,7 +73,7 @@ def open_session_scene(session: str | Path, source: str | None) -> SessionScene:
 
 
 def open_session_settings(session: str | Path, params: Path | None, namespace: str = "") -> Settings:
-    """Return the settings of a session's twin, see `boom_twin.bag.session_model.settings_of`; unusual ones go to stderr."""
+    """Return the settings of a session's twin, see `boom_twin.bag.session_model.settings_of`; print unusual ones on stderr."""
     from ..bag.session_model import settings_of
 
     found = settings_of(Path(session), params, namespace)
@@ -83,7 +83,7 @@ def open_session_settings(session: str | Path, params: Path | None, namespace: s
 
 
 def tell_oddities(oddities: Iterable[Fault], source: str | None) -> None:
-    """Print warnings and notes on stderr, with the file that they are about."""
+    """Print warnings and notes with their file on stderr."""
     for oddity in oddities:
         tell(f"{oddity.kind}: {source}: {oddity}")
 
@@ -98,17 +98,17 @@ def warn_incomplete(session: Session) -> None:
     for told in clocks_set_back(session):
         warn(told)
     if missed := missed_messages(session.path):
-        told = ", ".join(f"{count} of {topic}" for topic, count in missed.items()) + "; a node that got them told otherwise"
+        told = ", ".join(f"{count} of {topic}" for topic, count in missed.items()) + ". A node that got them had other results"
         warn(f"{session.path}: never reached the recorder: {told}")
 
 
 def print_result(is_json: bool, values: Mapping[str, Any], lines: Iterable[str]) -> None:
-    """Print a result: `values` as one flat JSON object, in which a number that is not finite is null, or `lines` for people."""
+    """Print `values` as one flat JSON object (null for numbers that are not finite), or `lines` for people."""
     print(json.dumps(plain_values(values), allow_nan=False) if is_json else "\n".join(lines))
 
 
 def plain_values(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values as JSON has them; a number that is not finite becomes None."""
+    """Return JSON values; None for numbers that are not finite."""
     return {key: _plain(value) for key, value in values.items()}
 
 
@@ -125,7 +125,7 @@ def _plain(value: Any) -> Any:
 
 
 def columns(rows: Sequence[Sequence[str]], left: Iterable[int] = (0,)) -> list[str]:
-    """Return rows of aligned cells as lines. Columns of the numbers `left` are aligned to the left, the others to the right."""
+    """Return rows of cells as aligned lines: columns with index in `left` to the left, others to the right."""
     widths, at_left = [max(map(len, cells)) for cells in zip(*rows, strict=True)], frozenset(left)
     return [
         "  ".join(

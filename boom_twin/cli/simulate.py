@@ -1,4 +1,4 @@
-"""``boom_twin simulate``: the boom's answer to a history of drives or of cylinder lengths."""
+"""``boom_twin simulate``: response of the boom to drives or cylinder lengths."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
     Balances = tuple[EnergyBalance, MomentumBalance]
 
-FAR = 1e-3  # m, most that the first row may be away from the posture's strokes
-FASTEST = 0.5  # m/s; cylinders of booms go at less than 0.3
-SPARSE = 1.0  # s from row to row
+FAR = 1e-3  # m, largest deviation of the first row from the posture's strokes
+FASTEST = 0.5  # m/s, speed above which a warning comes; booms stay below 0.3
+SPARSE = 1.0  # s between rows, above which a warning comes
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -119,7 +119,7 @@ def _check_targets(targets: dict[str, str | None]) -> None:
     seen: dict[Path, str] = {}
     for option, target in targets.items():
         if target and seen.setdefault(Path(target).resolve(), option) != option:
-            raise UsageError(f"{option} {target}: is what {seen[Path(target).resolve()]} writes. Give it a file of its own.")
+            raise UsageError(f"{option} {target}: {seen[Path(target).resolve()]} writes this file too. Give it another file.")
 
 
 def _check_sampling(args: Namespace) -> None:
@@ -187,7 +187,7 @@ def _start(args: Namespace, scene: Scene, first: Array, angles: Array | None) ->
 
 
 def as_json(result: Simulation, out: str, balances: Balances | None) -> dict[str, object]:
-    """Return the figures of a simulation; with the balances of energy and momentum, if given."""
+    """Return the figures of a simulation, and the balances if given."""
     x, y = result.tip[:, 0], result.tip[:, 1]
     figures: dict[str, object] = {
         "out": out,
@@ -241,21 +241,21 @@ def _draw_orbits(args: Namespace, scene: Scene, result: Simulation) -> None:
 
 
 def _is_earlier(start: bytes) -> bool:
-    """Return True if a file with this beginning holds results of a boom, and is no drive and no session."""
+    """Return True if a file with this beginning holds simulation results, not a drive or session."""
     names = start.partition(b"\n")[0].decode(errors="replace").split(",")
     is_replay = any(name.startswith("measured_") for name in names)
     return names[0] == "t_s" and not is_replay and any(name.startswith("tip_x_m") for name in names)
 
 
 def read_history(path: Path, n: int, stems: Sequence[str]) -> tuple[Array, Array, str]:
-    """Return times (m,) in s, strokes or lengths (m, n) in m of a CSV file, and the stem of their columns: ``stroke_1_m``, .. .
+    """Return times (m,) in s, strokes or lengths (m, n) in m, and their column stem (``stroke``) from a CSV file.
 
-    The first of `stems` that the header has is taken.
+    The stem is the first of `stems` in the header.
 
     Raises
     ------
     UsageError
-        The file cannot be read, has another header, no rows, or a value that is not a number; says where.
+        The file cannot be read, has another header, no rows, or a value that is no number.
     """
     table = read_csv(path, UsageError)
     stem = next((stem for stem in stems if f"{stem}_1_m" in table.names), stems[0])
@@ -265,7 +265,7 @@ def read_history(path: Path, n: int, stems: Sequence[str]) -> tuple[Array, Array
 
 
 def odd_in_drive(times: Array, strokes: Array, stem: str = "stroke") -> list[str]:
-    """Return warnings of a drive that was probably meant otherwise, with place and remedy: times in ms, strokes that jump."""
+    """Return warnings, with place and remedy, of probable input errors: times in ms, strokes that jump."""
     steps, found = np.diff(times), []
     if not len(steps) or not (steps > 0.0).all():
         return []  # `simulate` refuses it
@@ -285,7 +285,7 @@ def odd_in_drive(times: Array, strokes: Array, stem: str = "stroke") -> list[str
 
 
 def _angles_near(scene: Scene, posture: str, first: Array, are_lengths: bool) -> Array:
-    """Return the joint angles of the posture; UsageError unless the first row has its drives."""
+    """Return the posture's joint angles; UsageError unless the first row matches its drives."""
     from ..analysis.equilibrium import drives_at_rest
     from ..scene.kinematics import posture_angles, strokes_of_posture
 

@@ -1,7 +1,7 @@
 """Small arrays on the stack of a kernel.
 
-The compiler knows that nothing else points there, so that it keeps the numbers in registers and works on several at once;
-behind an array that came from Python it must expect every other one, and loads anew after each number that is written.
+The compiler knows that such arrays have no alias. So it keeps their values in registers and vectorises.
+Arrays that come from Python may overlap, so each write forces the compiler to reload values.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numba.np.arrayobj import make_array, populate_array
 
 
 def type_of_maker(shape: tuple[int, ...]) -> Any:
-    """numba's type of a function that makes an array of `shape` and of the numbers of its argument; see `jit.StackArray`."""
+    """Return numba's type of a function that makes an array of `shape` with its argument's dtype; see `jit.StackArray`."""
     size = 1
     for length in shape:
         size *= length

@@ -15,13 +15,13 @@ from ..system.child_process import python_command
 from .data.feed import Feed
 
 RECORDER_TIMEOUT = 2 * PATIENCE
-"""Seconds that a recorder may take to end: longer than it waits for its disk, or a slow disk would cost messages."""
+"""Timeout (s) for the end of a recorder: longer than its wait for a slow disk, so that no messages are lost."""
 
 
 class RecorderProcess:
     """Recorder in a child process, at most one at a time.
 
-    Every recording gets a directory in `folder`, named by its time (UTC); `options` are further arguments of
+    Every recording gets a directory in `folder`, named by its time (UTC). `options` are more arguments of
     ``boom_twin record``.
     """
 
@@ -36,7 +36,7 @@ class RecorderProcess:
         return self._process is not None and self._process.poll() is None
 
     def start(self) -> str:
-        """Start a recorder unless one is running; return what was done, in words."""
+        """Start a recorder unless one is running; return a sentence for the viewer."""
         if self.is_running:
             ending = "the recording before this one is still being completed: start again when it has ended"
             return ending if self._is_stopped else "recording already"
@@ -47,7 +47,7 @@ class RecorderProcess:
         return f"recording into {out}"
 
     def stop(self) -> str:
-        """Ask the recorder to stop, without waiting for its end; return what was done, in words."""
+        """Signal the recorder to stop, without waiting; return a sentence for the viewer."""
         if not self.is_running or self._process is None:
             return "not recording"
         self._process.send_signal(signal.SIGINT)
@@ -65,16 +65,16 @@ class RecorderProcess:
 
 
 NOTE_LENGTH = 500
-"""Characters of a note."""
+"""Largest number of characters of a note."""
 NO_TEXT = ("Cc", "Cs")
-"""Unicode's categories of control characters, and of halves of characters, which cannot be published."""
+"""Unicode categories that cannot be published: control characters and surrogates."""
 ACTS = ("mark", "acknowledge", "record")
 AT_NODE = "acknowledge-at-node"
-"""Permits ``acknowledge``, which then makes the node release alarms that have ended, too."""
+"""Permission for ``acknowledge`` that also releases ended alarms at the node."""
 
 
 class ViewerActions:
-    """Actions of the page's viewers, limited to those of `ACTS` and `AT_NODE` that were permitted at start."""
+    """Actions of viewers of the page: those of `ACTS` and `AT_NODE` permitted at start."""
 
     def __init__(self, feed: Feed, permitted: frozenset[str], recording: RecorderProcess | None = None) -> None:
         self._feed, self._recording = feed, recording
@@ -99,7 +99,7 @@ class ViewerActions:
         return self._recording is not None and self._recording.is_running
 
     def act(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Carry out a request and return the answer to the page; raise ValueError if it is none of `ACTS`."""
+        """Carry out a request and return the answer to the page; ValueError if it is unknown."""
         name = request.get("do")
         if name not in self._acts:
             raise ValueError("unknown request")

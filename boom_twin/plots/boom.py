@@ -51,7 +51,7 @@ def draw_link(axes: Axes, points: list[Array], colour: str = BLUE, width: float 
 
 
 def draw_cylinder(axes: Axes, barrel_pin: Array, rod_pin: Array, closed_length: float, width: float) -> None:
-    """Draw the barrel from its pin, nine tenths of `closed_length` long, and the rod out of it; `width` of the barrel in m."""
+    """Draw barrel (0.9 `closed_length` long, `width` in m) and rod between two pins."""
     along = (rod_pin - barrel_pin) / np.hypot(*(rod_pin - barrel_pin))
     end = barrel_pin + 0.9 * closed_length * along
     _box(axes, barrel_pin, end, width, BARREL, 6.0)
@@ -59,7 +59,7 @@ def draw_cylinder(axes: Axes, barrel_pin: Array, rod_pin: Array, closed_length: 
 
 
 def draw_section(axes: Axes, corners: list[tuple[Array, Array, bool]], depth: float, alpha: float = 1.0) -> None:
-    """Draw parts of a section from point to point (m); flexible ones light, rigid ones dark. `depth` in m."""
+    """Draw the parts of a section (m), `depth` (m) high. Flexible parts are light, rigid ones dark."""
     for start, stop, flexible in corners:
         if np.hypot(*(stop - start)) > 1e-9:
             _box(axes, start, stop, depth, STEEL if flexible else RIGID, 2.0, alpha)
@@ -78,7 +78,7 @@ TIMES = "\N{MULTIPLICATION SIGN}"
 
 
 def boom_picture(scene: Scene, equilibrium: Equilibrium, path: Path, title: str = "Boom at rest", note: str = "") -> Path:
-    """Draw a boom as `statics` found it into a PNG file; `note` is small print. Returns `path`."""
+    """Draw a boom in equilibrium into a PNG file, with `note` in small print; return `path`."""
     angles = joint_angles_of_strokes(scene, equilibrium.strokes, near=equilibrium.joints)
     bones, straight = skeleton(scene, angles), UndeflectedBoom(scene, compile_scene(scene)).at(angles)
     with picture(path, title, note) as figure:
@@ -120,7 +120,7 @@ def named_pins(joint: JointPins) -> dict[str, Array]:
 
 
 def section_parts(scene: Scene, bones: Skeleton, i: int) -> list[tuple[Array, Array, bool]]:
-    """Return root, beam and head of section `i` (0-based) from point to point, and whether they bend."""
+    """Return root, beam and head of section `i` (0-based): start, end, True if flexible."""
     section = scene.sections[i]
     if section.beam is None:
         return [(bones.pivots[i], bones.pivots[i + 1], False)]
@@ -166,7 +166,7 @@ def _detail(axes: Axes, scene: Scene, bones: Skeleton) -> None:
 
 
 def _numbers(side: Axes, equilibrium: Equilibrium) -> None:
-    """Draw two small tables: per cylinder, and natural frequencies."""
+    """Draw tables of the cylinders and of the natural frequencies."""
     side.axis("off")
     sag = 1e3 * (equilibrium.tip - equilibrium.tip_rigid)
     lines = [f"tip deflection   x {sag[0]:+.0f} mm", f"                 y {sag[1]:+.0f} mm", ""]

@@ -1,4 +1,4 @@
-"""``report.html``: one file that says what a session showed, to read or to print."""
+"""Writer of ``report.html``: the report of a session in one file."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ASSUMED = f"Heights are not in the scene: assumed are {BOX:g} radii of gyration,
 
 
 def write_report(found: Evaluation, folder: Path) -> Path:
-    """Write the report into `folder`, where the pictures of the replay are; returns its path."""
+    """Write the report into `folder` beside the pictures of the replay; return its path."""
     parts = [
         *_head(found),
         *_alarms(found, folder),
@@ -127,7 +127,7 @@ def _alarms(found: Evaluation, folder: Path) -> list[str]:
 
 
 def _alarm(alarm: Alarm, first: int) -> str:
-    """Return an alarm as HTML: words, times, and the causes with their estimates."""
+    """Return an alarm as HTML: text, times, causes with estimates."""
     start = max(0.0, (alarm.since - first) * NANO)
     end = "lasts to the end" if alarm.until is None else f"to {(alarm.until - first) * NANO:.2f} s"
     rows = [
@@ -179,7 +179,7 @@ def _vibration(found: Evaluation, folder: Path) -> list[str]:
 
 
 def _measured(each: Vibration, model: float) -> tuple[str, str, str]:
-    """Return frequency, its deviation from the model's, and damping, with their standard deviations."""
+    """Return frequency, deviation from the model, and damping, each with standard deviation."""
     apart, sigma = 100.0 * (each.frequency / model - 1.0), 100.0 * each.frequency_sigma / model
     return (
         f"{each.frequency:.4f} ± {each.frequency_sigma:.1g}",
@@ -247,7 +247,7 @@ def _fatigue(found: Evaluation) -> list[str]:
     return [heading("Fatigue", 3), paragraph(told, "note"), table(head, rows)]
 
 
-# -- what else --------------------------------------------------------------------------------------------------------
+# -- events and origin --------------------------------------------------------------------------------------------------------
 
 
 def _events(found: Evaluation) -> list[str]:

@@ -16,7 +16,7 @@ from ..errors import UsageError
 from ..system.child_process import python_command
 
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals that end a process. SIGHUP comes when its terminal is closed, and is ignored under ``nohup``."""
+"""Signals that end a process. A closed terminal sends SIGHUP; ``nohup`` ignores it."""
 
 
 def stop_signals() -> tuple[signal.Signals, ...]:
@@ -37,15 +37,15 @@ def on_stop_signal(act: Callable[[], None]) -> None:
 
 
 class InterruptedWorkError(KeyboardInterrupt):
-    """Interruption of a piece of work that took too long to end by itself.
+    """Interruption of work that took too long to end by itself.
 
-    A class of its own: a KeyboardInterrupt proper that passes through ``exec`` of a text, as dataclasses are made by, lets
-    Python end the process as killed by SIGINT even where it was caught.
+    It is a subclass because a plain KeyboardInterrupt inside ``exec`` (dataclasses use it) ends the process as killed by
+    SIGINT, even if it is caught.
     """
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    sys.unraisablehook = _nothing  # a finaliser of what was being made just now would tell of what it lacks
+    sys.unraisablehook = _nothing  # finalisers of half-made objects would print errors
     raise InterruptedWorkError
 
 
@@ -54,28 +54,28 @@ def _nothing(unraisable: object) -> None:
 
 
 class StopSignal:
-    """Stop by one of `STOPS`: seen between two pieces of work, or KeyboardInterrupt if one takes too long.
+    """Stop request by one of `STOPS`: checked between callbacks; KeyboardInterrupt if a callback takes too long.
 
-    An exception in the midst of a callback is reported by rclpy as a fault of the callback. Python handles a signal between two
-    of its instructions, and compiling has some that take seconds: a thread, which runs meanwhile, ends a process that goes on.
-    So this is for one that holds nothing which could be lost.
+    rclpy reports an exception inside a callback as a fault of the callback. Python handles signals only between its
+    instructions, and one instruction of the compiler may take seconds. So a thread ends a process that does not stop.
+    Use this only in a process without unsaved data.
 
     Attributes
     ----------
     asked : bool
-        Whether a signal came.
+        True after a signal.
     """
 
     LONGEST = 0.5
-    """Time (s) for a piece of work to come to its end."""
+    """Time (s) allowed to a callback before it is interrupted."""
     LAST = 1.7
-    """Time (s) after which the process is ended, if it has not come to its end by itself."""
+    """Time (s) after which the thread ends the process."""
 
     def __init__(self) -> None:
         self.asked = False
         reading, writing = os.pipe()
         os.set_blocking(writing, False)
-        signal.set_wakeup_fd(writing, warn_on_full_buffer=False)  # written to as soon as a signal comes, whatever Python does
+        signal.set_wakeup_fd(writing, warn_on_full_buffer=False)  # written at once, even within one instruction
         threading.Thread(target=self._end, args=(reading,), daemon=True).start()
         on_stop_signal(self._ask)
 
@@ -97,9 +97,9 @@ class StopSignal:
 
 
 def require_rclpy() -> None:
-    """Raise UsageError, with the remedy, where rclpy is not installed, or has not the middleware that is asked for.
+    """Raise UsageError with the remedy if rclpy or the requested middleware is not installed.
 
-    A middleware that is not there ends the process that imports rclpy, so another one tries that.
+    Importing rclpy without its middleware ends the process. So a child process tries it.
     """
     if find_spec("rclpy") is None:
         raise UsageError(

@@ -127,7 +127,7 @@ def test_the_command_starts_undeflected_saves_and_goes_on(tmp_path, capsys):
     common = ["simulate", "--posture", "horizontal", "--drive", str(drive), "--no-error-estimate"]
     begun = [*common, "--out", str(tmp_path / "a.csv"), "--start", "undeflected", "--joint-rates", "0,0,0,0.1"]
     assert main([*begun, "--save-state", str(tmp_path / "." / "a.csv")]) == 1
-    assert "is what --out writes" in capsys.readouterr().err and not (tmp_path / "a.csv").exists()
+    assert "--out writes this file too" in capsys.readouterr().err and not (tmp_path / "a.csv").exists()
     assert main([*begun, "--save-state", str(end), "--check"]) == 0
     assert "The balance is open by" in capsys.readouterr().out
     far = table[:, 1:] + np.array([0.02, 0.0, 0.0, 0.0])  # of no posture's strokes, as where a move was interrupted

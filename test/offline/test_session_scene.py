@@ -336,7 +336,7 @@ def test_what_never_reached_the_recorder_is_told(four, tmp_path, capsys):
     counts = [{"topic": "/cylinder_strokes", "received": 8, "written": 8, "missed": 3}, {"topic": "/tip_imu", "missed": None}]
     SessionSheet("0").write(session, counts)
     warn_incomplete(scan(session))
-    assert "never reached the recorder: 3 of /cylinder_strokes;" in capsys.readouterr().err
+    assert "never reached the recorder: 3 of /cylinder_strokes." in capsys.readouterr().err
 
 
 def test_the_bundled_session_keeps_the_default_scene():

@@ -14,19 +14,19 @@ from .received_messages import MalformedError
 from .status import AlarmList, Severity, StatusTable
 
 FIRST_ROOM = 1024
-"""Rows that there is room for at first."""
+"""Initial capacity of a table, rows."""
 Rows = tuple[NDArray[np.float64], NDArray[np.float32]]
 
 
 class Table:
-    """Named columns (``x_m``) and a time for every row; of more than `capacity` rows the oldest make room for new ones.
+    """Ring buffer of rows: named columns (``x_m``) and a time. Beyond `capacity` the oldest rows are dropped.
 
-    Memory is taken as rows come.
+    Memory grows with the rows.
     """
 
     def __init__(self, name: str, columns: Sequence[str], capacity: int) -> None:
         self.name, self.columns, self._capacity = name, tuple(columns), capacity
-        self.count = 0  # rows that ever came; they are numbered from 0 on
+        self.count = 0  # rows ever added; row numbers begin at 0
         self._times = np.zeros(min(capacity, FIRST_ROOM))
         self._values = np.zeros((len(self._times), len(columns)), dtype=np.float32)
 
@@ -37,7 +37,7 @@ class Table:
 
     @property
     def newest(self) -> float:
-        """Time of the newest row, s; minus infinity without one."""
+        """Time of the newest row, s; minus infinity if empty."""
         return float(self._times[(self.count - 1) % len(self._times)]) if self.count else -np.inf
 
     def append(self, time: float, values: Sequence[float]) -> None:
@@ -54,33 +54,33 @@ class Table:
         self._values = np.pad(self._values, ((0, more), (0, 0)))
 
     def until(self, time: float) -> int:
-        """Return the number of the first row after `time` (s). The rows are in order."""
+        """Return the number of the first row after `time` (s). Rows are sorted."""
         size = len(self._times)
         return bisect_right(range(self.first, self.count), time, key=lambda row: self._times[row % size]) + self.first
 
     def rows(self, first: int, end: int) -> Rows:
-        """Return times (k,) and values (k, columns) of the kept rows with numbers from `first` up to before `end`."""
+        """Return times (k,) and values (k, columns) of the kept rows `first` .. `end` - 1."""
         places = np.arange(max(first, self.first), min(end, self.count)) % len(self._times)
         return self._times[places], self._values[places]
 
 
 MAX_STATUSES = 100_000
-"""Earlier states of the lamps that are kept: a day of them."""
+"""Largest number of kept states of the lamps, about a day."""
 SET_BACK = 1_000_000_000
-"""A stamp earlier by more than this (ns) may be that of a clock that was set back; by less it is out of order."""
+"""Threshold (ns) of a backward jump: beyond it the clock may have been set back, else the stamp is out of order."""
 LEAP_AHEAD = 60_000_000_000
-"""A stamp later by more than this (ns) may be an outlier; no table has its rows so far apart."""
+"""Threshold (ns) of a forward jump that may be an outlier. Rows of a table are closer together."""
 EVERY_STROKE, GAP = "displacement", 0.1
-"""Table with a row for every stroke sample; a longer pause (s) between its rows raises an alarm."""
+"""Table with a row for every stroke sample; pause (s) between its rows that raises an alarm."""
 
 
 class Store:
-    """Data of a feed: tables of at most `capacity` rows, states of the lamps (earlier ones too, for a recording), alarms."""
+    """Data of a feed: tables of at most `capacity` rows, states of the lamps (all, for a recording), alarms."""
 
     def __init__(self, capacity: int, keeps_statuses: bool = False) -> None:
         self._capacity, self._keeps_statuses = capacity, keeps_statuses
-        self.generation = 0  # raised when all is deleted because time was set back
-        self.epoch = 0  # stamp (ns) that times count from: the first one
+        self.generation = 0  # incremented when a clock set back deletes all rows
+        self.epoch = 0  # first stamp (ns), origin of times
         self.tables: dict[str, Table] = {}  # in the order of their first row
         self.alarms = AlarmList()
         self._statuses: list[tuple[float, StatusTable]] = []
@@ -99,15 +99,15 @@ class Store:
         return (stamp - self.epoch) * NANO
 
     def receive(self, name: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
-        """Add a row to a table whatever its stamp is.
+        """Add a row to a table after a check of its stamp.
 
-        A row whose stamp leaps is held back until the next one of its table. If that goes on from it, time has leapt and both
-        are added; else it was an outlier. Time that was set back deletes all rows before.
+        A row with a jump in its stamp is held until the next row of its table. If that row follows it closely, both are
+        added. Otherwise the held row was an outlier. A clock set back deletes all earlier rows.
 
         Raises
         ------
         MalformedError
-            Its stamp is not after that of the row before, it has other columns, or the row held back was an outlier.
+            The stamp is not after the last one, the columns differ, or the held row was an outlier.
         """
         self._check(name, columns)
         last, held = self._last.get(name, stamp - 1), self._held.get(name)
@@ -139,18 +139,18 @@ class Store:
         table.append(time, values)
 
     def _check(self, name: str, columns: Sequence[str]) -> None:
-        """Raise MalformedError if a table has other columns than these."""
+        """Raise MalformedError if the table has other columns."""
         table = self.tables.get(name)
         if table is not None and table.columns != tuple(columns):
             raise MalformedError(_difference(table.columns, columns))
 
     @property
     def newest(self) -> float:
-        """Newest time of all tables, s; 0 without any."""
+        """Newest time of all tables, s; 0 if empty."""
         return max((table.newest for table in self.tables.values()), default=0.0)
 
     def set_statuses(self, time: float, statuses: StatusTable) -> None:
-        """Set the lamps from `time` (s, on the lamps' clock) on, and update the alarms."""
+        """Set the lamps from `time` (s, lamps' clock) on and update the alarms."""
         if not self._keeps_statuses:
             self._statuses.clear()
         self._statuses.append((time, statuses))

@@ -1,4 +1,4 @@
-"""Play a recorded session: publish its topics at the pace of its log times, with ``/clock``."""
+"""Player of a recorded session: publishes its topics and ``/clock`` at the pace of the log times."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from .subscriptions import installed_class
 CLOCK = "/clock"
 NAME = "boom_twin_player"
 LOOK = 0.05
-"""Time (s) between looks for listeners."""
+"""Polling period (s) of listeners and pause."""
 DELIVERY = 10.0
-"""Time (s) in which reliable listeners are to acknowledge what was sent, at the end."""
+"""Timeout (s) for acknowledgements of reliable listeners at the end."""
 SETTLE = 0.5
 """Time (s) from the match with the last listener to the first message."""
 CATCH_UP = 4.0
-"""Times the rate at which a player that was kept waiting sends what is overdue.
+"""Factor on the rate at which overdue messages are sent after a delay.
 
-All at once would be lost on best-effort listeners: in shared memory Fast DDS holds 512 messages for each program that listens.
+Best-effort listeners would lose a burst: in shared memory Fast DDS holds 512 messages for each listening program.
 """
 
 
@@ -42,23 +42,23 @@ class Player:
     ----------
     session : Session
     names : sequence of str, optional
-        Topics; by default the inputs of the twin. Their quality of service is that of the session.
+        Topics, with the session's quality of service; by default the inputs of the twin.
     clock_rate : float, optional
-        Publish the log times on ``/clock`` too, so many times in a second.
+        Rate (Hz) of log times on ``/clock``; None for none.
 
     Attributes
     ----------
     sent : Counter of str
         Messages sent by topic, in all calls of `play` so far.
     wall, latest : float
-        Wall time, and largest delay of a message, s.
+        Wall time (s); largest delay of a message (s).
 
     Raises
     ------
     BagError
         A topic is not in the session.
     UsageError
-        The type of one is not installed.
+        The type of a topic is not installed.
     """
 
     def __init__(self, session: Session, names: Sequence[str] | None = None, clock_rate: float | None = None) -> None:
@@ -86,9 +86,9 @@ class Player:
         return [name for name, each in self._publishers.items() if each.get_subscription_count() < listeners]
 
     def wait(self, timeout: float, listeners: int = 1, check: Callable[[], None] = lambda: None) -> list[str]:
-        """Wait until every topic is listened to, calling `check` now and then; return the topics that are not.
+        """Wait until every topic has listeners, calling `check` repeatedly; return the topics without.
 
-        It waits a little longer then, because a subscription may discover its publisher a moment later than the publisher does.
+        A short wait follows, because a publisher may discover a subscription a moment before the reverse.
         """
         end = time.monotonic() + timeout
         while (unmatched := self.unmatched(listeners)) and time.monotonic() < end:
@@ -99,15 +99,15 @@ class Player:
         return unmatched
 
     def refuse_other_publishers(self) -> None:
-        """Raise BoomTwinError if anybody else publishes one of the topics."""
+        """Raise BoomTwinError if another node publishes one of the topics."""
         for name in self._publishers:
             ends = self._node.get_publishers_info_by_topic(name)
             if len(ends) > 1:
                 names = ", ".join(sorted(node_name(end) for end in ends))
-                raise BoomTwinError(f"{name} is published by {names}: of these only one may be. End the other first.")
+                raise BoomTwinError(f"{name} is published by {names}. Only one publisher may run. End the other first.")
 
     def length(self, start: float = 0.0, duration: float | None = None) -> float:
-        """Return the length (s) of that part of the session; raise BagError if it starts after the end."""
+        """Return the length (s) of a part of the session; raise BagError if it starts after the end."""
         whole = (self._session.end - self._session.start) * NANO
         if start >= whole:
             raise BagError(f"{self._session.path}: nothing from {start:g} s on; the session lasts {whole:.1f} s.")
@@ -120,21 +120,21 @@ class Player:
         duration: float | None = None,
         is_held: Callable[[], bool] = lambda: False,
     ) -> Iterator[int]:
-        """Publish, one message for every step of the iterator; the attributes tell what was sent.
+        """Publish one message per step of the iterator, and update the attributes.
 
         Parameters
         ----------
         rate : float
-            Session time over real time, > 0.
+            Session time over wall time, > 0.
         start, duration : float
-            Part of the session, s; all from `start` on without a duration.
+            Part of the session, s; without a duration up to the end.
         is_held : callable
-            Asked often; as long as it says so, nothing is published but the time on ``/clock``.
+            Polled; while True, only the time on ``/clock`` is published.
 
         Returns
         -------
         iterator of int
-            Nanoseconds of session time that have been played, after every message.
+            Session time played (ns) after every message.
 
         Raises
         ------
@@ -157,7 +157,7 @@ class Player:
             self.wall += time.monotonic() - entered
 
     def _wait(self, due: float, stamp: int, is_held: Callable[[], bool]) -> float:
-        """Wait until `due`; return the seconds for which the play was held."""
+        """Wait until `due`; return the duration (s) of pauses."""
         held = 0.0
         while True:
             if time.monotonic() >= self._ask:
@@ -169,7 +169,7 @@ class Player:
             time.sleep(min(left, LOOK))
 
     def _hold(self, stamp: int, is_held: Callable[[], bool]) -> float:
-        """Wait as long as the play is held; return the seconds."""
+        """Wait while play is paused; return the duration (s)."""
         began, was_held = time.monotonic(), False
         while is_held():
             was_held = True
@@ -179,10 +179,10 @@ class Player:
         return time.monotonic() - began if was_held else 0.0
 
     def deliver(self, timeout: float = DELIVERY) -> list[str]:
-        """Wait until all reliable listeners have received everything; return the topics of which some have not.
+        """Wait until all reliable listeners have received everything; return the topics not delivered.
 
-        A lost packet is sent again only while its publisher lives: one that is taken away with its last message may take
-        seconds of messages with it.
+        A lost packet is sent again only while its publisher lives. Destroying the publisher at once may lose seconds
+        of messages.
         """
         end = time.monotonic() + timeout
         return [
@@ -203,7 +203,7 @@ class Player:
         self.sent[name] += 1
 
     def _schedule(self, first: int, end: int, rate: float) -> Iterator[tuple[int, str, bytes | Clock]]:
-        """Yield log time (ns), topic and message (in CDR, or a Clock) of all that is published in that span, in order."""
+        """Yield log time (ns), topic and message (CDR, or Clock) of the span in order."""
         tick, period = first, round(rate / self._clock_rate / NANO) if self._clock_rate else 0
         for name, stamp, data, _ in read_both(self._session, self._types):
             if not first <= stamp < end:

@@ -1,4 +1,4 @@
-"""Write a study's report: tables, files, and the machine and versions it was run with."""
+"""Writer of a study's report: tables, files, machine and versions."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _version(package: str) -> str | None:
 
 
 def _cpu() -> str:
-    """Return the model of the processor, as far as the system tells."""
+    """Return the model of the processor, or its architecture."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -51,13 +51,13 @@ SYNTHETIC = "Scene parameters are surrogates; nothing here was measured on a rig
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a Markdown table; floats with 3 significant digits or whole, None and NaN as a dash. Ends with a newline."""
+    """Return a Markdown table with a final newline. Floats have 3 digits or are whole; None and NaN are dashes."""
     lines = [list(head), ["---"] * len(head), *([_text(value) for value in row] for row in rows)]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 def provenance() -> str:
-    """Return one paragraph: when, where and with which versions, and that the parameters are surrogates."""
+    """Return a paragraph with date, machine, versions and the note on surrogates."""
     return ", ".join(f"{name} {value}" for name, value in machine().items() if value is not None) + f". {SYNTHETIC}\n"
 
 

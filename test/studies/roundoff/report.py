@@ -171,16 +171,16 @@ def text(lost: Sequence[Loss], turned: TurnUp) -> str:
         "# Round-off",
         "![Error over the step; digits lost over the length of the chain](roundoff.png)",
         "## Digits lost in one Newton pass",
-        "Decimal digits of 16 that the increment of the tip loses in one pass: by the Riccati form, by the plain product of "
-        "transfer matrices, and by LU of the whole system. The exact increment is that of the whole system, refined in "
-        "extended precision. Step 1 ms unless named. The Riccati form loses about as many as LU; the plain product "
-        "loses digits with every section (right panel).",
+        "The table lists the decimal digits, of 16, lost in the tip's increment. Solvers: Riccati form, plain product of "
+        "transfer matrices, LU of the whole system. The reference solution of the whole system is refined in extended "
+        "precision. Step 1 ms unless named. The Riccati form loses about as many as LU. The plain product loses digits with "
+        "every section (right panel).",
         table(("boom", "unknowns", "Riccati", "plain product", "LU"), rows),
         "## Error of the tip over the step",
-        f"The left panel, of one smooth move. Order {turned.order:.2f}; smallest error {error:.1e} of the length at "
-        f"{step:.0e} s. The error turns up {verdict} {TARGET:.0e}: a step of h "
-        "turns the rounding of positions into accelerations of its 1/h\N{SUPERSCRIPT TWO}.",
-        "Limits: one short smooth move of the default boom; long booms are made up.",
+        f"The left panel shows one smooth move. Order {turned.order:.2f}; smallest error {error:.1e} of the length at "
+        f"{step:.0e} s. The error rises again {verdict} {TARGET:.0e}: accelerations contain the rounding of positions "
+        "over h\N{SUPERSCRIPT TWO}.",
+        "Limits: one short smooth move of the default boom; long booms are invented.",
         provenance(),
     ]
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"

@@ -1,7 +1,7 @@
-"""Change stiffnesses and masses of an Exudyn boom while it moves.
+"""Changes of stiffnesses and masses of an Exudyn boom while it moves.
 
-A changed boom is built a second time, in full; what differs between its objects and those of the boom that moves is handed
-over by shares. So every parameter of a scene that leaves geometry alone can change, and none of its formulas is written twice.
+The changed boom is built in full. At each step the moving boom has its own parameters plus a share of the differences. So any
+parameter except geometry can change, without a second formula.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ _BODY = "RigidBody2D"
 
 
 class ParameterChanges:
-    """Differences between a boom and changed ones, and the share of them at every step.
+    """Parameter differences between a boom and changed ones, with their share at every step.
 
     Parameters
     ----------
     boom : Boom
-        The one that moves.
+        The moving boom.
     changed : sequence of (Boom, ndarray of shape (count + 1,))
-        Booms of the same parts, changed in full, and the share of their difference at the start and after every step.
+        Fully changed booms with the same parts; share of each difference at the start and after every step.
 
     Raises
     ------
     UsageError
-        A changed boom has other parts, or the boom is lumped, whose masses are loads.
+        A changed boom has other parts, or the boom is lumped (its masses are loads).
     """
 
     def __init__(self, boom: Boom, changed: Sequence[tuple[Boom, Array]]) -> None:
@@ -52,14 +52,14 @@ class ParameterChanges:
         self._last: list[float] = [0.0] * len(changed)
 
     def of(self, number: int, name: str) -> Array:
-        """Return by how much parameter `name` of an object is more than at rest, shape (count + 1,) or ()."""
+        """Return the change of parameter `name` of an object from the unchanged boom, shape (count + 1,) or ()."""
         found = np.zeros(())
         for share, more in zip(self._shares, self._more.get(number, []), strict=False):
             found = found + share * more.get(name, 0.0)
         return found
 
     def hand_over(self, row: int) -> None:
-        """Give all changed objects their parameters of a step."""
+        """Set the parameters of all changed objects for step `row`."""
         shares = [float(share[row]) for share in self._shares]
         if shares == self._last:
             return
@@ -72,13 +72,13 @@ class ParameterChanges:
             _set(self._system, number, values, {name for more in self._more[number] for name in more})
 
     def restore(self) -> None:
-        """Give all changed objects their parameters at rest."""
+        """Restore the unchanged boom's parameters."""
         for number, old in self._healthy.items():
             _set(self._system, number, old, {name for more in self._more[number] for name in more})
 
 
 def _objects(boom: Boom) -> list[dict[str, float]]:
-    """Parameters of all objects, such that those of two changes add up; of a body the first moments instead of the centre."""
+    """Return the parameters of all objects in additive form: first moments instead of the centre of mass."""
     return [_additive(boom.system.GetObject(number)) for number in range(boom.system.systemData.NumberOfObjects())]
 
 

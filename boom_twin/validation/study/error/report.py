@@ -54,13 +54,13 @@ def report(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -
     parts = [
         "# Error against run time", _setting(problem), "![Error against run time](error.png)",
         "## The default by step",
-        "Order: slope of the error from the step above; 2 is that of the scheme, until errors reach those of the references.",
+        "Order: slope of the error from the row above. The scheme has order 2, until errors reach those of the references.",
         _by_step(rows),
         "## At equal error of the tip",
-        "The fastest case of each program that errs no more; ratio: how many times as long Exudyn takes.",
+        "Rows: the fastest case of each program within this error. Ratio: Exudyn's time over boom_twin's.",
         _equal(problem, rows), _at_same_step(duel),
         f"## Methods at a step of {1e3 * Own().step:g} ms",
-        "The first is the default; the others differ from it in what they name. Other steps: picture below, `error.json`.",
+        "The first row is the default. Other rows name the difference. Other steps: picture below, `error.json`.",
         _methods(rows), "![Methods of boom_twin](error_methods.png)",
     ]  # fmt: skip
     if failed := _failed(rows):
@@ -68,7 +68,7 @@ def report(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -
     parts += [
         "## Limits",
         "One motion of one boom. Other work may share the machine, so only ratios within this page count. Exudyn's models and "
-        "schemes are the fastest of those tried; another setting may be faster.",
+        "schemes are the fastest of those tried. Another setting may be faster.",
         provenance(),
     ]
     return "\n\n".join(part.rstrip("\n") for part in parts if part) + "\n"
@@ -81,14 +81,15 @@ def _setting(problem: Problem) -> str:
     if other is not None and problem.apart is not None:
         apart = problem.apart
         second = (
-            f"The independent one is {other.what} (left in it: {_errors(other.tip_mm, other.acceleration)}). They differ by "
-            f"{_errors(*apart)}. Where one error is given, it is the larger of both."
+            f"The independent one is {other.what} (remaining error: {_errors(other.tip_mm, other.acceleration)}). They "
+            f"differ by {_errors(*apart)}. A single error is the larger of both."
         )
     return (
-        f"Motion: {problem.motion.label}. Errors are rms over the motion: of the tip, and of its acceleration as a share of "
-        f"its own. The own reference is {own.what} (left in it: {_errors(own.tip_mm, own.acceleration)}). {second}\n\n"
-        "Run time is CPU time of compiled stepping on one core, in ms per simulated second (ms/s): the least of several runs "
-        "in turn with the other program."
+        f"Motion: {problem.motion.label}. Errors are rms over the motion. The error of acceleration is relative to the "
+        f"acceleration's rms. The own reference is {own.what} (remaining error: {_errors(own.tip_mm, own.acceleration)}). "
+        f"{second}\n\n"
+        "Run time is CPU time of compiled stepping on one core, in ms per simulated second (ms/s): the least of several runs, "
+        "alternating with the other program."
     )
 
 
@@ -123,11 +124,12 @@ def _at_same_step(duel: dict[str, Any] | None) -> str:
     if duel is None:
         return ""
     return (
-        f"At the same step of {1e3 * duel['step_s']:g} ms, in turn, {duel['exudyn_method']} (its fastest that errs at most "
-        f"{duel['exudyn_error_at_most_mm']:g} mm) takes {duel['ratio_of_medians']:.3g} times as long as the default.\n\n"
+        f"At the same step of {1e3 * duel['step_s']:g} ms, in alternating runs, the default is "
+        f"{duel['ratio_of_medians']:.3g} times as fast as Exudyn's fastest case within "
+        f"{duel['exudyn_error_at_most_mm']:g} mm: {duel['exudyn_method']}.\n\n"
         f"Exudyn: build {build()}, sparse solver, one thread, generalised-alpha 0.8, beams exact at their nodes. Lumped (l in "
-        "the picture): masses of cylinders and two-force links act at their pins. A kept tangent is made anew in the step that "
-        "needs more passes than named. Its time includes the Python function that hands its drives their lengths."
+        "the picture): masses of cylinders and two-force links act at their pins. A kept tangent is renewed in a step that "
+        "needs more passes than named. Exudyn's time includes the Python function that sets the lengths of its drives."
     )
 
 

@@ -1,4 +1,4 @@
-"""Run the stability study: every case by every method, judged against its reference."""
+"""Runner of the stability study: every case by every method, compared with its reference."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ METHODS: dict[str, Method] = {
 }
 REFERENCE = Method(tolerance=1e-10)
 NOTHING = "there is no solution"
-FINER, FINEST = 8, 5e-6  # steps of the reference: an eighth, but not below this (s), where round-off takes over
-HALVINGS = 20  # of the bracket of a load
-WIDTH = 1e-6  # relative, of a frequency's bracket
+FINER, FINEST = 8, 5e-6  # divisor of the step for the reference; its smallest step (s), below which round-off prevails
+HALVINGS = 20  # bisections of the load limit
+WIDTH = 1e-6  # relative tolerance of a frequency
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class CaseResult:
-    """A case with a cell for each method, and what the reference was."""
+    """Case with its reference in words and a cell for each method."""
 
     case: Case
     reference: str
@@ -62,7 +62,7 @@ class CaseResult:
 def run(
     found: Iterable[Case], methods: dict[str, Method] | None = None, progress: Callable[[str], None] = lambda line: None
 ) -> list[CaseResult]:
-    """March all cases by all methods; `progress` is told of each case as it is done."""
+    """Integrate all cases by all methods. `progress` gets a line after each case."""
     rows = []
     for case in found:
         rows.append(one(case, METHODS if methods is None else methods))
@@ -71,7 +71,7 @@ def run(
 
 
 def one(case: Case, methods: dict[str, Method]) -> CaseResult:
-    """March one case by `methods`."""
+    """Integrate one case by `methods`."""
     try:
         setup = case.make()
         judge, reference = _judge(case, setup)
@@ -122,7 +122,7 @@ def _march(setup: Setup, step: float, every: int, method: Method) -> MethodRun:
 
 
 def _thinned(motion: MethodRun, stride: int) -> MethodRun:
-    """Return every `stride`-th row."""
+    """Return the motion with every `stride`-th row."""
     names = ("times", "tip", "tip_acceleration", "joints", "cylinder_forces")
     return replace(motion, **{name: getattr(motion, name)[::stride] for name in names})
 
@@ -140,7 +140,7 @@ def _equilibrium(setup: Setup) -> Array:
 
 @dataclass(frozen=True)
 class Limit:
-    """`share` of gravity carried at most; `frequency` (Hz) of the slowest vibration just below, and without load."""
+    """Largest `share` of gravity with an equilibrium; first natural `frequency` (Hz) there and `unloaded`."""
 
     share: float
     frequency: float
@@ -148,9 +148,9 @@ class Limit:
 
 
 def limit_of(setup: Setup) -> Limit:
-    """Halve the bracket of the load that still has a stable equilibrium, from no load to all of it.
+    """Return the largest share of gravity with a stable equilibrium, by bisection.
 
-    At a true limit the slowest frequency goes to zero: stiffness is used up, and no equilibrium is near.
+    At a true limit the first natural frequency goes to zero: the stiffness vanishes, and no equilibrium is near.
     """
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):

@@ -14,9 +14,9 @@ from ....scene.pump_pulses import ease
 from ....scene.schema import Scene
 from ....types import Array
 
-SHARE = 0.05  # of a cylinder's travel, from where it goes to the end
-SAMPLES = 1001  # of a joint's range
-FULL_STROKE = 10.0  # s that a drive at full speed takes for its whole stroke
+SHARE = 0.05  # distance of the start from the end, over a cylinder's travel
+SAMPLES = 1001  # angles over a joint's range
+FULL_STROKE = 10.0  # s, duration of a full stroke at full speed
 
 
 @dataclass(frozen=True)
@@ -28,15 +28,15 @@ class Setup:
     scene : Scene
     drive : Drive
     angles : ndarray, shape (n,)
-        Joint angles (rad) next to which the boom starts.
+        Approximate joint angles (rad) at the start.
     duration, step : float
         s.
     still : float
-        s, from here on the drives hold.
+        Time (s) after which the drives stand still.
     every : int
-        Steps to a row.
+        Steps per row.
     jump : float
-        When the drives' speed jumps, s; NaN if it does not. Accelerations and forces there are impulses, which have no value.
+        Time (s) of a jump in speed, or NaN. Accelerations and forces are impulses there, without a value.
     """
 
     scene: Scene
@@ -51,7 +51,7 @@ class Setup:
 
 @dataclass(frozen=True)
 class DeadStop:
-    """Strokes `first` (m) that reach `speed` (m/s), both shape (n,), within `ramp` (s) and stop dead at `stop` (s)."""
+    """Drive from strokes `first` (m) with `ramp` (s) to `speed` (m/s), both (n,), and a dead stop at `stop` (s)."""
 
     first: Array
     speed: Array
@@ -76,7 +76,7 @@ def smooth(
     scene: Scene, posture: str | None = None, share: float = 1.0, rise: float = 1.0, duration: float = 2.0, step: float = 1e-3,
     every: int = 1,
 ) -> Setup:  # fmt: skip
-    """Make `share` of the study's move in `rise` (s), then a hold until `duration` (s)."""
+    """Move by `share` of the study's move in `rise` (s), then rest until `duration` (s)."""
     own = motion_of(scene, posture)
     move = replace(own, travel=share * own.travel, rise=rise, duration=duration)
     return Setup(scene, move, own.angles, duration, step, rise, every)
@@ -89,7 +89,7 @@ def move_in_words(scene: Scene) -> str:
 
 
 def first_cylinder(scene: Scene, posture: str, turn: float, step: float, rise: float = 1.0, duration: float = 2.0) -> Setup:
-    """Turn joint 1 by `turn` (rad) in `rise` (s) by its cylinder, then hold."""
+    """Turn joint 1 by `turn` (rad) in `rise` (s) by its cylinder, then rest."""
     angle = motion_of(scene, posture).angles[0]
     first, last = stroke_curve(scene, 0, np.array([angle, angle + turn]))
     return one_cylinder(scene, posture, 0, float(last - first), step, rise, duration)
@@ -98,7 +98,7 @@ def first_cylinder(scene: Scene, posture: str, turn: float, step: float, rise: f
 def one_cylinder(
     scene: Scene, posture: str, index: int, travel: float, step: float = 1e-3, rise: float = 1.0, duration: float = 2.0
 ) -> Setup:
-    """Move cylinder `index` by `travel` (m) in `rise` (s), then hold."""
+    """Move cylinder `index` by `travel` (m) in `rise` (s), then rest."""
     own = motion_of(scene, posture)
     far = np.zeros(len(own.first))
     far[index] = travel
@@ -106,7 +106,7 @@ def one_cylinder(
 
 
 def dead_stop(scene: Scene, step: float = 1e-3) -> Setup:
-    """Make the study's move at full speed of the drives from 0.3 s on, stop dead at 0.8 s and hold until 2 s."""
+    """Move as in the study, at full speed from 0.3 s, stop dead at 0.8 s and rest until 2 s."""
     own = motion_of(scene)
     full = np.array([joint.cylinder.max_stroke for joint in scene.joints]) / FULL_STROKE
     drive = DeadStop(own.first, np.sign(own.travel) * full, 0.3, 0.8)
@@ -114,7 +114,7 @@ def dead_stop(scene: Scene, step: float = 1e-3) -> Setup:
 
 
 def to_the_ends(scene: Scene, longest: bool) -> Setup:
-    """Move all cylinders, from near by, to the longest or shortest stroke that range and cylinder allow."""
+    """Move all cylinders from near their longest or shortest allowed stroke to that stroke."""
     ends = np.array([stroke_range(scene, i, SAMPLES) for i in range(len(scene.joints))])
     last, other = (ends[:, 1], ends[:, 0]) if longest else (ends[:, 0], ends[:, 1])
     first = last + SHARE * (other - last)
