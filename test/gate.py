@@ -62,7 +62,8 @@ COMMANDS = {  # small outputs of users' commands: what they print as JSON or tex
     "info": "info {bags}/pump_session --json",
 }
 TIMING = re.compile(
-    r"machine|^costs$|^feeding$|^on_front|step_time|time_saved|seconds|wall|twin_s$|exudyn_s$|ratio|realtime|_us$|path|folder|out$|bag$|session$"
+    r"machine|^costs$|^feeding$|^on_front|step_time|time_saved|seconds|wall|twin_s$|exudyn_s$|ratio|realtime|_us$"
+    r"|path|folder|out$|bag$|session$"
 )
 HEALTH = (0, 1, 3, 7)  # numbers of sessions of test/bench/health, see there
 
