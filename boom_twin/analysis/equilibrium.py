@@ -328,7 +328,7 @@ def _loosen_gradually(plan: Plan, state: State, work: Work, drive: Array) -> flo
 
 
 def _gradually(state: State, step: float, least: float, rests: Callable[[float, float], bool]) -> float:
-    """Return the largest load fraction reached. A step doubles if `rests` succeeds, and halves, to `least`, if it fails."""
+    """Return the largest fraction reached. A step doubles if `rests` succeeds, and halves, to `least`, if it fails."""
     share = 0.0
     while share < 1.0 and step >= least:
         z, history, aim = state.z.copy(), state.history.copy(), min(share + step, 1.0)

@@ -57,7 +57,7 @@ def _counts_faulty(detail: ErrorDetails) -> bool:
 def _known(
     document: Document, root: type[BaseModel], block: Any, model: type[BaseModel], place: Place, faults: list[Fault]
 ) -> Any:
-    """Return a block without unknown and empty keys, quantities converted to SI units. Add unknown keys to `faults`."""
+    """Return a block without unknown and empty keys, quantities in the units of their keys. Add unknown keys to `faults`."""
     if not isinstance(block, dict):
         return block
     known: dict[str, Any] = {}
