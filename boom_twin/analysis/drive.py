@@ -1,8 +1,8 @@
-"""Stroke histories as smooth drives: monotone interpolation of rows, and a drive's course for steps of any length.
+"""Stroke histories as smooth drives: monotone cubic interpolation between rows, and simulation along it in any step.
 
-The slopes are those of Fritsch and Butland (SIAM J. Sci. Stat. Comput. 5, 1984), at inner rows a weighted harmonic mean of the
-two neighbouring secants, zero where they differ in sign; at the ends a parabola through three rows, held back where it would
-overshoot. `scipy.interpolate.PchipInterpolator` gives the same, but takes longer to import than all that `simulate` does.
+The slopes follow Fritsch and Butland (SIAM J. Sci. Stat. Comput. 5, 1984). At inner rows they are a weighted harmonic mean of
+both neighbouring secants, or zero if the secants differ in sign. At the ends they are those of a parabola through three rows,
+limited against overshoot. `scipy.interpolate.PchipInterpolator` is equal, but its import takes longer than all of `simulate`.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from ..types import Array
 
 
 def pchip(x: Array, y: Array, at: Array) -> tuple[Array, Array]:
-    """The curve and its derivative at places `at`.
+    """Return the interpolating curve and its derivative at `at`.
 
     Parameters
     ----------
     x : ndarray, shape (m,)
-        Increasing, at least two.
+        Increasing abscissae, m >= 2.
     y : ndarray, shape (m, n)
-        Rows, one curve a column.
+        Values at `x`, one curve per column.
     at : ndarray, shape (k,)
-        Within x[0] to x[-1].
+        Abscissae between x[0] and x[-1].
 
     Returns
     -------
@@ -51,7 +51,7 @@ def pchip(x: Array, y: Array, at: Array) -> tuple[Array, Array]:
 
 
 def _slopes(h: Array, secant: Array) -> Array:
-    """Derivatives at all rows, (m, n), from spacings (m - 1, 1) and secants (m - 1, n)."""
+    """Return the slopes at all rows, (m, n), from spacings (m - 1, 1) and secants (m - 1, n)."""
     if len(h) == 1:
         return np.repeat(secant, 2, axis=0)
     before, after = 2.0 * h[1:] + h[:-1], h[1:] + 2.0 * h[:-1]
@@ -64,21 +64,21 @@ def _slopes(h: Array, secant: Array) -> Array:
 
 
 def _end(near: Array, far: Array, first: Array, second: Array) -> Array:
-    """Derivative at an end, (n,), from the spacings and secants next to it."""
+    """Return the slope at an end, (n,), from the two nearest spacings and secants."""
     slope = ((2.0 * near + far) * first - near * second) / (near + far)
     turned, steep = slope * first <= 0.0, (first * second < 0.0) & (np.abs(slope) > 3.0 * np.abs(first))
     return np.asarray(np.where(turned, 0.0, np.where(steep, 3.0 * first, slope)))
 
 
-TOLERANCE = 1e-6  # rad in the last pass of a step; what is left is about 1 to 50 times its square
+TOLERANCE = 1e-6  # rad, increment in the last pass; the remaining error is about 1 to 50 times its square
 PASSES = np.int64(20)
 
 
 class Run(NamedTuple):
-    """A motion: status and the row of the drive that it got to, results at the rows, and sums over its steps.
+    """Simulated motion: status, last step reached (`row`), results at the rows, and sums over the steps.
 
-    passes : Newton passes per step, mean. square : sum of h^2 over all steps, s^2. longest : step, s. rates : of the drive
-    at the rows, m/s. lost : how often each pin with clearance lost contact. end : the boom after the last row.
+    passes : mean Newton passes per step. square : sum of h^2 over all steps, s^2. longest : longest step, s. rates : drive
+    rates at the rows, m/s. lost : number of lost contacts of each pin with clearance. end : state after the last row.
     """
 
     status: int
@@ -96,16 +96,16 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True)
 class DriveCourse:
-    """Rows of a drive, and the boom at the first of them.
+    """Rows of a drive, and the state of the boom at the first row.
 
     Attributes
     ----------
     start : State
-        In equilibrium, or in motion; stays as it is.
+        State at the first row, at rest or in motion. It is not modified.
     times : ndarray, shape (m,)
-        s.
+        Times of the rows, s.
     strokes : ndarray, shape (m, n)
-        m; between rows they follow a monotone cubic.
+        Strokes at the rows, m. Between rows they follow a monotone cubic.
     rho : float
         Spectral radius of generalised-alpha at infinite frequency.
     """
@@ -118,7 +118,7 @@ class DriveCourse:
     rho: float
 
     def stepped(self, rows: NDArray[np.int64], dt: float, finer: int = 1) -> Run:
-        """Follow the curve through some of the rows in steps of at most `dt` (s) that end on them, each divided by `finer`."""
+        """Simulate through `rows` in steps of at most `dt` (s), each divided by `finer`. Steps end on the rows."""
         plan, state = self.plan, State(*(array.copy() for array in self.start))
         out = np.empty((len(rows), width_of(plan)))
         out[0] = first_row(plan, state)
@@ -134,9 +134,9 @@ class DriveCourse:
         )  # fmt: skip
 
     def states(self, dt: float, finer: int = 1) -> Iterator[tuple[float, State]]:
-        """Follow the curve through all rows in the same steps, one by one: each step (s), and the boom after it.
+        """Simulate through all rows in the steps of `stepped`; yield each step (s) and the state after it.
 
-        The boom is one and the same state throughout, which goes on with the next step. SolverError where a step fails.
+        The same state object is yielded each time and changes with the next step. SolverError if a step fails.
         """
         plan, work, state, row = self.plan, self.work, State(*(array.copy() for array in self.start)), 0
         steps, counts, drives, rates = self._drive(self.times, self.strokes, dt, finer)
@@ -152,7 +152,7 @@ class DriveCourse:
                 yield span, state
 
     def _drive(self, times: Array, strokes: Array, dt: float, finer: int) -> tuple[Array, NDArray[np.int64], Array, Array]:
-        """Steps and their number before every row but the first, and lengths and rates of the drives after each step."""
+        """Return step size and count before every row but the first, and drive lengths and rates after each step."""
         spans = np.diff(times)
         counts = finer * np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
         if len(spans) == 0:

@@ -26,17 +26,17 @@ from ..types import Array
 from .cylinder_drives import spring_free
 from .modal import Mode, constraints, natural_modes, negative_pivots
 
-CLAMP = 1e12  # N/m, a pin that is as good as ideal
+CLAMP = 1e12  # N/m, stiffness of a practically ideal pin
 
 
 def clamp_pins(state: State) -> None:
-    """Hold all journals in the middle of their bushes."""
+    """Hold all journals in the middle of their bushes by stiff springs."""
     state.contacts[:] = 0.0
     state.contacts[:, SPRING] = CLAMP
 
 
 def release_pins(plan: Plan, state: State) -> None:
-    """Let contact hold every clamped journal, as deep in its bush as its force presses it, with no clearance yet."""
+    """Replace every clamp by contact with zero clearance, at the penetration that gives the same force."""
     for row, memory in zip(plan.tables.clearances, state.contacts, strict=True):
         offset = state.z[row.z : row.z + 2]
         distance = float(np.hypot(*offset))
@@ -46,7 +46,7 @@ def release_pins(plan: Plan, state: State) -> None:
 
 
 def loosen_pins(plan: Plan, state: State, share: float, more: float) -> Plan:
-    """Move every journal outwards by `more` of its clearance; returns the boom with `share` of all clearances."""
+    """Move every journal outwards by the fraction `more` of its clearance; return the plan with `share` of all clearances."""
     worn = plan.tables.clearances.copy()
     for row in worn:
         offset = state.z[row.z : row.z + 2]
@@ -59,7 +59,7 @@ def loosen_pins(plan: Plan, state: State, share: float, more: float) -> Plan:
 
 
 def linearise_pins(plan: Plan, state: State) -> None:
-    """Note which pins touch, and give those that are to be linear their spring and damper at the present force."""
+    """Store which pins touch, and set spring and damper of linearised pins at the present force."""
     for row, memory in zip(plan.tables.clearances, state.contacts, strict=True):
         offset = state.z[row.z : row.z + 2]
         distance = float(np.hypot(*offset))
@@ -75,7 +75,7 @@ def linearise_pins(plan: Plan, state: State) -> None:
 
 
 def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
-    """Write the undeformed boom at relative joint `angles` (rad), shape (n,), into the state; all forces zero."""
+    """Set the state to the undeformed boom at joint `angles` (rad), shape (n,), with all forces zero."""
     state.z[:] = 0.0
     heading = 0.0
     for i, angle in enumerate(angles):
@@ -88,12 +88,12 @@ def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
     state.history[X, : len(state.z)] = state.z
 
 
-SHARE = 0.5  # of the boom's reach, most that the tip may be off the undeformed boom's
-INSTANTS = 8  # of a motion, evenly spaced, at which that is looked at; and where the tip is farthest from its start
+SHARE = 0.5  # validity limit of the tip deflection, as a fraction of the boom's reach
+INSTANTS = 8  # evenly spaced instants of a motion to check; the tip's farthest point is added
 
 
 def beyond_validity(scene: Scene, away: float) -> tuple[str, ...]:
-    """A sentence if a tip `away` (m) from the undeformed boom's is outside the model's validity."""
+    """Return a warning if the tip deflection `away` (m) exceeds the model's validity, else an empty tuple."""
     if away <= SHARE * scene.reach:
         return ()
     return (
@@ -103,9 +103,9 @@ def beyond_validity(scene: Scene, away: float) -> tuple[str, ...]:
 
 
 def motion_beyond_validity(scene: Scene, strokes: Array, tip: Array, angles: Array | None) -> tuple[str, ...]:
-    """Return the sentence of `beyond_validity` for the worst of some instants of a motion.
+    """Return the warning of `beyond_validity` for the worst of some instants of a motion.
 
-    `strokes` (m, n) and `tip` (m, 2) are in m; `angles` (n,) are near the first joint angles, rad.
+    `strokes` (m, n) and `tip` (m, 2) are in m. `angles` (n,) is a guess of the first joint angles, rad.
     """
     rows: NDArray[np.int64] = np.linspace(0, len(tip) - 1, INSTANTS).astype(np.int64)
     rows = np.unique(np.append(rows, np.argmax(np.hypot(*(tip - tip[0]).T))))
@@ -113,39 +113,39 @@ def motion_beyond_validity(scene: Scene, strokes: Array, tip: Array, angles: Arr
     for row in rows:
         try:
             near = joint_angles_of_strokes(scene, strokes[row], near=near)
-        except UsageError:  # in the cylinder's travel, but out of the joint's range
+        except UsageError:  # within the cylinder's travel but outside the joint's range
             continue
         worst = max(worst, float(np.hypot(*(tip[row] - skeleton(scene, near).pivots[-1]))))
     return beyond_validity(scene, worst)
 
 
-TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
+TOLERANCE = 1e-9  # rad, increment in the last pass; the remaining error is its square
 PASSES = 60
-LONGEST_INCREMENT = 0.1  # rad in one pass
-FIRST_LOAD, LEAST_LOAD = 0.05, 1e-3  # of gravity: first step where the full load at once fails, and the smallest that is tried
-LEAST_SHARE = 1e-3  # of the clearances, likewise
+LONGEST_INCREMENT = 0.1  # rad per pass
+FIRST_LOAD, LEAST_LOAD = 0.05, 1e-3  # first and smallest load step, as fractions of gravity, if the full load fails
+LEAST_SHARE = 1e-3  # smallest clearance step, as a fraction of the clearances
 
 
 @dataclass(frozen=True, repr=False)
 class Equilibrium(SummaryDisplay):
-    """A boom at rest. n sections.
+    """State of a boom at rest, with n sections.
 
     Attributes
     ----------
     strokes, lengths : ndarray, shape (n,)
-        Drives, and lengths of the cylinders pin to pin less `closed_length`, m: they differ by what the oil gives.
+        Drives, and cylinder lengths (pin to pin minus `closed_length`), m. They differ by the oil's compression.
     tip_rigid, tip : ndarray, shape (2,)
         Tip of the undeformed and of the deflected boom, m.
     joints : ndarray, shape (n,)
-        Root of section i against head of section i - 1, rad.
+        Angle from head of section i - 1 to root of section i, rad.
     cylinder_forces : ndarray, shape (n,)
         N, positive in tension.
     modes : tuple of Mode
-        Undamped, about this equilibrium, ascending.
+        Undamped modes about this equilibrium, ascending.
     outline : ndarray, shape (k, 2)
         Points of the deflected centre line from base to tip, m.
     doubts : tuple of str
-        A sentence if it is outside the model's validity, see `analysis.equilibrium`.
+        Warning if the boom is outside the model's validity, see `beyond_validity`.
     """
 
     strokes: Array
@@ -188,13 +188,13 @@ def statics(
     scene : Scene, path or mapping
         The boom, of n sections: a `Scene`, a scene file, a dict with its keys; None: the default scene.
     strokes : array_like, shape (n,), or str, optional
-        Absolute strokes of the drives, m; or the name of a posture.
+        Absolute strokes of the drives, m, or a posture name.
     posture : str, optional
-        A posture of the scene; just one of strokes, posture and lengths is given.
+        A posture of the scene. Give exactly one of strokes, posture and lengths.
     modes : int
-        How many natural frequencies are looked for, the lowest first.
+        Number of natural frequencies, lowest first.
     lengths : array_like, shape (n,), optional
-        What stroke transducers read of the boom at rest, m: pin to pin less `closed_length`, with the oil compressed.
+        Stroke transducer readings at rest, m: pin to pin minus `closed_length`, with the oil compressed.
 
     Returns
     -------
@@ -204,7 +204,7 @@ def statics(
     Raises
     ------
     UsageError
-        Unknown posture, strokes or lengths outside the cylinders, not exactly one of strokes, posture and lengths.
+        Unknown posture, strokes or lengths out of range, or not exactly one of strokes, posture and lengths.
     SolverError
         No stable equilibrium was found.
     """
@@ -234,14 +234,14 @@ def statics(
 
 
 def strokes_and_angles(scene: Scene, strokes: ArrayLike | str | None, posture: str | None) -> tuple[Array, Array]:
-    """Strokes (m) and joint angles (rad) of the undeformed boom, both (n,), at `strokes` or in a `posture` of the scene.
+    """Return strokes (m) and joint angles (rad) of the undeformed boom, both (n,), at `strokes` or in a `posture`.
 
-    A name given for `strokes` is that of a posture.
+    A string as `strokes` is a posture name.
 
     Raises
     ------
     UsageError
-        Unknown posture, strokes outside the cylinders, not exactly one of strokes and posture.
+        Unknown posture, strokes out of range, or not exactly one of strokes and posture.
     """
     if isinstance(strokes, str):
         strokes, posture = None, strokes if posture is None else None
@@ -254,7 +254,7 @@ def strokes_and_angles(scene: Scene, strokes: ArrayLike | str | None, posture: s
 
 
 def checked_strokes(scene: Scene, strokes: Array, name: str = "stroke") -> Array:
-    """Return `strokes` as an array, shape (n,); UsageError, by `name`, unless each cylinder has one within its travel."""
+    """Return `strokes` as an array (n,); UsageError, with `name`, unless each cylinder has one within its travel."""
     values = np.asarray(strokes, dtype=float)
     n = len(scene.joints)
     if values.shape != (n,):
@@ -267,22 +267,22 @@ def checked_strokes(scene: Scene, strokes: Array, name: str = "stroke") -> Array
 
 
 def drives_at_rest(scene: Scene, lengths: Array, angles: Array) -> Array:
-    """Return the drives (m), shape (n,), of the boom that rests with these cylinder `lengths` (m) next to joint `angles` (rad).
+    """Return the drives (m), shape (n,), of the boom at rest with cylinder `lengths` (m), near joint `angles` (rad).
 
-    A cylinder at rest is a strut, whatever its oil. So the boom without oil springs gives the forces, and these the springs'
-    extension.
+    Cylinder forces at given lengths do not depend on the oil. They are computed with rigid cylinders, and give the extension
+    of the oil springs.
     """
     struts, state, _ = rest_at(with_rigid_cylinders(scene), lengths, angles)
     return spring_free(compile_scene(scene), lengths, taken_apart(struts, first_row(struts, state)).cylinder_forces)
 
 
 def travel_words(i: int, most: float) -> str:
-    """Return a sentence with the stroke range of cylinder `i` (0-based), and the remedy for another stroke."""
+    """Return the stroke range of cylinder `i` (0-based) and the remedy, for an error message."""
     return f"cylinder {i + 1} travels 0 to {most:g} m. Give in m by how much it is longer than closed_length."
 
 
 def rest_at(scene: Scene, strokes: Array, angles: Array) -> tuple[Plan, State, Work]:
-    """Compile a scene and bring it to rest at `strokes` (m) next to joint `angles` (rad), both (n,); see `settle`."""
+    """Compile a scene and solve its equilibrium at `strokes` (m) near joint `angles` (rad), both (n,); see `settle`."""
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, strokes, angles)
@@ -290,10 +290,10 @@ def rest_at(scene: Scene, strokes: Array, angles: Array) -> tuple[Plan, State, W
 
 
 def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) -> None:
-    """Bring `state` to rest in equilibrium at `strokes` (m), from the undeformed boom at joint `angles` (rad).
+    """Set `state` to equilibrium at `strokes` (m), starting from the undeformed boom at joint `angles` (rad).
 
-    The full load at once is tried first, then gradually, both with ideal pins; then those with clearance are let go,
-    likewise. Histories are left without motion.
+    With ideal pins the full load is tried first, then load steps. Then the clearances are introduced in the same way.
+    Histories end without motion.
     """
     drive, where = plan.closed_lengths + strokes, ", ".join(f"{stroke:.4f}" for stroke in strokes)
     state.drives[0], state.drives[1], state.pace[0] = drive, 0.0, 0
@@ -304,8 +304,8 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
         share = _gradually(state, FIRST_LOAD, LEAST_LOAD, lambda share, aim: _rests(plan, state, work, drive, aim))
         if share < 1.0:
             raise SolverError(
-                f"no equilibrium at strokes {where} m: the boom carries {share:.2g} of its weight, then it moves on and on or "
-                "folds a linkage over. Check masses, payload, stiffnesses, and how near the posture is to the end of a joint's "
+                f"no equilibrium at strokes {where} m: the boom carries {share:.2g} of its weight, then it keeps moving or a "
+                "linkage folds over. Check masses, payload, stiffnesses, and how near the posture is to the end of a joint's "
                 "range."
             )
     if plan.pins:
@@ -319,7 +319,7 @@ def settle(plan: Plan, state: State, work: Work, strokes: Array, angles: Array) 
 
 
 def _loosen_gradually(plan: Plan, state: State, work: Work, drive: Array) -> float:
-    """Follow the equilibrium from no clearance to all of it, at once if that goes; returns the share that was reached."""
+    """Follow the equilibrium from zero to full clearance, in one step if possible; return the fraction reached."""
 
     def rests(share: float, aim: float) -> bool:
         return _rests(loosen_pins(plan, state, aim, aim - share), state, work, drive, 1.0)
@@ -328,7 +328,7 @@ def _loosen_gradually(plan: Plan, state: State, work: Work, drive: Array) -> flo
 
 
 def _gradually(state: State, step: float, least: float, rests: Callable[[float, float], bool]) -> float:
-    """Follow what `rests` solves from share to share, in steps that halve down to `least` where it fails and double."""
+    """Return the largest fraction reached. A step doubles if `rests` succeeds, and halves, to `least`, if it fails."""
     share = 0.0
     while share < 1.0 and step >= least:
         z, history, aim = state.z.copy(), state.history.copy(), min(share + step, 1.0)
@@ -341,10 +341,10 @@ def _gradually(state: State, step: float, least: float, rests: Callable[[float, 
 
 
 def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> bool:
-    """Solve for equilibrium under `load` times gravity from the present guess; return True if there is a stable one."""
+    """Solve for equilibrium under `load` times gravity from the present guess; return True if a stable one is found."""
     loaded = replace(plan, tables=plan.tables._replace(gravity=load * plan.tables.gravity))
     scheme, still = prepare(REST, 0.0, 0.0, work.weights), np.zeros(plan.joints)
-    for cylinder in plan.tables.cylinders:  # angles of barrels and rods within half a turn, whatever was tried
+    for cylinder in plan.tables.cylinders:  # reset angles of barrels and rods, to stay within half a turn after failed attempts
         own = slice(cylinder.first_part, cylinder.first_part + cylinder.parts)
         state.history[X, plan.tables.parts.history[own] + 2] = 0.0
     status, _, _ = advance(loaded.tables, state, work, scheme, drive, still, TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW)
@@ -352,7 +352,7 @@ def _rests(plan: Plan, state: State, work: Work, drive: Array, load: float) -> b
 
 
 def is_stable(plan: Plan, state: State, work: Work) -> bool:
-    """Return True if energy has a minimum here: as many negative pivots as there are forces among the unknowns."""
+    """Return True if energy is minimal: negative pivots equal the constraint forces among the unknowns in number."""
     try:
         return negative_pivots(plan, state, work, 0.0) == constraints(plan)
     except SolverError:
@@ -360,7 +360,7 @@ def is_stable(plan: Plan, state: State, work: Work) -> bool:
 
 
 def outline(plan: Plan, frames: Array, position: Array) -> Array:
-    """Points (.., k, 2) of the centre line, base to tip, m.
+    """Return points (.., k, 2) of the centre line from base to tip, m.
 
     Parameters
     ----------

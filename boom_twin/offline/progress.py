@@ -1,4 +1,4 @@
-"""Progress of a long run on stderr: a bar on a terminal, elsewhere a line for every tenth."""
+"""Progress of a long run on stderr: a bar on a terminal, otherwise a line per 10 %."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ if TYPE_CHECKING:
 
 
 class TenthLines:
-    """Progress as a line for every tenth.
+    """Progress as one line per 10 %.
 
     Parameters
     ----------
     total : int
-        Of what is to be done.
+        Number of units in the whole run.
     unit, name : str
-        What is counted, in the plural, and by which command.
+        Plural name of the units, and name of the command.
     done : int
-        Of it before the run.
+        Units done before the run.
     """
 
     def __init__(self, total: int, unit: str, name: str, done: int = 0) -> None:
@@ -31,7 +31,7 @@ class TenthLines:
         return min(10, int(10 * self._done / self._total)) if self._total else 0
 
     def update(self, n: float, /) -> None:
-        """Add `n` to what was done."""
+        """Add `n` units, and print a line if a further 10 % is done."""
         self._done += n
         if self._tenths > self._told:
             self._told = self._tenths
@@ -39,11 +39,11 @@ class TenthLines:
             print(f"{self._name}: {10 * self._told} %, {done} of {self._total} {self._unit}", file=sys.stderr, flush=True)
 
     def close(self) -> None:
-        """Do nothing: the last line was printed before."""
+        """Do nothing; `update` has printed the last line."""
 
 
 def progress_of(total: int, unit: str, name: str, done: int = 0) -> ProgressBar:
-    """Return a bar if stderr is a terminal, else lines."""
+    """Return a progress bar if stderr is a terminal, else `TenthLines`."""
     if not sys.stderr.isatty():
         return TenthLines(total, unit, name, done)
     from tqdm import tqdm

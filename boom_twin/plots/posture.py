@@ -1,4 +1,4 @@
-"""Pictures of postures: the deflected boom through a session, and journals in their bushes."""
+"""Pictures of the deflected boom through a session, and of journals in their bushes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_LINES = 24
 
 
 def posture_picture(path: Path, session: str, history: History, note: str) -> None:
-    """Write ``posture.png``."""
+    """Write the picture of the deflected boom at instants of a session."""
     with picture(path, f"{session}: deflected boom through the session", note) as figure:
         axes = figure.add_subplot()
         side_view(axes)
@@ -38,18 +38,18 @@ def posture_picture(path: Path, session: str, history: History, note: str) -> No
 
 
 def spread(count: int, most: int) -> list[int]:
-    """Return at most `most` of `count` places, evenly spread, with the first and the last."""
+    """Return at most `most` of `count` indices, evenly spaced, with the first and the last."""
     return sorted({round(place) for place in np.linspace(0, count - 1, min(count, most))}) if count else []
 
 
 COLUMNS = 4
-WIDTH = 4.2  # of a panel, hundreds of pixels
+WIDTH = 4.2  # width of a panel, hundreds of pixels
 MICRO = 1e6
-ROOM = 1.25  # clearances from the middle of a bush to the edge of its panel, at least
+ROOM = 1.25  # least half width of a panel, in clearances
 
 
 def orbits_picture(path: Path, title: str, orbits: Orbits, note: str = "") -> None:
-    """Write one panel a pin."""
+    """Write the picture of journal paths, one panel per pin."""
     columns = max(2, min(COLUMNS, len(orbits.names)))
     rows = -(-len(orbits.names) // columns)
     with picture(path, title, note, (WIDTH * columns + 1.0, WIDTH * rows + 1.1)) as figure:

@@ -1,4 +1,4 @@
-"""One look for all pictures: canvas, colours, titles, files. No display is needed."""
+"""Common style of all pictures: canvas, colours, titles, PNG files. No display is needed."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     from .history import AlarmSpan
 
 
-# Okabe and Ito: told apart by every kind of colour vision
+# after Okabe and Ito: distinguishable with every kind of colour vision
 BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#56B4E9"
 INK, GREY, PALE = "#222222", "#8A8A8A", "#DDDDDD"
 TONES = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "D"), (PURPLE, "^"), (SKY, "v"), (INK, "P"))
-"""Colour and marker of one curve among others."""
+"""Colour and marker of each curve in a group."""
 DPI = 100
-MARGIN = 0.08  # of the height of an axis, above and below what is shown
+MARGIN = 0.08  # fraction of the data range, left free above and below
 TIME = "time since first sample, s"
-"""Label of an axis of time."""
-NOTE = 70  # characters of small print that fit beside a title
+"""Label of time axes."""
+NOTE = 70  # longest note beside a title, characters
 
 LOOK = {
     "font.size": 13,
@@ -65,9 +65,9 @@ SMALL: dict[str, Any] = {"fontsize": 13, "color": GREY, "va": "top", "ha": "righ
 
 @contextmanager
 def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = (16.0, 9.0)) -> Iterator[Figure]:
-    """Provide a titled figure of `size` (hundreds of pixels), written to `path` as PNG when the block is left.
+    """Provide a titled figure of `size` (hundreds of pixels), and write it to `path` as PNG at the end of the block.
 
-    The same arrays give the same bytes: the file holds no time and no version. UsageError if the name is of another kind.
+    Equal arrays give equal bytes: the file contains no time and no version. UsageError if `path` does not end with .png.
     """
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -90,13 +90,13 @@ def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = 
 
 
 def shade_gaps(axes: Axes, gaps: list[tuple[float, float]]) -> None:
-    """Draw grey bands where strokes were missing; the first one is labelled for a legend."""
+    """Draw grey bands where strokes were missing. The first band has a legend label."""
     for number, (start, stop) in enumerate(gaps):
         axes.axvspan(start, stop, color=PALE, linewidth=0, zorder=0.5, label="" if number else "strokes missing")
 
 
 def shade_alarms(axes: Axes, alarms: list[AlarmSpan]) -> None:
-    """Draw coloured bands where alarms lasted, each with its cause."""
+    """Draw a coloured band for the duration of each alarm, with its label."""
     for alarm in alarms:
         axes.axvspan(alarm.start, alarm.stop, color=ORANGE, alpha=0.13, linewidth=0, zorder=0.4)
         place = (max(alarm.start, axes.get_xlim()[0]), 0.97)
@@ -107,14 +107,14 @@ def shade_alarms(axes: Axes, alarms: list[AlarmSpan]) -> None:
 
 
 def broken(stamps: Array, values: Array, gaps: list[tuple[float, float]]) -> tuple[Array, Array]:
-    """Return `stamps` (m,) and `values` (m, c) with a NaN in the middle of every gap, so that no line is drawn across it."""
+    """Return `stamps` (m,) and `values` (m, c) with a NaN row in the middle of every gap, to interrupt lines there."""
     middles = np.array([0.5 * (start + stop) for start, stop in gaps])
     places = np.searchsorted(stamps, middles)
     return np.insert(stamps, places, middles), np.insert(values, places, np.nan, axis=0)
 
 
 def extent(times: Array) -> tuple[float, float]:
-    """Return the first and last of `times` (k,), at least a millisecond apart, as the limits of an axis."""
+    """Return axis limits: the first and last of `times` (k,), at least a millisecond apart."""
     return float(times[0]), float(max(times[-1], times[0] + 1e-3))
 
 
@@ -126,7 +126,7 @@ def side_view(axes: Axes) -> None:
 
 
 def colours_of_times(figure: Figure, axes: Any, times: Array, label: str) -> Callable[[Any], Any]:
-    """Draw a bar of the colours that stand for `times` (k,) in s beside `axes`; return the function from times to colours."""
+    """Draw a colour bar of `times` (k,), s, beside `axes`; return the function from times to colours."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LinearSegmentedColormap, Normalize
 
@@ -138,12 +138,12 @@ def colours_of_times(figure: Figure, axes: Any, times: Array, label: str) -> Cal
 
 
 def legend_above(axes: Axes, columns: int = 1, top: float = 1.0, **look: Any) -> None:
-    """Draw a legend above the right end of an axes; `top` as a share of its height."""
+    """Draw a legend above the right end of `axes`; `top` is its lower edge as a fraction of the axes' height."""
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, top), ncols=columns, borderaxespad=0.1, **look)
 
 
 def limits(*arrays: Array, around: float | None = None) -> tuple[float, float]:
-    """Return limits of an axis that show all finite values with a margin; symmetric about `around` if that is given."""
+    """Return axis limits with a margin around all finite values, symmetric about `around` if given."""
     values = np.concatenate([np.ravel(array) for array in arrays])
     values = values[np.isfinite(values)]
     if values.size == 0:

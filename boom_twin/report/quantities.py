@@ -1,4 +1,4 @@
-"""Quantities of a session with their standard deviations, bending moments and stresses included, for comparisons."""
+"""Quantities of a session with standard deviations, for comparing sessions; also bending moments and stresses."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from .vibration import RestPeriod
 
 FILE_NAME = "quantities.json"
 BATCHES = 10
-"""Parts of a session whose means show how sure the mean of all is (method of batch means)."""
+"""Number of batches for the standard deviation of a mean (method of batch means)."""
 LEG = 1e-3
-"""m; a stroke has turned when it came back by this."""
+"""Reversal (m) of a stroke that begins a new leg."""
 MODEL_ERROR: dict[Stream | None, float] = {Stream.ANGLES: 5e-5, Stream.IMU: 0.02}
-"""Deviation of the model's error of a reading in one posture, by stream; rad, m/s^2."""
-FREQUENCY_ERROR = 0.01  # share by which natural frequencies of the model may be wrong in one posture
+"""Standard deviation of the model error of a reading in one posture, by stream; rad, m/s^2."""
+FREQUENCY_ERROR = 0.01  # relative standard deviation of the model's natural frequencies in one posture
 
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """Figure of a session in SI units. Its standard deviation is None if it is not known."""
+    """Quantity of a session in SI units; `sigma` is its standard deviation, None if unknown."""
 
     name: str
     value: float
@@ -45,17 +45,17 @@ class Quantity:
 
 
 class QuantityBuilder:
-    """Computation of a session's quantities, block by block."""
+    """Accumulator of a session's quantities, block by block."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._channels: dict[str, tuple[BatchMeans, BatchMeans]] = {}  # of values, and of their squares
+        self._channels: dict[str, tuple[BatchMeans, BatchMeans]] = {}  # means of values and of squares
         self._displacement = self._acceleration = 0.0
         self._travels = [PathLength() for _ in scene.joints]
         self._loads = SectionLoads(scene)
 
     def add(self, history: History, load: Array, variance: Array) -> None:
-        """Add the next block, with all its rows; `load`, `variance` as for `SectionLoads.add`."""
+        """Add the next block of rows; `load` and `variance` as for `SectionLoads.add`."""
         for name, column in zip(history.residual_names, history.residual_values.T, strict=True):
             values = column[np.isfinite(column)]
             means, squares = self._channels.setdefault(name, (BatchMeans(), BatchMeans()))
@@ -68,11 +68,11 @@ class QuantityBuilder:
         self._loads.add(history, load, variance)
 
     def loads(self, heights: Array | None) -> list[Load]:
-        """Return the loads, see `SectionLoads.loads`."""
+        """Return the result of `SectionLoads.loads`."""
         return self._loads.loads(heights)
 
     def quantities(self, tip_sigma: float | None, rests: list[RestPeriod], settings: Settings) -> list[Quantity]:
-        """Return all figures of the session; `tip_sigma` is the largest deviation of the predicted tip, m, if it is known."""
+        """Return all quantities; `tip_sigma` is the largest standard deviation of the predicted tip, m, or None."""
         return [
             *self._residuals(),
             *_frequencies(rests),
@@ -86,9 +86,9 @@ class QuantityBuilder:
         ]
 
     def _residuals(self) -> Iterator[Quantity]:
-        """Yield mean and root mean square of every channel; the model's error in a posture counts as uncertainty of the mean.
+        """Yield mean and root mean square of every channel's residual.
 
-        The deviations are None where that error is not known.
+        Their standard deviations include `MODEL_ERROR`, and are None for streams without one.
         """
         for name, (values, squares) in self._channels.items():
             unit = sensor_kind(name).unit
@@ -109,11 +109,11 @@ class QuantityBuilder:
 
 
 class BatchMeans:
-    """Mean of values that come in parts, and its standard deviation by the method of batch means."""
+    """Mean of values added in parts, and its standard deviation by the method of batch means."""
 
     def __init__(self) -> None:
         self.count = 0  # values so far
-        self._sums: list[tuple[float, int]] = []  # of each of `BATCHES` pieces of each part: sum and number of values
+        self._sums: list[tuple[float, int]] = []  # sum and count of each piece; every part has `BATCHES` pieces
 
     def add(self, values: Array) -> None:
         """Add values, shape (k,)."""
@@ -122,7 +122,7 @@ class BatchMeans:
 
     @property
     def mean(self) -> tuple[float, float]:
-        """Mean, and its standard deviation from `BATCHES` batches. It needs at least so many values."""
+        """Mean, and its standard deviation from `BATCHES` batches. At least `BATCHES` values are needed."""
         parts = [part.sum(axis=0) for part in np.array_split(np.array(self._sums), BATCHES)]
         means = np.array([total / count for total, count in parts if count])
         total = sum(total for total, _ in self._sums)
@@ -130,7 +130,7 @@ class BatchMeans:
 
 
 def _frequencies(rests: list[RestPeriod]) -> Iterator[Quantity]:
-    """Yield measured over model frequency, and damping, of every mode that was seen."""
+    """Yield the ratio of measured to model frequency, and the damping ratio, of every measured mode."""
     for mode in sorted({mode for rest in rests for mode in rest.measured}):
         seen = [(rest.model[mode], rest.measured[mode]) for rest in rests if mode in rest.measured]
         ratios = np.array([(each.frequency / model, each.frequency_sigma / model) for model, each in seen])
@@ -140,9 +140,9 @@ def _frequencies(rests: list[RestPeriod]) -> Iterator[Quantity]:
 
 
 def _weighted(name: str, rows: Array, error: float) -> Quantity:
-    """Return the weighted mean of values and deviations (k, 2).
+    """Return the weighted mean of `rows` (k, 2): values and standard deviations.
 
-    Its standard deviation follows from the weights or from the scatter, whichever is larger, and includes `error`.
+    Its standard deviation is the larger of those from weights and from scatter, combined with `error`.
     """
     weights = rows[:, 1] ** -2.0
     mean = float(weights @ rows[:, 0] / weights.sum())
@@ -151,7 +151,7 @@ def _weighted(name: str, rows: Array, error: float) -> Quantity:
 
 
 class PathLength:
-    """Travel of a stroke back and forth, and its number of legs. A reversal smaller than `LEG` is noise."""
+    """Total travel of a stroke, and its number of legs. Reversals smaller than `LEG` are ignored as noise."""
 
     def __init__(self) -> None:
         self._begin: float | None = None
@@ -159,7 +159,7 @@ class PathLength:
         self._travel, self._legs = 0.0, 0
 
     def add(self, stroke: Array) -> None:
-        """Add the next values, shape (k,), m; at least one."""
+        """Add the next stroke values (m), shape (k,), k >= 1."""
         begin = float(stroke[0]) if self._begin is None else self._begin
         extreme, way = begin if self._begin is None else self._extreme, self._way
         for value in stroke.tolist():
@@ -174,7 +174,7 @@ class PathLength:
 
     @property
     def length(self) -> tuple[float, int]:
-        """Travel so far, m, and legs."""
+        """Travel so far (m), and number of legs."""
         if not self._way or self._begin is None:
             return 0.0, 0
         return self._travel + abs(self._extreme - self._begin), self._legs + 1
@@ -189,7 +189,7 @@ def write(folder: Path, scene: Scene, found: list[Quantity]) -> Path:
 
 
 def read(folder: Path) -> tuple[str, list[Quantity]]:
-    """Return digest of the scene, and the figures, of a replay folder; raise BagError if they are not there."""
+    """Return scene digest and quantities of a replay folder; raise BagError if they cannot be read."""
     path = folder / FILE_NAME
     try:
         with open_received(path) as file:
@@ -200,7 +200,7 @@ def read(folder: Path) -> tuple[str, list[Quantity]]:
 
 
 def digest(scene: Scene) -> str:
-    """Return the SHA-256 of everything that a scene names, in hexadecimal."""
+    """Return the hexadecimal SHA-256 of the scene's keys and values."""
     return sha256(scene.model_dump_json(exclude_none=True).encode()).hexdigest()
 
 
@@ -209,13 +209,13 @@ class Load:
     """Most loaded station of a section."""
 
     station: Station
-    column: int  # of `History.moments`
+    column: int  # column of `History.moments`
     moment: float  # N m, the largest in magnitude
-    time: float  # s, when
-    static: float  # N m, the static part of it then
-    unknown: float  # N m, by the load at the tip that only sensors know of, at rest; NaN where only strokes were measured
-    sigma: float  # N m, standard deviation of that
-    modulus: float  # m^3, of the section
+    time: float  # s, of that moment
+    static: float  # N m, its static part
+    unknown: float  # N m, static moment of the estimated load at the tip; NaN if there is no estimate
+    sigma: float  # N m, standard deviation of `unknown`
+    modulus: float  # m^3, section modulus
 
     @property
     def stress(self) -> float:
@@ -231,7 +231,7 @@ class SectionLoads:
         self._largest: dict[int, _Largest] = {}  # by section
 
     def add(self, history: History, load: Array, variance: Array) -> None:
-        """Add the next block, with all its rows; estimated load at the tip (N) and its variance (N^2), each (m, 2)."""
+        """Add the next block of m rows; `load` (N) at the tip, estimated, and its `variance` (N^2), each (m, 2)."""
         for section in sorted({station.section for station in self._places}):
             columns = [i for i, station in enumerate(self._places) if station.section == section]
             size = np.abs(history.moments[:, columns])
@@ -246,7 +246,7 @@ class SectionLoads:
     def loads(self, heights: Array | None) -> list[Load]:
         """Return the load of every flexible section.
 
-        `heights` (n,) of the sections, m; None for the scene's, or those of thin-walled boxes.
+        `heights` (n,) are the section heights, m. None: those of the scene, else those of thin-walled boxes.
         """
         if not self._largest:
             return []
@@ -262,7 +262,7 @@ class SectionLoads:
 
 
 class _Largest(NamedTuple):
-    """Largest moment of a section so far, as in `Load`, and the state at that time."""
+    """Largest moment of a section so far (fields as in `Load`), and the state at that time."""
 
     column: int
     moment: float
@@ -271,11 +271,11 @@ class _Largest(NamedTuple):
     strokes: Array  # m
     joints: Array  # rad
     load: Array  # N, estimated at the tip
-    variance: Array  # N^2, of that
+    variance: Array  # N^2, of `load`
 
 
 def section_heights(text: str | None, scene: Scene) -> Array | None:
-    """Return the heights (m) of all sections from ``h1,h2,..``; raise UsageError unless there is one above 0 for each."""
+    """Return the section heights (m) from ``h1,h2,..``; raise UsageError unless every section has one above 0."""
     if text is None:
         return None
     count = len(scene.sections)

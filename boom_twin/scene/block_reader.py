@@ -1,4 +1,4 @@
-"""Plain values of a file to a validated block: unknown keys, quantities with units, pydantic's errors in the file's words."""
+"""Validation of a file's plain values: unknown keys, quantities with units, pydantic errors in the file's terms."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ if TYPE_CHECKING:
 Root = TypeVar("Root", bound=BaseModel)
 EMPTY: tuple[Any, ...] = (None, {}, ())
 ITEM = "a block of keys, as in the default scene"
-LONGEST = 40  # characters of a text that is taken for a number
+LONGEST = 40  # characters, longest text that may be a misspelt number
 
 
 @dataclass(frozen=True)
 class Validated(Generic[Root]):
-    """Content of a document, with the faults of its values."""
+    """Validated content of a document, or the faults of its values."""
 
     block: Root | None
-    """The whole, if every value is good by itself."""
+    """The validated document; None if any single value is faulty."""
     known: Any
-    """The plain values without unknown keys."""
+    """Plain values without unknown and empty keys."""
     broken: frozenset[Place]
-    """Places of values that are not good."""
+    """Places of faulty values."""
     faults: tuple[Fault, ...]
     """Faults of single values and unknown keys."""
 
 
 def validated(document: Document, root: type[Root]) -> Validated[Root]:
-    """Return the block that a document holds, with all faults of single values."""
+    """Return the document as a block of type `root`, with all faults of single values."""
     faults: list[Fault] = []
     known = _known(document, root, document.values, root, (), faults)
     try:
@@ -50,14 +50,14 @@ def validated(document: Document, root: type[Root]) -> Validated[Root]:
 
 
 def _counts_faulty(detail: ErrorDetails) -> bool:
-    """Return True if a list is called too short because its entries are faulty; each of them has a fault of its own."""
+    """Return True if pydantic reports a list as too short only because its entries are faulty. These have their own faults."""
     return detail["type"] == "too_short" and detail["loc"] in (("sections",), ("joints",)) and len(detail["input"]) > 0
 
 
 def _known(
     document: Document, root: type[BaseModel], block: Any, model: type[BaseModel], place: Place, faults: list[Fault]
 ) -> Any:
-    """Return a block without unknown and empty keys, with quantities in their keys' units. Add unknown keys to `faults`."""
+    """Return a block without unknown and empty keys, quantities in the units of their keys. Add unknown keys to `faults`."""
     if not isinstance(block, dict):
         return block
     known: dict[str, Any] = {}
@@ -78,16 +78,16 @@ def _known(
     return known
 
 
-# -- what a model says of its keys ------------------------------------------------------------------------------------
+# -- meanings and blocks of keys --------------------------------------------------------------------------------------
 
 
 def meaning_of(model: type[BaseModel], key: str) -> str:
-    """Return the meaning and unit of a key, as error messages quote them."""
+    """Return meaning and unit of a key, for error messages."""
     return model.model_fields[key].description or ""
 
 
 def inner_block(model: type[BaseModel], key: str) -> type[BaseModel] | None:
-    """Return the block, or the block of each item, that a key of a model holds; None for plain values and unknown keys."""
+    """Return the block type of a key's value, or of its list items; None for plain values and unknown keys."""
     return _block(model.model_fields[key].annotation) if key in model.model_fields else None
 
 
@@ -102,7 +102,7 @@ def _is_list(model: type[BaseModel], key: str) -> bool:
 
 
 def _homes(model: type[BaseModel], place: str = "") -> Iterator[tuple[type[BaseModel], str]]:
-    """Yield every block of a file with its place, the whole file first."""
+    """Yield every block type of a file with its place, the top level first."""
     yield model, place or "the top level"
     for key in model.model_fields:
         if (inner := inner_block(model, key)) is not None:
@@ -110,7 +110,7 @@ def _homes(model: type[BaseModel], place: str = "") -> Iterator[tuple[type[BaseM
 
 
 def meaning_at(root: type[BaseModel], place: Place) -> str:
-    """Return meaning and unit of the key at or around a place of a file, empty if there are none."""
+    """Return meaning and unit of the nearest described key at or above `place`; empty if there is none."""
     if place[:1] == ("postures",) and len(place) > 1:
         return "section angles to the horizontal, degrees"
     model: type[BaseModel] = root
@@ -123,7 +123,7 @@ def meaning_at(root: type[BaseModel], place: Place) -> str:
     return meaning
 
 
-# -- the words of a refused value -------------------------------------------------------------------------------------
+# -- messages about refused values ------------------------------------------------------------------------------------
 
 
 BOUNDS = {
@@ -142,7 +142,7 @@ BOUNDS = {
 
 
 def _unknown_key(document: Document, root: type[BaseModel], place: Place, value: Any, model: type[BaseModel]) -> Fault:
-    """Return the fault of a key that `model` does not have: the nearest one, and where the key belongs if known elsewhere."""
+    """Return the fault of a key that `model` lacks, with the nearest known key and the blocks that have this key."""
     key = str(place[-1])
     if key.isdigit() and value is None:
         bound = "a number stands where a key is expected"
@@ -160,7 +160,7 @@ def _unknown_key(document: Document, root: type[BaseModel], place: Place, value:
 
 
 def _value_fault(document: Document, root: type[BaseModel], detail: ErrorDetails) -> Fault:
-    """Return a pydantic error in the words of the file."""
+    """Return the fault for a pydantic error, in the file's terms."""
     place, kind, value, limits = detail["loc"], detail["type"], detail["input"], detail.get("ctx", {})
     meaning = meaning_at(root, place)
     give = f"Give {meaning}." if meaning else "Give such a value."
@@ -196,7 +196,7 @@ def _length_fault(document: Document, detail: ErrorDetails, place: Place, give: 
 
 
 def _what(value: Any) -> str:
-    """Return the kind of a value, in a newcomer's words."""
+    """Return the type of a value in plain words."""
     if isinstance(value, bool):
         return "true or false"
     if isinstance(value, str):

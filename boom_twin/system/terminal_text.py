@@ -1,4 +1,4 @@
-"""Standard streams: escape text of others that would steer a terminal, and bear streams that are closed or full."""
+"""Standard streams: escape control characters in received text, and tolerate closed or full streams."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ STDERR = 2  # number of the last of the three standard streams
 def printable(text: str, keep: str = "\n\t") -> str:
     r"""Return the text with every unprintable character escaped, as in ``\x1b``.
 
-    Unprintable are controls, escapes, marks of direction and lone surrogates. Characters of `keep` are unchanged.
+    Unprintable: control characters, escapes, direction marks and lone surrogates. Characters of `keep` stay unchanged.
     """
     if text.isprintable():
         return text
@@ -21,29 +21,29 @@ def printable(text: str, keep: str = "\n\t") -> str:
 
 
 def open_closed_streams() -> None:
-    """Open standard streams that the caller has closed. Otherwise a file of results gets their number and the printed text."""
+    """Open closed standard streams on the null device. Otherwise a result file would get their number and the printed text."""
     while (number := os.open(os.devnull, os.O_RDWR)) <= STDERR:
         os.set_inheritable(number, True)
     os.close(number)
 
 
 class PrintableStream:
-    """Text stream that writes texts through `printable` to a `stream`, with all other methods of that stream.
+    """Wrapper of a text `stream` that escapes all written text by `printable`.
 
-    If the reader has ended, the text is dropped. The work goes on, and its exit code gives the result.
+    If the reader of a pipe has ended, text is dropped and the command continues. Its exit code still gives the result.
 
     Parameters
     ----------
     stream : TextIO
     name : str
-        Name in the OSError of a stream that cannot be written. If it is empty, the text is dropped then, too.
+        Name in the OSError of a failed write. If it is empty, failed writes are dropped without an error.
     """
 
     def __init__(self, stream: TextIO, name: str) -> None:
         self._stream, self._name = stream, name
 
     def write(self, text: str) -> None:
-        """Write the text. A carriage return is kept, for lines that are written over."""
+        """Write the text. Carriage returns are kept, so that progress lines can be overwritten."""
         self._do(lambda: self._stream.write(printable(text, keep="\n\t\r")))
 
     def flush(self) -> None:
@@ -54,7 +54,7 @@ class PrintableStream:
         try:
             act()
         except OSError as error:
-            with suppress(OSError):  # nothing may be flushed to it at the exit of the process
+            with suppress(OSError):  # redirect, so that the flush at process exit cannot fail
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
             if self._name and not isinstance(error, BrokenPipeError):
                 raise OSError(error.errno, error.strerror, self._name) from None

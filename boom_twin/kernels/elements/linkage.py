@@ -1,16 +1,15 @@
-"""Length of a cylinder as a function of the joint angle it turns: the rigid geometry of substructures A and B.
+"""Cylinder length as a function of the joint angle: rigid geometry of joint kinds A and B.
 
-All points in the frame of the carrier (the base for A; the section before for B) with its origin in the pivot and the
-carrier's axes; `phi` is the angle of the turned section against the carrier.
+Points are in the axes of the carrier (the base for A, the section before for B), with origin in the pivot. `phi` is the angle
+of the turned section against the carrier.
 
     A:  R = Rot(phi) (rx, ry), the rod pin on the turned section.
-    B:  E = Rot(phi) (ex, ey); Q = intersection of the circles (D, lL) and (E, lR) to the left of D->E, or to the right of it
-        (`side`); the rod pin sits on a link:
-        R = base + along u + left n, with base = D, u = (Q - D)/lL on link L, and base = E, u = (Q - E)/lR on link R.
-        B1 is link L with (lL, 0); B2 is link L with R itself; B3 is link R with (lR - R0, -R1), because the scene measures
-        B3's R from Q towards E.
+    B:  E = Rot(phi) (ex, ey). Q is the intersection of circles (D, lL) and (E, lR) to the left or right of D->E (`side`).
+        The rod pin is on a link: R = base + along u + left n, n to the left of u.
+        Link L: base = D, u = (Q - D)/lL. Link R: base = E, u = (Q - E)/lR.
+        (along, left): B1 (lL, 0) on L; B2 R on L; B3 (lR - R0, -R1) on R, as the scene measures B3's R from Q to E.
 
-Plain Python calls these with arrays of angles too, under np.errstate(invalid="ignore") where links may not close.
+Plain Python may call these with arrays of angles, under np.errstate(invalid="ignore") if links may not close.
 
     length = |R - C|.  Derivatives follow from (Q-D).dQ = 0 and (Q-E).(dQ-dE) = 0.
 """
@@ -31,17 +30,17 @@ LINKAGE = np.dtype(
         ("mount", np.int64),  # DIRECT: rod pin on the turned section; LINK_L, LINK_R: on that link
         ("cx", float), ("cy", float),  # barrel pin C, m
         ("dx", float), ("dy", float),  # pivot D of link L, m
-        ("ex", float), ("ey", float),  # pin E of link R; of DIRECT the rod pin, m
+        ("ex", float), ("ey", float),  # pin E of link R, or the rod pin of DIRECT, m
         ("length_l", float), ("length_r", float),  # m
         ("side", float),  # 1: Q left of D->E; -1: right of it
-        ("along", float), ("left", float),  # place of the rod pin on its link, m
+        ("along", float), ("left", float),  # rod pin on its link, m
     ]
 )  # fmt: skip
 
 
 @inner
 def joint_pin(row, ex, ey):
-    """Pin Q on its side of D->E, at distance length_l from D and length_r from E; NaN if the circles do not meet."""
+    """Return pin Q at distance length_l from D and length_r from E on `side` of D->E; NaN if the circles do not meet."""
     vx, vy = ex - row.dx, ey - row.dy
     distance2 = vx * vx + vy * vy
     foot = (row.length_l * row.length_l - row.length_r * row.length_r + distance2) / (2.0 * distance2)
@@ -51,7 +50,7 @@ def joint_pin(row, ex, ey):
 
 @inner
 def link_angles(row, phi):
-    """Angles of links L (D->Q) and R (E->Q) in the carrier's frame (rad); NaN if they do not close."""
+    """Return the angles of links L (D->Q) and R (E->Q) in the carrier's frame (rad); NaN if they do not close."""
     ex, ey = turned(phi, row.ex, row.ey)
     qx, qy = joint_pin(row, ex, ey)
     return np.arctan2(qy - row.dy, qx - row.dx), np.arctan2(qy - ey, qx - ex)
@@ -59,7 +58,7 @@ def link_angles(row, phi):
 
 @inner
 def cylinder_length(row, phi):
-    """Pin-to-pin length of the cylinder (m) and its derivative by phi (m/rad); NaN if the links do not close."""
+    """Return the cylinder's pin-to-pin length (m) and its derivative by phi (m/rad); NaN if the links do not close."""
     ex, ey = turned(phi, row.ex, row.ey)
     if row.mount == DIRECT:
         rx, ry, drx, dry = ex, ey, -ey, ex
@@ -88,7 +87,7 @@ def cylinder_length(row, phi):
 
 @inner
 def angle_of_length(row, length, phi, low, high):
-    """Angle next to `phi` at which the cylinder has `length`: Newton steps kept inside [low, high]; NaN if none."""
+    """Return the angle near `phi` at which the cylinder has `length`, by Newton steps within [low, high]; NaN if none."""
     for _ in range(50):
         now, slope = cylinder_length(row, phi)
         step = (length - now) / slope
@@ -103,9 +102,9 @@ def angle_of_length(row, length, phi, low, high):
 
 @kernel
 def angles_of_lengths(rows, lengths, near, lows, highs, samples, angles):
-    """Write the angles (n,) of cylinders of these lengths (m), n linkages each, as `angle_of_length` does.
+    """Write the `angles` (n,) of n linkages whose cylinders have `lengths` (m), by `angle_of_length`.
 
-    It is searched next to `near` (n,), or where that is NaN, next to the best of so many `samples` from `lows` to `highs`, rad.
+    The search starts at `near` (n,). If that is NaN, it starts at the best of `samples` angles from `lows` to `highs`, rad.
     """
     for i in range(angles.shape[0]):
         start, least = near[i], math.inf

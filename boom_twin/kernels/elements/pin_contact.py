@@ -1,23 +1,23 @@
-"""A journal in a bush with clearance: the force between pin and hole, as contact or as its linearisation.
+"""Force between a journal and its bush with clearance, as contact or as its linearisation.
 
-The journal's centre is off the bush's by delta = (x, y). With r = sqrt(|delta|^2 + s^2), n = delta/r, s = `SMOOTH`,
+The journal's centre is offset from the bush's by delta = (x, y). With r = sqrt(|delta|^2 + s^2), n = delta/r, s = `SMOOTH`,
 
     gap g = r - c,    penetration d = [g + sqrt(g^2 + s^2)]/2,    g' = n.delta',
     F = K d^e [1 + chi g'/v],        K = 4/[3 (s_i + s_j)] sqrt(R_i R_j/(R_j - R_i)),
 
-c the radial clearance, v the speed of approach when contact began, s_i = (1 - nu^2)/E of each body, R_i and R_j = R_i + c the
-radii. K grows without bound as c vanishes while the pin becomes ideal, so R_j - R_i is not taken below `LEAST_GAP` in it.
-K and the form of F: Lankarani and Nikravesh 1990, the second paper's model ([R] in `boom_twin.scene.notation`); the laws differ
-in chi, a function of the coefficient of restitution each. The bracket is kept above `LEAST_SHARE`: nothing pulls, and a
-journal without mass, which leaves as fast as it likes, is still held somewhere. With g' in the bracket the rebound does not
-depend on how d is smoothed. The elastic part is convex in delta: at rest a pin has one place.
+with radial clearance c, speed of approach v at the start of contact, s_i = (1 - nu^2)/E of each body, and radii R_i and
+R_j = R_i + c. K diverges as c vanishes, although the pin becomes ideal. So K uses at least `LEAST_GAP` for R_j - R_i.
+K and the form of F are those of Lankarani and Nikravesh 1990, used in [R] of `boom_twin.scene.notation`. The laws differ in
+chi, a function of the coefficient of restitution. The bracket is at least `LEAST_SHARE`. So contact never pulls, and the
+position of a massless journal stays determined when it leaves. With g' in the bracket the rebound does not depend on the
+smoothing of d. The elastic energy is convex in delta, so a pin at rest has one position.
 
-Friction against the slip of the surfaces, w = n x delta' + R_i (turning of the journal in the bush): mu F w/sqrt(w^2 + w_s^2),
-with F of the step before, which leaves the tangent symmetric.
+Friction opposes the surfaces' slip velocity w = n x delta' + R_i (angular velocity of the journal in the bush). It is
+mu F w/sqrt(w^2 + w_s^2). F is that of the step before, which keeps the tangent symmetric.
 
-Linearised at a preload F_0 with penetration d_0, the pin is a spring k = e F_0/d_0 and a damper chi F_0/v about the place from
-which F_0 stretches it to c + d_0. That place is fixed to the cylinder, or to the body that holds the bush of a pivot or link
-pin: it turns with the force of a cylinder, and stays on its side when the force reverses.
+The linearised pin at preload F_0 with penetration d_0 is a spring k = e F_0/d_0 and a damper chi F_0/v. Force F_0 stretches
+the spring from its seat to c + d_0. The seat is fixed to the cylinder, or to the body with the bush of a pivot or link pin. It
+therefore turns with the cylinder's force, and stays on its side if the force reverses.
 """
 
 from __future__ import annotations
@@ -30,23 +30,23 @@ import numpy as np
 
 from ..jit import inner
 
-SMOOTH = 1e-6  # m, over which contact sets in
-NEAR = 4.0 * SMOOTH  # m, width of the gap at which journal and bush count as touching
+SMOOTH = 1e-6  # m, smoothing length of the onset of contact
+NEAR = 4.0 * SMOOTH  # m, gap below which journal and bush count as touching
 LEAST_GAP = 3e-5  # m, least difference of radii in K
 SLOWEST = 1e-3  # m/s, least speed of approach
-LEAST_RESTITUTION = 0.01  # that chi is solved for
-LEAST_SHARE = 0.01  # of the elastic force, however fast the journal leaves
+LEAST_RESTITUTION = 0.01  # least restitution for which chi is solved
+LEAST_SHARE = 0.01  # least contact force as a fraction of the elastic force
 SLIP = 1e-3  # m/s, slip at which friction has 0.7 of its full size
 
-# Places of pins; typed, because numba compiles once more for every literal.
+# Kinds of pins. They are typed because numba compiles again for every literal.
 PIVOT, LINK_L_PIN, LINK_R_PIN, Q_PIN, ROD_END_PIN, BARREL_END_PIN = map(np.int64, range(6))
 
 
 class Journal(NamedTuple):
     """Position and velocity of a journal in its bush.
 
-    x, y : offset, m. vx, vy : its velocity, m/s. before_x, before_y : that at the start of the step, m/s.
-    turning : of the journal in the bush, rad/s. axis_x, axis_y : first axis of what the linearisation is fixed to.
+    x, y : offset, m. vx, vy : velocity, m/s. before_x, before_y : velocity at the start of the step, m/s.
+    turning : angular velocity of the journal in the bush, rad/s. axis_x, axis_y : first axis of the body with the seat.
     """
 
     x: float
@@ -61,10 +61,10 @@ class Journal(NamedTuple):
 
 
 class PinForce(NamedTuple):
-    """Contact force and friction torque that hold a journal back, and their derivatives.
+    """Contact force and friction torque on a journal, and their derivatives.
 
-    x, y : force, N. xx, xy, yy : its tangent by the offset, N/m.
-    torque : of friction, N m. torque_x, torque_y, torque_turn : its derivatives by the offset (N) and by the turning (N m).
+    x, y : force, N. xx, xy, yy : tangent by the offset, N/m. torque : friction torque, N m.
+    torque_x, torque_y, torque_turn : derivatives of the torque by offset (N) and by angle (N m).
     """
 
     x: float
@@ -83,10 +83,10 @@ HOLD_X, HOLD_Y, K_XX, K_XY, K_YY, TORQUE, TORQUE_X, TORQUE_Y, TORQUE_TURN, HOLD_
 
 CLEARANCE = np.dtype(
     [
-        ("z", np.int64),  # place of delta among the unknowns
-        ("owner", np.int64),  # row of its joint and cylinder ..
-        ("place", np.int64),  # .. and which pin of them it is
-        ("turn", np.int64),  # place of the journal's angle in the bush among the histories, if there is friction
+        ("z", np.int64),  # index of delta in the unknowns
+        ("owner", np.int64),  # row of its joint and cylinder
+        ("place", np.int64),  # kind of pin, `PIVOT` to `BARREL_END_PIN`
+        ("turn", np.int64),  # index of the journal's angle in the histories, with friction only
         ("heavy", np.int64),  # 1 if the journal has inertia of its own
         ("linear", np.int64),  # 1: linearised at the preload of the first equilibrium
         ("gap", float),  # radial clearance c, m
@@ -98,33 +98,33 @@ CLEARANCE = np.dtype(
     ]
 )
 
-# What a pin remembers: whether it touches, speed of approach (m/s), normal force (N); spring (N/m; 0: contact), damper
-# (N s/m) and place (m, in the axes it is fixed to) of the linearisation; how often contact was lost.
+# Memory of a pin: touches (1) or not (0), speed of approach (m/s), normal force (N). Linearisation: spring (N/m; 0 for
+# contact), damper (N s/m), seat (m, in the axes of its body). Number of lost contacts.
 CLOSED, APPROACH, FORCE, SPRING, DAMPER, SEAT_X, SEAT_Y, LOST, COLUMNS = range(9)
 
 
 def hertz(restitution: float) -> float:
-    """Elastic contact, without loss: 0 (Hertz 1882)."""
+    """Return chi of lossless elastic contact: 0 (Hertz 1882)."""
     return 0.0
 
 
 def lankarani_nikravesh(restitution: float) -> float:
-    """Nearly elastic contact: 3 (1 - e^2)/4 (Lankarani and Nikravesh 1990)."""
+    """Return chi of nearly elastic contact: 3 (1 - e^2)/4 (Lankarani and Nikravesh 1990)."""
     return 0.75 * (1.0 - restitution**2)
 
 
 def flores(restitution: float) -> float:
-    """Elastic to plastic contact: 8 (1 - e)/(5 e) (Flores, Machado, Silva and Martins 2011)."""
+    """Return chi of elastic to plastic contact: 8 (1 - e)/(5 e) (Flores, Machado, Silva and Martins 2011)."""
     return 1.6 * (1.0 - restitution) / restitution
 
 
 def hunt_crossley(restitution: float) -> float:
-    """Hard contact at low speed: 3 (1 - e)/2 (Hunt and Crossley 1975)."""
+    """Return chi of hard contact at low speed: 3 (1 - e)/2 (Hunt and Crossley 1975)."""
     return 1.5 * (1.0 - restitution)
 
 
 def hunt_crossley_exact(restitution: float) -> float:
-    """Hunt and Crossley's force with the chi that really gives this restitution, solved for; see `restitution_of`."""
+    """Return the chi for which Hunt and Crossley's force gives exactly this restitution, by `restitution_of`."""
     wanted, low, high = max(restitution, LEAST_RESTITUTION), 0.0, 1.0
     while restitution_of(high) > wanted:
         low, high = high, 2.0 * high
@@ -141,10 +141,10 @@ LAWS = {
 
 
 def restitution_of(loss: float) -> float:
-    """The restitution that an impact with chi = `loss` really has, whatever speed, mass, K and exponent.
+    """Return the exact restitution of an impact with chi = `loss`. It is independent of speed, mass, K and exponent.
 
-    With u the speed over that of approach, m v^2 u du = -K d^e (1 + chi u) dd integrates to G(-e) = G(1) over an impact, with
-    G(u) the integral of s/max(1 + chi s, `LEAST_SHARE`) from 0 to u (Gonthier, McPhee, Lange and Piedboeuf 2004).
+    Let u be the speed relative to that of approach. Over an impact m v^2 u du = -K d^e (1 + chi u) dd integrates to
+    G(-e) = G(1). G(u) integrates s/max(1 + chi s, `LEAST_SHARE`) from 0 to u (Gonthier, McPhee, Lange and Piedboeuf 2004).
     """
     entering = _impact(loss, 1.0)
     return bisect(lambda e: _impact(loss, -e) < entering, 0.0, 1.0)
@@ -162,7 +162,7 @@ def _impact(chi: float, u: float) -> float:
 
 
 def bisect(is_below: Callable[[float], bool], low: float, high: float) -> float:
-    """Return the place between `low` and `high` where `is_below` turns from true to false."""
+    """Return the value between `low` and `high` where `is_below` changes from True to False."""
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if is_below(middle) else (low, middle)
@@ -170,14 +170,14 @@ def bisect(is_below: Callable[[float], bool], low: float, high: float) -> float:
 
 
 def contact_stiffness(radius: float, gap: float, softness: float) -> float:
-    """K (N/m^1.5) of a pin of `radius` in a hole wider by `gap` (m); softness = s_i + s_j (1/Pa)."""
+    """Return K (N/m^1.5) of a pin of `radius` (m) with radial clearance `gap` (m); softness = s_i + s_j (1/Pa)."""
     apart = max(gap, LEAST_GAP)
     return 4.0 / (3.0 * softness) * math.sqrt(radius * (radius + apart) / apart)
 
 
 @inner
 def penetration(row, x, y):
-    """Direction n, distance r, penetration d and dd/dg of a journal at (x, y)."""
+    """Return direction n, distance r, penetration d and dd/dg of a journal at (x, y)."""
     r = math.sqrt(x * x + y * y + SMOOTH * SMOOTH)
     gap = r - row.gap
     root = math.sqrt(gap * gap + SMOOTH * SMOOTH)
@@ -187,7 +187,7 @@ def penetration(row, x, y):
 
 @inner
 def approach(memory, nx, ny, vx, vy):
-    """Speed of approach (m/s): the one remembered, else that of the velocity (vx, vy) at the start of the step."""
+    """Return the speed of approach (m/s): the stored one in contact, else that of velocity (vx, vy)."""
     if memory[CLOSED] > 0.0:
         return memory[APPROACH]
     return max(SLOWEST, nx * vx + ny * vy)
@@ -195,7 +195,7 @@ def approach(memory, nx, ny, vx, vy):
 
 @inner
 def pin_force(row, memory, journal, rate):
-    """The `PinForce` of the pin `row` on a `Journal`; rate : C of the integrator, dv/dx."""
+    """Return the `PinForce` of pin `row` on a `Journal`; `rate` is the integrator's C = dv/dx."""
     x, y, vx, vy = journal.x, journal.y, journal.vx, journal.vy
     if memory[SPRING] > 0.0:
         k, c, ax, ay = memory[SPRING], memory[DAMPER], journal.axis_x, journal.axis_y
@@ -231,9 +231,9 @@ def pin_force(row, memory, journal, rate):
 
 @inner
 def limited(row, x, y, dx, dy):
-    """Increments of delta, shortened so that the penetration does not much more than double in a pass.
+    """Return the increments of delta, limited so that the penetration roughly doubles at most in a Newton pass.
 
-    A pass from inside the gap knows no contact; this is the active set's limit on what it may claim.
+    A pass that starts inside the gap does not see contact, so its increment may be far too large.
     """
     _, _, _, d, _ = penetration(row, x, y)
     far = math.sqrt((x + dx) * (x + dx) + (y + dy) * (y + dy))
@@ -246,7 +246,7 @@ def limited(row, x, y, dx, dy):
 
 @inner
 def remember(row, memory, x, y, before_x, before_y, fx, fy):
-    """Note contact that began or ended in a step that is accepted, and the force."""
+    """Store the start or end of contact in an accepted step, and the normal force."""
     nx, ny, r, _, _ = penetration(row, x, y)
     closed = r - row.gap > -NEAR
     if closed and memory[CLOSED] == 0.0:

@@ -1,14 +1,14 @@
 """Frequency response by transfer matrices: the Riccati sweeps of a time step, with complex weights.
 
-A time step takes accelerations and velocities as a = A (x - x_hat), v = C x + D with the integrator's weights A and C
-(`kernels.integrators`), and condenses the tangent K + C D + A M of every element. Small harmonic motion x + Re(dx e^(s t)),
-s = i omega, about a state at rest x has a = s^2 dx and v = s dx: the same with A = s^2, C = s, x_hat = x and D = -s x. So the
-sweeps, run on complex numbers with these weights, condense the dynamic stiffness
+A time step sets a = A (x - x_hat) and v = C x + D with the integrator's weights A and C (`kernels.integrators`). It condenses
+the tangent K + C D + A M of every element (there D is the damping matrix). Small harmonic motion x + Re(dx e^(s t)) with
+s = i omega about a rest state x has a = s^2 dx and v = s dx. This is a time step with A = s^2, C = s, x_hat = x and D = -s x.
+The sweeps on complex numbers with these weights condense the dynamic stiffness
 
     H(s) = K + s D + s^2 M
 
-of the boom linearised about the state, with the geometric stiffness of weight and pin forces in K, and solve H(s) dx = load.
-No part of it is a sum over natural modes.
+of the boom linearised about the state, and solve H(s) dx = load. K includes the geometric stiffness of weight and pin forces.
+No sum over natural modes is used.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from ..tables import OK, Motion
 from .riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
 TANGENTS = np.bool_(True)  # typed, because numba compiles once more for every literal
-TIP_FORCE = np.int64(2)  # entries of a load that are the force at the tip; those of the drives follow
+TIP_FORCE = np.int64(2)  # number of leading load entries for the tip force; the drives follow
 
 
 @kernel
 def harmonic_response(t, state, work, drive, rates, loads, pins, increments, tip):
-    """Complex amplitudes of all unknowns, and of the tip, under harmonic loads about a state at rest.
+    """Compute complex amplitudes of all unknowns and of the tip under harmonic loads about a state at rest.
 
-    With ideal pins linear in the load, which may therefore be of any size; a large one keeps the rounding of the static forces
-    out. A sweep of forces alone is for ideal pins only. With clearance the tangents are made once more under the load and
-    hold its forces: there the load must be small against the static forces, and half the difference of the answers to it and
-    to its opposite is what is linear in it.
+    With ideal pins the response is linear in the load. Use a large load to reduce rounding by the static forces.
+
+    With clearance the tangents are recomputed under the load and depend on it. Use a load that is small against the static
+    forces. The linear response is half the difference between the responses to the load and to its opposite.
 
     Parameters
     ----------
     t : Tables
     state : State
-        In equilibrium, and placed in `work`.
+        State in equilibrium, already placed in `work`.
     work : Work
-        As `kernels.tables.complex_scratch` makes it.
+        Made by `kernels.tables.complex_scratch`.
     drive : ndarray, shape (n,)
         Drive lengths of the state, m.
     rates : ndarray of complex, shape (k,)
@@ -46,7 +46,7 @@ def harmonic_response(t, state, work, drive, rates, loads, pins, increments, tip
     loads : ndarray of complex, shape (k, 2 + n)
         Amplitudes: force at the tip in x and y (N), then the drive of every cylinder (m).
     pins : ndarray, shape (2, pins with clearance, HOLD_COLUMNS)
-        What holds their journals at rest (see `Work.hold`), and the derivative of that by s.
+        `Work.hold` of the journals at rest, and its derivative by s.
     increments : ndarray of complex, shape (k, unknowns)
         Written, in the units of the unknowns.
     tip : ndarray of complex, shape (k, 3)
@@ -84,7 +84,7 @@ def harmonic_response(t, state, work, drive, rates, loads, pins, increments, tip
 
 @inner
 def put_load(work, drive, rate, load, share):
-    """The cut at the tip and the drives under `share` of a load; tangents are made without, because they hold forces too."""
+    """Set tip force and drives to `share` of a load; 0 for tangents, because these include forces."""
     clear_cut(work, FREE)
     work.p[0], work.p[1] = -share * load[0], -share * load[1]
     for i in range(drive.shape[0]):

@@ -1,4 +1,4 @@
-"""Publish the node's state on ``/diagnostics``, log its changes, and look who is at the other ends of its topics."""
+"""Publish the node's state on ``/diagnostics``, log irregular samples once, and check the peers of its topics."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ from .receive_queue import LARGEST, ReceiveQueue
 
 
 class GraphPeers:
-    """Publishers and subscribers at the other ends of every topic of `node`, one topic looked up at a time.
+    """Peers (publishers or subscribers) of every topic of `node`, looked up one topic per call.
 
-    Discovery is asked besides the events of incompatible QoS, which tell neither which node it was nor that it has gone.
+    Discovery is used because the events of incompatible QoS do not name the peer and do not report when it leaves.
 
     Attributes
     ----------
     publishers : dict of Stream to Peers
-        Of the inputs.
+        Peers of the inputs.
     subscribers : dict of Output to Peers
-        Of the outputs.
+        Peers of the outputs.
     """
 
     def __init__(self, node: Node, topics: Topics) -> None:
@@ -67,14 +67,14 @@ class GraphPeers:
 
 
 def _as_discovered(qos: QoSProfile) -> QoSProfile:
-    """Return the own QoS as the other ends see it; settings left at their default count as none."""
+    """Return the node's own QoS as discovery reports it to peers: default durations are infinite."""
     qos.deadline = qos.lifespan = qos.liveliness_lease_duration = Infinite
     qos.liveliness = LivelinessPolicy.AUTOMATIC
     return qos
 
 
 def _peers(address: str, kind: str, ends: list[tuple[Any, QoSProfile, QoSProfile]]) -> Peers:
-    """Return the peers by the other ends, and the QoS offered and asked for; `kind` is the right type of message."""
+    """Return the `Peers` of a topic with message type `kind`; `ends`: endpoint, offered QoS and requested QoS of each peer."""
     strange = tuple(f"{node_name(end)}: {end.topic_type}, not {kind}" for end, _, _ in ends if end.topic_type != kind)
     ends = [each for each in ends if each[0].topic_type == kind]
     faults = [(node_name(end), _reason(offered, asked)) for end, offered, asked in ends]
@@ -84,7 +84,7 @@ def _peers(address: str, kind: str, ends: list[tuple[Any, QoSProfile, QoSProfile
 
 
 def _reason(offered: QoSProfile, asked: QoSProfile) -> str:
-    """Return why the two are incompatible; empty if they are compatible."""
+    """Return the reason of a QoS incompatibility, or an empty string."""
     verdict, reason = qos_check_compatible(offered, asked)
     return str(reason).removeprefix("ERROR: ").rstrip(";") if verdict == QoSCompatibility.ERROR else ""
 
@@ -96,10 +96,10 @@ class ClockCheck:
         self._was_apart, self._newest, self._since = False, 0, 0.0
 
     def apart(self, clock: float, newest: int, tolerance: float, now: float) -> float:
-        """Return by how much `clock` (s) is ahead of the `newest` stamp (ns), if it is for two looks; else 0.
+        """Return the lead (s) of `clock` (s) over the `newest` stamp (ns) if two checks in a row exceed the tolerance; else 0.
 
-        A bag that begins again steps at another moment than its clock. While nothing comes, the newest stamp grows old: that
-        is time of the clock `now` (s), which only goes forward.
+        Two checks are needed because the stamps and the clock of a looping bag jump at different moments. While no sample
+        arrives, the tolerance grows with the monotonic time `now` (s).
         """
         if newest != self._newest:
             self._newest, self._since = newest, now
@@ -109,27 +109,27 @@ class ClockCheck:
 
 
 WORDS = {**EVENTS, **ODDITIES, "too large": f"a message of more than {LARGEST >> 10} KiB, which is left out"}
-"""Descriptions that are logged with the first sample of a kind."""
-TICK = 0.1  # s of steady time between looks at whether something is urgent
-PERIOD = 1.0  # s from one message to the next, where nothing is
-PIECE = 0.002  # s from one piece of such a look to the next: samples are taken in between
-SLOWEST = 0.02  # s from one piece to the next, at most, on the average: of a flood, timers wait behind its messages
+"""Descriptions logged with the first irregular sample of each kind."""
+TICK = 0.1  # s of steady time between checks for an urgent state
+PERIOD = 1.0  # s between diagnostics messages if nothing is urgent
+PIECE = 0.002  # s between pieces of a check; samples are processed in between
+SLOWEST = 0.02  # s between pieces on average, at most; in a flood of messages timers run late
 
 
 class Diagnostics:
-    """Diagnostics of one node. Nothing is computed or logged for a single message.
+    """Diagnostics of one node, computed and logged periodically and never per message.
 
     Parameters
     ----------
     node : Node
     topics : Topics
     queue : ReceiveQueue
-        Of the inputs.
+        Queue of the inputs.
 
     Attributes
     ----------
     watch : TwinWatch
-        Takes what happens; another one from each `configure` on.
+        Receives the twin's events. Every `configure` replaces it.
     """
 
     def __init__(self, node: Node, topics: Topics, queue: ReceiveQueue) -> None:
@@ -154,7 +154,7 @@ class Diagnostics:
         self._clock = ClockCheck()
 
     def configure(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
-        """Watch the twin that the node is configured with."""
+        """Watch a newly configured twin."""
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts, twin.absent)
         stress = stress_model(twin.scene, twin.reads)
         self.watch = TwinWatch(sensors, self._inputs, self.watch.thresholds, stress=stress)
@@ -164,18 +164,18 @@ class Diagnostics:
         self._told.clear()
 
     def start(self) -> None:
-        """Start watching, because the node is active: from now on an input that is silent is stale."""
+        """Start watching when the node becomes active. From now on a silent input is stale."""
         self.watch.begin()
         self._drop_work()
         self._active = True
 
     def stop(self) -> None:
-        """Stop watching, because the node is no longer active."""
+        """Stop watching when the node becomes inactive."""
         self._drop_work()
         self._active = False
 
     def _tick(self) -> None:
-        """Look up one topic's other ends at every second call; begin a look at everything, if it is due."""
+        """Look up the peers of one topic at every second call, and begin a full check if it is due."""
         self._is_peers_turn = not self._is_peers_turn
         if self._is_peers_turn:
             self._peers.look()
@@ -186,7 +186,7 @@ class Diagnostics:
             self._pieces.reset()
 
     def _go_on(self) -> None:
-        """Do the next piece of the look that was begun, and as many more as were due since the last one."""
+        """Do the next piece of the current check, and further pieces if the timer ran late."""
         began, self._newest_piece = self._newest_piece, time.monotonic()
         for _ in range(1 + int((self._newest_piece - began) / SLOWEST)):
             if self._work is None or next(self._work, self) is self:
@@ -214,7 +214,7 @@ class Diagnostics:
         self._tell_clock(clock, max((each.wait for each in received.values() if each.wait > 0.0), default=0.0))
 
     def _wrong_names(self) -> dict[Stream, tuple[Level, str]]:
-        """Return the inputs that named cylinders or joints unknown to the scene since the last look, with level and words."""
+        """Return level and message of every input that named cylinders or joints unknown to the scene since the last check."""
         decoder, found = self._decoder, dict[Stream, tuple[Level, str]]()
         if decoder is None:
             return found
@@ -228,18 +228,18 @@ class Diagnostics:
         return found
 
     def _tell_oddities(self) -> None:
-        """Log the first sample of every kind that is out of the ordinary; all of them are counted."""
+        """Log the first irregular sample of every kind. All are counted on ``/diagnostics``."""
         for name in sorted({name for found in self._counts.values() for name in found} - TOLD_AT_ONCE):
             self._tell(name, f"{name}: {WORDS.get(name, 'seen in a message')} (told once; counted on /diagnostics)")
 
     def _tell_types(self) -> None:
-        """Warn of publishers with another type of message, which cannot be heard. The input's level does not show them."""
+        """Warn of publishers with another message type. They cannot be received, and the input's level does not show them."""
         for each in self._peers.publishers.values():
             if each.mistyped:
                 self._tell(f"type of {each.address}", f"{each.address}: another type of message: {'; '.join(each.mistyped)}")
 
     def _tell_clock(self, clock: float, wait: float) -> None:
-        """Warn if the stamps of strokes are not of the node's clock; messages waited at most `wait` seconds."""
+        """Warn if the stroke stamps do not follow the node's clock; `wait` (s) is the longest time a message was queued."""
         newest, is_simulated = self.watch.newest if self._active else None, self._node.get_parameter("use_sim_time").value
         if newest is None:
             return

@@ -155,16 +155,16 @@ def as_markdown(found: PartsStudy) -> str:
     parts = [
         "# What the parts of a model cost, and what leaving them out changes",
         "![What leaving a part out changes, and what it saves](parts.png)",
-        f"Each row is the scene after an edit, against the scene as it is ({found.unknowns} unknowns, {first:.2f} us a step, "
-        f"at the end {second:.2f} us: a smaller difference is noise). At rest: the largest distance of the tips in "
-        f"{', '.join(found.course.names)}. Moving: the largest distance in a move, {found.course.motion.label}; steps of "
-        f"{1e3 * found.course.step:g} ms. f1: change of the first natural frequency, {found.frequencies[0]:.3f} Hz. Time: "
-        "stepping alone, the least of interleaved runs; negative where it costs time.",
-        "Every row above the error that you can bear may be left out; it is worth it where it saves time. "
-        "`boom_twin check --need` makes such a scene. `parts.json` has the edits, other frequencies, and single sections with "
-        "other numbers of shapes.",
+        f"Each row compares an edited scene with the full scene ({found.unknowns} unknowns). A step of the full scene took "
+        f"{first:.2f} us, and {second:.2f} us at the end. Smaller differences are noise.",
+        f"- At rest: largest distance between the tips. States: {', '.join(found.course.names)}.\n"
+        f"- Moving: the same in a move with steps of {1e3 * found.course.step:g} ms. Move: {found.course.motion.label}.\n"
+        f"- f1: change of the first natural frequency ({found.frequencies[0]:.3f} Hz).\n"
+        "- Time saved: stepping alone, minimum of interleaved runs. Negative means slower.",
+        "Leave out parts whose error you accept, if that saves time. `boom_twin check --need` makes the reduced scene. "
+        "`parts.json` adds the edits, other frequencies, and single sections with other mode numbers.",
         table(HEAD, [_row(found, part) for part in found.shown]),
-        "Limits: one motion, another may differ; several parts left out at once may err more.",
+        "Limits: another motion may differ. Leaving out several parts may cause larger errors.",
         provenance(),
     ]
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"

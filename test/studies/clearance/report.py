@@ -42,10 +42,10 @@ def report(scene: Scene, swings: list[Swing], shifts: list[Shift], found: Conver
     sizes = ", ".join(f"{1e6 * size:g}" for size in sorted({pin.radial_clearance for pin in block.pins}))
     parts = [
         "# Play in the pins",
-        f"{len(block.pins)} pins with a radial clearance of {sizes} um; {block.contact.law}, restitution "
+        f"{len(block.pins)} pins have a radial clearance of {sizes} um. Contact law: {block.contact.law}, restitution "
         f"{block.contact.restitution:g}. `make study` writes all numbers.",
         *_stops(swings), *_rests(shifts), *_convergence(found), *_costs(costs),
-        "Limits: one motion a posture.", provenance(),
+        "Limits: one motion per posture.", provenance(),
     ]  # fmt: skip
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
 
@@ -59,8 +59,8 @@ def _stops(found: list[Swing]) -> list[str]:
     return [
         "## After a stop",
         "![The tip after a stop](clearance.png)",
-        f"Full speed, brakes within {1e3 * BRAKE:g} ms, hold. Rest: the tip with contact against ideal pins. Peak: largest "
-        "distance from rest, mm. m/s²: vertical acceleration, rms. Linear: pins as springs and dampers.",
+        f"The drives brake from full speed within {1e3 * BRAKE:g} ms. Rest: tip height with contact minus that with ideal "
+        "pins. Peak: largest distance from rest, mm. m/s²: rms vertical acceleration. Linear: pins are springs and dampers.",
         table(("posture", "rest, mm", *(f"peak, {name}" for name in PINS), *(f"m/s², {name}" for name in PINS)), rows),
     ]
 
@@ -74,9 +74,9 @@ def _rests(found: list[Shift]) -> list[str]:
     return [
         "## At rest",
         "![The resting tip](clearance_static.png)",
-        f"Shift of the resting tip (mm) by play of {1e6 * SHOWN_CLEARANCE:g} um in one pin: lever x (clearance + penetration) "
-        f"x {ratios.min():.3f} to {ratios.max():.3f}. Below {1e6 * IDEAL_BELOW:g} um a pin is ideal: the tip jumps, at worst "
-        f"by {1e3 * worst.jump:.3g} mm ({worst.pin}, {worst.posture}).",
+        f"Shift of the resting tip (mm) by play of {1e6 * SHOWN_CLEARANCE:g} um in one pin. It is lever x (clearance + "
+        f"penetration) x {ratios.min():.3f} to {ratios.max():.3f}. Pins below {1e6 * IDEAL_BELOW:g} um are ideal. There the "
+        f"tip jumps by up to {1e3 * worst.jump:.3g} mm ({worst.pin}, {worst.posture}).",
         table(("pin", *postures), rows),
     ]
 
@@ -89,8 +89,8 @@ def _convergence(found: Convergence) -> list[str]:
     return [
         "## Convergence",
         "![Error against run time](clearance_convergence.png)",
-        f"Rms errors of a stop within {1e3 * near.BRAKE:g} ms on one pin of the rigid boom, against Lagrange's equations "
-        "integrated by SciPy between touch and release (`test/reference/worn_pin`).",
+        f"Rms errors of a stop within {1e3 * near.BRAKE:g} ms with one worn pin in a rigid boom. Reference: Lagrange's "
+        "equations, integrated by SciPy between touch and release (`test/reference/worn_pin`).",
         table(("step, ms", *MEASURES), rows),
     ]
 
@@ -102,7 +102,7 @@ def _costs(found: list[Cost]) -> list[str]:
     rows += [(pins, *by[pins, "contact"], *by[pins, "spring-damper"]) for pins in counts]
     return [
         "## What a pin costs",
-        "Time of a step of 1 ms, us: in the usual move, and in a violent start and stop.",
+        "Time of a 1 ms step, us, in the usual move and in a violent start and stop.",
         table(("pins", "contact", "contact, violent", "linear", "linear, violent"), rows),
     ]
 

@@ -13,24 +13,24 @@ from .module import exudyn, items
 from .system import Boom, Station
 
 _FORCE = {"distance": exudyn.OutputVariableType.Force, "referenceLength": exudyn.OutputVariableType.ForceLocal}
-"""Output that is the cylinder force, by the name of the connector's length parameter."""
+"""Exudyn output with the cylinder force, by the name of the connector's length parameter."""
 
 
 @dataclass(frozen=True, slots=True)
 class Probes:
-    """Numbers of the sensors that record while the boom moves."""
+    """Exudyn sensor numbers of all recorded quantities."""
 
     tip: tuple[int, int]  # position, acceleration
-    head: tuple[int, int]  # velocities and accelerations of the last head's node
+    head: tuple[int, int]  # velocity, acceleration of the last head's node
     roots: tuple[int, ...]
     heads: tuple[int, ...]
     forces: tuple[int, ...]
     lengths: tuple[int, ...]
-    pins: tuple[tuple[int, int], ...]  # places of hole and journal of every pin with play
+    pins: tuple[tuple[int, int], ...]  # positions of hole and journal, for every pin with play
 
 
 def attach(boom: Boom) -> Probes:
-    """Add all sensors; to be called before the system is assembled."""
+    """Add all sensors. Call this before the system is assembled."""
     kind, last = exudyn.OutputVariableType, boom.sections[-1].head
     return Probes(
         tip=(_at_tip(boom, kind.Position), _at_tip(boom, kind.Acceleration)),
@@ -44,14 +44,14 @@ def attach(boom: Boom) -> Probes:
 
 
 def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
-    """All that was recorded, m rows; or, `at_rest`, the equilibrium just found, one row.
+    """Return all recorded rows (m); if `at_rest`, one row with the present equilibrium.
 
     Returns
     -------
     dict
         ``t`` (m,) s; ``tip``, ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle``, ``tip_rate``, ``tip_rate_dot`` (m,) rad,
-        rad/s, rad/s^2; ``joints`` (m, n) rad; ``forces`` (m, n) N, positive in tension; ``lengths`` (m, n) m, pin to pin,
-        less the closed length; ``pins`` (m, k, 2) m, offsets of the journals that have play.
+        rad/s, rad/s^2; ``joints`` (m, n) rad; ``forces`` (m, n) N, positive in tension; ``lengths`` (m, n) m, pin to pin
+        minus `closed_length`; ``pins`` (m, k, 2) m, offsets of the journals with play.
     """
     data = partial(_data, boom, at_rest=at_rest)
     roots = np.column_stack([_angle(data(p), s.root) for p, s in zip(probes.roots, boom.sections, strict=True)])
@@ -75,22 +75,21 @@ def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
 
 
 def _data(boom: Boom, number: int, at_rest: bool) -> Array:
-    """Time in column 0, then the sensor's values: what was recorded, or one row of the present state."""
+    """Return time (column 0) and sensor values: the recorded rows, or one row of the present state (time 0)."""
     if at_rest:
         return np.hstack([0.0, boom.system.GetSensorValues(number)])[None, :]
     return np.asarray(boom.system.GetSensorStoredData(number), float)
 
 
 def _angle(data: Array, station: Station) -> Array:
-    """Absolute angle of a rigid frame (rad): the node keeps only the change from its reference."""
+    """Return the absolute angle (rad) of a rigid frame. The node stores only the change from its reference."""
     return np.asarray(data[:, 3] + station.angle)
 
 
 def _force(boom: Boom, index: int, number: int, at_rest: bool) -> Array:
-    """Cylinder force (N), positive in tension.
+    """Return the cylinder force (N), positive in tension.
 
-    The multiplier of a distance is positive in tension in Exudyn's dynamic solver, in compression in its static one
-    (seen in 1.13.6).
+    Exudyn's distance multiplier is positive in tension in the dynamic solver, but in compression in the static one (1.13.6).
     """
     force = _data(boom, number, at_rest)[:, 1]
     return -force if at_rest and not boom.scene.joints[index].cylinder.is_compressible else force
@@ -114,5 +113,5 @@ def _on_drive(boom: Boom, drive: int, kind: Any) -> int:
 
 
 def _sensor(boom: Boom, kind: Any, item: Any, **where: Any) -> int:
-    """Add a sensor that keeps its values in memory and writes no file."""
+    """Add a sensor that stores its values in memory only."""
     return int(boom.system.AddSensor(item(outputVariableType=kind, storeInternal=True, writeToFile=False, **where)))

@@ -1,4 +1,4 @@
-"""Report of the error study: error against run time, `boom_twin study error`."""
+"""Report of the study of error against run time (`boom_twin study error`)."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from .problem import Problem, build, pose
 from .runner import ROUNDS, Row, Runner
 
 QUICK_DURATION = 0.6  # s
-TURNS, QUICK_TURNS = 5, 2  # of both programs at the same step
+TURNS, QUICK_TURNS = 5, 2  # runs of each program at the same step
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
-    """Run all cases on a motion of `scene`, write ``error.json``, ``error.md`` and pictures into `out`; returns their paths.
+    """Run all cases on a motion of `scene`; write ``error.json``, ``error.md`` and pictures into `out`; return the paths.
 
     Parameters
     ----------
     quick : bool
-        Few cases on a short motion.
+        Run few cases on a short motion.
     posture : str, optional
-        Where the motion starts, see `motion_of`.
+        Start of the motion, see `motion_of`.
     """
     problem = pose(scene, motion_of(scene, posture, QUICK_DURATION if quick else DURATION), quick)
     cases: list[Case] = [*own_cases(scene, quick), *(peer_cases(quick) if problem.exudyn else ())]
@@ -50,7 +50,7 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
 
 
 def report(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -> str:
-    """Return the whole report in Markdown."""
+    """Return the report in Markdown."""
     parts = [
         "# Error against run time", _setting(problem), "![Error against run time](error.png)",
         "## The default by step",
@@ -75,7 +75,7 @@ def report(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -
 
 
 def _setting(problem: Problem) -> str:
-    """Return a paragraph on the motion, the errors and the times."""
+    """Return the paragraphs on motion, error measures and run time."""
     own, other = problem.own, problem.exudyn
     second = f"There is no independent reference: {problem.missing}"
     if other is not None and problem.apart is not None:
@@ -108,7 +108,7 @@ def _by_step(rows: Sequence[Row]) -> str:
 
 
 def _equal(problem: Problem, rows: Sequence[Row]) -> str:
-    """Return a table of the fastest of both programs at equal errors."""
+    """Return a table of the fastest case of each program within each error bound of `EQUAL`."""
     if problem.exudyn is None:
         return problem.missing
     lines = []
@@ -134,7 +134,7 @@ def _at_same_step(duel: dict[str, Any] | None) -> str:
 
 
 def _methods(rows: Sequence[Row]) -> str:
-    """Return a table of the methods at the default step; other numbers of modes only where nothing else differs."""
+    """Return a table of the methods at the default step. Other mode numbers appear only if nothing else differs."""
     default = Own().label
     lines = []
     for row in of(rows, Own):
@@ -147,7 +147,7 @@ def _methods(rows: Sequence[Row]) -> str:
 
 
 def _failed(rows: Sequence[Row]) -> str:
-    """Return a list of the reasons of failure, each with its cases."""
+    """Return a Markdown list of failure reasons with their cases."""
     cases: dict[str, list[str]] = {}
     for row in rows:
         if not row.good:
@@ -183,7 +183,7 @@ def _content(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None)
 
 
 def _flat(row: Row) -> dict[str, Any]:
-    """Return a row as one flat object; settings first."""
+    """Return a row as a flat dict, settings first."""
     settings = asdict(row.case)
     settings |= settings.pop("method", {})
     numbers = {key: value for key, value in vars(row).items() if key not in ("case", "status")}

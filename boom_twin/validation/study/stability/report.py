@@ -22,9 +22,9 @@ from .verdict import BOUNDS
 NO_EQUILIBRIUM = "no equilibrium"
 MEANINGS = {
     "holds": "every bound below is kept",
-    "degrades": "usable, with a symptom",
+    "degrades": "usable, with a symptom listed below",
     "fails": "no usable numbers, and the status or a warning says so",
-    "silent": "wrong numbers without a word",
+    "silent": "wrong numbers without a warning",
     "refuses": "there is no solution, and the status says so",
 }
 
@@ -83,23 +83,23 @@ def text(rows: Sequence[CaseResult], long_rows: Sequence[CaseResult], limits: di
     ]
     parts = [
         "# Stability on stiff and extreme cases",
-        "Every case is marched by every method and compared with the default method at an eighth of its step (Newton "
-        f"tolerance 1e-10 rad), or with the equilibrium. The move: {move}. Cases take it, or a share of it, in 1 s unless they "
-        "say otherwise. For 50 ms after a jump of speed, accelerations and forces are impulses and are not compared.",
+        "Every method integrates every case. The reference is the default method at an eighth of the step (Newton tolerance "
+        f"1e-10 rad), or the equilibrium. The move: {move}. Cases make all or part of it, in 1 s unless stated otherwise. "
+        "Accelerations and forces within 50 ms after a speed jump are impulses and are ignored.",
         "![Where each method holds](stability.png)",
         "## Verdicts by method", _meanings(), _counts(rows),
         "## The default",
-        "It holds all cases but these:", _default(rows),
+        "All cases hold except:", _default(rows),
         "## Other methods",
-        "Where they are worse than the default (symptoms: `stability.json`):", _others(rows),
-        "## Bounds", "A case degrades above the first, and fails above the second:", "".join(bounds),
+        "Cases worse than with the default (symptoms: `stability.json`):", _others(rows),
+        "## Bounds", "A case degrades above the first number and fails above the second:", "".join(bounds),
     ]  # fmt: skip
     if limits:
-        parts += ["## Where there is no equilibrium", "The boom loses its last stiffness: its slowest vibration comes to rest."]
+        parts += ["## Where there is no equilibrium", "The lowest natural frequency falls to zero."]
         parts += ["".join(_limit(name, limit) for name, limit in limits.items())]
     if long_rows:
         parts += ["## Holds of 24 simulated hours", _long(long_rows)]
-    parts += ["Limits: one move; booms that need a geometry of their own are made up.", provenance()]
+    parts += ["Limits: one move. Cases with another geometry use invented booms.", provenance()]
     return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
 
 
@@ -145,8 +145,8 @@ def _listed(groups: dict[str, list[str]]) -> str:
 
 def _limit(name: str, limit: Limit) -> str:
     return (
-        f"- {name}: carries {limit.share:.3g} of its weight; there it vibrates at {limit.frequency:.2g} Hz, without load at "
-        f"{limit.unloaded:.2g} Hz.\n"
+        f"- {name}: equilibrium up to {limit.share:.3g} of its weight. Lowest frequency there {limit.frequency:.2g} Hz, "
+        f"unloaded {limit.unloaded:.2g} Hz.\n"
     )
 
 

@@ -1,4 +1,4 @@
-"""Verdict of the stability study: whether a method holds, degrades, fails or refuses, with the symptom."""
+"""Verdict of the stability study on a method (holds, degrades, fails or refuses), with the symptom."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from ....types import Array
 
 Word = Literal["holds", "degrades", "fails", "refuses"]
 Mask = NDArray[np.bool_]
-QUIET = 1e-3  # share of the peak acceleration below which vibration is not followed
-IMPULSE = 0.05  # s after a jump of speed
-WRONG = 0.05  # of the largest cylinder force, above which an impulse still rings
-SHORTEST_PATH = 1e-9  # m
-TINY = 1e-12  # m/s^2 or N, instead of a zero to divide by
+QUIET = 1e-3  # fraction of the peak acceleration below which vibration counts as still
+IMPULSE = 0.05  # s after a speed jump in which accelerations and forces are not compared
+WRONG = 0.05  # fraction of the largest cylinder force above which forces are wrong after a jump
+SHORTEST_PATH = 1e-9  # m, least path of the tip used as divisor
+TINY = 1e-12  # m/s^2 or N, least divisor
 
 
 @dataclass(frozen=True)
 class Facts:
-    """Deviations of a motion from its reference. NaN where a quantity has no meaning in the case.
+    """Deviations of a motion from its reference. A quantity that does not apply to the case is NaN.
 
     Attributes
     ----------
     status : str
-        "ok", or why the motion did not start or ended.
+        "ok", or the reason for an early end of the motion.
     solvable : bool
-        Whether there is a solution at all.
+        True if a solution exists.
     doubt : str
-        Warning of the motion itself, see `analysis.error_estimate`.
+        Warning that the simulation gave, see `analysis.error_estimate`.
     error : float
-        Largest error of the tip, as a share of the tip's path.
+        Largest tip error, relative to the tip's path.
     acceleration, force : float
-        Error of the tip's acceleration, rms over its own rms; of the cylinder forces, rms over the largest.
+        Rms error of the tip acceleration, relative to its rms; of the cylinder forces, relative to the largest force.
     ringing, force_ringing : float
-        Part that changes sign from step to step, rms after the drives hold, as a share of the peak.
+        Rms of the part that alternates from step to step while the drives hold, relative to the peak.
     growth : float
-        Vibration in the last quarter of the hold over that in the first, as a multiple of the reference's.
+        Ratio of vibration in the last quarter of the hold to the first, relative to the reference's ratio.
     drift : float
-        Distance from the equilibrium, or way of the mean, at the end of a long hold, as a share of the tip's path.
+        Distance from equilibrium, or shift of the mean, at the end of a long hold, relative to the tip's path.
     lasting : float
-        Steps after a jump of speed until cylinder forces are right again.
+        Steps after a speed jump until cylinder forces are correct again.
     passes : float
         Newton passes per step.
     """
@@ -65,7 +65,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class CaseVerdict:
-    """Verdict with its symptom; `silent`: the numbers are wrong, the status is "ok" and there is no warning."""
+    """Verdict with its symptom. `silent` is True if the numbers are wrong without a bad status or a warning."""
 
     word: Word
     symptom: str
@@ -92,7 +92,7 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
 
 
 def verdict(facts: Facts) -> CaseVerdict:
-    """Return the verdict on `facts` by `BOUNDS`; an infinite value is beyond every bound, NaN within."""
+    """Return the verdict on `facts` by `BOUNDS`. Infinite values exceed every bound; NaN exceeds none."""
     if facts.status != "ok":
         return CaseVerdict("fails" if facts.solvable else "refuses", facts.status)
     warned = f" (it says: {facts.doubt})" if facts.doubt else ""
@@ -112,9 +112,9 @@ def verdict(facts: Facts) -> CaseVerdict:
 
 
 def against_motion(found: MethodRun, right: MethodRun, still: float, jump: float = math.nan) -> Facts:
-    """Compare with a motion at the same rows; the drives hold from `still` (s) on.
+    """Return the deviations from the reference motion `right` at the same rows; the drives hold from `still` (s) on.
 
-    Accelerations and forces are not compared right after a `jump` (s) of speed, where they are impulses.
+    Accelerations and forces are not compared just after a speed jump at time `jump` (s), because they are impulses there.
     """
     smooth = ~(np.abs(right.times - jump - 0.5 * IMPULSE) <= 0.5 * IMPULSE + 1e-9)
     acceleration, force = right.tip_acceleration[smooth], right.cylinder_forces[smooth]
@@ -134,7 +134,7 @@ def against_motion(found: MethodRun, right: MethodRun, still: float, jump: float
 
 
 def _lasting(found: MethodRun, right: MethodRun, jump: float, largest: float) -> float:
-    """Return the rows from a jump of speed to the last one where cylinder forces are wrong; NaN without a jump."""
+    """Return the number of rows from a speed jump to the last wrong cylinder force; NaN without a jump."""
     if math.isnan(jump):
         return math.nan
     wrong = np.linalg.norm(found.cylinder_forces - right.cylinder_forces, axis=1) > WRONG * largest
@@ -143,9 +143,9 @@ def _lasting(found: MethodRun, right: MethodRun, jump: float, largest: float) ->
 
 
 def against_rest(found: MethodRun, equilibrium: Array | None, still: float, every: int = 1) -> Facts:
-    """Compare the end of a long hold with the `equilibrium` of the tip (m), shape (2,), or without one the mean with itself.
+    """Return the deviations at the end of a long hold from the tip's `equilibrium` (m), shape (2,).
 
-    `every` steps lie between rows; ringing is seen only where there is a row for each.
+    If that is None, drift is the shift of the mean over the hold. `every` is the number of steps per row; ringing needs 1.
     """
     late = np.flatnonzero(found.times > still)
     first, last = late[: len(late) // 4], late[-(len(late) // 4) :]
@@ -163,7 +163,7 @@ def against_rest(found: MethodRun, equilibrium: Array | None, still: float, ever
 
 
 def growth(motion: MethodRun, still: float) -> float:
-    """Return the vibration of the tip's acceleration in the last quarter of the hold over that in the first; 1 where still."""
+    """Return the ratio of tip acceleration vibration in the last quarter of the hold to the first; 1 if it is still."""
     late = np.flatnonzero(motion.times > still)
     quarter = max(len(late) // 4, 1)
     first, last = (motion.tip_acceleration[rows] for rows in (late[:quarter], late[-quarter:]))
@@ -174,12 +174,12 @@ def growth(motion: MethodRun, still: float) -> float:
 
 
 def alternating(values: Array) -> Array:
-    """Return the part of rows (m, c) that changes sign from row to row, (m - 2, c); nearly zero for a smooth curve."""
+    """Return the row-to-row alternating part of `values` (m, c), shape (m - 2, c); nearly zero for a smooth curve."""
     return np.asarray(0.25 * (2.0 * values[1:-1] - values[2:] - values[:-2]))
 
 
 def _rings(found: MethodRun, right: MethodRun | None, late: Mask) -> tuple[float, float]:
-    """Return the ringing of tip acceleration and cylinder forces in the rows `late`, beyond that of the reference."""
+    """Return the ringing of tip acceleration and cylinder forces in rows `late`, after subtraction of the reference."""
 
     def ring(own: Array, other: Array | None) -> float:
         more = own if other is None else own - other
@@ -192,18 +192,18 @@ def _rings(found: MethodRun, right: MethodRun | None, late: Mask) -> tuple[float
 
 
 def _rms(values: Array) -> float:
-    """Return the rms length of the rows (m, c); infinite if any is not finite, 0 without rows."""
+    """Return the rms norm of the rows (m, c); infinite if any value is not finite, 0 without rows."""
     if not values.size:
         return 0.0
     return float(np.sqrt(np.mean(np.sum(values**2, axis=-1)))) if np.isfinite(values).all() else math.inf
 
 
 def _path(motion: MethodRun) -> float:
-    """Return the largest distance of the tip from where it starts, m."""
+    """Return the largest distance of the tip from its start, m."""
     return max(_largest(motion.tip - motion.tip[0]), SHORTEST_PATH)
 
 
 def _largest(values: Array) -> float:
-    """Return the largest length of the rows; infinite if any is not finite."""
+    """Return the largest norm of the rows; infinite if any value is not finite."""
     sizes = np.linalg.norm(values, axis=-1)
     return float(sizes.max()) if np.isfinite(sizes).all() else math.inf
