@@ -52,7 +52,6 @@ LONGEST_STEP = 0.02  # s of one transition
 IMU_TURN, IMU_SCALE = 0.1, 0.1  # rad, by which it may be mounted askew; share by which it may read too much
 CONTRADICTION = 8.0  # standard deviations of the predicted tip, by which the estimate may be off it
 MOST_EXCESS = 1e6  # times the variance that a channel is stated to have
-DEAF_WAY, DEAF_RATE = 0.05, 0.02  # m, m/s: how far a drive is, and how fast, whose transducer fails
 
 
 @inner
@@ -142,7 +141,7 @@ def hold_still(p, f, k, size):
     """Correct model `k` by readings of zero rate and acceleration of drives behind closed valves."""
     n, drive = p.drives.shape[0], drive_place(p)
     for i in range(n):
-        if f.is_open[i] == 0 and not (k >= ALL_VALVES and f.deaf[i]):
+        if f.is_open[i] == 0 and not f.deaf[i]:
             for order in (1, 2):
                 at = drive + order * n + i
                 clear(f.row, size)
@@ -172,7 +171,7 @@ def take_lengths(p, f, k, size, y):
     """Correct model `k` by lengths `y` (n, m; NaN = missing); return their log likelihood."""
     total = 0.0
     for i in range(y.shape[0]):
-        if math.isfinite(y[i]) and not (k >= ALL_VALVES and f.deaf[i]):
+        if math.isfinite(y[i]) and not f.deaf[i]:
             length_row(p, i, f.row)
             innovation = y[i] - length_of(p, i, f.row, f.x[k], size)
             expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, f.length2[i], size)
@@ -217,8 +216,5 @@ def follow_prediction(p, f):
         for i in range(n):
             covariance[size + 4 + i, size + 4 + i] = ANGLE_ZERO * ANGLE_ZERO
             covariance[size + 4 + n + i, size + 4 + n + i] = (FORCE_ZERO * (abs(f.pulls[i]) + 0.1 * largest)) ** 2
-            if f.deaf[i]:
-                covariance[drive_place(p) + i, drive_place(p) + i] += DEAF_WAY * DEAF_WAY
-                covariance[drive_place(p) + n + i, drive_place(p) + n + i] += DEAF_RATE * DEAF_RATE
     f.chances[ALL_VALVES], f.chances[ALL_OPEN] = f.chances[VALVES] + f.chances[BURST], f.chances[OPEN]
     mix(f, ESTIMATE, every)

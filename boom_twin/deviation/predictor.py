@@ -37,6 +37,7 @@ HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration o
 WIDTH = 1e-6  # relative accuracy of natural frequencies
 USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD = 2.5e-3, 1e-4, 2e-3, 2e-2  # shares of the boom's weight, see `SensorNoise`
 DOUBTED_DRIFT = 1000.0  # times the usual variance of the drift of a zero, of a sensor in doubt
+FAILED_WAY, FAILED_RATE = 0.05, 0.02  # m, m/s: how far a drive is, and how fast, when its transducer is found to fail
 SWING, SPEED = 0.3, 0.05  # how far a boom at work swings, as a share of the tip's deflection; m/s of its cylinders
 
 
@@ -216,8 +217,16 @@ class BoomPredictor:
     # -- changes by the twin
 
     def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_]) -> None:
-        """Leave masked channels (c,) and strokes (n,) out of the estimate; restart it if they include new ones."""
-        f = self.filters
+        """Leave masked channels (c,) out of the estimate, and strokes (n,) out of all; restart the estimate if any are new.
+
+        The prediction takes the angle sensor of the joint in the place of a stroke that is left out.
+        """
+        f, first, n = self.filters, 2 * int(self.posture.modes[0]) + LOADS, self.plan.joints
+        for i in np.flatnonzero(strokes & ~f.deaf):
+            f.is_open[i] = 1
+            for covariance in f.p:
+                covariance[first + i, first + i] += FAILED_WAY**2
+                covariance[first + n + i, first + n + i] += FAILED_RATE**2
         if (masked & ~f.masked).any() or (strokes != f.deaf).any():
             f.status[FED] = 0
         f.masked[:], f.deaf[:] = masked, strokes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .kalman import correct
+from .kalman import ANGLE_ZERO, correct
 from .learning import SURPRISE
 from .mixture import mix, weigh_models
 from .rows import angle_row, force_row, specific_force_row, variance_of
@@ -64,6 +64,8 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         if stream == ANGLES:
             angle_row(p, i, f.row)
             take_reading(p, f, first + i, residuals[i], zero + 4 + i, f.noise.angle2, age)
+            if f.deaf[i] and math.isfinite(residuals[i]):
+                replace_length(p, f, i, residuals[i])
         elif stream == IMU:
             specific_force_row(p, f, i, c, s, f.row)
             inexact2 = INEXACT * INEXACT * f.shaking[0]
@@ -73,6 +75,21 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
             take_reading(p, f, first + i, residuals[i], zero + 4 + n + i, f.noise.force2, age)
     weigh_models(f, ESTIMATE)
     mix(f, ESTIMATE, all_states(p))
+
+
+@inner
+def replace_length(p, f, i, residual):
+    """Correct the prediction by the residual of angle sensor `i`, because the stroke transducer of its cylinder fails.
+
+    The mean stays that of the prediction which the residual was taken against, until the next step.
+    """
+    size = zero_place(p)
+    angle_row(p, i, f.row)
+    for k in range(ALL_VALVES):
+        innovation = residual
+        for j in range(size):
+            innovation -= f.row[j] * (f.x[k, j] - f.mean[PREDICTION, j])
+        correct(f.x[k], f.p[k], f.row, f.gain, innovation, f.noise.angle2 + ANGLE_ZERO * ANGLE_ZERO, size)
 
 
 @inner

@@ -39,7 +39,7 @@ class Filters(NamedTuple):
     estimate, along x and y.
     jerk : (n,) m^2/s^5. is_open : (n,) 1 where a valve is believed open. still : (n,) s since its drive began to stand still.
     status : (2,) whether the estimate has readings of its own, stamp of the newest of these.
-    masked, deaf : (c,), (n,) measured channels, and strokes, that the estimate is not to use. noise : variances.
+    masked, deaf : (c,), (n,) measured channels that the estimate, and strokes that no model is to use. noise : variances.
     excess : (c,) times the variance that channels are stated to have. ratio : (c,) mean square of their normalised innovations.
     drift : (z,) times the usual variance of the random walk of sensors' zeros. length2 : (n,) variances of lengths as learnt,
     m^2. before, interval : (n, 3), (1,) the three lengths before (m), and the time between the newest two, s.

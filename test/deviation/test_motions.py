@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from deviation.motions import measured, rms
+from deviation.motions import measured, rms, true_motion
 
 from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.config.settings import load_settings
@@ -14,6 +14,7 @@ from boom_twin.errors import UsageError
 from boom_twin.health.baseline import load_baseline
 from boom_twin.offline.recording import Recording
 from boom_twin.twin.blocks import SampleBlock
+from boom_twin.types import SECOND
 
 
 def followed(session, **options):
@@ -47,6 +48,22 @@ def test_one_by_one_is_as_in_blocks():
     (_, predictions), twin = followed(session), Twin(load_scene())
     reports = [twin.update(Sample(Stream.STROKES, *row)) for row in zip(session.stamps.tolist(), session.strokes, strict=True)]
     assert predictions.tip_acceleration.tobytes() == np.array([r.prediction.tip_acceleration for r in reports]).tobytes()
+
+
+def test_the_angle_sensor_of_the_joint_replaces_a_transducer_that_sticks():
+    """Cylinder 4 sticks at rest, is found when it moves, and the tip is right again a second after that."""
+    session, twin, tips = measured("rests"), Twin(load_scene(), baseline=load_baseline(None)), {}
+    times, boom = true_motion("rests")
+    stuck = session.strokes.copy()
+    stuck[1200:, 3] = stuck[1200, 3]
+    for stamp, strokes, joints in zip(session.stamps.tolist(), stuck, session.joints, strict=True):
+        prediction = twin.update(Sample(Stream.STROKES, stamp, strokes)).prediction
+        twin.update(Sample(Stream.ANGLES, stamp, joints))
+        assert prediction is not None
+        tips[stamp] = prediction.tip_position
+    at = np.array(list(tips)) / SECOND - 100.0
+    error = np.array(list(tips.values())) - np.column_stack([np.interp(at, times, column) for column in boom.tip[:, :2].T])
+    assert np.abs(error[at > 7.5]).max() < 5e-3
 
 
 @pytest.mark.parametrize(("name", "rate"), [("stops", 50.0), ("sweep", 50.0), ("12 Hz", 50.0)])
