@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum, StrEnum
 from math import pi
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:  # commands that only look at a bag start without NumPy
     import numpy as np
@@ -384,31 +384,8 @@ class Health:
     """Noise of most sensors of a stream over the stated noise, at least 1, by ``noise_over_`` and the name of its setting."""
 
 
-class _Rows(Protocol):
-    """Source of the report's fields that are made on request."""
-
-    row: Array | None
-    streams: Sequence[int]
-
-    def prediction(self) -> Prediction | None: ...
-
-    def estimate(self) -> Estimate | None: ...
-
-    def residuals(self) -> tuple[Residuals, ...]: ...
-
-
-class _MadeWhenAsked:
-    """Base of a report with the rows from which its missing fields are made on request."""
-
-    __slots__ = ("rows",)
-    rows: Any  # _Rows or None; what is encoded from rows knows more of them
-
-
-_MADE_OF_ROWS = frozenset({"prediction", "estimate", "residuals"})
-
-
 @dataclass(frozen=True, slots=True)
-class Report(_MadeWhenAsked):
+class Report:
     """Report on one sample and all that it caused."""
 
     stamp: int
@@ -433,43 +410,6 @@ class Report(_MadeWhenAsked):
     """Set beside every prediction."""
     earlier: tuple[Report, ...] = ()
     """Reports of samples that were held until this one confirmed their stamps, in their order."""
-
-    @classmethod
-    def of_rows(cls, stamp: int, rows: _Rows, events: tuple[str, ...], health: Health | None) -> Report:
-        """Return a report whose prediction, estimate and residuals are made from `rows` on request.
-
-        Few callers read them where messages are encoded straight from the rows. The report is the same in every other way.
-        """
-        report, put = object.__new__(cls), object.__setattr__
-        put(report, "stamp", stamp)
-        put(report, "accepted", True)
-        put(report, "events", events)
-        put(report, "status", "ok")
-        put(report, "change", None)
-        put(report, "health", health)
-        put(report, "earlier", ())
-        put(report, "rows", rows)
-        return report
-
-    def __getattr__(self, name: str) -> Any:
-        """Make and return a field that is not made yet; ``rows`` is None for a report that was made at once."""
-        if name == "rows":
-            return None
-        if name not in _MADE_OF_ROWS or self.rows is None:
-            raise AttributeError(f"Report has no {name}")
-        value = getattr(self.rows, name)()
-        object.__setattr__(self, name, value)
-        return value
-
-    @property
-    def is_predicted(self) -> bool:
-        """Return True if there is a prediction; the prediction itself is not made."""
-        return self.prediction is not None if self.rows is None else self.rows.row is not None
-
-    @property
-    def has_residuals(self) -> bool:
-        """Return True if there are residuals; the residuals themselves are not made."""
-        return bool(self.residuals if self.rows is None else self.rows.streams)
 
     @property
     def all(self) -> tuple[Report, ...]:

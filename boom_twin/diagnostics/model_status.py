@@ -40,7 +40,7 @@ class ModelWatch:
     def took(self, report: Report, duration: float) -> None:
         """Count a `report` that the twin made in `duration` seconds."""
         self._busy += duration
-        if report.is_predicted:
+        if report.prediction is not None:
             self._steps += 1
             self._is_deflected = "deflected" in report.events
             if duration > self._longest:

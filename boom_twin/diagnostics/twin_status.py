@@ -9,7 +9,7 @@ import numpy as np
 
 from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Thresholds
-from ..types import Array, Health, Report, Sample, Stream
+from ..types import Health, Report, Residuals, Sample, Stream
 from .levels import ComponentJudge, Evaluation, Level, Status
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, stress_status
 from .sensor_status import SensorSpec, sensor_status
@@ -86,31 +86,21 @@ class TwinWatch:
         self._streams[sample.stream].took(sample)
         for each in report.all:
             self._model.took(each, duration if each is report else 0.0)
-            if each.has_residuals:
-                self._keep_residuals(each)
-            if each.is_predicted:
+            for residuals in each.residuals:
+                self._keep(residuals)
+            if each.prediction is not None:
                 self._newest = each
             if self._load.is_due(each.stamp) and each.estimate is not None:
                 self._load.took(each.estimate)
             self.judged(each.health, 0.0)
 
-    def _keep_residuals(self, report: Report) -> None:
-        """Keep the residuals of a report until the next look."""
-        rows = report.rows
-        if rows is not None and len(rows.streams) == 1:  # as nearly always
-            names = rows.names(rows.streams[0])
-            self._keep(names, rows.values[0, : len(names)], rows.sigmas[0, : len(names)])
-            return
-        for each in report.residuals:
-            self._keep(each.names, each.values, each.sigmas)
-
-    def _keep(self, names: tuple[str, ...], values: Array, sigmas: Array) -> None:
-        """Append a row of values and standard deviations of these channels."""
-        kept = self._rows.get(names)
+    def _keep(self, residuals: Residuals) -> None:
+        """Keep residuals until the next look."""
+        kept = self._rows.get(residuals.names)
         if kept is None:
-            kept = self._rows[names] = Rows(len(names)), Rows(len(names))
-        kept[0].append(values)
-        kept[1].append(sigmas)
+            kept = self._rows[residuals.names] = Rows(len(residuals.names)), Rows(len(residuals.names))
+        kept[0].append(residuals.values)
+        kept[1].append(residuals.sigmas)
 
     def judged(self, health: Health | None, duration: float) -> None:
         """Take the result of a look at the rig's health, which took `duration` seconds; None if there is no news."""

@@ -19,11 +19,10 @@ from ..health.monitor import HealthMonitor
 from ..kernels.jit import SameTypes, hold
 from ..kernels.result_row import PIN
 from ..scene.schema import Scene
-from ..types import NANO, SECOND, Array, Health, Outline, Report, Stream, channels_of
-from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock
+from ..types import NANO, SECOND, Array, Health, Outline, Report, Residuals, Stream, channels_of
+from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
 from .health_rows import copy_predictions, copy_residuals, count_residuals
 from .load_shedding import LoadShedding
-from .report_rows import ReportRows
 from .run import Run
 from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .stroke_check import FAR
@@ -351,17 +350,20 @@ class BlockUpdate:
     def report(self, stamp: int, events: Sequence[str], judged: bool = True) -> Report:
         """Return the report of one sample, with `events` added; unless `judged`, health is left out, see `judge`."""
         found, news, (predicted, known) = self._found, self._news, self._found.counts.tolist()
-        rows = ReportRows(self._boom, self._channels, stamp)
-        if known > self._begin[1]:
-            own = slice(self._begin[1], known)
-            rows.streams, rows.stamps = found.residual_streams[own].tolist(), found.residual_stamps[own].tolist()
-            rows.values, rows.sigmas = found.values[own].copy(), found.sigmas[own].copy()
-        told, health = tuple(events), None
-        if predicted > self._begin[0]:
-            at = predicted - 1
-            rows.row, rows.estimated = found.rows[at].copy(), found.estimates[at].copy()
-            rows.moments = found.moments[at].copy()
-            if news is not NO_EXTRAS:
-                rows.outline, told = self._outlines().get(0), (*events, *news.events.get(0, ()))
-            health = self.judge() if judged else None
-        return Report.of_rows(stamp, rows, told, health)
+        residuals = tuple(self._residuals_in(row) for row in range(self._begin[1], known))
+        if predicted == self._begin[0]:
+            return Report(stamp, True, residuals=residuals, events=tuple(events))
+        at, outline = predicted - 1, None
+        if news is not NO_EXTRAS:
+            outline, events = self._outlines().get(0), (*events, *news.events.get(0, ()))
+        prediction = self._boom.prediction_in(found.rows[at].copy(), stamp, outline, found.moments[at].copy())
+        health = self.judge() if judged else None
+        estimate = estimate_of(stamp, found.estimates[at].copy())
+        return Report(stamp, True, prediction, residuals, tuple(events), health=health, estimate=estimate)
+
+    def _residuals_in(self, row: int) -> Residuals:
+        """Return a copy of the residuals in one row of the results."""
+        found, stream = self._found, STREAMS[int(self._found.residual_streams[row])]
+        names = self._channels[stream]
+        values, sigmas = (array[row, : len(names)].copy() for array in (found.values, found.sigmas))
+        return Residuals(stream, int(found.residual_stamps[row]), names, values, sigmas)
