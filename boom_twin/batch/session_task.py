@@ -88,8 +88,8 @@ def row_of(task: SessionTask) -> Row:
     from ..bag.session_model import scene_of, settings_of
     from ..bag.time_window import TimeWindow
     from ..offline.history import draw
-    from ..offline.replay import replay_into
-    from ..report.evaluation import Evaluator
+    from ..offline.replay import ReplayOptions
+    from ..report.evaluation import evaluated_replay
     from ..report.page import write_report
     from ..report.quantities import read
     from ..system.result_folder import REPLAY, result_folder
@@ -100,21 +100,18 @@ def row_of(task: SessionTask) -> Row:
     assert session is not None
     scene, settings = scene_of(session, task.scene), settings_of(session, params).settings
     window = TimeWindow(task.start, task.duration)
-    evaluator = Evaluator(scene.scene, settings)
+    options = ReplayOptions(mapping=mapping, baseline=baseline, window=window)
     with result_folder(Path(task.out), REPLAY, [session]) as building:
-        result = replay_into(
-            building, session, scene, settings, mapping=mapping, baseline=baseline, window=window, take=evaluator.add
-        )
-        found = evaluator.finish(result, building.folder)
+        found = evaluated_replay(building, session, scene, settings, options)
         if task.report:
-            draw(result, found.history, building.folder)
+            draw(found.result, found.history, building.folder)
             write_report(found, building.folder)
         _, quantities = read(building.folder)
         if not task.keep_bag:
             rmtree(building.folder / "bag")
-    summary = result.summary
+    result, summary = found.result, found.result.summary
     row = _head(task) | {"status": OK, "reason": None, "first_stamp_ns": result.recording.first}
-    row |= {name: value for name, value in summary.items() if name not in ("events", "alarms", "lost_contacts")}
+    row |= {name: value for name, value in summary.items() if name not in ("events", "alarms")}
     row |= {
         "file_sha256": files_sha256(result.session),
         "rig": scene.scene.description or scene.sha256[:12],

@@ -51,9 +51,9 @@ def run(args: Namespace) -> int:
 
 
 def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) -> ComparedSession:
-    from ..offline.replay import replay_into
+    from ..offline.replay import ReplayOptions
     from ..report.compare import side_of
-    from ..report.evaluation import Evaluator
+    from ..report.evaluation import evaluated_replay
 
     window = window_of(args)
 
@@ -61,9 +61,7 @@ def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) ->
         tell(f"replaying {session} ..")
         scene, settings = open_session_scene(session, args.scene), open_session_settings(session, args.params)
         inner = building.inner(name)
-        evaluator = Evaluator(scene.scene, settings)
-        result = replay_into(inner, session, scene, settings, baseline=args.baseline, window=window, take=evaluator.add)
-        evaluator.finish(result, inner.folder)
+        evaluated_replay(inner, session, scene, settings, ReplayOptions(baseline=args.baseline, window=window))
         return inner.folder
 
     return side_of(path, replayed, window)

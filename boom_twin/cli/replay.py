@@ -25,7 +25,6 @@ from .arguments import (
 from .output import open_session_scene, open_session_settings, print_result, tell, warn_incomplete
 
 if TYPE_CHECKING:
-    from ..offline.recording import Stretch
     from ..report.evaluation import Evaluation
 
 
@@ -67,9 +66,9 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Replay, draw, and print the result."""
-    from ..offline.replay import replay_into
+    from ..offline.replay import ReplayOptions
     from ..offline.sample_table import SampleTable, check_kind, table_file
-    from ..report.evaluation import Evaluator
+    from ..report.evaluation import evaluated_replay
     from ..report.quantities import section_heights
     from ..system.result_folder import REPLAY, result_folder
 
@@ -85,20 +84,9 @@ def run(args: Namespace) -> int:
     tell("preparing the model (compiles for up to a minute the first time) ..")
     out, sources = Path(args.out), files_of(args, "bag", "scene", "params", "mapping", "baseline")
     with result_folder(out, REPLAY, sources) as building:
-        evaluator = Evaluator(scene.scene, settings, heights, args.fatigue)
         joints, name = len(scene.scene.joints), f"samples.{args.table}"
         table = SampleTable(table_file(building.folder / name, joints), joints) if args.table else None
-
-        def take(stretch: Stretch) -> None:
-            evaluator.add(stretch)
-            if table is not None:
-                table.add(stretch)
-
-        result = replay_into(
-            building,
-            args.bag,
-            scene,
-            settings,
+        options = ReplayOptions(
             progress=partial(progress_of, unit="messages", name="replay"),
             mapping=args.mapping,
             changes=not args.no_changes,
@@ -106,26 +94,26 @@ def run(args: Namespace) -> int:
             baseline=args.baseline,
             window=window,
             namespace=args.namespace,
-            take=take,
             with_bag=not args.no_bag,
             causes=args.causes,
         )
-        found = evaluator.finish(result, building.folder)
+        also = None if table is None else table.add
+        found = evaluated_replay(building, args.bag, scene, settings, options, heights, args.fatigue, also)
         files = [path.name for path in _write(args, found, building.folder)]
         if table is not None:
             table.finish()
             files.append(name)
-    warn_incomplete(result.session)
+    warn_incomplete(found.result.session)
     written = ["summary.json", *([] if args.no_bag else ["bag"]), *files]
-    print_result(args.json, flat(result.summary), [*as_text(result.summary), *(str(out / name) for name in written)])
+    summary = found.result.summary
+    print_result(args.json, flat(summary), [*as_text(summary), *(str(out / name) for name in written)])
     return 0
 
 
 def flat(summary: dict[str, Any]) -> dict[str, Any]:
     """Return a summary as one flat object: one key for each count, one list for each key of its alarms."""
-    found = {key: value for key, value in summary.items() if key not in ("events", "alarms", "lost_contacts")}
-    for group in ("events", "lost_contacts"):
-        found |= {f"{group}_{name.replace(' ', '_')}": count for name, count in summary.get(group, {}).items()}
+    found = {key: value for key, value in summary.items() if key not in ("events", "alarms")}
+    found |= {f"events_{name.replace(' ', '_')}": count for name, count in summary["events"].items()}
     alarms = summary["alarms"]
     return found | {f"alarm_{key}": [alarm[key] for alarm in alarms] for key in ("channel", "kind", "from_s", "to_s", "cause")}
 
@@ -169,8 +157,6 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         lines += _errors(summary)
     if "tip_load" in summary:
         lines.append(f"load at the tip    {summary['tip_load']}")
-    for name, count in summary.get("lost_contacts", {}).items():
-        lines.append(f"{name:18s} lost contact between two samples {count} times")
     lines += [f"noise              {told}" for told in noise_as_text(summary)]
     if summary["output_sha256"] is None:
         lines.append("result bag         not written (--no-bag)")

@@ -37,16 +37,6 @@ def draw(result: Replay, history: History, out: Path) -> list[Path]:
     return replay_pictures(out, history, truth, session=result.session.path.resolve().name, note=note)
 
 
-def history_of(recording: Recording, scene: Scene) -> History:
-    """Return everything a replay predicted, as arrays; times are since the first prediction.
-
-    The recording must keep its session.
-    """
-    builder = HistoryBuilder(scene)
-    builder.add(recording.whole)
-    return builder.history(recording)
-
-
 MOST_ROWS = 2**15
 """Rows of predictions, and of each stream's residuals, beyond which they are thinned out: 2.7 min at 200 Hz."""
 MOST_SHAPES = 1024

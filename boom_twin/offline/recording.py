@@ -97,8 +97,6 @@ class SessionTotals:
         The largest of the tip, m/s^2.
     residuals, normalised : ColumnStatistics
         Of the joints: rad, and over the expected deviations.
-    lost_contacts : ndarray of int, shape (c,)
-        How often each pin with clearance touched at one prediction and not at the next.
     tip_sigmas : ndarray, shape (2,)
         Largest standard deviation of the predicted tip's x and y, m; NaN if nothing is known of it.
     tip_sigma : float or None
@@ -110,11 +108,9 @@ class SessionTotals:
     def __init__(self, joints: int) -> None:
         self.samples, self.acceleration = 0, 0.0
         self.residuals, self.normalised = ColumnStatistics(joints), ColumnStatistics(joints)
-        self.lost_contacts: NDArray[np.int64] = np.zeros(0, np.int64)
         self.tip_sigmas: Array = np.full(2, np.nan)
         self.tip_sigma: float | None = None
         self.load = TipLoadFinder()
-        self._touching: Array | None = None
 
     def add(self, stretch: Stretch) -> None:
         """Add a stretch."""
@@ -128,11 +124,6 @@ class SessionTotals:
         self.samples += len(predictions.stamps)
         self.load.add(predictions.stamps, stretch.estimates.load)
         self.acceleration = float(np.fmax(self.acceleration, np.hypot(*predictions.tip_acceleration.T).max()))
-        touching = predictions.clearances[:, :, 3]
-        before = touching[:1] if self._touching is None else self._touching
-        parted = (np.diff(touching, axis=0, prepend=before) < 0.0).sum(axis=0)
-        self.lost_contacts = parted if self._touching is None else self.lost_contacts + parted
-        self._touching = touching[-1:].copy()
 
     def _add_tip_sigmas(self, sigmas: Array) -> None:
         self.tip_sigmas = np.fmax(self.tip_sigmas, sigmas)

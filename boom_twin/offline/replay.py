@@ -71,6 +71,24 @@ GIVEN = "given as a Scene"
 """Source of a scene that came by no file."""
 
 
+@dataclass(frozen=True)
+class ReplayOptions:
+    """Options of a replay, see the parameters of `replay`."""
+
+    progress: Progress | None = None
+    mapping: str | Path | None = None
+    changes: bool = True
+    health: bool = True
+    baseline: str | Path | None = None
+    window: TimeWindow = WHOLE
+    namespace: str = ""
+    with_bag: bool = True
+    causes: bool = False
+
+
+USUAL = ReplayOptions()
+
+
 @dataclass(frozen=True, repr=False)
 class Replay(SummaryDisplay):
     """Result of a replay: the numbers of ``summary.json``, and all predictions.
@@ -190,8 +208,8 @@ def replay(
         recorded with cannot be used; or `out` cannot be written, or holds anything else than an earlier result.
     """
     with result_folder(Path(out), REPLAY, [Path(bag)]) as building:
-        options = progress, mapping, changes, health, baseline, window, namespace
-        return replay_into(building, bag, scene, settings, *options, with_bag=with_bag, causes=causes)
+        options = ReplayOptions(progress, mapping, changes, health, baseline, window, namespace, with_bag, causes)
+        return replay_into(building, bag, scene, settings, options)
 
 
 def replay_into(
@@ -199,30 +217,24 @@ def replay_into(
     bag: str | Path,
     scene: SceneSource | SessionScene,
     settings: Settings | None = None,
-    progress: Progress | None = None,
-    mapping: str | Path | None = None,
-    changes: bool = True,
-    health: bool = True,
-    baseline: str | Path | None = None,
-    window: TimeWindow = WHOLE,
-    namespace: str = "",
+    options: ReplayOptions = USUAL,
     take: Callable[[Stretch], None] | None = None,
-    with_bag: bool = True,
-    causes: bool = False,
 ) -> Replay:
     """Replay as `replay` does, into a folder under construction to which more will be added.
 
     With `take`, memory stays the same however long the session is: it is given one `Stretch` after the other, and none is kept.
     """
-    with _processes(building, with_bag) as (reader, writer):
+    with _processes(building, options.with_bag) as (reader, writer):
         session, out, settings = scan(Path(bag)), building.folder, settings or settings_of(Path(bag)).settings
         taken = scene_for(session.path, scene)
         scene, joints = taken.scene, len(taken.scene.joints)
-        mapped = mapping_of(session.path, Path(mapping) if mapping else None, joints, namespace)
+        mapped = mapping_of(session.path, Path(options.mapping) if options.mapping else None, joints, options.namespace)
         topics, wanted = mapped.topics.of_joints(joint.range_deg for joint in scene.joints), _wanted(session, mapped.topics)
         strokes = strokes_of(session.path, mapped)
         refuse_other_names(session, topics, joints, taken.source)
-        usual = baseline_of(session.path, Path(baseline) if baseline else None) if health else None
+        baseline = Path(options.baseline) if options.baseline else None
+        usual = baseline_of(session.path, baseline) if options.health else None
+        window = options.window
         truth = _truth_in(window, session, topics, wanted)
         errors = None if truth is None else TipErrors(truth)
         taking = None if take is None else _Timed(take)
@@ -238,11 +250,11 @@ def replay_into(
             if behind is not None:
                 behind.wait_ready()
             samples: Iterator[SampleBlock | Change | None] = iter(ahead)
-            bar = progress(expected) if progress else None
+            bar = options.progress(expected) if options.progress else None
             began = time.perf_counter()
-            if not changes:
+            if not options.changes:
                 samples = (sample for sample in samples if not isinstance(sample, Change))
-            fault_twins = _fault_twins(twin) if causes else None
+            fault_twins = _fault_twins(twin) if options.causes else None
             if fault_twins is not None:
                 samples = _followed(samples, fault_twins)
             for step in drive_blocks(twin, samples):
@@ -282,9 +294,9 @@ def replay_into(
                 f"{session.path}: of {1 + recording.refused} stroke samples only the first could be used ({_told(twin)})."
                 f"{_explained(twin.counts)}"
             )
-        if with_bag:
+        if options.with_bag:
             SessionSheet(__version__, taken.text, strokes=strokes.reading).write(out / "bag")
-        summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME if with_bag else None) | {
+        summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME if options.with_bag else None) | {
             "scene": taken.source,
             "scene_sha256": taken.sha256,
             "baseline": None if usual is None else usual.source,
@@ -464,7 +476,6 @@ def _summary(recording: Recording, twin: Twin, wall: float, file: Path | None) -
         "joint_residual_normalised_std": totals.normalised.deviation,
         "tip_acceleration_max_m_s2": totals.acceleration,
         **_load(totals.load.load),
-        **_pins(recording, twin),
         **recording.noise,
         "output_sha256": None if file is None else sha256_of(file),
         "alarms": _alarms(recording, recording.first),
@@ -514,10 +525,3 @@ def _load(load: TipLoad | None) -> dict[str, Any]:
         "tip_load_frequency_Hz": None if pulses is None else pulses.frequency,
         "tip_load_frequency_sigma_Hz": None if pulses is None else pulses.frequency_sigma,
     }
-
-
-def _pins(recording: Recording, twin: Twin) -> dict[str, dict[str, int]]:
-    """Return how often each pin with clearance lost contact from one sample to the next; empty without such pins."""
-    if not twin.plan.pins:
-        return {}
-    return {"lost_contacts": dict(zip(twin.plan.pins, recording.totals.lost_contacts.tolist(), strict=True))}

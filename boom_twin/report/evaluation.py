@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..bag.session_model import SessionScene
 from ..config.settings import Settings
 from ..offline.history import HistoryBuilder
 from ..offline.recording import Stretch
-from ..offline.replay import Replay
+from ..offline.replay import USUAL, Replay, ReplayOptions, replay_into
 from ..plots import History
 from ..scene.schema import Scene
+from ..system.result_folder import UnfinishedResult
 from ..types import Array
 from .fatigue import Fatigue, FatigueCounter
 from .quantities import Load, QuantityBuilder, write
@@ -85,3 +88,36 @@ class Evaluator:
             self._category,
             write(folder, self._scene, found),
         )
+
+
+def evaluated_replay(
+    building: UnfinishedResult,
+    bag: str | Path,
+    scene: SessionScene,
+    settings: Settings,
+    options: ReplayOptions = USUAL,
+    heights: Array | None = None,
+    category: float | None = None,
+    also: Callable[[Stretch], None] | None = None,
+) -> Evaluation:
+    """Replay a session as `replay_into` does, with its figures; return its evaluation.
+
+    Parameters
+    ----------
+    building : UnfinishedResult
+        Folder of the replay.
+    bag, scene, settings, options
+        See `boom_twin.offline.replay.replay_into`.
+    heights, category
+        See `Evaluator`.
+    also : callable, optional
+        Is given each stretch too.
+    """
+    evaluator = Evaluator(scene.scene, settings, heights, category)
+
+    def take(stretch: Stretch) -> None:
+        evaluator.add(stretch)
+        if also is not None:
+            also(stretch)
+
+    return evaluator.finish(replay_into(building, bag, scene, settings, options, take), building.folder)

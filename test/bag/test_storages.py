@@ -25,7 +25,7 @@ from boom_twin.bag.time_window import TimeWindow
 from boom_twin.batch.sources import sessions_of
 from boom_twin.cli.main import main
 from boom_twin.errors import BagError
-from boom_twin.offline.replay import replay_into
+from boom_twin.offline.replay import ReplayOptions, replay_into
 from boom_twin.offline.sample_table import SampleTable, table_file
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.system.result_folder import REPLAY, result_folder
@@ -108,7 +108,7 @@ def moving(folder: Path) -> Path:
 def table_of(session: Path, out: Path) -> bytes:
     with result_folder(out, REPLAY, [session]) as building:
         table = SampleTable(table_file(building.folder / "samples.csv", 4), 4)
-        replay_into(building, session, load_scene(), health=False, take=table.add)
+        replay_into(building, session, load_scene(), options=ReplayOptions(health=False), take=table.add)
         table.finish()
     return (out / "samples.csv").read_bytes()
 

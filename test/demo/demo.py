@@ -20,15 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boom_twin.bag.reader import Session, read, scan
-from boom_twin.bag.session_model import scene_of
+from boom_twin.bag.session_model import scene_of, settings_of
 from boom_twin.errors import BagError, BoomTwinError
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import Output, Topic, load_topics
 from boom_twin.offline.ground_truth import FILE_NAME as TRUTH
 from boom_twin.offline.ground_truth import TipTruth, load_truth
-from boom_twin.offline.history import draw, history_of
+from boom_twin.offline.history import draw
 from boom_twin.offline.progress import progress_of
-from boom_twin.offline.replay import Replay, replay_into
+from boom_twin.offline.recording import Stretch
+from boom_twin.report.evaluation import evaluated_replay
 from boom_twin.ros.startup import require_rclpy
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.system.received_files import holds_file, open_received
@@ -182,9 +183,11 @@ def main() -> int:
                 write_atomic(recorded / TRUTH, truth.read())
         live = score(recorded)
         with result_folder(args.out / "replay", REPLAY, [recorded]) as building:
-            again = replay_into(building, recorded, None)
-            pictures = [path.name for path in draw(again, history_of(again.recording, taken.scene), building.folder)]
-        print("\n".join(live.as_text(f"{session.path.name} ({about})", sent[Stream.STROKES.value], _equal(live, again))))
+            stretches: list[Stretch] = []
+            scene, settings = scene_of(recorded), settings_of(recorded).settings
+            found = evaluated_replay(building, recorded, scene, settings, also=stretches.append)
+            pictures = [path.name for path in draw(found.result, found.history, building.folder)]
+        print("\n".join(live.as_text(f"{session.path.name} ({about})", sent[Stream.STROKES.value], _equal(live, stretches))))
         for path in [recorded, *(args.out / "replay" / name for name in pictures)]:
             print(path)
         print(f"see it in a browser: {sys.executable} -P -m boom_twin.cli.main monitor --bag {recorded}")
@@ -229,10 +232,13 @@ def _play(session: Session, duration: float, running: DemoProcesses) -> dict[str
     return player.sent
 
 
-def _equal(live: DemoResult, again: Replay) -> int:
+def _equal(live: DemoResult, again: list[Stretch]) -> int:
     """Return how many live predictions a replay of the recorded inputs reproduces, to the last bit."""
-    rows = again.recording.predictions
-    replayed = dict(zip(rows.stamps.tolist(), map(tuple, rows.tip_position.tolist()), strict=True))
+    replayed = {
+        stamp: tuple(position)
+        for each in again
+        for stamp, position in zip(each.predictions.stamps.tolist(), each.predictions.tip_position.tolist(), strict=True)
+    }
     return sum(replayed.get(stamp) == position for stamp, position in live.positions.items())
 
 

@@ -24,7 +24,7 @@ from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.protocol import layout
-from boom_twin.offline.history import history_of
+from boom_twin.offline.history import HistoryBuilder
 from boom_twin.plots.residuals import residual_picture
 from boom_twin.scene.kinematics import strokes_of_posture
 
@@ -132,7 +132,7 @@ def test_replay_report_and_page(scene, bag, tmp_path, monkeypatch):
     labels, set_ylabel = [], Axes.set_ylabel
     monkeypatch.setattr(Axes, "set_ylabel", lambda self, text: labels.append(text) or set_ylabel(self, text))
     recording = replay(bag, scene, tmp_path / "again", health=False).recording
-    residual_picture(tmp_path / "residuals.png", "session", history_of(recording, scene), "")
+    residual_picture(tmp_path / "residuals.png", "session", HistoryBuilder(scene).add(recording.whole), "")
     assert "cylinder\nforce_2\nN" in labels and "joint_1\nmrad" in labels
     feed = bag_feed(bag, scene, Settings())
     while feed.is_reading:

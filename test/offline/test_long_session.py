@@ -11,10 +11,10 @@ from drive_twin import ARCH_DRIVES, drive_twin
 from health.recorded import written
 
 from boom_twin import Settings, Stream, load_scene
+from boom_twin.bag.session_model import scene_of
 from boom_twin.offline import history, recording
 from boom_twin.offline.recording import Recording, Stretch
-from boom_twin.offline.replay import replay_into
-from boom_twin.report.evaluation import Evaluation, Evaluator
+from boom_twin.report.evaluation import Evaluation, Evaluator, evaluated_replay
 from boom_twin.report.quantities import read
 from boom_twin.system.result_folder import REPLAY, result_folder
 from boom_twin.twin.blocks import CODES, ReportBlock, SampleBlock
@@ -22,16 +22,10 @@ from boom_twin.twin.blocks import CODES, ReportBlock, SampleBlock
 
 def replayed(session: Path, out: Path) -> tuple[dict, Evaluation, list[Stretch]]:
     """Summary, evaluation and stretches of a replay into `out`."""
-    scene, stretches = load_scene(), []
-    evaluator = Evaluator(scene, Settings())
-
-    def take(stretch: Stretch) -> None:
-        stretches.append(stretch)
-        evaluator.add(stretch)
-
+    stretches: list[Stretch] = []
     with result_folder(out, REPLAY, [session]) as building:
-        result = replay_into(building, session, scene, take=take)
-        return result.summary, evaluator.finish(result, building.folder), stretches
+        found = evaluated_replay(building, session, scene_of(session), Settings(), also=stretches.append)
+    return found.result.summary, found, stretches
 
 
 def numbers(value: object) -> list:

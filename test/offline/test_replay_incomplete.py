@@ -25,7 +25,7 @@ from boom_twin.errors import BagError
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.offline import writer_process as behind
 from boom_twin.offline.process_pipe import END, Pipe
-from boom_twin.offline.replay import replay_into
+from boom_twin.offline.replay import ReplayOptions, replay_into
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.system.result_folder import REPLAY, result_folder
 
@@ -262,7 +262,7 @@ def test_a_full_disk_leaves_one_line_and_an_earlier_result(session: Path, tmp_pa
     """The limit on the size of a file stands for the disk's."""
     out = tmp_path / "out"
     with result_folder(out, REPLAY, [session]) as building:
-        replay_into(building, session, load_scene(), health=False)
+        replay_into(building, session, load_scene(), options=ReplayOptions(health=False))
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     command = [sys.executable, "-m", "boom_twin.cli.main", "replay", str(session), "--out", str(out), "--no-health"]
     done = subprocess.run(

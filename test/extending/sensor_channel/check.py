@@ -25,7 +25,7 @@ from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.protocol import layout
-from boom_twin.offline.history import history_of
+from boom_twin.offline.history import HistoryBuilder
 from boom_twin.plots.residuals import residual_picture
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.load import default_text
@@ -93,7 +93,7 @@ assert math.isclose(mean["value"], WRONG, abs_tol=5e-4) and mean["unit"] == "rad
 labels, set_ylabel = [], Axes.set_ylabel
 Axes.set_ylabel = lambda self, text: labels.append(text) or set_ylabel(self, text)
 recording = replay("session", load_scene("scene.yaml"), "again", health=False).recording
-residual_picture(Path("residuals.png"), "session", history_of(recording, scene), "")
+residual_picture(Path("residuals.png"), "session", HistoryBuilder(scene).add(recording.whole), "")
 assert f"{CHANNEL}\nrad" in labels and "joint_1\nmrad" in labels
 
 # On the live page: a table of residuals, from which it makes chart, figures and columns of the export.
