@@ -17,7 +17,7 @@ from .output import open_session_scene, open_session_settings, print_result, war
 if TYPE_CHECKING:
     from ..bag.session_model import SessionScene
     from ..calibration.run import Calibration, Progress
-    from ..offline.replay import ProgressBar
+    from ..offline.progress import ProgressBar
 
 
 def add_arguments(parser: ArgumentParser) -> None:

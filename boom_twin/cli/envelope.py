@@ -14,7 +14,7 @@ from .output import columns, open_scene, plain_values, print_result
 
 if TYPE_CHECKING:
     from ..analysis.envelope import Envelope
-    from ..offline.replay import ProgressBar
+    from ..offline.progress import ProgressBar
     from ..scene import Scene
     from ..types import Array
 

@@ -134,7 +134,7 @@ def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
 def as_text(summary: dict[str, Any]) -> list[str]:
     """Return the lines of a short table."""
     from ..health.sensor_monitor import noise_as_text
-    from ..offline.replay import alarm_as_text
+    from ..offline.summary import alarm_as_text
 
     lines = [
         f"samples            {summary['samples']} in {summary['duration_s']:.1f} s",

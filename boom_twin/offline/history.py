@@ -19,7 +19,7 @@ from ..plots import AlarmSpan, EstimateTrace, History, ImuTrace, Truth, replay_p
 from ..plots.extreme_rows import ExtremeRows
 from ..plots.health import SLOW
 from ..plots.residuals import running_mean
-from ..plots.session_totals import SessionTotalsBuilder
+from ..plots.session_distributions import SessionDistributionsBuilder
 from ..plots.tip import WINDOW
 from ..scene.kinematics import gravity_in_base
 from ..scene.schema import Scene
@@ -66,7 +66,7 @@ class HistoryBuilder:
         self._predicted = ExtremeRows(MOST_ROWS, EXTREME)
         self._imu = ExtremeRows(MOST_ROWS, ("measured", "predicted"))
         self._residuals = {stream: ExtremeRows(MOST_ROWS, ("values", "means")) for stream in Stream}
-        self._totals = SessionTotalsBuilder()
+        self._distributions = SessionDistributionsBuilder()
         self._shapes = _Shapes()
         self._peak, self._peak_at = -1.0, 0.0  # largest acceleration of the tip, and when, s
 
@@ -75,7 +75,7 @@ class HistoryBuilder:
         groups = _channel_groups(stretch)
         own = _stretch_history(stretch, self._scene, self._plan, [*groups.values()])
         self._note_peak(own)
-        self._totals.add(own)
+        self._distributions.add(own)
         estimated = dict(zip(ESTIMATED, _estimate_trace(stretch).columns, strict=True))
         self._put(self._predicted, {name: getattr(own, name) for name in PREDICTED} | estimated)
         for stream, group in groups.items():
@@ -118,7 +118,7 @@ class HistoryBuilder:
             shapes=self._shapes.kept,
             gaps=[((start - recording.first) * NANO, (end - recording.first) * NANO) for start, end in recording.gaps],
             alarms=_alarms(recording, float(found["stamps_s"][-1])),
-            totals=self._totals.totals,
+            distributions=self._distributions.distributions,
             estimate=None if load is None else EstimateTrace(*(found[name] for name in ESTIMATED)),
             load_text="" if load is None else load.text,
         )

@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import Protocol
 
-if TYPE_CHECKING:
-    from .replay import ProgressBar
+
+class ProgressBar(Protocol):
+    """Receiver of a run's progress; ``tqdm`` is one."""
+
+    def update(self, n: float, /) -> object:
+        """Add `n` to what was done."""
+
+    def close(self) -> object:
+        """Close the display after the last step."""
+
+
+Progress = Callable[[int], ProgressBar]
 
 
 class TenthLines:

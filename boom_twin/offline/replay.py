@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,6 @@ from ..bag.session_sheet import SessionSheet
 from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
-from ..deviation.load_spectrum import TipLoad
 from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
 from ..health.baseline import Baseline
@@ -37,36 +36,26 @@ from ..scene.edit import anew, loaded
 from ..scene.load import SceneSource, as_scene
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
-from ..system.received_files import sha256_of
 from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
 from ..system.summary_display import SummaryDisplay, data_frame
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..twin.events import EVENTS
-from ..types import NANO, Alarm, Array, Change, Report, Stream, StrokeReading, channels_of
+from ..types import NANO, Array, Change, Report, Stream, StrokeReading, channels_of
 from .ground_truth import TipErrors, TipTruth, load_truth
 from .process_pipe import Pipe
+from .progress import Progress
 from .reader_process import SampleReader
 from .recording import Recording, Stretch
 from .refused_strokes import RefusedStrokes
 from .sample_table import RowsInMemory, SampleTable, columns_of
+from .summary import alarm_as_text, summary_of
 from .writer_process import ReportWriter
 
 if TYPE_CHECKING:
     from ..twin.twin import Twin
 
 
-class ProgressBar(Protocol):
-    """Receiver of a replay's progress; ``tqdm`` is one."""
-
-    def update(self, n: float, /) -> object:
-        """Add `n` messages to those taken."""
-
-    def close(self) -> object:
-        """Close the display after the last message."""
-
-
-Progress = Callable[[int], ProgressBar]
 GIVEN = "given as a Scene"
 """Source of a scene that came by no file."""
 
@@ -296,7 +285,7 @@ def replay_into(
             )
         if options.with_bag:
             SessionSheet(__version__, taken.text, strokes=strokes.reading).write(out / "bag")
-        summary = _summary(recording, twin, wall, out / "bag" / FILE_NAME if options.with_bag else None) | {
+        summary = summary_of(recording, twin.counts, wall, out / "bag" / FILE_NAME if options.with_bag else None) | {
             "scene": taken.source,
             "scene_sha256": taken.sha256,
             "baseline": None if usual is None else usual.source,
@@ -458,70 +447,3 @@ def _explained(counts: Counter[str]) -> str:
 
 def _told(twin: Twin) -> str:
     return ", ".join(f"{name}: {count}" for name, count in twin.counts.items()) or "it was empty"
-
-
-def _summary(recording: Recording, twin: Twin, wall: float, file: Path | None) -> dict[str, Any]:
-    """Return the numbers of a replay for ``summary.json``; `file` is that of the result bag, if there is one."""
-    totals, duration = recording.totals, recording.duration
-    return {
-        "samples": totals.samples,
-        "duration_s": duration,
-        "wall_s": wall,
-        "realtime_factor": duration / wall,
-        "dropped": recording.refused,
-        "outside_validity": twin.counts["deflected"],
-        "events": dict(sorted(twin.counts.items())),
-        "joint_residual_rms_rad": totals.residuals.rms,
-        "joint_residual_normalised_mean": totals.normalised.mean,
-        "joint_residual_normalised_std": totals.normalised.deviation,
-        "tip_acceleration_max_m_s2": totals.acceleration,
-        **_load(totals.load.load),
-        **recording.noise,
-        "output_sha256": None if file is None else sha256_of(file),
-        "alarms": _alarms(recording, recording.first),
-    }
-
-
-def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
-    """Return gaps, clock steps and health alarms in the order of their beginning; seconds since the stamp `first`."""
-    gaps = [
-        Alarm(Stream.STROKES.value, "gap", start, end, None, f"no strokes for {(end - start) * NANO:.2f} s")
-        for start, end in recording.gaps
-    ]
-    gaps += [
-        Alarm(Stream.STROKES.value, "clock", start, start, None, f"stamps went on at {(end - first) * NANO:.3f} s")
-        for start, end in recording.clock_sets
-    ]
-    return [
-        {
-            "channel": alarm.channel,
-            "kind": alarm.kind,
-            "from_s": max(0.0, (alarm.since - first) * NANO),
-            "to_s": None if alarm.until is None else (alarm.until - first) * NANO,
-            "cause": alarm.cause,
-            "told": alarm.told,
-            "ranked": [{"cause": rank.cause, "probability": rank.probability} for rank in alarm.ranked],
-        }
-        for alarm in sorted([*gaps, *recording.alarms()], key=lambda alarm: alarm.since)
-    ]
-
-
-def alarm_as_text(alarm: dict[str, Any]) -> str:
-    """Return an alarm of ``summary.json`` in words."""
-    end = "the end" if alarm["to_s"] is None else f"{alarm['to_s']:.2f} s"
-    return f"{alarm['channel']}, {max(0.0, alarm['from_s']):.2f} s to {end}: {alarm['told']}"
-
-
-def _load(load: TipLoad | None) -> dict[str, Any]:
-    """Return the numbers of the unknown load at the tip; empty where only strokes were measured."""
-    if load is None:
-        return {}
-    pulses = load.pulses
-    return {
-        "tip_load": load.text,
-        "tip_load_rms_N": load.rms,
-        "tip_load_pulses_N": None if pulses is None else pulses.height,
-        "tip_load_pulses_sigma_N": None if pulses is None else pulses.height_sigma,
-        "tip_load_frequency_Hz": None if pulses is None else pulses.frequency,
-        "tip_load_frequency_sigma_Hz": None if pulses is None else pulses.frequency_sigma,
-    }

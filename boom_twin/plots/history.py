@@ -80,14 +80,14 @@ class Density:
 class ResidualDistribution:
     """Distribution of the residuals of one channel over their expected deviations."""
 
-    counts: NDArray[np.int64]  # (b,), between `boom_twin.plots.session_totals.EDGES`
+    counts: NDArray[np.int64]  # (b,), between `boom_twin.plots.session_distributions.EDGES`
     mean: float | None  # None without any
     deviation: float | None
     reach: float  # largest residual that a picture is to show, in the unit of the channel; 0 without any
 
 
 @dataclass(frozen=True)
-class SessionTotals:
+class SessionDistributions:
     """Statistics of all rows of a session, also of those that are not in its `History`.
 
     Densities are of the specific force at the tip along x and z; without an IMU of the predicted acceleration of the tip.
@@ -103,7 +103,7 @@ class History:
     """Everything predicted in a replay of m stroke samples, and k rows of residuals of c channels; n joints.
 
     Of a long session, rows are left out between those that hold the extremes, see `boom_twin.plots.extreme_rows`. Then
-    `totals` are given, which do not follow from the rows that are left.
+    `distributions` are given, which do not follow from the rows that are left.
     """
 
     stamps_s: Array  # (m,)
@@ -124,6 +124,6 @@ class History:
     alarms: list[AlarmSpan] = field(default_factory=list)  # in the order of their beginning
     moments: Array = field(default_factory=lambda: np.zeros((0, 0)))  # N m at the `boom_twin.analysis.bending_moments.stations`
     slow_moments: Array = field(default_factory=lambda: np.zeros((0, 0)))  # their static parts
-    totals: SessionTotals | None = None
+    distributions: SessionDistributions | None = None
     estimate: EstimateTrace | None = None  # None where nothing but strokes was measured
     load_text: str = ""  # size and main frequency of its load, in words

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..types import Array, sensor_kind
 from .history import Density, History, ResidualDistribution
-from .session_totals import EDGES, SEGMENT, totals_of
+from .session_distributions import EDGES, SEGMENT, distributions_of
 from .style import BLUE, GREY, INK, ORANGE, SKY, TIME, extent, legend_above, picture, shade_alarms, shade_gaps
 
 if TYPE_CHECKING:
@@ -22,14 +22,14 @@ MEAN_OVER = 1.0  # s of the running mean
 
 def residual_picture(path: Path, session: str, history: History, note: str) -> None:
     """Write ``residuals.png``."""
-    channels, totals = len(history.residual_names), totals_of(history).residuals
+    channels, found = len(history.residual_names), distributions_of(history).residuals
     height = max(9.0, 1.2 + 1.5 * channels)
     with picture(path, f"{session}: residuals, measured minus predicted", note, (16.0, height)) as figure:
         panels = figure.subplots(channels, 2, squeeze=False, sharex="col", gridspec_kw={"width_ratios": [5.0, 1.0]})
         for channel, (over_time, spread) in enumerate(panels):
-            found = totals[history.residual_names[channel]]
-            _channel(over_time, history, channel, found.reach)
-            _distribution(spread, found)
+            own = found[history.residual_names[channel]]
+            _channel(over_time, history, channel, own.reach)
+            _distribution(spread, own)
         panels[-1, 0].set_xlabel(TIME)
         panels[-1, 1].set_xlabel(f"residual / {SIGMA}")
         panels[0, 1].set_title("against the unit normal")
@@ -85,15 +85,15 @@ SHORTEST = 4.0  # s; no spectrum of less
 
 def spectrum_picture(path: Path, session: str, history: History, note: str) -> None:
     """Write ``spectrum.png``: specific force if there is an IMU, else tip acceleration."""
-    totals = totals_of(history)
-    quantity = "tip acceleration" if totals.measured is None else "specific force at the tip"
-    names = ("x (forward)", "y (up)") if totals.measured is None else ("x, along the tip", "z, across it")
+    found = distributions_of(history)
+    quantity = "tip acceleration" if found.measured is None else "specific force at the tip"
+    names = ("x (forward)", "y (up)") if found.measured is None else ("x, along the tip", "z, across it")
     with picture(path, f"{session}: spectrum of the {quantity}", note) as figure:
         panels = figure.subplots(1, 2, sharex=True, sharey=True)
         for i, axes in enumerate(panels):
-            if totals.measured is not None:
-                axes.loglog(*_curve(totals.measured[i]), color=GREY, label="measured")
-            axes.loglog(*_curve(totals.predicted[i]), color=(BLUE, ORANGE)[i], linewidth=1.8, label="predicted")
+            if found.measured is not None:
+                axes.loglog(*_curve(found.measured[i]), color=GREY, label="measured")
+            axes.loglog(*_curve(found.predicted[i]), color=(BLUE, ORANGE)[i], linewidth=1.8, label="predicted")
             axes.set_title(f"{quantity[0].upper()}{quantity[1:]}, {names[i]}")
             axes.set_xlabel("frequency, Hz")
             axes.legend(loc="upper right")

@@ -64,8 +64,8 @@ def test_the_history_is_that_of_the_whole(both: tuple) -> None:
     for name in ("stamps_s", "tip_position", "moments", "residual_values"):
         assert np.array_equal(getattr(parts.history, name), getattr(whole.history, name), equal_nan=True), name
     assert len(parts.history.shapes) == len(whole.history.shapes)
-    for name, found in parts.history.totals.residuals.items():
-        wanted = whole.history.totals.residuals[name]
+    for name, found in parts.history.distributions.residuals.items():
+        wanted = whole.history.distributions.residuals[name]
         assert np.array_equal(found.counts, wanted.counts)
         assert (found.mean, found.deviation) == pytest.approx((wanted.mean, wanted.deviation), rel=1e-9)
 

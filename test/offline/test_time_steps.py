@@ -24,7 +24,7 @@ from boom_twin.cli.main import main
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.messages.type_store import jazzy
-from boom_twin.plots.session_totals import density
+from boom_twin.plots.session_distributions import density
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 SECOND, START, ROWS = 10**9, 1_700_000_000 * 10**9, 1600

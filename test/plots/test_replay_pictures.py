@@ -15,7 +15,7 @@ import pytest
 from boom_twin.plots import AlarmSpan, EstimateTrace, History, ImuTrace, Truth, replay_pictures, tip
 from boom_twin.plots.posture import spread
 from boom_twin.plots.residuals import residual_picture, running_mean
-from boom_twin.plots.session_totals import density
+from boom_twin.plots.session_distributions import density
 from boom_twin.plots.style import broken, limits
 from boom_twin.plots.tip import most_active_window
 from boom_twin.types import Array

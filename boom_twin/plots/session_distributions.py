@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..analysis.column_statistics import ColumnStatistics
 from ..analysis.even_times import spacing, unbroken
 from ..types import Array
-from .history import Density, History, ResidualDistribution, SessionTotals
+from .history import Density, History, ResidualDistribution, SessionDistributions
 
 EDGES = np.linspace(-5.0, 5.0, 51)
 """Edges of the bins of normalised residuals. Residuals outside count in the outermost bins."""
@@ -18,8 +18,8 @@ SEGMENT = 8.0
 """s; lines of a spectrum are 1/SEGMENT apart."""
 
 
-class SessionTotalsBuilder:
-    """Computation of session totals from parts of a session."""
+class SessionDistributionsBuilder:
+    """Distributions and spectra of a session, from its parts."""
 
     def __init__(self) -> None:
         self._channels: dict[str, _Channel] = {}
@@ -40,10 +40,10 @@ class SessionTotalsBuilder:
             self._measured = _averaged(self._measured, imu.stamps_s, imu.measured)
 
     @property
-    def totals(self) -> SessionTotals:
-        """Totals of all parts so far."""
+    def distributions(self) -> SessionDistributions:
+        """Distributions and spectra of all parts so far."""
         residuals = {name: channel.distribution for name, channel in self._channels.items()}
-        return SessionTotals(residuals, tuple(self._predicted), tuple(self._measured) or None)
+        return SessionDistributions(residuals, tuple(self._predicted), tuple(self._measured) or None)
 
 
 class _Channel:
@@ -69,13 +69,13 @@ class _Channel:
         return ResidualDistribution(self._counts.copy(), mean, deviation, self._reach)
 
 
-def totals_of(history: History) -> SessionTotals:
-    """Return the totals of a session: its own, or those of its rows if they are all there."""
-    if history.totals is not None:
-        return history.totals
-    builder = SessionTotalsBuilder()
+def distributions_of(history: History) -> SessionDistributions:
+    """Return the distributions of a session: its own, or those of its rows if they are all there."""
+    if history.distributions is not None:
+        return history.distributions
+    builder = SessionDistributionsBuilder()
     builder.add(history)
-    return builder.totals
+    return builder.distributions
 
 
 _UNKNOWN = Density(np.array([1.0]), np.array([np.nan]), 0.0, 0)
