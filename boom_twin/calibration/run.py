@@ -222,7 +222,8 @@ def _refuse_other_boom(scene: Scene, sessions: Sequence[MeasuredSession]) -> Non
 
 def _estimates(problem: CalibrationProblem, fit: Fit, groups: Sequence[InseparableUnknowns]) -> tuple[Estimate, ...]:
     untold = {name for group in groups for name in group.names}
-    reach = BETWEEN * np.sqrt(np.diag(fit.covariance()))
+    least = np.array([unknown.kind.least / unknown.kind.prior for unknown in problem.unknowns])
+    reach = BETWEEN * np.sqrt(np.diag(fit.covariance()) + least**2)
     best = fit.without([i for i, unknown in enumerate(problem.unknowns) if unknown.name in untold], problem.least)
     best = np.where([unknown.name in untold for unknown in problem.unknowns], fit.deviations, best)
     found = []

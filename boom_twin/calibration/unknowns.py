@@ -6,11 +6,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..deviation.kalman import ANGLE_ZERO
 from ..errors import UsageError
 from ..scene.edit import parameter, parameter_names
 from ..scene.schema import Scene
 from ..types import Stream, channels_of, stream_of
 
+LEVER = 0.3  # m, of a cylinder about its joint
 LEAST_LOAD = 1e-3  # kg, kg/m; a load of nothing is another model
 
 
@@ -25,12 +27,15 @@ class UnknownKind:
         Deviation that is expected of the present value, and the one from which an estimate is of use.
     relative : bool
         Whether these two are shares of the value, which stays positive; else they have its unit.
+    least : float
+        Smallest standard deviation of an estimate: the error of the model's statics looks like a zero.
     """
 
     unit: str
     prior: float
     useful: float
     relative: bool = False
+    least: float = 0.0
 
 
 KINDS = {
@@ -45,8 +50,8 @@ KINDS = {
 """Kinds of parameters, by the last word of a parameter's name."""
 
 ZEROS = {
-    Stream.ANGLES: UnknownKind("rad", math.radians(2.0), math.radians(0.05)),
-    Stream.STROKES: UnknownKind("m", 0.01, 5e-4),
+    Stream.ANGLES: UnknownKind("rad", math.radians(2.0), math.radians(0.05), least=ANGLE_ZERO),
+    Stream.STROKES: UnknownKind("m", 0.01, 5e-4, least=LEVER * ANGLE_ZERO),
     Stream.IMU: UnknownKind("m/s^2", 0.3, 0.03),
 }
 """Kinds of the sensors' zeros, by stream, in the order in which they are estimated."""

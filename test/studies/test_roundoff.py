@@ -63,4 +63,4 @@ def test_the_page():
     lost = [report.Loss("extremes", "2", 2.0, one_step(scene, posture_angles(scene, "test"), 1e-3, 0.8))]
     steps = np.array([1e-3, 1e-4])
     text = report.text(lost, TurnUp(steps, 1e-9 * steps, steps, 10.0, 2.0))
-    assert "| 2 | 36 |" in text and "turns up below 1e-08" in text and "surrogates" in text
+    assert "| 2 | 36 |" in text and "rises again below 1e-08" in text and "surrogates" in text
