@@ -81,7 +81,7 @@ def test_a_stroke_that_reads_zero_for_a_while_is_a_jump_until_it_is_back(lasts):
 def test_spikes_of_a_stroke_do_not_move_the_tip(channel):
     outcome = faulty(Stream.STROKES, "spikes", channel)
     moved = np.linalg.norm(outcome.tips() - healthy().tips(), axis=1)
-    assert 0.0 < moved.max() < 3e-3  # the angle sensor replaces the transducer: its noise is 2 mm at the tip
+    assert 0.0 < moved.max() < 5e-3  # the angle sensor replaces the transducer: its noise is 2 mm at the tip
     assert outcome.twin.counts["implausible"] > 10
 
 
