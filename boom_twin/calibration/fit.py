@@ -9,14 +9,14 @@ ch. 6).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from ..types import Array
-from .problem import CalibrationProblem, Noise, Tell, likelihood_cost
+from .problem import CalibrationProblem, Noise, likelihood_cost
 from .unknowns import Unknown
 
 MOST = 12  # passes
@@ -46,7 +46,6 @@ class Fit:
         Root mean square of each channel's normalised innovations, with the noise that the settings state. It is 1 where noise
         alone is left, and without readings.
     passes : int
-    noise : Noise
     """
 
     deviations: Array
@@ -56,7 +55,6 @@ class Fit:
     by_model: Array
     misfits: Array
     passes: int
-    noise: Noise
 
     @property
     def precision(self) -> Array:
@@ -91,7 +89,7 @@ def bounded_minimum(precision: Array, pull: Array, least: Array) -> Array:
     return np.asarray(lsq_linear(root.T, np.linalg.solve(root, pull), (least, np.inf), "bvls").x)
 
 
-def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Tell) -> Fit:
+def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Callable[[], None]) -> Fit:
     """Return the fit; `assumed` are parameters taken to be known, `tell` is called before every pass over the sessions."""
     at, stated, furthest, learning = problem.start(), problem.sensor_noise(), np.inf, True
     for passes in range(1, MOST + 1):
@@ -114,7 +112,7 @@ def fitted(problem: CalibrationProblem, assumed: Sequence[Unknown], tell: Tell) 
     sums = np.array([np.bincount(problem.blocks, row) for row in score])
     by_model = _together(slopes, problem.slopes_by_model(at, assumed, noise, base), base)
     misfits = np.sqrt(_mean_squares(problem, base) * noise.channels / stated)
-    return Fit(at, information, sums @ sums.T, pull, by_model, misfits, passes, noise)
+    return Fit(at, information, sums @ sums.T, pull, by_model, misfits, passes)
 
 
 def _shortened(problem: CalibrationProblem, at: Array, step: Array, noise: Noise, base: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -33,6 +33,39 @@ class Noise:
 
     loads: Array
     channels: Array
+
+
+class RestingBoom:
+    """Boom of one trial of the unknowns, and its filter in a rest period.
+
+    Parameters
+    ----------
+    scene : Scene
+    zeros : ndarray, shape (c,)
+        What the channels read too much, SI.
+    rigging : Rigging
+    gravity : ndarray, shape (2,)
+        m/s^2.
+    """
+
+    def __init__(self, scene: Scene, zeros: Array, rigging: Rigging, gravity: Array) -> None:
+        self._boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads)
+        self._zeros, self._gravity, self._inclination = zeros, gravity, scene.base.inclination
+
+    def rest(self, period: RestPeriod) -> None:
+        """Put the boom to rest where it stands in a period."""
+        self._boom.start(period.strokes - self._zeros[: self._boom.plan.joints])
+        self._readings = period.times, period.channels, period.values - self._zeros[period.channels]
+
+    def filtered(self, loads: Array, sensors: Array, zero2: Array) -> tuple[Array, Array]:
+        """Return innovations of that period with their variances, (r, 2), and the zeros at its end; see `filter_rest`.
+
+        `loads` (2,) and `sensors` (c,) are variances of the fast load and of the sensors' noise.
+        """
+        found, zeros = np.empty((len(self._readings[0]), 2)), np.empty(len(zero2))
+        own = self._boom.posture, self._boom.filters
+        filter_rest(*own, loads, zero2, self._gravity, self._inclination, *self._readings, sensors, found, zeros)
+        return found, zeros
 
 
 class CalibrationProblem:
@@ -76,7 +109,10 @@ class CalibrationProblem:
     def start(self) -> Array:
         """Return the deviations to start from: zeros of angle sensors and IMU that rest periods show one by one, shape (p,)."""
         usual = Noise(np.full((len(self._periods), 2), (USUAL * self._weight) ** 2), self.sensor_noise())
-        seen = [self._filtered({}, usual, [k], self._zero2 + self._prior2)[1] for k in range(len(self._periods))]
+        boom, seen = self.boom_at({}), []
+        for period, loads in zip(self._periods, usual.loads, strict=True):
+            boom.rest(period)
+            seen.append(boom.filtered(loads, usual.channels, self._zero2 + self._prior2)[1])
         zeros = dict(zip(self._zeroed, np.mean(seen, axis=0).tolist(), strict=True))
         return np.array([zeros.get(unknown.channel or "", 0.0) / unknown.kind.prior for unknown in self.unknowns])
 
@@ -86,34 +122,33 @@ class CalibrationProblem:
 
     def innovations(self, trials: Iterable[dict[str, float]], noise: Noise) -> list[Array]:
         """Return innovations and their variances, (r, 2), of several trials of parameters and zeros (SI, by name)."""
-        with ThreadPoolExecutor(usable_cores()) as pool:
-            every = range(len(self._periods))
-            return list(pool.map(lambda trial: self._filtered(trial, noise, every, self._zero2)[0], trials))
 
-    def _filtered(self, trial: dict[str, float], noise: Noise, which: Sequence[int], zero2: Array) -> tuple[Array, Array]:
-        """Return innovations with their variances, (r, 2), and the zeros of `filter_rest` at the end of the last period."""
+        def of(trial: dict[str, float]) -> Array:
+            boom, found = self.boom_at(trial), []
+            for period, loads in zip(self._periods, noise.loads, strict=True):
+                boom.rest(period)
+                found.append(boom.filtered(loads, noise.channels, self._zero2)[0])
+            return np.concatenate(found)
+
+        with ThreadPoolExecutor(usable_cores()) as pool:
+            return list(pool.map(of, trials))
+
+    def boom_at(self, trial: dict[str, float]) -> RestingBoom:
+        """Return the boom with the parameters of a trial, whose sensors read too much by its zeros."""
         scene = with_parameters(self.scene, {name: value for name, value in trial.items() if not name.endswith(".zero")})
-        read_too_much = np.array([trial.get(f"{name}.zero", 0.0) for name in self.names])
-        boom = BoomPredictor(scene, self._rigging.settings, self._rigging.mounts, self._rigging.reads)
-        inclination, found, zeros = scene.base.inclination, [], np.empty(len(zero2))
-        for k in which:
-            period = self._periods[k]
-            boom.start(period.strokes - read_too_much[: len(scene.joints)])
-            found.append(np.empty((len(period.times), 2)))
-            filter_rest(
-                boom.posture, boom.filters, noise.loads[k], zero2, self._gravity, inclination, period.times,
-                period.channels, period.values - read_too_much[period.channels], noise.channels, found[-1], zeros,
-            )  # fmt: skip
-        return np.concatenate(found), zeros
+        zeros = np.array([trial.get(f"{name}.zero", 0.0) for name in self.names])
+        return RestingBoom(scene, zeros, self._rigging, self._gravity)
 
     def noise(self, deviations: Array, sensors: Array) -> Noise:
         """Return the noise with the load of each rest period at its greatest likelihood; `sensors` (c,) is kept."""
         trial, bounds = self.values(deviations), np.log(np.array(LOADS) * self._weight)
 
-        def most_likely(k: int) -> Array:
+        def most_likely(period: RestPeriod) -> Array:
+            boom = self.boom_at(trial)
+            boom.rest(period)
+
             def cost(sizes: Array) -> float:
-                loads = np.tile(np.exp(2.0 * sizes), (len(self._periods), 1))
-                return likelihood_cost(self._filtered(trial, Noise(loads, sensors), [k], self._zero2)[0])
+                return likelihood_cost(boom.filtered(np.exp(2.0 * sizes), sensors, self._zero2)[0])
 
             exact = {"xatol": EXACT}
             both = minimize_scalar(lambda size: cost(np.full(2, size)), bounds=bounds, method="bounded", options=exact).x
@@ -122,7 +157,7 @@ class CalibrationProblem:
             return np.asarray(np.exp(2.0 * found))
 
         with ThreadPoolExecutor(usable_cores()) as pool:
-            return Noise(np.array(list(pool.map(most_likely, range(len(self._periods))))), sensors)
+            return Noise(np.array(list(pool.map(most_likely, self._periods))), sensors)
 
     def slopes(self, deviations: Array, noise: Noise, base: Array) -> Array:
         """Return derivatives of innovations and variances by the unknowns, (p, r, 2); `base` is at `deviations`."""
@@ -140,6 +175,3 @@ class CalibrationProblem:
 def likelihood_cost(found: Array) -> float:
     """Return the negative log likelihood of innovations and variances (r, 2), up to a constant."""
     return float(0.5 * np.sum(found[:, 0] ** 2 / found[:, 1] + np.log(found[:, 1])))
-
-
-Tell = Callable[[], None]

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ..deviation.kalman import FAST, FORCE_ZERO, correct, make_transition, transit
-from ..deviation.models import IMU_SCALE, IMU_TURN
+from ..deviation.kalman import FAST, correct, free_sensors, make_transition, transit
 from ..deviation.rows import (
     about_rest,
     acceleration_row,
@@ -151,9 +150,6 @@ def start_rest(p, f, x, covariance, loads, zero2):
     """Set the state to rest at the posture; the covariance allows for vibration, and for drives beside it."""
     n, m, size, zero = p.drives.shape[0], p.modes[0], all_states(p), zero_place(p)
     load, drive = force_place(p), drive_place(p)
-    largest = 0.0
-    for i in range(n):
-        largest = max(largest, abs(p.pulled[i]))
     for i in range(size):
         x[i] = 0.0
         for k in range(size):
@@ -171,8 +167,6 @@ def start_rest(p, f, x, covariance, loads, zero2):
         x[drive + i], covariance[drive + i, drive + i] = p.drives[i], DRIVE * DRIVE
         covariance[zero + 4 + i, zero + 4 + i] = zero2[2 + i]
         f.jerk[i], f.pulls[i] = 0.0, p.pulled[i]
-        force = FORCE_ZERO * (abs(p.pulled[i]) + 0.1 * largest)
-        covariance[zero + 4 + n + i, zero + 4 + n + i] = force * force
-    covariance[zero + 2, zero + 2], covariance[zero + 3, zero + 3] = IMU_TURN * IMU_TURN, IMU_SCALE * IMU_SCALE
+    free_sensors(p, f, covariance)
     for k in range(f.drift.shape[0]):
         f.drift[k] = 0.0

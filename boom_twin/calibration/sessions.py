@@ -76,7 +76,7 @@ def read_sessions(paths: Sequence[Path], topics: Topics, joints: int, window: Ti
     Raises
     ------
     BagError
-        One cannot be read, is of another boom, or lacks strokes or angles of this one.
+        One cannot be read, is of another boom, or lacks strokes of this one.
     """
     sessions = [scan(path) for path in paths]
     for session in sessions:

@@ -12,6 +12,7 @@ FAST, SLOW = 0.1, 60.0  # s, time constants of the two parts of the load
 DRIVE_TIME = 0.12  # s, correlation time of a drive's acceleration
 LEAK = 1e-14  # m^2/s, random walk of a drive
 IMU_ZERO, IMU_DRIFT = 0.3, 3e-3  # m/s^2; m/s^2 in a root second
+IMU_TURN, IMU_SCALE = 0.1, 0.1  # rad, by which it may be mounted askew; share by which it may read too much
 ANGLE_ZERO, ANGLE_DRIFT = 2e-4, 1e-5  # rad; rad in a root second: sensors' zeros, and the error of the model's statics
 FORCE_ZERO, FORCE_DRIFT = 1.0, 0.03  # share of the force; in a root second
 
@@ -120,6 +121,18 @@ def multiply(f, right, found, size):
             weight, line = f.weights[i, c], right[f.places[i, c]]
             for j in range(size):
                 found[i, j] += weight * line[j]
+
+
+@inner
+def free_sensors(p, f, covariance):
+    """Write the variances of unknown states of sensors: mount and scale of the IMU, zeros of the force sensors."""
+    n, zero, largest = p.drives.shape[0], zero_place(p), 0.0
+    covariance[zero + 2, zero + 2], covariance[zero + 3, zero + 3] = IMU_TURN * IMU_TURN, IMU_SCALE * IMU_SCALE
+    for i in range(n):
+        largest = max(largest, abs(f.pulls[i]))
+    for i in range(n):
+        at = zero + 4 + n + i
+        covariance[at, at] = (FORCE_ZERO * (abs(f.pulls[i]) + 0.1 * largest)) ** 2
 
 
 @inner

@@ -27,7 +27,7 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .kalman import ANGLE_ZERO, FAST, FORCE_ZERO, IMU_ZERO, correct, make_transition, transit
+from .kalman import ANGLE_ZERO, FAST, IMU_ZERO, correct, free_sensors, make_transition, transit
 from .learning import learn_jerk, learn_length_noise, learn_load, watch_valves
 from .mixture import copy_model, interact, mix, weigh_models
 from .rows import clear, column_row, length_of, length_row, read, variance_of
@@ -49,7 +49,6 @@ from .states import (
 JERK = 3e-3  # m^2/s^5, density of the jerk of a drive that begins to move
 CLOSED_RATE, CLOSED_ACCELERATION = 1e-5, 1e-3  # m/s, m/s^2, noise of the reading that a closed valve's drive stands still
 LONGEST_STEP = 0.02  # s of one transition
-IMU_TURN, IMU_SCALE = 0.1, 0.1  # rad, by which it may be mounted askew; share by which it may read too much
 CONTRADICTION = 8.0  # standard deviations of the predicted tip, by which the estimate may be off it
 MOST_EXCESS = 1e6  # times the variance that a channel is stated to have
 
@@ -200,9 +199,6 @@ def leave_contradiction(p, f, size):
 def follow_prediction(p, f):
     """Set the estimate to the prediction; the sensors' zeros are unknown then."""
     size, every, n = zero_place(p), all_states(p), p.drives.shape[0]
-    largest = 0.0
-    for i in range(n):
-        largest = max(largest, abs(f.pulls[i]))
     for k in range(2):
         for i in range(every):
             f.x[ALL_VALVES + k, i] = f.mean[PREDICTION, i] if i < size else 0.0
@@ -211,10 +207,8 @@ def follow_prediction(p, f):
         covariance = f.p[ALL_VALVES + k]
         for a in range(2):
             covariance[size + a, size + a] = IMU_ZERO * IMU_ZERO
-        covariance[size + 2, size + 2] = IMU_TURN * IMU_TURN
-        covariance[size + 3, size + 3] = IMU_SCALE * IMU_SCALE
         for i in range(n):
             covariance[size + 4 + i, size + 4 + i] = ANGLE_ZERO * ANGLE_ZERO
-            covariance[size + 4 + n + i, size + 4 + n + i] = (FORCE_ZERO * (abs(f.pulls[i]) + 0.1 * largest)) ** 2
+        free_sensors(p, f, covariance)
     f.chances[ALL_VALVES], f.chances[ALL_OPEN] = f.chances[VALVES] + f.chances[BURST], f.chances[OPEN]
     mix(f, ESTIMATE, every)

@@ -31,7 +31,7 @@ from .estimate_row import MODES
 from .models import start_models
 from .posture import Posture, linearise, new_posture
 from .sensor_model import mounting_of
-from .states import ESTIMATE, FED, FED_STAMP, LOADS, PREDICTION, Filters, SensorNoise, new_filters
+from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, drive_place, new_filters
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
 WIDTH = 1e-6  # relative accuracy of natural frequencies
@@ -207,7 +207,7 @@ class BoomPredictor:
         Speeds and braking are taken `sure` deviations to the safe side.
         """
         n, f = self.plan.joints, self.filters
-        first = 2 * int(self.posture.modes[0]) + LOADS + n
+        first = drive_place(self.posture) + n
         mean, deviations = f.mean[PREDICTION], np.sqrt(np.maximum(f.spread[PREDICTION].diagonal(), 0.0))
         rates, accelerations = slice(first, first + n), slice(first + n, first + 2 * n)
         speeds = np.maximum(np.abs(mean[rates]) - sure * deviations[rates], 0.0)
@@ -221,7 +221,7 @@ class BoomPredictor:
 
         The prediction takes the angle sensor of the joint in the place of a stroke that is left out.
         """
-        f, first, n = self.filters, 2 * int(self.posture.modes[0]) + LOADS, self.plan.joints
+        f, first, n = self.filters, drive_place(self.posture), self.plan.joints
         for i in np.flatnonzero(strokes & ~f.deaf):
             f.is_open[i] = 1
             for covariance in f.p:
@@ -275,11 +275,12 @@ class BoomPredictor:
     def tip_sigmas(self) -> Array:
         """Standard deviations of the predicted tip along x and y, m, shape (2,)."""
         n, m = self.plan.joints, int(self.posture.modes[0])
-        rows = np.zeros((2, 2 * m + LOADS + 3 * n))
+        drive = drive_place(self.posture)
+        rows = np.zeros((2, drive + 3 * n))
         columns = self.posture.readings[: 2 + n + m, n : n + 2].T
         rows[:, :m], rows[:, 2 * m : 2 * m + 2] = columns[:, 2 + n :], columns[:, :2]
         rows[:, 2 * m + 2 : 2 * m + 4] = columns[:, :2]
-        rows[:, 2 * m + LOADS : 2 * m + LOADS + n] = columns[:, 2 : 2 + n]
+        rows[:, drive : drive + n] = columns[:, 2 : 2 + n]
         spread = self.filters.spread[PREDICTION, : rows.shape[1], : rows.shape[1]]
         return np.asarray(np.sqrt(np.einsum("ai,ij,aj->a", rows, spread, rows)))
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from boom_twin.calibration.fit import Fit, bounded_minimum
-from boom_twin.calibration.problem import Noise
 
 
 def fit_of(slopes: np.ndarray, measured: np.ndarray, by_model: np.ndarray | None = None) -> Fit:
@@ -14,8 +13,7 @@ def fit_of(slopes: np.ndarray, measured: np.ndarray, by_model: np.ndarray | None
     information, unknowns = slopes.T @ slopes, slopes.shape[1]
     best = np.linalg.solve(information + np.eye(unknowns), slopes.T @ measured)
     none = np.zeros((unknowns, 0)) if by_model is None else by_model
-    noise = Noise(np.ones((1, 2)), np.ones(1))
-    return Fit(best, information, information, np.zeros(unknowns), none, np.ones(0), 1, noise)
+    return Fit(best, information, information, np.zeros(unknowns), none, np.ones(0), 1)
 
 
 @pytest.mark.parametrize("left_out", [[1], [0, 3], []])
