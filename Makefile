@@ -14,12 +14,13 @@ unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE _ROS_WHEELS_BOOTSTRAP_COM
 WORKERS ?= 3
 PARALLEL = -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
-.PHONY: help setup warm demo demo-live test lint test-extra ament client study gate soak fuzz session figures docs clean
+.PHONY: help setup warm demo demo-live test lint test-system test-extra ament client study gate soak fuzz session figures docs clean
 
 help:
 	@echo "make demo        play two recorded sessions, a quiet one and one with pump and wind, through the live node, show what it predicted"
 	@echo "make demo-live   the same in a browser: node, recorder and monitor, until Ctrl-C"
-	@echo "make test        linters and tests"
+	@echo "make test        linters and tests in five minutes: model, twin, bags, commands, one node, one page, one replay"
+	@echo "make test-system tests with processes, ROS nodes, kills, launch files and browsers"
 	@echo "make test-extra  slow tests, colcon, linters of ament, and checks that need more than PyPI"
 	@echo "make study       error against run time, stability, what every part costs, play in pins: docs/study (20 minutes)"
 	@echo "make gate        hashes of sessions, commands and studies, speed as ratios; BEFORE=gate.json of an earlier run compares (5 minutes)"
@@ -50,13 +51,16 @@ demo-live: warm
 	PYTHONPATH=test $(BIN)/python -P -m demo.demo_live --out out/demo_live $(if $(DOMAIN),--domain $(DOMAIN))
 
 test: lint warm
-	$(BIN)/python -m pytest $(PARALLEL) -m "not slow"
+	$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not system"
 
 lint: $(READY)
 	$(BIN)/ruff check boom_twin test setup.py docs/site_hooks.py
 	$(BIN)/ruff format --check --quiet boom_twin test setup.py docs/site_hooks.py
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+test-system: warm
+	$(BIN)/python -m pytest $(PARALLEL) -m "system and not slow"
 
 test-extra: warm $(COLCON_READY) ament client
 	$(BIN)/python -m pytest $(PARALLEL) -m slow

@@ -27,8 +27,31 @@ FIRST = (
 """Files that take longest: begun first, or one process is left with one of them when the others are done."""
 
 
+SYSTEM = (
+    "batch/", "bag/test_bombs", "cli/test_isolation", "cli/test_printable", "cli/test_start_up", "docs/test_examples",
+    "extending/", "kernels/test_kernel_cache", "kernels/test_uncompiled", "monitor/test_monitor_browser",
+    "monitor/test_monitor_connections", "monitor/test_monitor_recording", "offline/test_kills", "offline/test_suspended",
+    "ros/", "test_made_once", "twin/test_growth",
+)  # fmt: skip
+"""Folders and files whose tests start processes; single ones elsewhere have the mark themselves."""
+
+USUAL = (
+    "monitor/test_monitor_browser.py::test_the_first_glance", "ros/test_ros_hostile", "ros/test_ros_layouts",
+    "ros/test_ros_receive_queue",
+)  # fmt: skip
+"""Run by `make test` all the same: one page in a browser, one round trip over DDS, and what starts no process."""
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest selects by marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mix the files where several processes share the tests, so that not all of them wait for a ROS node at a time."""
+    """Mark tests of the whole system, and mix the files where several processes share the tests.
+
+    Mixed, not all processes wait for a ROS node at a time.
+    """
+    for item in items:
+        name = item.nodeid.removeprefix("test/")
+        if name.startswith(SYSTEM) and not name.startswith(USUAL):
+            item.add_marker("system")
     if "PYTEST_XDIST_WORKER" in os.environ:
         first = {f"test/{name}.py" for name in FIRST}
         items.sort(key=lambda item: (item.location[0] not in first, crc32(item.location[0].encode())))

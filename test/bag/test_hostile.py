@@ -68,6 +68,7 @@ def test_yaml_gives_plain_values_only(tmp_path: Path, monkeypatch: pytest.Monkey
 
 @pytest.mark.parametrize("file", [METADATA, SHEET])
 @pytest.mark.parametrize("bomb", BOMBS)
+@pytest.mark.system
 def test_a_command_survives_bombs_beside_a_bag(bag: Path, bomb: str, file: str, tmp_path: Path) -> None:
     (bag / file).write_text(BOMBS[bomb])
     code = (  # the peak of this process: ru_maxrss would take over that of the one that started it

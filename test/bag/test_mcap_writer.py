@@ -166,6 +166,7 @@ except BagError as error:
 """
 
 
+@pytest.mark.system
 def test_a_disk_that_fills_up_under_a_block(tmp_path: Path) -> None:
     """The limit on the size of a file stands for the disk's."""
     program = FULL.format(tests=str(Path(__file__).parents[1]), bag=str(tmp_path / "bag"))

@@ -101,6 +101,7 @@ COMMANDS = (
 
 
 @pytest.mark.parametrize(("name", "arguments"), COMMANDS)
+@pytest.mark.system
 def test_a_command_refuses_a_device(bag: Path, name: str, arguments: list[str], tmp_path: Path) -> None:
     (bag / name).unlink(missing_ok=True)
     (bag / name).symlink_to("/dev/zero")

@@ -163,6 +163,7 @@ except BagError as error:
 """
 
 
+@pytest.mark.system
 def test_a_disk_that_fills_up(tmp_path: Path) -> None:
     """The limit on the size of a file stands for the disk's."""
     bag = tmp_path / "bag"
@@ -271,6 +272,7 @@ def kill_once(tmp_path: Path, delay: float, size: int | None) -> None:
 
 
 @pytest.mark.parametrize(("delay", "size"), [(1.3, None), (2.1, 30_000)])
+@pytest.mark.system
 def test_a_kill_costs_little(tmp_path: Path, delay: float, size: int | None) -> None:
     kill_once(tmp_path, delay, size)
 

@@ -149,6 +149,7 @@ def _process(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
 
 
+@pytest.mark.system
 def test_starting_up_imports_neither_ros_nor_a_compiler_nor_pictures() -> None:
     done = _process(
         "import sys, boom_twin, boom_twin.cli.main as m; m._parser([]); "
@@ -171,12 +172,14 @@ def test_starting_up_imports_neither_ros_nor_a_compiler_nor_pictures() -> None:
         ("scene", "> /dev/full", 1, "boom_twin scene: standard output: No space left on device\n"),
     ],
 )
+@pytest.mark.system
 def test_as_a_process_whose_streams_are_closed_or_full(command: str, redirection: str, code: int, told: str) -> None:
     shell = f"{sys.executable} -m boom_twin.cli.main {command} {redirection}; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (code, told)
 
 
+@pytest.mark.system
 def test_as_a_process_a_bad_scene_leaves_no_traceback(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "boom_twin.cli.main", "check", _scene(tmp_path, "length: 3.30", "length: 3,30")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

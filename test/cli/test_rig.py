@@ -151,6 +151,7 @@ def test_a_bad_fault_is_told_before_anything_is_simulated(
     assert not (tmp_path / "none").exists()
 
 
+@pytest.mark.system
 def test_a_full_disk_leaves_nothing(scene: Path, tmp_path: Path) -> None:
     """The limit on the size of a file stands for the disk's."""
     command = [sys.executable, "-m", "boom_twin.cli.main", "rig", str(scene), "--random", "up", "--duration", "3"]

@@ -117,6 +117,7 @@ def test_as_a_module_and_quiet(tmp_path: Path) -> None:
     assert failed.returncode == 1 and failed.stderr.startswith("boom_twin info: ")
 
 
+@pytest.mark.system
 def test_the_shell_is_told_what_may_follow(tmp_path: Path) -> None:
     pytest.importorskip("argcomplete", reason="pip install .[test]")
     answer, line = tmp_path / "answer", "boom_twin replay bag --no-"

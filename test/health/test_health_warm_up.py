@@ -44,6 +44,7 @@ print(ready, [len(kernel.dispatcher.signatures) for kernel in kernels], told)
 
 
 @pytest.mark.parametrize("session", [PUMP_DRIVES, PUMP], ids=["drives", "lengths"])
+@pytest.mark.system
 def test_nothing_is_compiled_while_a_session_runs(session):
     found = subprocess.run([sys.executable, "-c", CODE, str(session)], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == f"{ONCE} {ONCE} 3"

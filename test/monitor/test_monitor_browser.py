@@ -26,10 +26,7 @@ from boom_twin.monitor.data.feed import Feed
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install .[test]")
 CHROMIUM = Path("/usr/bin/chromium")
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not CHROMIUM.is_file(), reason="chromium is not there (Debian: apt-get install chromium)"),
-]
+pytestmark = pytest.mark.skipif(not CHROMIUM.is_file(), reason="chromium is not there (Debian: apt-get install chromium)")
 PATIENCE = 60_000  # ms
 FAULT = 25.0  # s, where encoder 3 is known to be wrong
 RESPONSE = "twin.response.chart.plot.data.map(row => Array.from(row))"
@@ -550,6 +547,7 @@ def test_everything_comes_from_this_server(page: Any, monitor: Monitor) -> None:
     assert len(page.asked) > 10 and all(url.startswith((monitor.url, "data:", "ws://127.0.0.1")) for url in page.asked)
 
 
+@pytest.mark.slow
 def test_two_minutes_of_six_traces_at_200_hz() -> None:
     bench = Path(__file__).parents[1] / "bench" / "monitor.py"
     done = subprocess.run([sys.executable, str(bench)], capture_output=True, text=True, timeout=400)

@@ -9,7 +9,6 @@ import pytest
 from bench.kills import kills
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("command", "count", "needs"), [("replay", 4, "numpy"), ("rig", 4, "exudyn"), ("record", 12, "rclpy")])
 def test_kills(command: str, count: int, needs: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     pytest.importorskip(needs)
@@ -20,7 +19,6 @@ def test_kills(command: str, count: int, needs: str, tmp_path: Path, request: py
     assert kills(command, count, tmp_path, seed).total() == count
 
 
-@pytest.mark.slow
 def test_kills_of_calibrate(tmp_path: Path) -> None:
     pytest.importorskip("exudyn")
     assert kills("calibrate", 5, tmp_path, time.time_ns() % 10**6).total() == 5

@@ -78,6 +78,7 @@ def wait_for_group(leader: int) -> None:
     pytest.fail("children of a killed replay go on")
 
 
+@pytest.mark.system
 def test_a_killed_replay_says_so(killed: Path, session: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Its writer did not take the end of the pipe for the end of the session."""
     assert not (killed / "bag" / "metadata.yaml").exists() and not (killed / "summary.json").exists()
@@ -107,6 +108,7 @@ def test_a_bag_that_is_whole_in_a_result_that_is_not_says_so(
     assert "incomplete" in capsys.readouterr().err
 
 
+@pytest.mark.system
 def test_the_next_replay_takes_the_place_of_the_killed_one(killed: Path, session: Path) -> None:
     out = killed.with_name("out")
     replay(session, load_scene(), out, health=False)
@@ -154,6 +156,7 @@ def test_compare_replays_over_none_of_what_it_compares(
 
 
 @pytest.mark.parametrize("which", ["reader_process", "writer_process"])
+@pytest.mark.system
 def test_a_process_of_a_replay_that_dies_is_an_error(
     session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, which: str
 ) -> None:
@@ -258,6 +261,7 @@ def test_a_recording_that_tells_no_end_is_incomplete_wherever_it_is_used(
     assert scan(bag).incomplete == ""
 
 
+@pytest.mark.system
 def test_a_full_disk_leaves_one_line_and_an_earlier_result(session: Path, tmp_path: Path) -> None:
     """The limit on the size of a file stands for the disk's."""
     out = tmp_path / "out"

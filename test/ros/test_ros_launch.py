@@ -58,10 +58,7 @@ def has_launch() -> bool:
     return subprocess.run(command, env=own_environment(), capture_output=True, check=False).returncode == 0
 
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not has_launch(), reason=f"{PYTHON} has no launch_ros; name another one by LAUNCH_PYTHON"),
-]
+pytestmark = pytest.mark.skipif(not has_launch(), reason=f"{PYTHON} has no launch_ros; name another one by LAUNCH_PYTHON")
 
 
 class Launched:

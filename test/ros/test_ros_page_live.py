@@ -39,10 +39,7 @@ from boom_twin.scene import load_scene
 from boom_twin.types import Alarm
 
 CHROMIUM = Path("/usr/bin/chromium")
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not CHROMIUM.is_file(), reason="chromium is not there (Debian: apt-get install chromium)"),
-]
+pytestmark = pytest.mark.skipif(not CHROMIUM.is_file(), reason="chromium is not there (Debian: apt-get install chromium)")
 LIVE = Path(__file__).parents[1] / "bench" / "live.py"
 TOPICS = load_topics()
 HEARD = [

@@ -63,6 +63,7 @@ def content_of(folder: Path) -> str | None:
     return word
 
 
+@pytest.mark.system
 def test_a_kill_at_any_step_leaves_a_whole_result_or_one_that_says_it_is_not(tmp_path: Path) -> None:
     """Every step of replacing an earlier result, one after the other; the next run puts all in order."""
     for steps in range(200):
@@ -91,6 +92,7 @@ def build(out: Path, kind: ResultKind = REPLAY, sources: tuple[Path, ...] = (), 
         write_atomic(building.folder / name, "{}")
 
 
+@pytest.mark.system
 def test_the_second_of_two_is_refused_at_once_and_a_killed_one_is_not_waited_for(tmp_path: Path) -> None:
     with result_folder(tmp_path / "out", REPLAY, []):
         before = sorted(tmp_path.rglob("*"))
@@ -100,6 +102,7 @@ def test_the_second_of_two_is_refused_at_once_and_a_killed_one_is_not_waited_for
     build(tmp_path / "out")
 
 
+@pytest.mark.system
 def test_the_lock_lasts_as_long_as_a_child_that_inherits_it(tmp_path: Path) -> None:
     """A writer that outlives its killed command must have ended before its folder is used again."""
     with pytest.raises(KeyboardInterrupt), result_folder(tmp_path / "out", REPLAY, []) as building:
