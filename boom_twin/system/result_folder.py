@@ -18,22 +18,19 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from hashlib import file_digest
 from pathlib import Path
 
 from ..errors import BagError
 from .atomic_files import DRAFT, sync_folder, write_atomic
-from .received_files import real_path
+from .received_files import real_path, sha256_of
 
 MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
 BUILDING, REPLACED = ".unfinished", ".replaced"
 """Suffixes of the folders beside the result."""
-OF_THE_SYSTEM = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
-"""Files that a file manager leaves in a folder."""
+OF_THE_SYSTEM = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})  # a file manager leaves them in a folder
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Errors of a full disk, a full quota, or a file at its size limit. Errors of writing name no file."""
-_LARGEST = 2**20  # bytes of a manifest that is read
-_WRITABLE = 0o222  # mode of a folder that somebody may write to
+_LARGEST_MANIFEST = 2**20  # bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +48,6 @@ class ResultKind:
         last = name.rpartition("/")[2]
         is_draft = last.startswith(".") and last.endswith(DRAFT) and _folders(name)[0] in _folders(*self.files)
         return is_draft or any(name.count("/") == each.count("/") and fnmatchcase(name, each) for each in self.files)
-
-    def has_folder(self, name: str) -> bool:
-        """Return True if a path, with a slash at its end, is a folder of some of its files."""
-        return name in _folders(*self.files)
 
 
 def _folders(*names: str) -> list[str]:
@@ -120,17 +113,24 @@ def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Itera
         raise BagError(f"{out}: is the current folder, which would be renamed. Name another, or go up by one.")
     building, replaced = (place.with_name(place.name + end) for end in (BUILDING, REPLACED))
     for folder in (place, building, replaced):
-        _check_apart(out, folder, sources)
-        _check_links(folder, sources)
+        _check_sources(out, folder, sources)
     with _locked(building, kind) as lock:
         try:
-            _settle(place, replaced, kind)
-            _clear(building, kind)
+            note = {"command": kind.command, "state": "unfinished; if no such command runs, a run that was stopped left this"}
+            os.truncate(lock, 0)
+            os.pwrite(lock, json.dumps(note).encode() + b"\n", 0)
+            os.fsync(lock)
+            _check_earlier(replaced, kind)
+            if replaced.exists() and not place.exists():  # a kill came between the two renames of a replacement
+                replaced.rename(place)
+            _check_earlier(place, kind)
+            _discard(replaced)
+            _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
             yield UnfinishedResult(building, lock)
             _complete(building, kind)
         except BaseException as error:
-            with suppress(OSError, BagError):
-                _clear(building, kind)
+            with suppress(OSError):
+                _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
                 (building / UNFINISHED).unlink()
                 _remove_empty(building)
             if isinstance(error, OSError) and error.errno in FULL and not error.filename:
@@ -159,11 +159,15 @@ def check_lasting(out: Path) -> None:
         raise BagError(f"{out}: {told}. Choose another folder.")
 
 
-# -- what may not be touched ------------------------------------------------------------------------------------------
+def _check_sources(out: Path, folder: Path, sources: Sequence[Path]) -> None:
+    """Refuse a folder that is a source, holds one, lies in one, or has a file that a source links to.
 
-
-def _check_apart(out: Path, folder: Path, sources: Sequence[Path]) -> None:
-    """Refuse a folder that is a source, holds one, or lies in one. Paths are compared by identity, not by spelling."""
+    Paths are compared by identity, not by spelling. A file that a source links to would be removed with an earlier result.
+    """
+    own: dict[tuple[int, int], str] = {}
+    for name in _entries(folder):
+        with suppress(FileNotFoundError):  # a draft of another run, at work there
+            own[_identity(folder / name)] = name
     for source in sources:
         real = real_path(source)
         session = real if real.is_dir() else real.parent
@@ -172,15 +176,6 @@ def _check_apart(out: Path, folder: Path, sources: Sequence[Path]) -> None:
             raise BagError(f"{out}: lies in the source, which is never touched. Choose a folder outside {session}.")
         if folder.exists() and any(folder.samefile(each) for each in (real, *real.parents) if each.exists()):
             raise BagError(f"{out}: {source} lies in {folder}, and a source is never touched. Choose another folder.")
-
-
-def _check_links(folder: Path, sources: Sequence[Path]) -> None:
-    """Refuse a folder with a file that a source links to, because it would be removed with an earlier result."""
-    own: dict[tuple[int, int], str] = {}
-    for name in _entries(folder):
-        with suppress(FileNotFoundError):  # a draft of another run, at work there
-            own[_identity(folder / name)] = name
-    for source in sources:
         for file in [source, *(source.iterdir() if source.is_dir() else ())]:
             if file.exists() and (held := own.get(_identity(file))) is not None:
                 raise BagError(f"{folder}: its {held} is {file}, and a source is never touched. Choose another folder.")
@@ -202,17 +197,17 @@ def _check_earlier(folder: Path, kind: ResultKind) -> None:
         raise BagError(f"{folder}: holds {entries[0]} already, and nothing is written over. Choose a new folder.")
     remedy = f"Choose a new folder, or move it away: only an earlier {kind.command} is replaced, and as it was written"
     command, listed = _manifest(folder)
-    if command != kind.command:
+    if command != kind.command or listed is None:
         raise BagError(f"{folder}: holds {entries[0]}, and no manifest of a {kind.command} (0.1.0 wrote none). {remedy}.")
     own = {name for name in listed if kind.has(name)}  # a manifest may come with a recording, and say anything
     folders = set(_folders(*own))
     for name in entries:
         if name not in own and name not in folders and name not in (MANIFEST, UNFINISHED):
             raise BagError(f"{folder}: holds {name}, which {command} did not write. {remedy}.")
-        if name in own and _sha256(folder / name) != listed[name]:
+        if name in own and ((folder / name).is_symlink() or sha256_of(folder / name) != listed[name]):
             raise BagError(f"{folder}: {name} was changed since {command} wrote it. {remedy}.")
     for inner in (folder, *(folder / name for name in folders & set(entries))):
-        if not inner.stat().st_mode & _WRITABLE:
+        if not inner.stat().st_mode & 0o222:
             raise BagError(f"{inner}: is write-protected. Choose a new folder, or allow to write there.")
 
 
@@ -227,30 +222,24 @@ def _entries(folder: Path) -> list[str]:
     return sorted(found)
 
 
-def _manifest(folder: Path) -> tuple[str, dict[str, str]]:
-    """Return command and SHA-256 by file of a result that is complete or partly removed; empty without a manifest."""
-    for name in (MANIFEST, UNFINISHED):
-        try:
-            content = json.loads((folder / name).read_bytes()[:_LARGEST])
-            return str(content["command"]), {str(name): str(digest) for name, digest in content["files"].items()}
-        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-            continue
-    return "", {}
+def _manifest(folder: Path) -> tuple[str, dict[str, str] | None]:
+    """Return the note of a result that is complete or partly removed."""
+    return _note(folder / MANIFEST) if (folder / MANIFEST).exists() else _note(folder / UNFINISHED)
 
 
-def _sha256(path: Path) -> str:
-    if path.is_symlink() or not path.is_file():
-        return ""
-    with path.open("rb") as stream:
-        return file_digest(stream, "sha256").hexdigest()
-
-
-# -- building ---------------------------------------------------------------------------------------------------------
+def _note(path: Path) -> tuple[str, dict[str, str] | None]:
+    """Return command and SHA-256 by file that a manifest states; a marker lists no files, an unreadable note no command."""
+    try:
+        content = json.loads(path.read_bytes()[:_LARGEST_MANIFEST])
+        listed = {str(name): str(digest) for name, digest in content["files"].items()} if "files" in content else None
+        return str(content["command"]), listed
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return "", None
 
 
 @contextmanager
 def _locked(building: Path, kind: ResultKind) -> Iterator[int]:
-    """Make the folder to build in, lock it and mark it as unfinished."""
+    """Make the folder to build in, and lock its marker."""
     marker = building / UNFINISHED
     try:
         building.parent.mkdir(parents=True, exist_ok=True)
@@ -263,27 +252,11 @@ def _locked(building: Path, kind: ResultKind) -> Iterator[int]:
         raise BagError(f"{building}: cannot be made ({error.strerror}). Choose a folder that can be written.") from None
     try:
         if not _is_taken(lock, marker):
-            busy = f"another `boom_twin {kind.command}` is at work there. Wait for its end, or choose another folder."
-            raise BagError(f"{building}: {busy}")
+            raise BagError(f"{building}: another `boom_twin {kind.command}` is at work there. Wait for its end.")
         _check_left(building, kind)
-        _mark(lock, marker, kind)
         yield lock
     finally:
         os.close(lock)
-
-
-def _mark(lock: int, marker: Path, kind: ResultKind) -> None:
-    """Write the name of the command into the open marker. If that fails, remove marker and folder if the folder has no more."""
-    note = {"command": kind.command, "state": "unfinished; if no such command runs, a run that was stopped left this"}
-    try:
-        os.truncate(lock, 0)
-        os.pwrite(lock, json.dumps(note).encode() + b"\n", 0)
-        os.fsync(lock)
-    except OSError as error:
-        if _entries(marker.parent) == [UNFINISHED]:
-            marker.unlink()
-            _remove_empty(marker.parent)
-        raise BagError(f"{marker}: cannot be written ({error.strerror}). Make room or choose another disk.") from None
 
 
 def _is_taken(lock: int, marker: Path) -> bool:
@@ -301,27 +274,13 @@ def _check_left(building: Path, kind: ResultKind) -> None:
     """Refuse a folder that a killed run of the same command cannot have left."""
     entries = _entries(building)
     remedy = "Move it away, or choose another folder: results are built there"
-    if entries and entries != [UNFINISHED] and _command(building) != kind.command:
+    if entries and entries != [UNFINISHED] and _note(building / UNFINISHED)[0] != kind.command:
         raise BagError(f"{building}: holds {entries[0]}, and no unfinished {kind.command} left it. {remedy}.")
     for name in entries:
-        if not (kind.has(name) or kind.has_folder(name) or name in (MANIFEST, UNFINISHED)):
+        if not (kind.has(name) or name in (*_folders(*kind.files), MANIFEST, UNFINISHED)):
             raise BagError(f"{building}: holds {name}, which {kind.command} does not write. {remedy}.")
     if not kind.is_replaced and MANIFEST in entries:
-        whole = f"holds a whole result of an earlier {kind.command}, which was not put in its place"
-        raise BagError(f"{building}: {whole}. Rename it, or choose another folder.")
-
-
-def _command(building: Path) -> str:
-    """Return the command that left an unfinished result; empty if its marker does not name it."""
-    try:
-        return str(json.loads((building / UNFINISHED).read_bytes()[:_LARGEST])["command"])
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return ""
-
-
-def _clear(building: Path, kind: ResultKind) -> None:
-    """Remove the files that a run has written, the manifest first, and keep the marker."""
-    _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
+        raise BagError(f"{building}: holds a whole result of an earlier {kind.command}. Rename it, or choose another folder.")
 
 
 def _remove(folder: Path, names: Sequence[str]) -> None:
@@ -341,9 +300,6 @@ def _remove_empty(folder: Path) -> None:
             folder.rmdir()
 
 
-# -- completing -------------------------------------------------------------------------------------------------------
-
-
 def _complete(building: Path, kind: ResultKind) -> None:
     """Sync all files to the disk, then list them in the manifest."""
     files = [name for name in _entries(building) if not name.endswith("/") and name != UNFINISHED]
@@ -354,17 +310,8 @@ def _complete(building: Path, kind: ResultKind) -> None:
             os.fsync(stream.fileno())
     for folder in {(building / name).parent for name in files}:
         sync_folder(folder)
-    content = {"command": kind.command, "files": {name: _sha256(building / name) for name in files}}
+    content = {"command": kind.command, "files": {name: sha256_of(building / name) for name in files}}
     write_atomic(building / MANIFEST, json.dumps(content, indent=1) + "\n")
-
-
-def _settle(place: Path, replaced: Path, kind: ResultKind) -> None:
-    """Complete a replacement that a kill interrupted between two renames. Refuse a place that is not free."""
-    _check_earlier(replaced, kind)
-    if replaced.exists() and not place.exists():
-        replaced.rename(place)
-    _check_earlier(place, kind)
-    _discard(replaced)
 
 
 def _discard(folder: Path) -> None:
@@ -372,7 +319,7 @@ def _discard(folder: Path) -> None:
     try:
         with suppress(FileNotFoundError):
             (folder / MANIFEST).rename(folder / UNFINISHED)
-        _, listed = _manifest(folder)
+        listed = _manifest(folder)[1] or ()
         _remove(folder, [name for name in _entries(folder) if name in listed])
         (folder / UNFINISHED).unlink(missing_ok=True)
         _remove_empty(folder)
