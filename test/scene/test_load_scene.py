@@ -1,4 +1,4 @@
-"""What `load_scene` accepts, and how it reads the text."""
+"""What `load_scene` accepts, how it reads the text, and what is refused."""
 
 from __future__ import annotations
 
@@ -8,40 +8,73 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scene.editing import put
 
+from boom_twin import load_scene
+from boom_twin.config.yaml_text import plain
 from boom_twin.errors import SceneError, SceneWarning
-from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.load import default_text
 
 
-def test_the_default_scene_loads_without_warnings() -> None:
+def test_the_default_scene_loads_without_warnings_from_everywhere_and_is_frozen(bench: Any) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         scene = load_scene()
     assert [joint.kind for joint in scene.joints] == ["A", "B1", "B2", "B3"]
-    assert scene.material.E == 2.06e11
-    assert scene.sections[1].head is not None and scene.sections[1].head.com == (3.18, 0.0)
-
-
-def test_a_path_and_a_string_give_the_same_scene(bench: Any) -> None:
+    assert scene.material.E == 2.06e11 and scene.sections[1].head.com == (3.18, 0.0)
     path = bench.text(default_text())
-    assert load_scene(path) == load_scene()
-    assert load_scene(str(path)) == load_scene()
-
-
-@pytest.mark.parametrize(("text", "number"), [("2e11", 2e11), ("2E+11", 2e11), ("200_000_000_000", 2e11), ("+.5e12", 5e11)])
-def test_every_spelling_of_a_number_is_a_number(bench: Any, text: str, number: float) -> None:
-    path = bench.text(default_text().replace("E: 2.06e+11", f"E: {text}"))
-    assert number == load_scene(path).material.E
-
-
-def test_numbers_keep_their_type_whatever_yaml_made_of_them(bench: Any) -> None:
+    assert load_scene(path) == load_scene(str(path)) == scene
+    with pytest.raises(ValueError, match="frozen"):
+        scene.line_fill = 10.0
     scene = load_scene(bench.text(default_text().replace("length: 3.86", "length: 4")))
-    assert type(scene.sections[0].length) is float
+    assert type(scene.sections[0].length) is float, "numbers keep their type whatever YAML made of them"
 
 
-def _no_beam(values: dict[str, Any]) -> None:
-    values["sections"][3] = {"length": 3.1, "root": {"mass": 80, "com": [1.5, 0], "inertia": 60}}
+# -- spellings of numbers ---------------------------------------------------------------------------------------------
+
+READ = {
+    "2E+11": 2e11, "200_000_000_000": 2e11, "+.5e12": 5e11, "0x1F": 31.0, "0o17": 15.0, "017": 17.0, "1_000": 1000.0,
+    "0b101": 5.0, "&a 5": 5.0, "!!float 5": 5.0, "!!int 5": 5.0,
+}  # fmt: skip
+NO_VALUES = ["!!bool maybe", "!!bool ''", "!!int x", "!!int 0x", "!!int 1:30", "!!float x", "!!float _", "9" * 5000]
+REFUSED = [
+    *NO_VALUES, "!!float 1e400", "-1e400", ".inf", ".nan", "1:30", "!!binary aGk=", "!!set {a}", "!!omap [a: 1]", "!!int [1]",
+    "!foo 3", "&a [*a]", "1e-400", "1e31", "yes", '"\\uD800"',
+]  # fmt: skip
+
+
+def with_modulus(text: str) -> str:
+    return default_text().replace("E: 2.06e+11", f"E: {text}")
+
+
+@pytest.mark.parametrize(("text", "value"), READ.items())
+def test_every_spelling_of_a_number_is_a_number(bench: Any, text: str, value: float) -> None:
+    with warnings.catch_warnings(action="ignore"):
+        assert value == load_scene(bench.text(with_modulus(text))).material.E
+
+
+@pytest.mark.parametrize("text", REFUSED, ids=lambda text: text[:16])
+def test_what_is_no_number_is_refused(bench: Any, text: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        load_scene(bench.text(with_modulus(text)))
+    assert {(fault.path.split("[")[0], fault.line) for fault in caught.value.faults} == {("material.E", 15)}
+    str(caught.value).encode()
+    assert max(map(len, str(caught.value).splitlines())) < 300
+    if text in NO_VALUES:  # nor does a text take it
+        (fault,) = bench.faults_of(bench.text(default_text() + f"description: {text}\n"))
+        assert fault.path == "description"
+        with pytest.raises(ValueError, match="line 1"):
+            plain(f"a: {text}")
+
+
+def test_half_a_character_is_refused(bench: Any) -> None:
+    (fault,) = bench.faults_of(bench.text(default_text() + 'description: "\\uD800"\n'))
+    assert "half a character" in fault.bound
+
+
+# -- what the format allows -------------------------------------------------------------------------------------------
+
+RIGID = {"length": 3.1, "root": {"mass": 80, "com": [1.5, 0], "inertia": 60}}
 
 
 def _empty(values: dict[str, Any]) -> None:
@@ -60,32 +93,24 @@ def _one_section(values: dict[str, Any]) -> None:
     values |= {"sections": values["sections"][:1], "joints": values["joints"][:1], "postures": {}}
 
 
-@pytest.mark.parametrize("edit", [_no_beam, _empty, _all_options, _one_section])
-def test_what_the_format_allows_loads_without_a_warning(bench: Any, edit: Any) -> None:
-    assert bench.oddities(edit) == []
-
-
-def test_an_empty_key_is_an_absent_key(bench: Any) -> None:
+def test_what_the_format_allows_loads_without_a_warning(bench: Any) -> None:
+    for edit in (lambda values: put(values, "sections[3]", RIGID), _empty, _all_options, _one_section):
+        assert bench.oddities(edit) == []
     scene = load_scene(bench.edited(_empty))
     assert scene.tip is None and scene.sections[2].head is None and scene.sections[2].beta is None
-    assert scene.joints[2].cylinder.barrel is None
-
-
-def test_modes_of_a_section_override_those_of_the_scene(bench: Any) -> None:
+    assert scene.joints[2].cylinder.barrel is None, "an empty key is an absent key"
     scene = load_scene(bench.edited(_all_options))
     assert [scene.modes_of(i) for i in range(4)] == [2, 0, 2, 2]
     assert [scene.is_flexible(i) for i in range(4)] == [True, False, True, True]
 
 
-def test_any_order_of_six_bars(bench: Any) -> None:
+def test_six_bars_come_in_any_order_and_aliases_are_read(bench: Any) -> None:
     def edit(values: dict[str, Any]) -> None:
         values["joints"] = [values["joints"][i] for i in (0, 3, 1, 2)]
         values["postures"] = {}
 
-    assert [joint.kind for joint in load_scene(bench.edited(edit)).joints] == ["A", "B3", "B1", "B2"]
-
-
-def test_aliases_are_read(bench: Any) -> None:
+    with warnings.catch_warnings(action="ignore"):
+        assert [joint.kind for joint in load_scene(bench.edited(edit)).joints] == ["A", "B3", "B1", "B2"]
     text = default_text().replace("kind: B1, range_deg: [-165, 10]", "kind: B1, range_deg: &range [-165, 10]")
     text = text.replace("kind: B2, range_deg: [-165, 10]", "kind: B2, range_deg: *range")
     assert load_scene(bench.text(text)) == load_scene()
@@ -98,6 +123,9 @@ def test_oddities_are_issued_as_warnings_of_their_own_category(bench: Any) -> No
     assert len(caught) == 1 and caught[0].filename == __file__
 
 
+# -- what is refused --------------------------------------------------------------------------------------------------
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -107,10 +135,10 @@ def test_oddities_are_issued_as_warnings_of_their_own_category(bench: Any) -> No
         ("[1, 2]", "a block of keys is needed, not a list"),
         ("gravity: [0, -9.81", "not valid YAML"),
         ("a: 1\n---\na: 2\n", "not valid YAML"),
-        ("base:\n\tpivot: [0, 0]\n", "not valid YAML"),
+        ("base:\n\tpivot: [0, 0]\n", "Indent with spaces"),
         ("gravity: *nowhere", "undefined alias"),
         ("gravity: \x00", "not valid YAML"),
-        ("[" * 3000, "nested too deeply"),
+        ("[" * 500, "nested too deeply"),
         ("a: &a [*a]", "nested too deeply"),
         ("? [1, 2]\n: 3", "kind of key"),
         ("<<: {modes: 3}", "kind of key"),
@@ -122,11 +150,6 @@ def test_what_is_no_scene_at_all(bench: Any, text: str, words: str) -> None:
     assert words in str(caught.value)
 
 
-def test_tabs_have_their_own_remedy(bench: Any) -> None:
-    (fault,) = bench.faults_of(bench.text("base:\n\tpivot: [0, 0]\n"))
-    assert fault.line == 2 and "spaces" in fault.remedy
-
-
 def test_many_aliases_do_not_grow_without_bound(bench: Any) -> None:
     rows = ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]
     rows += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 9)]
@@ -134,34 +157,25 @@ def test_many_aliases_do_not_grow_without_bound(bench: Any) -> None:
         load_scene(bench.text("\n".join(rows)))
 
 
-def test_yaml_cannot_execute_code(bench: Any, tmp_path: Path) -> None:
+def test_a_tag_is_refused_and_cannot_execute_code(bench: Any, tmp_path: Path) -> None:
     trap = tmp_path / "trap"
-    text = default_text().replace("E: 2.06e+11", f"E: !!python/object/apply:os.mkdir [{trap}]")
-    faults = bench.faults_of(bench.text(text))
-    assert any(fault.path == "material.E" for fault in faults)
-    assert not trap.exists()
+    faults = bench.faults_of(bench.text(with_modulus(f"!!python/object/apply:os.mkdir [{trap}]")))
+    assert any(fault.path == "material.E" for fault in faults) and not trap.exists()
+    (fault,) = bench.faults_of(bench.text(default_text().replace("name: Q345B", "name: !secret Q345B")))
+    assert (fault.path, fault.line) == ("material.name", 15) and "Remove the tag" in fault.remedy
 
 
-def test_a_tag_is_refused(bench: Any) -> None:
-    faults = bench.faults_of(bench.text(default_text().replace("name: Q345B", "name: !secret Q345B")))
-    assert [(fault.path, fault.line) for fault in faults] == [("material.name", 15)]
-    assert "tag" in faults[0].bound and "Remove the tag" in faults[0].remedy
-
-
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match="No such file") as caught:
+def test_files_that_cannot_be_read_are_refused(bench: Any, tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"nowhere\.yaml.*\n?.*No such file.*boom_twin scene"):
         load_scene(tmp_path / "nowhere.yaml")
-    assert "nowhere.yaml" in str(caught.value) and "boom_twin scene" in str(caught.value)
-
-
-def test_a_folder_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match="directory"):
-        load_scene(tmp_path)
-
-
-def test_an_impossible_path_is_refused() -> None:
-    with pytest.raises(SceneError, match="null"):
-        load_scene("a\0b")
+    for source, words in ((tmp_path, "directory"), ("a\0b", "null")):
+        with pytest.raises(SceneError, match=words):
+            load_scene(source)
+    bench.path.write_bytes(b"\xff\xfe\x00binary\x80")
+    with pytest.raises(SceneError, match="UTF-8"):
+        load_scene(bench.path)
+    with pytest.raises(SceneError, match="4 MB"):
+        load_scene(bench.text(default_text() + "#" * 4_000_000))
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root reads every file")
@@ -170,21 +184,3 @@ def test_an_unreadable_file(bench: Any) -> None:
     path.chmod(0)
     with pytest.raises(SceneError, match="Permission"):
         load_scene(path)
-
-
-def test_a_binary_file_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "scene.yaml"
-    path.write_bytes(b"\xff\xfe\x00binary\x80")
-    with pytest.raises(SceneError, match="UTF-8"):
-        load_scene(path)
-
-
-def test_a_huge_file_is_refused(bench: Any) -> None:
-    with pytest.raises(SceneError, match="4 MB"):
-        load_scene(bench.text(default_text() + "#" * 4_000_000))
-
-
-def test_a_scene_is_frozen() -> None:
-    scene: Scene = load_scene()
-    with pytest.raises(ValueError, match="frozen"):
-        scene.line_fill = 10.0
