@@ -1,7 +1,7 @@
 """A first scene from a table of the drawing: every value that is worked out stands with its formula beside it.
 
 What no drawing tells (rigid ends, barrels, rods, damping) is estimated and marked so. The damping needs the first natural
-frequency, which `boom_twin.scene.straight_boom` estimates.
+frequency, which `boom_twin.scene.checks.whole_boom` estimates.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from ..errors import ABSENT, Fault, SceneError
 from ..kernels.elements.linkage import cylinder_length
 from ..types import Array
 from .boom_table import BoomTable, BoxSection, DrawnJoint, odd_boxes, second_moment
-from .checks.joint_range import NEXT_TO
-from .checks.values import TURNS
+from .checks.geometry import NEXT_TO
+from .checks.sizes import TURNS
+from .checks.whole_boom import straight_boom
 from .kinematics import linkage_of, stroke_curve
 from .load import examine_text
 from .oil_spring import middle_stiffness, stiffness
 from .schema import Cylinder, JointGeometry, Oil, Scene, Section
-from .straight_boom import straight_boom
 from .yaml_reader import with_end_mark
 
 ENDS = 1.2  # mass per metre of a rigid end against the beam's

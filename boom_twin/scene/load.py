@@ -13,15 +13,7 @@ import numpy as np
 from ..config.yaml_text import Document, Place
 from ..errors import Fault, SceneError, SceneWarning, UsageError
 from .block_reader import inner_block, validated
-from .checks import (
-    joint_clearance,
-    joint_range,
-    parts,
-    pins,
-    stretched_boom,
-    values,
-)
-from .checks.draft import Draft, Findings
+from .checks import Draft, Findings, geometry, linkages, sizes, values, whole_boom
 from .schema import Scene
 from .yaml_reader import missing_end_mark, parse, read_text, text_of
 
@@ -57,22 +49,22 @@ CHECKS: tuple[Callable[[Draft], Findings], ...] = (
     values.sections,
     values.modes,
     values.joints,
-    pins.placed_pins,
-    pins.thin_parts,
-    pins.centres,
-    pins.worn_pins,
-    joint_range.joints,
-    values.suspects,
+    geometry.placed_pins,
+    geometry.thin_parts,
+    geometry.centres,
+    values.worn_pins,
+    geometry.joints,
+    sizes.suspects,
 )
 
 
 PLAUSIBILITY: tuple[Callable[[Draft, Scene], Findings], ...] = (
-    parts.material,
-    parts.beams,
-    parts.rigid_parts,
-    parts.moving_parts,
-    joint_clearance.clear_cylinders,
-    joint_clearance.spaced_pins,
+    sizes.material,
+    sizes.beams,
+    sizes.rigid_parts,
+    sizes.moving_parts,
+    linkages.clear_cylinders,
+    linkages.spaced_pins,
 )
 """Of a scene without faults: parts against each other."""
 
@@ -175,12 +167,14 @@ def examine_text(text: str, name: str, whole: bool = False) -> tuple[Scene, list
 
 
 def _implausible(draft: Draft, scene: Scene, findings: list[Fault]) -> list[Fault]:
-    """Return warnings of values that do not fit together, none for a block that has a finding already."""
-    more: list[Fault] = []
+    """Return warnings of values that do not fit together: one at a key, none for a block that has a finding already."""
+    more: dict[str, Fault] = {}
     for check in PLAUSIBILITY:
-        told = {_block(finding) for finding in (*findings, *more)}
-        more += [finding for finding in check(draft, scene) if _block(finding) not in told]
-    return more + stretched_boom.stretched_boom(draft, scene, [finding.path for finding in (*findings, *more)])
+        told = {_block(finding) for finding in (*findings, *more.values())}
+        for finding in check(draft, scene):
+            if _block(finding) not in told:
+                more.setdefault(finding.path, finding)
+    return [*more.values(), *whole_boom.whole_boom(draft, scene, [*(finding.path for finding in findings), *more])]
 
 
 def _block(finding: Fault) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from .checks.linkages import LinkageAccount, linkage_account
 from .kinematics import stroke_range
-from .linkage_range import LinkageAccount, linkage_account
 from .oil_spring import stiffness_over_stroke
 from .schema import IDEAL_BELOW, Joint, Pin, Scene
 from .segmentation import Split, flexible_parts, splits

@@ -1,4 +1,8 @@
-"""Checks of a joint over its range: links that meet, strokes within reach and unique, dead centres, named postures in it."""
+"""Geometry of a scene: pins and centres of mass on their parts; a joint over its range.
+
+Over its range the links of a joint meet, its strokes are within reach and unique, it keeps clear of dead centres, and it holds
+the named postures.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +17,12 @@ from ...config.yaml_text import Place
 from ...kernels.elements.linkage import cylinder_length
 from ...types import Array
 from ..kinematics import linkage_of, transmission_angles
-from ..schema import Joint
-from .draft import Draft, Findings
-from .pins import TOLERANCE
+from ..schema import Joint, Point, Section
+from . import Draft, Findings
 from .values import NEEDED
 
+TOLERANCE = 1e-9  # m, deg
+RIGID = (math.inf, -math.inf)  # ends of the flexible part of a rigid section: every pin is on its root and on its head
 STEP_DEG = 0.1
 TRANSMISSION_DEG = 5.0  # least angle between the links at Q; forces in them are then 11 times those across
 LEVER = 0.25  # least lever ds/dphi over the largest; the cylinder's force is then 4 times the least one
@@ -26,6 +31,75 @@ MIRRORED = ("side", "cy", "dy", "ey", "left")  # numbers of a linkage that chang
 UNMET = "the links lL and lR, between D and E, do not meet at"
 NEXT_TO = "next to a dead centre"
 Mask = NDArray[np.bool_]
+
+
+def placed_pins(draft: Draft) -> Findings:
+    """Check that D is on the rigid head of the section before, E on the rigid root of its own, C near the section before."""
+    for i, joint in enumerate(draft.joints):
+        before, own = draft.section(i - 1), draft.section(i)
+        if i == 0 or joint is None:
+            continue
+        if before is not None and joint.C is not None and _far(before.length, (before.length + joint.C[0], joint.C[1])):
+            bound = f"C lies far outside sections[{i - 1}], which is {before.length:g} m long"
+            remedy = "C is measured from the OUTBOARD pivot of the section before, so its x is negative."
+            yield draft.warning(("joints", i, "C"), joint.C, bound, remedy)
+        first = -math.inf if before is None else _bending(draft, before)[1] - before.length
+        if before is not None and joint.D is not None and joint.D[0] < first - TOLERANCE:
+            bound = f"D must lie on the rigid head of sections[{i - 1}], x >= {first:.6g} m from its outboard pivot"
+            remedy = f"Move D, or end the beam of sections[{i - 1}] at x1 <= {before.length + joint.D[0]:.6g} m."
+            yield draft.fault(("joints", i, "D"), joint.D, bound, remedy)
+        if own is not None and joint.E is not None and joint.E[0] > (last := _bending(draft, own)[0]) + TOLERANCE:
+            bound = f"E must lie on the rigid root of sections[{i}], x <= {last:.6g} m from its inboard pivot"
+            remedy = f"Move E, or start the beam of sections[{i}] at x0 >= {joint.E[0]:.6g} m."
+            yield draft.fault(("joints", i, "E"), joint.E, bound, remedy)
+
+
+def _bending(draft: Draft, section: Section) -> Point:
+    """Return the ends of the flexible part; inf, -inf if it is rigid or its ends are wrong, which another check says."""
+    beam = section.beam if section.beam is not None and draft.modes_of(section) > 0 else RIGID
+    return beam if 0 <= beam[0] < beam[1] <= section.length else RIGID
+
+
+def thin_parts(draft: Draft) -> Findings:
+    """Yield warnings of pins just beside an end of the beam, which cut off a sliver of it."""
+    for i, section in enumerate(draft.sections):
+        if section is None:
+            continue
+        following = draft.joints[i + 1] if i + 1 < len(draft.joints) else None
+        if following is not None and following.C is not None:
+            yield from _sliver(draft, section, ("joints", i + 1, "C"), following.C, section.length + following.C[0])
+        if i == 0 and section.rod_pin is not None:
+            yield from _sliver(draft, section, ("sections", i, "rod_pin"), section.rod_pin, section.rod_pin[0])
+
+
+def _sliver(draft: Draft, section: Section, place: Place, value: Point, x: float) -> Findings:
+    beam = _bending(draft, section)
+    for end in beam:
+        if TOLERANCE < abs(x - end) < 0.01 * section.length and beam[0] < x < beam[1]:
+            bound = f"the pin splits the beam {abs(x - end) * 1e3:.3g} mm from its end, at x = {end:g} m"
+            yield draft.warning(place, value, bound, f"Let the beam end at the pin, x = {x:.6g} m, or move the pin.")
+
+
+def centres(draft: Draft) -> Findings:
+    """Check that centres of mass, and the rod pin, are near their section."""
+    for i, section in enumerate(draft.sections):
+        if section is None:
+            continue
+        parts: list[tuple[Place, Point | None]] = [(("rod_pin",), section.rod_pin)]
+        parts += [((end, "com"), part.com) for end, part in (("root", section.root), ("head", section.head)) if part]
+        for place, point in parts:
+            if point is not None and _far(section.length, point):
+                bound = f"it lies far outside the section, which is {section.length:g} m long"
+                remedy = "It is measured from the inboard pivot, along the section."
+                yield draft.warning(("sections", i, *place), point, bound, remedy)
+
+
+def _far(length: float, point: tuple[float, float]) -> bool:
+    """Return True if a point is more than a quarter of the length beyond the section's ends, or half of it beside."""
+    return not -0.25 * length <= point[0] <= 1.25 * length or abs(point[1]) > 0.5 * length
+
+
+# -- a joint over its range -----------------------------------------------------------------------------------------------
 
 
 def joints(draft: Draft) -> Findings:

@@ -1,21 +1,37 @@
-"""A joint over its range: its pins, what stands between them, how far it is from dead centres, what runs over the pivot."""
+"""Pins and cylinder of a joint over its range: dead centres, what runs over the pivot, what comes too close.
+
+A pin goes through the whole width of the boom, so two of them need room beside each other in whatever planes the links lie. A
+link may run over the pivot, for it lies beside the section. In most six-bars that turn 165 degrees it does.
+
+A cylinder lies amid the section, where the pivot's pin and those of the links pass through. Its barrel is taken as thick as its
+bore and two walls, its rod as thick as it is, a pin as half the bore. Only `oil` gives them: a cylinder with `k` is not judged.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
-from ..kernels.elements.linkage import LINK_L, cylinder_length, link_angles
-from ..kernels.plane_algebra import turned
-from ..types import Array
-from .kinematics import linkage, transmission_angles
-from .schema import Scene, section_depth
+from ...config.yaml_text import Place
+from ...errors import Fault
+from ...kernels.elements.linkage import LINK_L, cylinder_length, link_angles
+from ...kernels.plane_algebra import turned
+from ...types import Array
+from ..kinematics import linkage, transmission_angles
+from ..schema import Cylinder, Oil, Scene, section_depth
+from . import Draft, Findings
+from .geometry import Mask, grid_of, usable
 
 PIN = 0.5  # diameter of a pin over the bore
 BORE = 0.4  # of a cylinder without `oil`, over the depth of the section that turns
 STEPS = 721  # angles of a range
+WALL = 0.12  # of a barrel, over its bore
+BARREL = 0.9  # of the closed length; the rest is the rod's end and its eye
+ROOM = 1.25  # between the centres of two pins, over the diameter: a quarter of it is left for the eyes around them
 
 
 @dataclass(frozen=True)
@@ -119,3 +135,87 @@ def _over_pivot(scene: Scene, i: int, pins: dict[str, Array], degrees: Array) ->
 
 def _complex(point: tuple[Array, Array]) -> Array:
     return np.asarray(point[0] + 1j * point[1])
+
+
+class Pass(NamedTuple):
+    """A pin that a cylinder passes: its name, and at each angle the distance (m), what is needed, and whether of the barrel."""
+
+    pin: str
+    distance: Array
+    needed: Array
+    at_barrel: Mask
+
+
+def clear_cylinders(draft: Draft, scene: Scene) -> Findings:
+    """Check all cylinders that have `oil`; of each the pin that is closest against what it needs."""
+    for i, joint in enumerate(scene.joints):
+        if joint.cylinder.oil is not None:
+            degrees = grid_of(joint)
+            passes = list(passes_of(scene, i, joint.cylinder, joint.cylinder.oil, np.radians(degrees)))
+            worst = min(passes, key=lambda each: float(np.nanmin(each.distance / each.needed)), default=None)
+            if worst is not None and np.nanmin(worst.distance / worst.needed) < 1.0:
+                clear = np.all([each.distance >= each.needed for each in passes], axis=0)
+                yield _finding(draft, scene, i, worst, degrees, clear)
+
+
+def _finding(draft: Draft, scene: Scene, i: int, worst: Pass, degrees: Array, clear: Array) -> Fault:
+    at = int(np.nanargmin(worst.distance / worst.needed))
+    part, size = ("barrel", "half the barrel") if worst.at_barrel[at] else ("rod", "half the rod")
+    bound = (
+        f"at {degrees[at]:.0f} deg the {part} of cylinder {i + 1} passes {worst.distance[at]:.3f} m from {worst.pin}, where a "
+        f"boom has a pin; expected at least {worst.needed[at]:.3f} m, {size} and half a pin of half the bore"
+    )
+    pins = "C, D, E or the lengths of the links" if i else "cylinder_pin or rod_pin"
+    low, high = usable(degrees, np.where(clear, degrees, np.nan))
+    narrower = f", or narrow range_deg to [{low:g}, {high:g}]" if low < high else ""
+    place: Place = ("joints", i, "C") if i else ("base", "cylinder_pin")
+    value = scene.joints[i].C if i else scene.base.cylinder_pin
+    return draft.warning(place, value, bound, f"Look at `check --picture`; move {pins}{narrower}.")
+
+
+def passes_of(scene: Scene, i: int, cylinder: Cylinder, oil: Oil, phi: Array) -> Iterator[Pass]:
+    """Return the pins beside the cylinder's own two, in the axes of its carrier, as complex numbers x + iy, m."""
+    pins = joint_pins(scene, i, phi)
+    foot, rod_pin = pins.pop("C" if i else "cylinder_pin"), pins.pop(rod_pin_of(pins))
+    length = np.abs(rod_pin - foot)
+    for name, pin in (pins | _pins_before(scene, i, pins["the pivot"])).items():
+        distance, place = distances_to(pin, foot, rod_pin)
+        at_barrel = place * length < BARREL * cylinder.closed_length
+        radius = np.where(at_barrel, (0.5 + WALL) * oil.bore, 0.5 * oil.rod)
+        yield Pass(name, distance, radius + 0.5 * PIN * oil.bore, at_barrel)
+
+
+def _pins_before(scene: Scene, i: int, pivot: Array) -> dict[str, Array]:
+    """Return the pins at the inboard end of the carrier of joint `i`, each shape as `pivot`."""
+    if i == 0:
+        return {}
+    carrier, before = scene.sections[i - 1], scene.joints[i - 1]
+    inner = carrier.rod_pin if i == 1 else before.E
+    found = {"the pivot before": pivot - carrier.length}
+    if inner is not None:
+        found["rod_pin of section 1" if i == 1 else "E of the joint before"] = np.asarray(
+            pivot + (complex(*inner) - carrier.length)
+        )
+    return found
+
+
+def spaced_pins(draft: Draft, scene: Scene) -> Findings:
+    """Yield a warning for each six-bar whose two closest pins have less room than they need."""
+    for i, joint in enumerate(scene.joints):
+        degrees = grid_of(joint)
+        pins, needed = joint_pins(scene, i, np.radians(degrees)), ROOM * pin_diameter(scene, i)
+        nearest = nearest_pins(pins, degrees)
+        if nearest is None or nearest.distance >= needed:
+            continue
+        apart = np.abs(pins[nearest.first] - pins[nearest.second])
+        low, high = usable(degrees, np.where(apart >= needed, degrees, np.nan))
+        narrower = f", or narrow range_deg to [{low:g}, {high:g}]" if low < high else ""
+        oil = joint.cylinder.oil
+        bore = "the bore" if oil else f"a bore guessed as {BORE:g} of the depth of the section"
+        bound = (
+            f"at {nearest.degrees:.0f} deg {nearest.first} and {nearest.second} are {nearest.distance:.3f} m apart; "
+            f"expected at least {needed:.3f} m, pins {pin_diameter(scene, i):.3f} m thick ({PIN:g} of {bore}) with their eyes"
+        )
+        key = next((name for name in ("R", "E", "D", "C") if name in (nearest.first, nearest.second)), "lL")
+        remedy = f"Look at `check --picture`; move C, D, E or R, or change lL or lR{narrower}."
+        yield draft.warning(("joints", i, key), getattr(joint, key), bound, remedy)

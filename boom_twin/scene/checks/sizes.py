@@ -1,16 +1,131 @@
-"""Plausibility of parts by each other.
+"""Plausible sizes: values that look like another unit, then parts against each other.
 
 Beams: box and mass per metre, by the length and by the section before. Rigid parts, links, barrels and rods: centre inside the
-part, inertia by its size, mass by its volume.
+part, inertia by its size, mass by its volume. Of several findings at one key the first is told.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
+
+from pydantic import BaseModel
 
 from ...config.yaml_text import Place
-from ..schema import Cylinder, CylinderPart, Joint, Point, RigidPart, Scene, Section, section_depth
-from .draft import Draft, Findings
+from ..schema import Cylinder, Joint, Point, RigidPart, Scene, Section, section_depth
+from . import Draft, Findings
+
+LENGTHS = ("length", "beam", "height", "rod_pin", "com", "pivot", "cylinder_pin", "C", "D", "E", "R", "lL", "lR",
+           "closed_length", "max_stroke")  # fmt: skip
+BULK = (4e8, 2.5e9)  # Pa; water has 2.2e9
+TURNS = "the joint turns by"
+NARROW = 25.0  # deg; joints of booms turn by 60 and more
+TILT = 1e-3  # of gravity against -y, rad
+
+
+class Suspect(NamedTuple):
+    """Keys whose values look wrong below a least or above a greatest magnitude: what they look like, what to do.
+
+    Remedies are formatted with the value (``{0:g}``) and `factor` times the value (``{1:g}``).
+    """
+
+    keys: tuple[str, ...]
+    least: float
+    most: float
+    looks: str
+    remedy: str
+    factor: float = 1.0
+
+
+_K = "expected from 1e6 to 1e9 N/m"
+_OIL_HAS = "hydraulic oil has 1.4e9 to 1.7e9, with air in it less"
+SUSPECTS = (
+    Suspect(("Young's modulus",), 1e3, math.inf, "less than 1e6 Pa: GPa or MPa?", "Give Pa: {0:g} GPa are {1:g}.", 1e9),
+    Suspect(("Young's modulus",), 1e6, math.inf, "less than 1e6 Pa: GPa or MPa?", "Give Pa: {0:g} MPa are {1:g}.", 1e6),
+    Suspect(("rho",), 50.0, math.inf, "less than 50 kg/m^3: g/cm^3 or t/m^3?", "Give kg/m^3: {1:g}.", 1e3),
+    Suspect(("k",), 1e3, math.inf, f"{_K}: kN/mm?", "Give N/m: {0:g} kN/mm are {1:g}.", 1e6),
+    Suspect(("k",), 1e6, math.inf, f"{_K}: kN/m?", "Give N/m: {0:g} kN/m are {1:g}.", 1e3),
+    Suspect(("k",), 0.0, 1e9, _K, "Check its unit, N/m, or the bore and the oil that it comes from."),
+    Suspect(("bulk_modulus",), *BULK, f"expected from {BULK[0]:.2g} to {BULK[1]:.2g} Pa: {_OIL_HAS}",
+            "Check its unit: 1.4 GPa are 14000 bar."),
+    Suspect(("payload",), 1.0, math.inf, "less than 1 kg: tonnes?", "Give kg: {0:g} t are {1:g}.", 1e3),
+    Suspect(("mass", "mL", "mR", "payload"), 0.0, 1e5, "more than 1e5 kg: grams?", "Give kg: {0:g} g are {1:g}.", 1e-3),
+    Suspect(("A",), 0.0, 1.0, "more than 1 m^2: cm^2 or mm^2?", "Give the area in m^2: 49 cm^2 is 4.9e-3."),
+    Suspect(("I",), 0.0, 0.1, "more than 0.1 m^4: cm^4 or mm^4?", "Give the second moment in m^4: 3600 cm^4 is 3.6e-5."),
+    Suspect(("rho_A",), 0.0, 5e3, "more than 5000 kg/m: a density in kg/m^3?", "Give the mass of one metre of the section."),
+    Suspect(("line_fill",), 0.0, 100.0, "more than 100 kg/m: the whole load in kg?", "Give the concrete in one metre of pipe."),
+    Suspect(("inclination",), 0.0, 0.2, "more than 0.2 rad, which is 11.5 degrees: degrees?",
+            "Give radians: 5 degrees are 0.0873."),
+    Suspect(("closed_length", "max_stroke"), 0.0, 50.0, "more than 50 m: mm?", "Give lengths in m."),
+    Suspect(("cap_line", "rod_line"), 0.0, 0.5, "more than 0.5 m^3: litres?", "Give m^3: 1 litre is 1e-3."),
+)  # fmt: skip
+"""Values that look like another unit; the first that applies to a key is reported."""
+
+
+def suspects(draft: Draft) -> Findings:
+    """Check the size of all values of all usable parts."""
+    blocks: list[tuple[Place, Any]] = [(("material",), draft.material), (("base",), draft.base), (("tip",), draft.tip)]
+    blocks += [(("sections", i), section) for i, section in enumerate(draft.sections)]
+    blocks += [(("joints", i), joint) for i, joint in enumerate(draft.joints)]
+    for place, block in [*blocks, (("line_fill",), draft.line_fill)]:
+        if block is not None:
+            yield from _block(draft, place, block)
+    yield from _gravity(draft)
+    for name, angles in draft.postures.items():
+        if angles and max(map(abs, angles)) < 6.3 and any(angle != round(angle) for angle in angles):
+            yield draft.warning(("postures", name), angles, "all within 6.3: radians?", "Give degrees to the horizontal.")
+
+
+def _block(draft: Draft, place: Place, block: Any) -> Findings:
+    if not isinstance(block, BaseModel):
+        yield from _value(draft, place, block)
+        return
+    for key in type(block).model_fields:
+        if (value := getattr(block, key)) is not None:
+            yield from _block(draft, (*place, key), value)
+
+
+def _value(draft: Draft, place: Place, value: Any) -> Findings:
+    """Yield a warning of a value that looks like another unit. A zero is a value that is left out."""
+    key, numbers = str(place[-1]), value if isinstance(value, tuple) else (value,)
+    size = max((abs(item) for item in numbers if isinstance(item, int | float)), default=0.0)
+    key = "Young's modulus" if place == ("material", "E") else key  # E is also a pin
+    if key == "range_deg":
+        yield from _narrow(draft, place, value)
+    elif key in LENGTHS and size > 200:
+        written = draft.document.written(place)
+        told = f"written as `{written}`, which is more than 200 m" if isinstance(written, str) else "more than 200 m: mm?"
+        yield draft.warning(place, value, told, "Give lengths in m, or with their unit: 8500 mm.")
+    else:
+        for suspect in SUSPECTS:
+            if key in suspect.keys and size and not suspect.least <= size <= suspect.most:
+                yield draft.warning(place, value, suspect.looks, suspect.remedy.format(value, suspect.factor * value))
+                return
+
+
+def _narrow(draft: Draft, place: Place, value: tuple[float, float]) -> Findings:
+    if max(map(abs, value)) < 6.3:
+        shown = ", ".join(f"{math.degrees(angle):.4g}" for angle in value)
+        yield draft.warning(place, value, "all within 6.3: radians?", f"Give degrees; these radians would be [{shown}].")
+    elif 0.0 < value[1] - value[0] < NARROW:
+        bound = f"{TURNS} {value[1] - value[0]:.3g} deg in all; expected at least {NARROW:g} deg"
+        yield draft.warning(place, value, bound, "Give the lowest and the highest joint angle in degrees; check the decimals.")
+
+
+def _gravity(draft: Draft) -> Findings:
+    if draft.gravity is not None:
+        wrong = ""
+        if not 9.7 < math.hypot(*draft.gravity) < 9.9:
+            wrong = "its size is not that of the earth's gravity, about 9.81 m/s^2"
+        elif draft.gravity[1] > 0:
+            wrong = "it points upwards"
+        elif abs(draft.gravity[0]) > TILT * abs(draft.gravity[1]):
+            wrong = "it does not point along -y, which is down"
+        if wrong:
+            yield draft.warning(("gravity",), draft.gravity, wrong, "Give [0.0, -9.81]; a slope is base.inclination, rad.")
+
+
+# -- parts against each other -----------------------------------------------------------------------------------------
 
 GYRATION_BY_HEIGHT = (0.28, 0.5)  # a solid block has 0.289, two thin flanges 0.5
 GYRATION_BY_LENGTH = (0.004, 0.05)
@@ -28,14 +143,18 @@ SPECIFIC_STIFFNESS = (8e6, 1.2e8)  # E / rho, m^2/s^2: glass fibre 1e7, metals 2
 OVERHANG = 0.05  # of the section's length, that a rigid part may reach beyond the pivots
 BESIDE = 2.0  # depths of the section, that a centre may lie beside its axis
 LARGEST_GYRATION = 0.6  # of the size of a part
-LEAST_SHARE, LONG_PART = 0.2, 0.03  # of the beam's mass per metre, in parts longer than a share of the section
+LIGHTEST_PART, LONG_PART = 0.2, 0.03  # of the beam's mass per metre, in parts longer than a share of the section
 ROD_BY_BEAM = (0.01, 10.0)  # mass per metre of barrels and rods against that of the section
-LINK_BY_BEAM = (0.01, 1.5)  # likewise of links
+LINK_BY_BEAM = (0.01, 1.5)  # mass per metre of links against that of the section
 CYLINDER_GYRATION = (0.05, 0.5)  # of the closed length; a uniform rod has 0.29
 CYLINDER_CENTRE = 0.8  # of the closed length
 LONGEST_STROKE = 0.95  # of the closed length
 LONGEST_CYLINDER = 0.5  # of the section that it lies along: closed length
 LINE = (1e-3, 2.0)  # oil between piston and valve, of what the chamber takes
+
+
+def _between(value: float, limits: tuple[float, float], unit: float = 1.0) -> bool:
+    return limits[0] * unit <= value <= limits[1] * unit
 
 
 def density(scene: Scene) -> float | None:
@@ -45,20 +164,19 @@ def density(scene: Scene) -> float | None:
     """
     known, stiffness = scene.material.rho, scene.material.E
     if known is None:
-        return STEEL if _between(stiffness, STEEL_E, 1.0) else None
+        return STEEL if _between(stiffness, STEEL_E) else None
     return known if _between(stiffness, SPECIFIC_STIFFNESS, known) else None
 
 
 def material(draft: Draft, scene: Scene) -> Findings:
     """Check Young's modulus against the density."""
-    rho = scene.material.rho
-    if rho is not None and not _between(scene.material.E, SPECIFIC_STIFFNESS, rho):
-        low, high = (limit * rho for limit in SPECIFIC_STIFFNESS)
-        bound = f"expected from {low:.2g} to {high:.2g} Pa with a density of {rho:g} kg/m^3"
-        yield draft.warning(("material", "E"), scene.material.E, bound, "Steel has 2.06e11 Pa and 7850 kg/m^3.")
-    elif rho is not None and _between(rho, STEEL_RHO, 1.0) and not _between(scene.material.E, OF_STEEL, 1.0):
-        bound = f"expected from {OF_STEEL[0]:.2g} to {OF_STEEL[1]:.2g} Pa with the density of steel, {rho:g} kg/m^3"
-        yield draft.warning(("material", "E"), scene.material.E, bound, "Check E, or give the density of this material.")
+    place, value, rho = ("material", "E"), scene.material.E, scene.material.rho
+    if rho is not None:
+        where, remedy = f" Pa with a density of {rho:g} kg/m^3", "Steel has 2.06e11 Pa and 7850 kg/m^3."
+        yield from draft.expect(place, value, SPECIFIC_STIFFNESS, rho, where, remedy)
+        if _between(rho, STEEL_RHO):
+            where, remedy = f" Pa with the density of steel, {rho:g} kg/m^3", "Check E, or give the density of this material."
+            yield from draft.expect(place, value, OF_STEEL, 1.0, where, remedy)
 
 
 def beams(draft: Draft, scene: Scene) -> Findings:
@@ -66,49 +184,46 @@ def beams(draft: Draft, scene: Scene) -> Findings:
     for i, section in enumerate(scene.sections):
         if section.beam is not None and section.A is not None and section.I is not None:
             yield from _box(draft, i, section, section.A, section.I)
-            yield from _per_metre(draft, i, section, density(scene))
-            yield from _ends(draft, i, section, section.beam)
-            yield from _taper(draft, scene, i, section.I)
+            if (rho := density(scene)) is not None:
+                yield from _per_metre(draft, i, section, rho * section.A, rho * section.I)
+            yield from _ends(draft, i, section.length, section.beam)
+            before = scene.sections[i - 1].I if i > 0 else None
+            if before is not None:
+                where, remedy = (
+                    f" m^4 after sections[{i - 1}] with I = {before:g}",
+                    "Booms taper outwards: check the decimals of both.",
+                )
+                yield from draft.expect(("sections", i, "I"), section.I, TAPER, before, where, remedy)
 
 
 def _box(draft: Draft, i: int, section: Section, area: float, inertia: float) -> Findings:
-    place, radius = ("sections", i), math.sqrt(inertia / area)
-    says = f"its radius of gyration, sqrt(I/A), is {radius:.3g} m"
-    if section.height is not None and not _between(radius, GYRATION_BY_HEIGHT, section.height):
-        bound = f"{says}; expected {_range(GYRATION_BY_HEIGHT, section.height)} for a box {section.height:g} m high"
-        yield draft.warning((*place, "I"), inertia, bound, "Check I (m^4), A (m^2) and height (m).")
-    elif not _between(radius, GYRATION_BY_LENGTH, section.length):
-        bound = f"{says}; expected {_range(GYRATION_BY_LENGTH, section.length)} for a section of {section.length:g} m"
-        yield draft.warning((*place, "I"), inertia, bound, "Check I (m^4), A (m^2) and length (m), decimals and units.")
-    elif not _between(area**2, COMPACTNESS, inertia):
-        depth = DEEP * radius
-        walls = [f"{1e3 * depth * share / WALL:.2g}" for share in (area**2 / inertia, *COMPACTNESS)]
-        bound = (
-            f"with A = {area:g} m^2 this is a box about {depth:.2g} m high with walls of {walls[0]} mm; "
-            f"expected {walls[1]} to {walls[2]} mm"
-        )
-        yield draft.warning((*place, "I"), inertia, bound, "Check the decimals of I (m^4) and A (m^2).")
+    place, radius = ("sections", i, "I"), math.sqrt(inertia / area)
+    judged: dict[str, Any] = {"measured": radius, "says": f"its radius of gyration, sqrt(I/A), is {radius:.3g} m; "}
+    if section.height is not None:
+        where, remedy = f" for a box {section.height:g} m high", "Check I (m^4), A (m^2) and height (m)."
+        yield from draft.expect(place, inertia, GYRATION_BY_HEIGHT, section.height, where, remedy, **judged)
+    where, remedy = f" for a section of {section.length:g} m", "Check I (m^4), A (m^2) and length (m), decimals and units."
+    yield from draft.expect(place, inertia, GYRATION_BY_LENGTH, section.length, where, remedy, **judged)
+    wall, depth = 1e3 * DEEP * radius / WALL, DEEP * radius
+    says = f"with A = {area:g} m^2 this is a box about {depth:.2g} m high with walls of {wall * area**2 / inertia:.2g} mm; "
+    judged = {"measured": wall * area**2 / inertia, "says": says}
+    yield from draft.expect(place, inertia, COMPACTNESS, wall, " mm", "Check the decimals of I (m^4) and A (m^2).", **judged)
 
 
-def _per_metre(draft: Draft, i: int, section: Section, rho: float | None) -> Findings:
-    assert section.A is not None and section.I is not None and section.rho_A is not None
-    if rho is None:
-        return
-    place, steel = ("sections", i), rho * section.A
-    if not _between(section.rho_A * (1.0 + SLACK), MASS_BY_STEEL, steel):
-        bound = f"expected {_range(MASS_BY_STEEL, steel)} kg/m: the box alone, rho A, has {steel:.3g}"
+def _per_metre(draft: Draft, i: int, section: Section, steel: float, rotary: float) -> Findings:
+    if section.rho_A is not None:
+        where = f" kg/m: the box alone, rho A, has {steel:.3g}"
         remedy = "Give the mass of one metre of beam: box, pipe line, hoses, without concrete (line_fill)."
-        yield draft.warning((*place, "rho_A"), section.rho_A, bound, remedy)
-    rotary = rho * section.I
-    if section.rho_I and not _between(section.rho_I, ROTARY_BY_STEEL, rotary):
-        bound = f"expected {_range(ROTARY_BY_STEEL, rotary)} kg m: the box alone, rho I, has {rotary:.3g}"
-        yield draft.warning((*place, "rho_I"), section.rho_I, bound, "Give rho I, or leave it out.")
+        place, slack = ("sections", i, "rho_A"), section.rho_A * (1.0 + SLACK)
+        yield from draft.expect(place, section.rho_A, MASS_BY_STEEL, steel, where, remedy, measured=slack)
+    if section.rho_I:
+        where, remedy = f" kg m: the box alone, rho I, has {rotary:.3g}", "Give rho I, or leave it out."
+        yield from draft.expect(("sections", i, "rho_I"), section.rho_I, ROTARY_BY_STEEL, rotary, where, remedy)
 
 
-def _ends(draft: Draft, i: int, section: Section, beam: Point) -> Findings:
+def _ends(draft: Draft, i: int, length: float, beam: Point) -> Findings:
     place: Place = ("sections", i, "beam")
-    (x0, x1), length = beam, section.length
-    head = length - x1
+    (x0, x1), head = beam, length - beam[1]
     if x0 > 0.0 and x0 + x1 <= length * (1.0 + 1e-6) and head > LONGEST_HEAD * length:
         bound = f"[x0, x1] leave a rigid head of {head:.3g} m; expected at most {LONGEST_HEAD * length:.3g} m"
         remedy = f"x1 is measured from the inboard pivot; if {x1:g} m is the length of the beam, then x1 = {x0 + x1:g}."
@@ -118,37 +233,18 @@ def _ends(draft: Draft, i: int, section: Section, beam: Point) -> Findings:
         yield draft.warning(place, beam, bound, "Give [x0, x1] from the inboard pivot: where the box begins and ends.")
 
 
-def _taper(draft: Draft, scene: Scene, i: int, inertia: float) -> Findings:
-    before = scene.sections[i - 1].I if i > 0 else None
-    if before is not None and not _between(inertia, TAPER, before):
-        bound = f"expected {_range(TAPER, before)} m^4 after sections[{i - 1}] with I = {before:g}"
-        yield draft.warning(("sections", i, "I"), inertia, bound, "Booms taper outwards: check the decimals of both.")
-
-
-def _between(value: float, limits: tuple[float, float], unit: float) -> bool:
-    return limits[0] * unit <= value <= limits[1] * unit
-
-
-def _range(limits: tuple[float, float], unit: float) -> str:
-    return f"{limits[0] * unit:.3g} to {limits[1] * unit:.3g}"
-
-
-# -- rigid parts, links and cylinders ------------------------------------------------------------------------------------
-
-
 def rigid_parts(draft: Draft, scene: Scene) -> Findings:
     """Check roots and heads."""
     for i, section in enumerate(scene.sections):
         ends = section.beam or (section.length, section.length)
-        spans = {"root": (0.0, ends[0]), "head": (ends[1], section.length)}
-        for key, span in spans.items():
-            part = getattr(section, key)
+        for key, part, span in (("root", section.root, (0.0, ends[0])), ("head", section.head, (ends[1], section.length))):
             if part is not None and part.mass > 0.0:
                 yield from _part(draft, scene, ("sections", i, key), part, span)
 
 
 def _part(draft: Draft, scene: Scene, place: tuple[str, int, str], part: RigidPart, span: tuple[float, float]) -> Findings:
-    section, depth = scene.sections[place[1]], section_depth(scene, place[1])
+    """Check centre, inertia and mass: at least that of a share of as much beam, at most that of a solid block of its depth."""
+    section, depth, length = scene.sections[place[1]], section_depth(scene, place[1]), span[1] - span[0]
     more = OVERHANG * section.length
     low, high = span[0] - more, span[1] + more
     if not low <= part.com[0] <= high or abs(part.com[1]) > BESIDE * depth:
@@ -156,24 +252,18 @@ def _part(draft: Draft, scene: Scene, place: tuple[str, int, str], part: RigidPa
         remedy = "The centre of mass is measured from the INBOARD pivot, in the axes of the section."
         yield draft.warning((*place, "com"), part.com, bound, remedy)
         return
-    size, radius = math.hypot(span[1] - span[0] + more, 2.0 * depth), math.sqrt(part.inertia / part.mass)
-    if radius > LARGEST_GYRATION * size:
-        bound = f"a radius of gyration of {radius:.3g} m; expected at most {LARGEST_GYRATION * size:.2g} m for its size"
-        remedy = "Give kg m^2 about the part's OWN centre of mass: m (a^2 + b^2) / 12 of the block around it."
-        yield draft.warning((*place, "inertia"), part.inertia, bound, remedy)
-    yield from _part_mass(draft, scene, place, part.mass, (span[1] - span[0], depth))
-
-
-def _part_mass(draft: Draft, scene: Scene, place: tuple[str, int, str], mass: float, size: tuple[float, float]) -> Findings:
-    """Yield a warning if a part is lighter than a share of as much beam, or heavier than a solid block of its depth."""
-    section, rho = scene.sections[place[1]], density(scene)
-    (length, depth), lightest = size, 0.0
-    if section.rho_A is not None and length > LONG_PART * section.length:
-        lightest = LEAST_SHARE * section.rho_A * length
-    heaviest = math.inf if rho is None else rho * depth**2 * (length + 2.0 * depth)
-    if not lightest <= mass <= heaviest:
-        bound = f"expected {lightest:.2g} to {heaviest:.3g} kg for a part {length:.2g} m long and {depth:.2g} m high"
-        yield draft.warning((*place, "mass"), mass, bound, "Give kg: not grams, not tonnes; and check beam: [x0, x1].")
+    size, radius = math.hypot(length + more, 2.0 * depth), math.sqrt(part.inertia / part.mass)
+    remedy = "Give kg m^2 about the part's OWN centre of mass: m (a^2 + b^2) / 12 of the block around it."
+    judged: dict[str, Any] = {"measured": radius, "says": f"a radius of gyration of {radius:.3g} m; "}
+    yield from draft.expect(
+        (*place, "inertia"), part.inertia, (0.0, LARGEST_GYRATION), size, " m for its size", remedy, **judged
+    )
+    is_long = section.rho_A is not None and length > LONG_PART * section.length
+    lightest, rho = LIGHTEST_PART * (section.rho_A or 0.0) * length if is_long else 0.0, density(scene)
+    limits = lightest, math.inf if rho is None else rho * depth**2 * (length + 2.0 * depth)
+    where = f" kg for a part {length:.2g} m long and {depth:.2g} m high"
+    remedy = "Give kg: not grams, not tonnes; and check beam: [x0, x1]."
+    yield from draft.expect((*place, "mass"), part.mass, limits, 1.0, where, remedy)
 
 
 def moving_parts(draft: Draft, scene: Scene) -> Findings:
@@ -181,8 +271,7 @@ def moving_parts(draft: Draft, scene: Scene) -> Findings:
     for i, (section, joint) in enumerate(zip(scene.sections, scene.joints, strict=True)):
         root = 0.0 if section.root is None else section.root.mass
         per_metre = section.rho_A if section.rho_A is not None else root / section.length
-        for key, length in (("mL", joint.lL), ("mR", joint.lR)):
-            mass = getattr(joint, key)
+        for key, mass, length in (("mL", joint.mL, joint.lL), ("mR", joint.mR, joint.lR)):
             if mass and length:
                 yield from _rod_mass(draft, ("joints", i, key), mass, length, per_metre, LINK_BY_BEAM)
         yield from _cylinder(draft, i, joint, per_metre)
@@ -192,48 +281,37 @@ def moving_parts(draft: Draft, scene: Scene) -> Findings:
 def _rod_mass(
     draft: Draft, place: Place, mass: float, length: float, per_metre: float, limits: tuple[float, float] = ROD_BY_BEAM
 ) -> Findings:
-    low, high = (limit * per_metre * length for limit in limits)
-    if per_metre > 0.0 and not low <= mass <= high:
-        bound = f"expected {low:.2g} to {high:.2g} kg for {length:g} m beside a section of {per_metre:.3g} kg/m"
-        yield draft.warning(place, mass, bound, "Give kg: not grams, not tonnes, not N.")
+    if per_metre > 0.0:
+        where = f" kg for {length:g} m beside a section of {per_metre:.3g} kg/m"
+        yield from draft.expect(place, mass, limits, per_metre * length, where, "Give kg: not grams, not tonnes, not N.")
 
 
 def _cylinder(draft: Draft, i: int, joint: Joint, per_metre: float) -> Findings:
-    place, cylinder = ("joints", i, "cylinder"), joint.cylinder
-    closed = cylinder.closed_length
-    if cylinder.max_stroke > LONGEST_STROKE * closed:
-        bound = f"expected at most {LONGEST_STROKE * closed:.3g} m: closed, the cylinder is {closed:g} m long"
-        remedy = "Give the stroke, not the open length; closed_length is pin to pin with the rod all the way in."
-        yield draft.warning((*place, "max_stroke"), cylinder.max_stroke, bound, remedy)
-    for key in ("barrel", "rod"):
-        part = getattr(cylinder, key)
+    place, cylinder, closed = ("joints", i, "cylinder"), joint.cylinder, joint.cylinder.closed_length
+    where = f" m: closed, the cylinder is {closed:g} m long"
+    remedy = "Give the stroke, not the open length; closed_length is pin to pin with the rod all the way in."
+    yield from draft.expect((*place, "max_stroke"), cylinder.max_stroke, (0.0, LONGEST_STROKE), closed, where, remedy)
+    for key, part in (("barrel", cylinder.barrel), ("rod", cylinder.rod)):
         if part is not None and part.mass > 0.0:
-            yield from _cylinder_part(draft, (*place, key), part, closed)
+            remedy = "Barrels count from the barrel pin, rods from the rod pin."
+            yield from draft.expect((*place, key, "com"), part.com, (0.0, CYLINDER_CENTRE), closed, where, remedy)
+            radius = math.sqrt(part.inertia / part.mass)
+            if part.inertia:
+                judged: dict[str, Any] = {"measured": radius, "says": f"a radius of gyration of {radius:.3g} m; "}
+                told, remedy = f" m for a cylinder of {closed:g} m", "Give kg m^2 about the part's own centre of mass."
+                here = (*place, key, "inertia")
+                yield from draft.expect(here, part.inertia, CYLINDER_GYRATION, closed, told, remedy, **judged)
             yield from _rod_mass(draft, (*place, key, "mass"), part.mass, closed, per_metre)
 
 
 def _cylinder_size(draft: Draft, i: int, cylinder: Cylinder, section: float) -> Findings:
     """Check closed length against the section beside it, oil in the lines against that in the chambers."""
     place, closed = ("joints", i, "cylinder"), cylinder.closed_length
-    if closed > LONGEST_CYLINDER * section:
-        bound = f"expected at most {LONGEST_CYLINDER * section:.3g} m beside a section of {section:g} m"
-        remedy = "Check the pins at its ends: C from the outboard pivot, cylinder_pin from the same origin as pivot."
-        yield draft.warning((*place, "closed_length"), closed, bound, remedy)
+    remedy = "Check the pins at its ends: C from the outboard pivot, cylinder_pin from the same origin as pivot."
+    where = f" m beside a section of {section:g} m"
+    yield from draft.expect((*place, "closed_length"), closed, (0.0, LONGEST_CYLINDER), section, where, remedy)
     if cylinder.oil is not None:
         for key, area in (("cap_line", cylinder.oil.cap_area), ("rod_line", cylinder.oil.rod_area)):
-            volume, (least, most) = getattr(cylinder.oil, key), (share * area * cylinder.max_stroke for share in LINE)
-            if 0.0 < volume < least or volume > most:
-                words = f"at least {least:.2g} m^3, a thousandth of" if volume < least else f"at most {most:.2g} m^3, twice"
-                bound = f"expected {words} what the chamber takes"
-                yield draft.warning((*place, "oil", key), volume, bound, "Give m^3: half a litre is 5e-4.")
-
-
-def _cylinder_part(draft: Draft, place: Place, part: CylinderPart, closed: float) -> Findings:
-    if part.com > CYLINDER_CENTRE * closed:
-        bound = f"expected at most {CYLINDER_CENTRE * closed:.3g} m: closed, the cylinder is {closed:g} m long"
-        yield draft.warning((*place, "com"), part.com, bound, "Barrels count from the barrel pin, rods from the rod pin.")
-    radius = math.sqrt(part.inertia / part.mass)
-    low, high = (limit * closed for limit in CYLINDER_GYRATION)
-    if part.inertia and not low <= radius <= high:
-        bound = f"a radius of gyration of {radius:.3g} m; expected {low:.2g} to {high:.2g} m for a cylinder of {closed:g} m"
-        yield draft.warning((*place, "inertia"), part.inertia, bound, "Give kg m^2 about the part's own centre of mass.")
+            if volume := getattr(cylinder.oil, key):
+                where, remedy = " m^3, a thousandth to twice what the chamber takes", "Give m^3: half a litre is 5e-4."
+                yield from draft.expect((*place, "oil", key), volume, LINE, area * cylinder.max_stroke, where, remedy)

@@ -1,17 +1,14 @@
-"""Consistency checks of a scene's values: keys that need or exclude each other, and values that look like another unit."""
+"""Consistency of a scene's values: keys that need or exclude each other, counts, pins with clearance that are there."""
 
 from __future__ import annotations
 
-import math
-from typing import Any, NamedTuple
-
-from pydantic import BaseModel
+import re
 
 from ...config.yaml_text import Place
 from ...errors import ABSENT
 from ..block_reader import meaning_of
 from ..schema import Cylinder, Joint, Oil, Point, Section
-from .draft import Draft, Findings
+from . import Draft, Findings
 
 BEAM_NEEDS = ("A", "I", "rho_A")
 BEAM_ONLY = ("A", "I", "rho_A", "rho_I", "beta", "height", "modes", "axial", "geometric", "head")
@@ -19,6 +16,10 @@ LINK_KEYS = ("C", "D", "E", "lL", "lR")
 SIX_BAR_ONLY = (*LINK_KEYS, "side", "R", "mL", "mR")
 NEEDED = {"A": (), "B1": LINK_KEYS, "B2": (*LINK_KEYS, "R"), "B3": (*LINK_KEYS, "R")}
 """Keys of a joint by its kind."""
+ROD_BY_BORE = (0.4, 0.92)  # rods that may be pushed; the series of ISO 7181 has 0.45 to 0.89 for ratios of areas from 1.25 on
+PLACES = {"cylinder": ("rod", "barrel"), "joint": ("pivot", "link_L", "link_R", "Q")}
+NEAR_RESTITUTION = 0.02  # between the restitution that is asked for and the one that a law gives
+WIDE_CLEARANCE = 0.1  # of the pin's radius; contact of a journal in a bush is meant for much less
 
 
 def counts(draft: Draft) -> Findings:
@@ -148,10 +149,9 @@ def _oil_spring(draft: Draft, i: int, cylinder: Cylinder) -> Findings:
     if oil.rod >= oil.bore:
         bound = f"the rod must be thinner than the bore, {oil.bore:g} m"
         yield draft.fault((*place, "oil", "rod"), oil.rod, bound, "Give both as diameters in m.")
-    elif not ROD_BY_BORE[0] * oil.bore <= oil.rod <= ROD_BY_BORE[1] * oil.bore:
-        low, high = (share * oil.bore for share in ROD_BY_BORE)
-        bound = f"expected {low:.3g} to {high:.3g} m in a bore of {oil.bore:g} m"
-        yield draft.warning((*place, "oil", "rod"), oil.rod, bound, "Give both as diameters in m, not one as a radius.")
+    else:
+        where, remedy = f" m in a bore of {oil.bore:g} m", "Give both as diameters in m, not one as a radius."
+        yield from draft.expect((*place, "oil", "rod"), oil.rod, ROD_BY_BORE, oil.bore, where, remedy)
     for key, end in (("cap_line", "stroke 0"), ("rod_line", f"its full stroke, {cylinder.max_stroke:g} m")):
         if getattr(oil, key) == 0.0:
             bound = f"no oil is left there at {end}, and the cylinder is incompressible"
@@ -171,119 +171,48 @@ def _several(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-LENGTHS = ("length", "beam", "height", "rod_pin", "com", "pivot", "cylinder_pin", "C", "D", "E", "R", "lL", "lR",
-           "closed_length", "max_stroke")  # fmt: skip
-ROD_BY_BORE = (0.4, 0.92)  # rods that may be pushed; the series of ISO 7181 has 0.45 to 0.89 for ratios of areas from 1.25 on
-BULK = (4e8, 2.5e9)  # Pa; water has 2.2e9
-TURNS = "the joint turns by"
-NARROW = 25.0  # deg; joints of booms turn by 60 and more
+def worn_pins(draft: Draft) -> Findings:
+    """Check that every pin of the block is a pin of the boom, named once, with a clearance that fits its radius."""
+    if draft.clearance is None:
+        return
+    law = draft.clearance.contact
+    if "restitution" in law.model_fields_set and abs(law.given_restitution - law.restitution) > NEAR_RESTITUTION:
+        bound = f"the law {law.law} really gives {law.given_restitution:.3f}"
+        remedy = "Take the law hunt-crossley-exact, which gives what is asked for."
+        yield draft.warning(("clearance", "contact", "restitution"), law.restitution, bound, remedy)
+    there = [name for k, joint in enumerate(draft.joints) if joint is not None for name in names_of(k, joint)]
+    seen: dict[str, int] = {}
+    for i, pin in enumerate(draft.clearance.pins):
+        place = ("clearance", "pins", i)
+        if there and pin.at not in there and None not in draft.joints:
+            yield draft.fault((*place, "at"), pin.at, *_unknown(pin.at, draft.joints, there))
+        if pin.at in seen:
+            bound = f"clearance.pins[{seen[pin.at]}] is this pin already"
+            yield draft.fault((*place, "at"), pin.at, bound, "Give every pin once.")
+        seen.setdefault(pin.at, i)
+        share = pin.radial_clearance / pin.pin_radius
+        if share >= 1.0:
+            bound = f"it must be less than pin_radius = {pin.pin_radius:g} m"
+            yield draft.fault((*place, "radial_clearance"), pin.radial_clearance, bound, "Give it in metres.")
+        elif share > WIDE_CLEARANCE:
+            bound = f"it is more than a tenth of pin_radius = {pin.pin_radius:g} m, for which the contact law is not meant"
+            yield draft.warning((*place, "radial_clearance"), pin.radial_clearance, bound, "Give both in metres.")
 
 
-class Suspect(NamedTuple):
-    """Keys whose values look wrong below a least or above a greatest magnitude: what they look like, what to do.
-
-    Remedies are formatted with the value (``{0:g}``) and `factor` times the value (``{1:g}``).
-    """
-
-    keys: tuple[str, ...]
-    least: float
-    most: float
-    looks: str
-    remedy: str
-    factor: float = 1.0
+def names_of(index: int, joint: Joint) -> list[str]:
+    """Return all pins of joint `index` (0-based) and of its cylinder that can have clearance."""
+    own = PLACES["joint"][:1] if joint.kind == "A" else PLACES["joint"]
+    number = index + 1
+    return [f"cylinder_{number}.{place}" for place in PLACES["cylinder"]] + [f"joint_{number}.{place}" for place in own]
 
 
-_K = "expected from 1e6 to 1e9 N/m"
-_OIL_HAS = "hydraulic oil has 1.4e9 to 1.7e9, with air in it less"
-SUSPECTS = (
-    Suspect(("Young's modulus",), 1e3, math.inf, "less than 1e6 Pa: GPa or MPa?", "Give Pa: {0:g} GPa are {1:g}.", 1e9),
-    Suspect(("Young's modulus",), 1e6, math.inf, "less than 1e6 Pa: GPa or MPa?", "Give Pa: {0:g} MPa are {1:g}.", 1e6),
-    Suspect(("rho",), 50.0, math.inf, "less than 50 kg/m^3: g/cm^3 or t/m^3?", "Give kg/m^3: {1:g}.", 1e3),
-    Suspect(("k",), 1e3, math.inf, f"{_K}: kN/mm?", "Give N/m: {0:g} kN/mm are {1:g}.", 1e6),
-    Suspect(("k",), 1e6, math.inf, f"{_K}: kN/m?", "Give N/m: {0:g} kN/m are {1:g}.", 1e3),
-    Suspect(("k",), 0.0, 1e9, _K, "Check its unit, N/m, or the bore and the oil that it comes from."),
-    Suspect(("bulk_modulus",), *BULK, f"expected from {BULK[0]:.2g} to {BULK[1]:.2g} Pa: {_OIL_HAS}",
-            "Check its unit: 1.4 GPa are 14000 bar."),
-    Suspect(("payload",), 1.0, math.inf, "less than 1 kg: tonnes?", "Give kg: {0:g} t are {1:g}.", 1e3),
-    Suspect(("mass", "mL", "mR", "payload"), 0.0, 1e5, "more than 1e5 kg: grams?", "Give kg: {0:g} g are {1:g}.", 1e-3),
-    Suspect(("A",), 0.0, 1.0, "more than 1 m^2: cm^2 or mm^2?", "Give the area in m^2: 49 cm^2 is 4.9e-3."),
-    Suspect(("I",), 0.0, 0.1, "more than 0.1 m^4: cm^4 or mm^4?", "Give the second moment in m^4: 3600 cm^4 is 3.6e-5."),
-    Suspect(("rho_A",), 0.0, 5e3, "more than 5000 kg/m: a density in kg/m^3?", "Give the mass of one metre of the section."),
-    Suspect(("line_fill",), 0.0, 100.0, "more than 100 kg/m: the whole load in kg?", "Give the concrete in one metre of pipe."),
-    Suspect(("inclination",), 0.0, 0.2, "more than 0.2 rad, which is 11.5 degrees: degrees?",
-            "Give radians: 5 degrees are 0.0873."),
-    Suspect(("closed_length", "max_stroke"), 0.0, 50.0, "more than 50 m: mm?", "Give lengths in m."),
-    Suspect(("cap_line", "rod_line"), 0.0, 0.5, "more than 0.5 m^3: litres?", "Give m^3: 1 litre is 1e-3."),
-)  # fmt: skip
-"""Values that look like another unit; the first that applies to a key is reported."""
-
-
-def suspects(draft: Draft) -> Findings:
-    """Check the size of all values of all usable parts."""
-    blocks: list[tuple[Place, Any]] = [(("material",), draft.material), (("base",), draft.base), (("tip",), draft.tip)]
-    blocks += [(("sections", i), section) for i, section in enumerate(draft.sections)]
-    blocks += [(("joints", i), joint) for i, joint in enumerate(draft.joints)]
-    for place, block in blocks:
-        if block is not None:
-            yield from _block(draft, place, block)
-    if draft.line_fill is not None:
-        yield from _value(draft, ("line_fill",), draft.line_fill)
-    yield from _gravity(draft)
-    yield from _postures(draft)
-
-
-def _block(draft: Draft, place: Place, block: BaseModel) -> Findings:
-    for key in type(block).model_fields:
-        value, here = getattr(block, key), (*place, key)
-        if isinstance(value, BaseModel):
-            yield from _block(draft, here, value)
-        elif value is not None:
-            yield from _value(draft, here, value)
-
-
-def _value(draft: Draft, place: Place, value: Any) -> Findings:
-    """Yield a warning of a value that looks like another unit. A zero is a value that is left out."""
-    key, numbers = str(place[-1]), value if isinstance(value, tuple) else (value,)
-    size = max((abs(item) for item in numbers if isinstance(item, int | float)), default=0.0)
-    key = "Young's modulus" if place == ("material", "E") else key  # E is also a pin
-    if key == "range_deg":
-        yield from _narrow(draft, place, value)
-    elif key in LENGTHS and size > 200:
-        written = draft.document.written(place)
-        told = f"written as `{written}`, which is more than 200 m" if isinstance(written, str) else "more than 200 m: mm?"
-        yield draft.warning(place, value, told, "Give lengths in m, or with their unit: 8500 mm.")
-    else:
-        for suspect in SUSPECTS:
-            if key in suspect.keys and size and not suspect.least <= size <= suspect.most:
-                yield draft.warning(place, value, suspect.looks, suspect.remedy.format(value, suspect.factor * value))
-                return
-
-
-def _narrow(draft: Draft, place: Place, value: tuple[float, float]) -> Findings:
-    if max(map(abs, value)) < 6.3:
-        shown = ", ".join(f"{math.degrees(angle):.4g}" for angle in value)
-        yield draft.warning(place, value, "all within 6.3: radians?", f"Give degrees; these radians would be [{shown}].")
-    elif 0.0 < value[1] - value[0] < NARROW:
-        bound = f"{TURNS} {value[1] - value[0]:.3g} deg in all; expected at least {NARROW:g} deg"
-        yield draft.warning(place, value, bound, "Give the lowest and the highest joint angle in degrees; check the decimals.")
-
-
-TILT = 1e-3  # of gravity against -y, rad
-
-
-def _gravity(draft: Draft) -> Findings:
-    if draft.gravity is not None:
-        if not 9.7 < math.hypot(*draft.gravity) < 9.9:
-            bound = "its size is not that of the earth's gravity, about 9.81 m/s^2"
-            yield draft.warning(("gravity",), draft.gravity, bound, "Usual is [0.0, -9.81].")
-        elif draft.gravity[1] > 0:
-            yield draft.warning(("gravity",), draft.gravity, "it points upwards", "Usual is [0.0, -9.81].")
-        elif abs(draft.gravity[0]) > TILT * abs(draft.gravity[1]):
-            bound = "it does not point along -y, which is down"
-            yield draft.warning(("gravity",), draft.gravity, bound, "Give [0.0, -9.81]; a slope is base.inclination, rad.")
-
-
-def _postures(draft: Draft) -> Findings:
-    for name, angles in draft.postures.items():
-        if angles and max(map(abs, angles)) < 6.3 and any(angle != round(angle) for angle in angles):
-            yield draft.warning(("postures", name), angles, "all within 6.3: radians?", "Give degrees to the horizontal.")
+def _unknown(at: str, joints: tuple[Joint | None, ...], there: list[str]) -> tuple[str, str]:
+    """Return why there is no such pin, and the names that exist."""
+    form = re.fullmatch(r"(cylinder|joint)_(\d+)\.(\w+)", at)
+    if form is None or form[3] not in PLACES[form[1]]:
+        return "not the name of a pin", "Write cylinder_i. with rod or barrel, or joint_i. with pivot, link_L, link_R or Q."
+    number = int(form[2])
+    if not 1 <= number <= len(joints):
+        return f"the boom has joints and cylinders 1 to {len(joints)}", f"Give one of {', '.join(there)}."
+    own = [name for name in there if name.split(".")[0] in (f"joint_{number}", f"cylinder_{number}")]
+    return f"joint {number} is of kind A and has no links", f"Give one of {', '.join(own)}."
