@@ -16,9 +16,8 @@ from ..errors import BagError, Fault, SceneError, UsageError
 from ..health.baseline import Baseline, baseline_from, load_baseline
 from ..messages.mapping import load_mapping, mapping_from
 from ..messages.topic_table import Topics
-from ..scene.load import DEFAULT_NAME, default_text, examine_text
+from ..scene.load import DEFAULT_NAME, default_text, examine_text, read_text
 from ..scene.schema import Scene
-from ..scene.yaml_reader import read_text
 from ..types import Stream, StrokeReading
 from .session_sheet import KeptText, kept, kept_parameters, rig_version, sha256
 

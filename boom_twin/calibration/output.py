@@ -15,9 +15,8 @@ from ..errors import SceneError, UsageError
 from ..messages.mapping import load_mapping
 from ..messages.topic_table import factor
 from ..scene.edit import anew
-from ..scene.load import structure
+from ..scene.load import parse, structure, with_end_mark
 from ..scene.schema import Scene
-from ..scene.yaml_reader import parse, with_end_mark
 from ..system.atomic_files import check_target, write_atomic
 from ..types import Stream
 from .run import Calibration, Estimate

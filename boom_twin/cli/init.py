@@ -13,11 +13,10 @@ from typing import Any
 
 from ..config.yaml_text import Document, Place, whole_text, words
 from ..errors import UsageError
-from ..scene.block_reader import meaning_at, validated
+from ..scene.block_reader import NUMBER, meaning_at, validated
 from ..scene.boom_table import BoomTable, checked_table, frozen, read_table
 from ..scene.checks.values import NEEDED
 from ..scene.first_scene import first_scene
-from ..scene.yaml_reader import NUMBER
 from ..system.atomic_files import check_new, check_target, write_atomic
 from .output import tell_oddities
 

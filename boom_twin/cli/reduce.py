@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..scene import Scene
-from ..scene.load import default_text
-from ..scene.yaml_reader import read_text, with_end_mark
+from ..scene.load import default_text, read_text, with_end_mark
 from ..system.atomic_files import check_new, write_atomic
 from .arguments import add_file, files_of, refuse_given
 

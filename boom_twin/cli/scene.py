@@ -5,8 +5,7 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 
-from ..scene.load import clearance_text, default_text, example_names, example_text
-from ..scene.yaml_reader import with_end_mark
+from ..scene.load import clearance_text, default_text, example_names, example_text, with_end_mark
 
 
 def add_arguments(parser: ArgumentParser) -> None:

@@ -11,7 +11,8 @@ from pydantic import Field
 
 from ..config.yaml_text import Document, Place
 from ..errors import ABSENT, Fault, SceneError
-from .block_reader import meaning_of, validated
+from .block_reader import NUMBER, meaning_of, validated
+from .load import Kind, parse, read_text
 from .schema import (
     CAP_LINE,
     ROD_LINE,
@@ -30,7 +31,6 @@ from .schema import (
     Scene,
     Section,
 )  # fmt: skip
-from .yaml_reader import NUMBER, Kind, parse, read_text
 
 STEEL = Material(E=2.1e11, rho=7850.0)
 

@@ -20,10 +20,9 @@ from ruamel.yaml.error import YAMLError
 
 from ..config.yaml_text import Place, with_value, words, yaml_text
 from ..errors import SceneError, UsageError
-from .load import examine_text, structure
+from .load import examine_text, parse, structure, text_of
 from .oil_spring import middle_stiffness
 from .schema import Cylinder, CylinderPart, RigidPart, Scene, Section, Tip
-from .yaml_reader import parse, text_of
 
 Body = TypeVar("Body", RigidPart, CylinderPart)
 

@@ -22,10 +22,9 @@ from .checks.geometry import NEXT_TO
 from .checks.sizes import TURNS
 from .checks.whole_boom import straight_boom
 from .kinematics import linkage_of, stroke_curve
-from .load import examine_text
+from .load import examine_text, with_end_mark
 from .oil_spring import middle_stiffness, stiffness
 from .schema import Cylinder, JointGeometry, Oil, Scene, Section
-from .yaml_reader import with_end_mark
 
 ENDS = 1.2  # mass per metre of a rigid end against the beam's
 TUBE = 0.12  # wall of a barrel over its bore

@@ -1,21 +1,182 @@
-"""Load a scene file: `load_scene` reads, validates every value against the schema, and runs the cross-checks."""
+"""Load a scene file: `load_scene` reads its text, validates every value against the schema, and runs the cross-checks.
+
+A line ``# end of scene`` shows that a file was not cut off, and a line in its head (`PROMISE`) says that it has one. Both are
+comments, so that the file stays plain YAML. A file that promises the mark is refused without it; one that says nothing can be
+used, with a warning.
+"""
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable, Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import ScalarNode
 
-from ..config.yaml_text import Document, Place
+from ..config.yaml_text import Document, Place, YamlReader, whole_text
 from ..errors import Fault, SceneError, SceneWarning, UsageError
-from .block_reader import inner_block, validated
+from .block_reader import NUMBER, inner_block, validated
 from .checks import Draft, Findings, geometry, linkages, sizes, values, whole_boom
 from .schema import Scene
-from .yaml_reader import missing_end_mark, parse, read_text, text_of
+
+MAX_BYTES = 4_000_000
+SURROGATE = re.compile("[\ud800-\udfff]")
+
+
+class Kind(NamedTuple):
+    """Expected kind of a file, and the command that prints one to start from."""
+
+    name: str
+    example: str
+
+
+SCENE = Kind("scene", "boom_twin scene")
+
+
+def read_text(path: Path, kind: Kind = SCENE) -> str:
+    """Return the text of a scene file, or of another of its kind.
+
+    Raises
+    ------
+    SceneError
+        If there is no such file, or it is no UTF-8 text of at most `MAX_BYTES`.
+    """
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            bound = f"more than {MAX_BYTES // 1_000_000} MB"
+            raise _refusal(kind, str(path), bound, f"A {kind.name} has a few kB: is this the right file?")
+        return data.decode("utf-8-sig")
+    except (OSError, ValueError) as error:
+        if isinstance(error, UnicodeDecodeError):
+            raise _refusal(kind, str(path), *_not_utf8(data, error)) from None
+        reason = getattr(error, "strerror", None) or str(error)
+        remedy = f"Give the path of a {kind.name} file; `{kind.example}` prints one to start from."
+        raise _refusal(kind, str(path), reason, remedy) from None
+
+
+def parse(text: str, source: str, kind: Kind = SCENE) -> Document:
+    """Return the plain values of a YAML text, sequences as tuples, with the line of each.
+
+    Raises
+    ------
+    SceneError
+        If the text is not YAML at all. What is YAML but not allowed here is in ``Document.faults``.
+    """
+    try:
+        reader = _SceneReader(text, tuple)
+    except (YAMLError, RecursionError, ValueError) as error:
+        raise SceneError(source, (_syntax_fault(text, error),)) from None
+    if reader.is_empty:
+        raise _refusal(kind, source, "the file is empty", f"Start from the one that `{kind.example}` prints.")
+    return reader.document
+
+
+def _not_utf8(data: bytes, error: UnicodeDecodeError) -> tuple[str, str]:
+    """Return what a file is instead of UTF-8 text, and the remedy."""
+    if data.startswith((b"PK", b"\xd0\xcf\x11\xe0")):  # zip, as .xlsx and .ods; .xls
+        return "this is not a text file but a spreadsheet's own or an archive", "Save a spreadsheet as `CSV UTF-8`."
+    if b"\0" in data:
+        return "this is not a text file in UTF-8", "Give a scene or a table in YAML, or a table in CSV."
+    line = data.count(b"\n", 0, error.start) + 1
+    return (
+        f"line {line} has a character that is not UTF-8, byte {data[error.start]:#x}",
+        "Save the file with the encoding UTF-8.",
+    )
+
+
+def _refusal(kind: Kind, source: str, bound: str, remedy: str) -> SceneError:
+    return SceneError(source, (Fault(f"{kind.name} file", source, bound, remedy),))
+
+
+def _syntax_fault(text: str, error: Exception) -> Fault:
+    """Return the syntax error of the YAML parser as a fault, with the line that it names."""
+    line, what, rows = None, "brackets nested too deeply", text.splitlines()
+    if isinstance(error, MarkedYAMLError):
+        mark = error.problem_mark or error.context_mark
+        what = str(error.problem or error.context)
+        line = None if mark is None else min(mark.line + 1, len(rows))
+    elif isinstance(error, YAMLError):
+        what = str(error)
+    what = " ".join(what.split())
+    shown = rows[line - 1].strip() if line else text[:40].strip()
+    return Fault("text", shown, f"this is not valid YAML, {what}", _yaml_remedy(what), line)
+
+
+def _yaml_remedy(what: str) -> str:
+    if "\\t" in what:
+        return "Indent with spaces, not with tabs."
+    return "Mend the text on this line or just above it: brackets, commas, colons, indentation."
+
+
+class _SceneReader(YamlReader):
+    """Reader that takes more spellings of numbers, and refuses half characters."""
+
+    def text(self, node: ScalarNode, place: Place) -> Any:
+        if SURROGATE.search(node.value):
+            self.fault(place, node.value, "it holds half a character", "Write the text without \\uD800 to \\uDFFF.")
+            return ""
+        if node.style is None and NUMBER.fullmatch(node.value):  # +.5e3, which YAML takes for text
+            return float(node.value)
+        return node.value
+
+
+PROMISE = '# This file ends with the line "# end of scene"; without it, it was cut off.'
+MARK = "# end of scene"
+
+
+def with_end_mark(text: str) -> str:
+    """Return text with the mark in its last line, and in its first the promise of it, if that does not stand there already."""
+    kept = [line for line in text.splitlines() if line != MARK]
+    head = [] if PROMISE in kept else [PROMISE]
+    return "\n".join([*head, *kept]).rstrip() + f"\n\n{MARK}\n"
+
+
+def text_of(document: Mapping[str, Any]) -> str:
+    """Return a scene file with these keys; UsageError if a value is none that YAML has."""
+    try:
+        return with_end_mark(whole_text(_plain(document)))
+    except YAMLError as error:
+        raise UsageError(f"scene: {str(error).splitlines()[0]}. Give texts, numbers, lists and dicts only.") from None
+
+
+def _plain(value: Any) -> Any:
+    """Return values of NumPy as Python's, tuples as lists."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return _plain(value.tolist()) if hasattr(value, "tolist") else value
+
+
+def missing_end_mark(text: str) -> Fault | None:
+    """Return a fault if the end of a scene file is cut off, a warning or a note if it may be; None if it is whole.
+
+    Many files that were written by hand have no mark. That is a note, and a warning where not even the last line ends.
+    """
+    lines = text.splitlines()
+    number = max((i for i, line in enumerate(lines, 1) if line.strip()), default=0)
+    last = lines[number - 1].strip() if number else ""
+    if last == MARK:
+        return None
+    if PROMISE in lines and MARK not in lines:
+        bound = f"the first lines say that the file ends with `{MARK}`, and it does not: it was cut off"
+        remedy = "Fetch the whole file; or, if nothing is missing, add that line."
+        return Fault("end of the file", last, bound, remedy, number)
+    kind: Literal["warning", "note"] = "note"
+    bound = f"no line `{MARK}`, so one cannot tell whether the rest of the file was cut off"
+    if not text.endswith("\n"):
+        bound, kind = f"no line `{MARK}`, and not even an end of line: it may have been cut off", "warning"
+    return Fault("end of the file", last, bound, "If nothing is missing, add that line at the end.", number, kind)
+
+
+# -- values and checks ---------------------------------------------------------------------------------------------------
 
 
 def structure(document: Document) -> tuple[Scene | None, Draft, list[Fault]]:

@@ -10,8 +10,7 @@ import pytest
 from boom_twin.cli.main import main
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.load import clearance_text, default_text
-from boom_twin.scene.yaml_reader import with_end_mark
+from boom_twin.scene.load import clearance_text, default_text, with_end_mark
 
 
 @pytest.fixture

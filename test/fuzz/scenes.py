@@ -22,7 +22,7 @@ from ruamel.yaml.error import YAMLError
 from boom_twin import Scene, load_scene, simulate, statics
 from boom_twin.errors import BoomTwinError, SceneError, SceneWarning
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.yaml_reader import NUMBER
+from boom_twin.scene.load import NUMBER
 
 from .mutate import cut, damaged, pick, rearranged
 from .odd_yaml import odd

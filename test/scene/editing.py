@@ -12,8 +12,7 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from boom_twin.errors import Fault, SceneError
-from boom_twin.scene.load import default_text, examine, example_text
-from boom_twin.scene.yaml_reader import with_end_mark
+from boom_twin.scene.load import default_text, examine, example_text, with_end_mark
 
 Values = dict[str, Any]
 Edit = Callable[[Values], None]

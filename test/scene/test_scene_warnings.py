@@ -14,9 +14,8 @@ from boom_twin.cli.main import main
 from boom_twin.errors import SceneError
 from boom_twin.scene.checks.linkages import passes_of
 from boom_twin.scene.kinematics import skeleton
-from boom_twin.scene.load import clearance_text, default_text, example_names, example_text
+from boom_twin.scene.load import clearance_text, default_text, example_names, example_text, with_end_mark
 from boom_twin.scene.summary import explain
-from boom_twin.scene.yaml_reader import with_end_mark
 
 # Each row: the place that is edited and, if it is another one, the place of the warning; the new value; words of the message.
 UNITS = [

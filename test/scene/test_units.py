@@ -10,10 +10,9 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from boom_twin.scene.block_reader import inner_block, meaning_of
+from boom_twin.scene.block_reader import converted, inner_block, meaning_of, unit_of
 from boom_twin.scene.load import examine, load_scene
 from boom_twin.scene.schema import Material, Scene
-from boom_twin.scene.units import converted, unit_of
 
 OTHER = {
     "m": (1000, "mm"), "m^2": (1e4, "cm^2"), "m^4": (1e8, "cm4"), "kg": (1e-3, "t"), "kg/m": (1e-3, "kg/mm"),

@@ -12,8 +12,7 @@ from ruamel.yaml import YAML
 from boom_twin.reduction.variants import KINDS, variants
 from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.edit import Edit, edited, merged, rewritten
-from boom_twin.scene.load import default_text, examine, structure
-from boom_twin.scene.yaml_reader import parse, with_end_mark
+from boom_twin.scene.load import default_text, examine, parse, structure, with_end_mark
 
 EDITS = (
     Edit(("modes",), 4),
