@@ -1,7 +1,8 @@
 """Hooks of MkDocs: pages made from the sources, and links that hold in the folder as well as on the site.
 
-Pages that are no file in ``docs/``: CONTRIBUTING.md and CHANGELOG.md of the root, the notation, and the API reference, one page
-for each folder of the package in the order of the import layers. A link may name any file of the repository that has a page.
+Pages that are no file in ``docs/``: CONTRIBUTING.md and CHANGELOG.md of the root, the notation, the table of settings, and the
+API reference, one page for each folder of the package in the order of the import layers. A link may name any file of the
+repository that has a page.
 """
 
 from __future__ import annotations
@@ -17,10 +18,12 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 
+from boom_twin.config.settings import Settings, Thresholds, is_live
+
 ROOT = Path(__file__).parents[1]
 ROOT_PAGES = ("CONTRIBUTING.md", "CHANGELOG.md")
-NOTATION = "boom_twin/scene/notation.py"
-OWN_PAGES = {"README.md": "index.md", NOTATION: "notation.md", **{name: name for name in ROOT_PAGES}}
+NOTATION, SETTINGS = "boom_twin/scene/notation.py", "boom_twin/config/settings.py"
+OWN_PAGES = {"README.md": "index.md", NOTATION: "notation.md", SETTINGS: "settings.md", **{name: name for name in ROOT_PAGES}}
 TAGS, TEXT = r"(?:<[^>]+>)*", r"(?:<[^>]+>|[^()<])*"
 SHAPE = re.compile(rf"\({TAGS}ndarray{TAGS}, {TAGS}shape{TAGS}\(({TEXT}(?:\({TEXT}\){TEXT})?)\)\)")
 PLACED = re.compile(r"^ |\S   |^\[")
@@ -71,6 +74,21 @@ def notation_page() -> str:
     return page
 
 
+def settings_page() -> str:
+    """Markdown of the table of settings: unit, range and meaning of each parameter of the twin and of ``/diagnostics``."""
+    page = "# Settings\n\nParameters of the node, of `replay --params` and of `load_settings`, in SI units.\n"
+    signs = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+    for title, table in (("The twin", Settings), ("Thresholds of `/diagnostics`", Thresholds)):
+        page += f"\n## {title}\n\n| name | default | range | meaning, unit | changes while running |\n|---|---|---|---|---|\n"
+        for name, field in table.model_fields.items():
+            bounds = [
+                f"{sign} {getattr(rule, key):g}" for rule in field.metadata for key, sign in signs.items() if hasattr(rule, key)
+            ]
+            row = (f"`{name}`", f"{field.default:g}", ", ".join(bounds), field.description, "yes" if is_live(field) else "no")
+            page += f"| {' | '.join(map(str, row))} |\n"
+    return page
+
+
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Complete the part of the navigation that is not written down."""
     reference = next(part["API reference"] for part in config.nav or [] if "API reference" in part)
@@ -81,7 +99,11 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are no file in ``docs/``."""
     pages = {name: (ROOT / name).read_text(encoding="utf-8") for name in ROOT_PAGES}
-    pages |= {"notation.md": notation_page(), **{f"reference/{room}.md": room_page(room) for room in rooms()}}
+    pages |= {
+        "notation.md": notation_page(),
+        "settings.md": settings_page(),
+        **{f"reference/{room}.md": room_page(room) for room in rooms()},
+    }
     for name, text in pages.items():
         files.append(File.generated(config, name, content=text))
     return files

@@ -1,16 +1,16 @@
-"""Parameters of the twin and thresholds of ``/diagnostics``: type, unit, bounds, meaning; the reader of ROS parameter files."""
+"""Table of all settings: those of the twin and the thresholds of ``/diagnostics``; the reader of ROS parameter files."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
-from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
 
 from ..errors import UsageError
 from ..types import SensorKind
@@ -97,8 +97,20 @@ def nearest(name: str, known: Sequence[str]) -> str:
     return get_close_matches(name, known, n=1, cutoff=0.0)[0]
 
 
-Share = Annotated[float, Field(gt=0, le=1)]
-Probability = Annotated[float, Field(gt=0, lt=1)]
+POSITIVE, NOT_NEGATIVE, SHARE, PROBABILITY = {"gt": 0.0}, {"ge": 0.0}, {"gt": 0.0, "le": 1.0}, {"gt": 0.0, "lt": 1.0}
+LOAD, LIMIT = {"ge": -1.0, "le": 1e5}, {"ge": 1e-6, "le": 1e9}
+"""Ranges of settings."""
+
+
+def setting(default: float, unit: str, bounds: Mapping[str, Any], meaning: str, live: bool = False) -> Any:
+    """Return a field of a table of settings; `unit` is ``1`` for a pure number, `live` tells if it can change at run time."""
+    text = meaning if unit == "1" else f"{meaning}, {unit}"
+    return Field(default=default, description=text, allow_inf_nan=False, json_schema_extra={"live": live}, **bounds)
+
+
+def is_live(field: FieldInfo) -> bool:
+    """Return True if a setting can change while the twin runs."""
+    return isinstance(field.json_schema_extra, dict) and bool(field.json_schema_extra["live"])
 
 
 class Thresholds(BaseModel):
@@ -106,32 +118,32 @@ class Thresholds(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    raise_after: NotNegative = Field(default=2.0, description="time for which a limit is passed before it is told, s")
-    clear_after: NotNegative = Field(default=5.0, description="time for which all is well again before it is told, s")
-    release: Share = Field(default=0.8, description="share of a limit below which its level is left")
-    stale_after: Positive = Field(default=2.0, description="a sensor without readings for so long is stale, s")
-    gap_warn: Positive = Field(default=0.1, description="a longer step between two stamps of a sensor is told, s")
-    unusable_warn: Share = Field(default=0.01, description="share of readings missing or out of range: warning")
-    unusable_error: Share = Field(default=0.5, description="share of readings missing or out of range: error")
-    frozen_after: Positive = Field(default=1.0, description="a reading unchanged for so long, at least, is frozen, s")
-    frozen_false_alarm: Probability = Field(
-        default=1e-9, description="probability that a live sensor is taken for frozen, for each reading"
+    raise_after: float = setting(2.0, "s", NOT_NEGATIVE, "time beyond a limit before its level is raised", True)
+    clear_after: float = setting(5.0, "s", NOT_NEGATIVE, "time back below a limit before its level is cleared", True)
+    release: float = setting(0.8, "1", SHARE, "share of a limit below which its level is left", True)
+    stale_after: float = setting(2.0, "s", POSITIVE, "time without readings after which a sensor is stale", True)
+    gap_warn: float = setting(0.1, "s", POSITIVE, "step between two stamps of a sensor: warning", True)
+    unusable_warn: float = setting(0.01, "1", SHARE, "share of readings missing or out of range: warning", True)
+    unusable_error: float = setting(0.5, "1", SHARE, "share of readings missing or out of range: error", True)
+    frozen_after: float = setting(1.0, "s", POSITIVE, "least time of an unchanged reading before its sensor is frozen", True)
+    frozen_false_alarm: float = setting(
+        1e-9, "1", PROBABILITY, "probability that a live sensor is called frozen, per reading", True
     )
-    clock_offset: Positive = Field(default=0.05, description="clocks of two streams that differ by more are told, s")
-    stamp_offset: Positive = Field(default=1.0, description="stamps and node's clock that differ by more are told once, s")
-    residual_window: Positive = Field(default=10.0, description="time over which a residual is judged, s")
-    residual_warn: Positive = Field(default=2.0, description="root mean square of a normalised residual: warning")
-    residual_error: Positive = Field(default=4.0, description="root mean square of a normalised residual: error")
-    load_warn: Positive = Field(default=0.5, description="time of a step over the time between strokes: warning")
-    load_error: Positive = Field(default=0.9, description="time of a step over the time between strokes: error")
-    unread_warn: Share = Field(default=0.01, description="share of messages lost, or given way to newer ones: warning")
-    unread_error: Share = Field(default=0.5, description="share of messages lost, or given way to newer ones: error")
-    wait_warn: Positive = Field(default=0.1, description="messages wait for their turn for longer: warning, s")
-    wait_error: Positive = Field(default=1.0, description="messages wait for their turn for longer: error, s")
-    lag_warn: Positive = Field(default=2.0, description="recorded messages not on the disk for so long: warning, s")
-    lag_error: Positive = Field(default=5.0, description="recorded messages not on the disk for so long: error, s")
-    disk_warn: Positive = Field(default=1800.0, description="the disk is full in less, at the present pace: warning, s")
-    disk_error: Positive = Field(default=120.0, description="the disk is full in less, at the present pace: error, s")
+    clock_offset: float = setting(0.05, "s", POSITIVE, "difference between the clocks of two streams: warning", True)
+    stamp_offset: float = setting(1.0, "s", POSITIVE, "difference of stamps and node's clock that is reported once", True)
+    residual_window: float = setting(10.0, "s", POSITIVE, "time over which a residual is judged", True)
+    residual_warn: float = setting(2.0, "1", POSITIVE, "root mean square of a normalised residual: warning", True)
+    residual_error: float = setting(4.0, "1", POSITIVE, "root mean square of a normalised residual: error", True)
+    load_warn: float = setting(0.5, "1", POSITIVE, "time of a step over the time between strokes: warning", True)
+    load_error: float = setting(0.9, "1", POSITIVE, "time of a step over the time between strokes: error", True)
+    unread_warn: float = setting(0.01, "1", SHARE, "share of messages lost, or given way to newer ones: warning", True)
+    unread_error: float = setting(0.5, "1", SHARE, "share of messages lost, or given way to newer ones: error", True)
+    wait_warn: float = setting(0.1, "s", POSITIVE, "time that messages wait for their turn: warning", True)
+    wait_error: float = setting(1.0, "s", POSITIVE, "time that messages wait for their turn: error", True)
+    lag_warn: float = setting(2.0, "s", POSITIVE, "age of recorded messages that are not on the disk: warning", True)
+    lag_error: float = setting(5.0, "s", POSITIVE, "age of recorded messages that are not on the disk: error", True)
+    disk_warn: float = setting(1800.0, "s", POSITIVE, "time until the disk is full at the present rate: warning", True)
+    disk_error: float = setting(120.0, "s", POSITIVE, "time until the disk is full at the present rate: error", True)
 
 
 def load_thresholds(path: Path, namespace: str = "") -> Thresholds:
@@ -141,16 +153,9 @@ def load_thresholds(path: Path, namespace: str = "") -> Thresholds:
 
 
 DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "twin.yaml"))
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 NODE_ONLY = ("scene", "mapping", "health", "baseline", "frame_prefix", "hardware_id", "autostart", "monitor")
 STROKE_RATE = 0.5
 """Upper bound of a cylinder's speed, m/s."""
-LIVE = "live"
-"""Mark of a setting that can change while the twin runs."""
-Load = Annotated[float, Field(ge=-1, le=1e5, allow_inf_nan=False), LIVE]
-Limit = Annotated[float, Field(ge=1e-6, le=1e9, allow_inf_nan=False), LIVE]
 
 
 class Settings(BaseModel):
@@ -158,31 +163,30 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    stroke_sigma: NotNegative = Field(default=2.0e-5, description="noise of a stroke transducer, m")
-    stroke_resolution: Positive = Field(default=5.0e-6, description="resolution of a stroke transducer, m")
-    angle_sigma: NotNegative = Field(default=1.745e-4, description="noise of a joint encoder, rad")
-    angle_resolution: Positive = Field(default=8.727e-5, description="resolution of a joint encoder, rad")
-    imu_sigma: Positive = Field(default=0.05, description="noise of the tip IMU, m/s^2")
-    force_sigma: Positive = Field(default=100.0, description="noise of a cylinder's force, N")
-    force_resolution: NotNegative = Field(default=20.0, description="resolution of a cylinder's force, N")
-    payload: Load = Field(default=-1.0, description="mass at the tip, kg; below 0: that of the scene")
-    line_fill: Load = Field(default=-1.0, description="concrete in the pipe line, kg/m; below 0: that of the scene")
-    stroke_rate: Limit = Field(default=STROKE_RATE, description="no cylinder is faster, m/s; such a stroke is left out")
-    gap: Limit = Field(default=0.1, description="longer pauses between strokes are flagged, s")
-    restart_gap: Limit = Field(default=5.0, description="longer pauses start again from rest, s")
-    jump_back: Limit = Field(default=1.0, description="a stamp earlier by less may be of a late sample, s")
-    leap: Limit = Field(default=3600.0, description="a longer step of the first stamps of angles is confirmed, s")
-    exaggeration: Positive = Field(default=10.0, description="factor of the displacements drawn large in ~/shape")
-    tip_deviation: Positive = Field(default=0.02, description="an angle off its prediction by more at the tip is an alarm, m")
-    force_deviation: Positive = Field(default=5e3, description="a cylinder force off its prediction by more is an alarm, N")
-    tip_load_limit: Positive = Field(default=500.0, description="force at the tip beside the known load that is an alarm, N")
-    force_scale: Positive = Field(default=1.0e5, description="cylinder force that has the full colour in ~/shape, N")
+    stroke_sigma: float = setting(2.0e-5, "m", NOT_NEGATIVE, "standard deviation of the noise of a stroke transducer")
+    stroke_resolution: float = setting(5.0e-6, "m", POSITIVE, "resolution of a stroke transducer")
+    angle_sigma: float = setting(1.745e-4, "rad", NOT_NEGATIVE, "standard deviation of the noise of a joint encoder")
+    angle_resolution: float = setting(8.727e-5, "rad", POSITIVE, "resolution of a joint encoder")
+    imu_sigma: float = setting(0.05, "m/s^2", POSITIVE, "standard deviation of the noise of the tip IMU")
+    force_sigma: float = setting(100.0, "N", POSITIVE, "standard deviation of the noise of a cylinder's force")
+    force_resolution: float = setting(20.0, "N", NOT_NEGATIVE, "resolution of a cylinder's force")
+    payload: float = setting(-1.0, "kg", LOAD, "mass at the tip; below 0: that of the scene", True)
+    line_fill: float = setting(-1.0, "kg/m", LOAD, "concrete in the pipe line; below 0: that of the scene", True)
+    stroke_rate: float = setting(STROKE_RATE, "m/s", LIMIT, "maximum speed of a cylinder; faster strokes are left out", True)
+    gap: float = setting(0.1, "s", LIMIT, "pause between strokes above which it is flagged", True)
+    restart_gap: float = setting(5.0, "s", LIMIT, "pause above which the model restarts from rest", True)
+    jump_back: float = setting(1.0, "s", LIMIT, "step back of a stamp below which the sample may be late", True)
+    leap: float = setting(3600.0, "s", LIMIT, "step of the first stamps of angles above which it is confirmed", True)
+    exaggeration: float = setting(10.0, "1", POSITIVE, "factor of the displacements drawn large in ~/shape")
+    tip_deviation: float = setting(0.02, "m", POSITIVE, "deviation of an angle, as it moves the tip, that is an alarm")
+    force_deviation: float = setting(5e3, "N", POSITIVE, "deviation of a cylinder force that is an alarm")
+    tip_load_limit: float = setting(500.0, "N", POSITIVE, "force at the tip beside the known load that is an alarm")
+    force_scale: float = setting(1.0e5, "N", POSITIVE, "cylinder force that has the full colour in ~/shape")
 
     @classmethod
-    @cache
     def live_names(cls) -> tuple[str, ...]:
         """Return the names of the settings that can change while the twin runs."""
-        return tuple(name for name, field in cls.model_fields.items() if LIVE in field.metadata)
+        return tuple(name for name, field in cls.model_fields.items() if is_live(field))
 
     @property
     def live(self) -> dict[str, float]:

@@ -11,6 +11,7 @@ from ruamel.yaml import YAML
 
 import boom_twin
 from boom_twin.cli.main import COMMANDS, main
+from boom_twin.config.settings import NODE_ONLY, Settings, Thresholds, read_parameters
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")]
@@ -52,7 +53,7 @@ def test_quoted_paths_are_there(page: Path) -> None:
 def test_every_page_stands_in_the_navigation() -> None:
     listed = re.findall(r"([\w/]+\.md)$", text_of("mkdocs.yml"), re.MULTILINE)
     written = [page.relative_to(ROOT / "docs").as_posix() for page in PAGES if page.parent != ROOT]
-    assert sorted(listed) == sorted([*written, "CHANGELOG.md", "CONTRIBUTING.md", "notation.md"])
+    assert sorted(listed) == sorted([*written, "CHANGELOG.md", "CONTRIBUTING.md", "notation.md", "settings.md"])
 
 
 def test_readme_is_short_and_its_figures_stand_in_the_docs() -> None:
@@ -92,6 +93,16 @@ def test_topics_are_those_of_the_table() -> None:
     told = {name for row in re.findall(r"^\| (`.*?) \|", rows, re.MULTILINE) for name in re.findall(r"`(\S+?)`", row)}
     entries = [*table["inputs"].values(), *table["outputs"].values(), table["events"]]
     assert told == {entry["name"] for entry in entries}
+
+
+def test_parameters_are_those_of_the_table_of_settings() -> None:
+    """The file to start from has every setting with its default, and nothing else but parameters of the node alone."""
+    written = read_parameters(ROOT / "msg_config" / "twin.yaml")
+    fields = {**Settings.model_fields, **Thresholds.model_fields}
+    assert {name: value for name, value in written.items() if name not in NODE_ONLY} == {
+        name: field.default for name, field in fields.items()
+    }
+    assert set(written) == {*fields, *NODE_ONLY}
 
 
 def test_rooms_are_those_of_the_package() -> None:
