@@ -12,7 +12,7 @@ from typing import Any
 
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString, LiteralScalarString
 
-from ..config.yaml_text import LARGEST, plain, read_plain
+from ..config.yaml_text import LARGEST_FILE, plain, read_plain
 from ..errors import BagError
 from ..system.atomic_files import write_atomic
 from ..system.received_files import holds_file
@@ -92,8 +92,8 @@ class SessionSheet:
         }
         text = _HEAD + dump({key: value for key, value in document.items() if value not in (None, "", {})})
         path = directory / FILE_NAME
-        if len(text.encode()) > LARGEST:
-            raise BagError(f"{path}: {len(text.encode())} bytes, of which {LARGEST} are read again. Shorten scene and mapping.")
+        if len(text.encode()) > LARGEST_FILE:
+            raise BagError(f"{path}: {len(text.encode())} bytes, more than {LARGEST_FILE}. Shorten scene and mapping.")
         write_atomic(path, text)
 
 
@@ -226,7 +226,7 @@ def incompleteness(path: Path) -> str:
     sheet = folder / FILE_NAME
     if sheet.is_file():
         with sheet.open("rb") as stream:
-            text = stream.read(LARGEST)
+            text = stream.read(LARGEST_FILE)
         if _BEGUN.search(text) and not _ENDED.search(text):
             return f"incomplete: the recorder was ended by force, or is still at work: {sheet} tells no end."
     return ""

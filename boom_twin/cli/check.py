@@ -14,7 +14,7 @@ from ..scene.kinematics import strokes_of_posture
 from ..scene.load import DEFAULT_NAME, examine
 from ..scene.oil_spring import STATIONS
 from ..scene.schema import Clearance
-from ..scene.segmentation import LEAST
+from ..scene.segmentation import LEAST_PARTS
 from ..scene.summary import UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from ..system.atomic_files import check_target
 from ..types import Stream
@@ -177,7 +177,7 @@ def _section_words(section: SectionAccount) -> str:
     if section.splits:
         words += ", split " + " and ".join(f"at {split.x:g} m by the {split.pin}" for split in section.splits)
     if len(section.parts) > len(section.splits) + 1:
-        words += f", cut evenly so that at least {LEAST} parts bend"
+        words += f", cut evenly so that at least {LEAST_PARTS} parts bend"
     parts = f"{len(section.parts)} parts with {coordinates} each" if len(section.parts) > 1 else coordinates
     return f"{words}: {parts}"
 

@@ -17,9 +17,9 @@ from ..errors import BoomTwinError, Fault, FaultKind
 from ..system.received_files import open_received
 from ..system.terminal_text import printable
 
-LARGEST = 4 * 2**20
+LARGEST_FILE = 4 * 2**20
 """Size limit of a file that is read, bytes."""
-MOST = 50_000
+MOST_VALUES = 50_000
 """Limit for the number of values in a file, with aliases expanded."""
 DEEPEST = 20
 
@@ -36,9 +36,9 @@ def read_plain(path: Path, failure: type[BoomTwinError], remedy: str, received: 
     """
     try:
         with open_received(path) if received else path.open("rb") as stream:
-            data = stream.read(LARGEST + 1)
-        if len(data) > LARGEST:
-            raise ValueError(f"more than {LARGEST} bytes")
+            data = stream.read(LARGEST_FILE + 1)
+        if len(data) > LARGEST_FILE:
+            raise ValueError(f"more than {LARGEST_FILE} bytes")
         return plain(data.decode("utf-8-sig"))
     except OSError as error:
         raise failure(f"{path}: {error.strerror}. {remedy}") from None
@@ -52,7 +52,7 @@ def plain(text: str) -> Any:
     Raises
     ------
     ValueError
-        It is not YAML; it has a value with a tag, a merge key, or a key twice; it holds more than `MOST` values, or is
+        It is not YAML; it has a value with a tag, a merge key, or a key twice; it holds more than `MOST_VALUES` values, or is
         nested deeper than `DEEPEST`.
     """
     try:
@@ -118,7 +118,7 @@ class YamlReader:
     Raises
     ------
     YAMLError, RecursionError, ValueError
-        The text is not YAML, holds more than `MOST` values, or is nested too deeply.
+        The text is not YAML, holds more than `MOST_VALUES` values, or is nested too deeply.
     """
 
     def __init__(self, text: str, sequence: type[list[Any]] | type[tuple[Any, ...]]) -> None:
@@ -141,9 +141,9 @@ class YamlReader:
     def _value(self, node: Node, place: Place) -> Any:
         self._count += 1
         self.document.lines.setdefault(place, node.start_mark.line + 1)
-        if len(place) > DEEPEST or self._count > MOST:
-            if self._count <= MOST + 1:
-                bound = f"nested too deeply, or too many values (more than {MOST} with aliases)"
+        if len(place) > DEEPEST or self._count > MOST_VALUES:
+            if self._count <= MOST_VALUES + 1:
+                bound = f"nested too deeply, or too many values (more than {MOST_VALUES} with aliases)"
                 self.fault(place, "...", bound, "Write it without aliases that hold themselves.")
             return None
         if isinstance(node, ScalarNode):
@@ -207,10 +207,10 @@ class BoundedComposer(Composer):
         return super().compose_document()
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        """Return the next node. Raise YAMLError after `MOST` nodes."""
+        """Return the next node. Raise YAMLError after `MOST_VALUES` nodes."""
         self.nodes += 1
-        if self.nodes > MOST:
-            raise YAMLError(f"more than {MOST} values")
+        if self.nodes > MOST_VALUES:
+            raise YAMLError(f"more than {MOST_VALUES} values")
         return super().compose_node(parent, index)
 
 

@@ -21,7 +21,7 @@ from .boom_table import BoomTable, BoxSection, DrawnJoint, odd_boxes, second_mom
 from .checks.geometry import NEXT_TO
 from .checks.sizes import TURNS
 from .checks.whole_boom import straight_boom
-from .kinematics import linkage_of, stroke_curve
+from .kinematics import RANGE_SAMPLES, linkage_of, stroke_curve
 from .load import examine_text, with_end_mark
 from .oil_spring import middle_stiffness, stiffness
 from .schema import Cylinder, JointGeometry, Oil, Scene, Section
@@ -29,8 +29,7 @@ from .schema import Cylinder, JointGeometry, Oil, Scene, Section
 ENDS = 1.2  # mass per metre of a rigid end against the beam's
 TUBE = 0.12  # wall of a barrel over its bore
 SPARE = 0.02  # of the travel, at each end of the stroke
-GRID = 721  # angles of a joint's range
-WIDTH = 46  # where comments begin
+COMMENT_COLUMN = 46  # where comments begin
 RANGE = re.compile(r"joints\[\d+\]\.range_deg")
 
 
@@ -184,7 +183,7 @@ def _lengths(table: BoomTable, i: int, joint: DrawnJoint) -> tuple[float, float]
     except TypeError:  # a pin is not given: the checks of the scene name it
         return 1.0, 2.0
     with np.errstate(invalid="ignore"):
-        lengths = cylinder_length(row, np.radians(np.linspace(*joint.range_deg, GRID)))[0]
+        lengths = cylinder_length(row, np.radians(np.linspace(*joint.range_deg, RANGE_SAMPLES)))[0]
     lengths = lengths[np.isfinite(lengths)]
     return (float(lengths.min()), float(lengths.max())) if lengths.size else (1.0, 2.0)
 
@@ -213,7 +212,7 @@ def _item(rows: list[Row]) -> list[str]:
     for number, (key, value, told) in enumerate(rows):
         text = value if isinstance(value, str) else yaml_text(value)  # words stand without quotes
         own = f"  {'-' if number == 0 else ' '} {key}: {text}".rstrip() if key.strip() else ""
-        lines.append(f"{own:{WIDTH}}  # {told}" if told else own)
+        lines.append(f"{own:{COMMENT_COLUMN}}  # {told}" if told else own)
     return lines
 
 

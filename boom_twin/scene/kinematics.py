@@ -19,6 +19,7 @@ from ..kernels.plane_algebra import turned
 from ..types import Array
 from .schema import Base, JointGeometry, Scene, Section
 
+RANGE_SAMPLES = 721  # angles of a joint's range at which it is examined
 MARGIN = math.radians(1.0)  # beyond range_deg: strokes at the ends, with their sensors' noise, still have an angle
 
 
@@ -267,14 +268,38 @@ def skeleton(scene: Scene, angles: Array) -> Skeleton:
 
 
 def _pins(scene: Scene, i: int, pivot: Array, headings: Array) -> JointPins:
-    row, carrier = linkage(scene, i), float(headings[i - 1]) if i else 0.0
-    phi = float(headings[i]) - carrier
-    barrel_pin = placed(pivot, carrier, (row.cx, row.cy))
-    if scene.joints[i].kind == "A":
-        return JointPins("A", pivot, barrel_pin, placed(pivot, carrier + phi, (row.ex, row.ey)))
-    d, e = placed(pivot, carrier, (row.dx, row.dy)), placed(pivot, carrier + phi, (row.ex, row.ey))
-    left, right = link_angles(row, phi)
-    q = d + row.length_l * np.array([math.cos(carrier + left), math.sin(carrier + left)])
-    base, angle = (d, left) if row.mount == LINK_L else (e, right)
-    rod_pin = placed(base, carrier + angle, (row.along, row.left))
-    return JointPins(scene.joints[i].kind, pivot, barrel_pin, rod_pin, d, e, q)
+    carrier = float(headings[i - 1]) if i else 0.0
+    found = joint_pins(scene, i, np.array(float(headings[i]) - carrier))
+    turn = np.exp(1j * carrier)
+    pins = {name: pivot + np.array([(turn * pin).real, (turn * pin).imag]) for name, pin in found.items()}
+    barrel_pin, rod_pin = pins["C" if i else "cylinder_pin"], pins[rod_pin_of(pins)]
+    return JointPins(scene.joints[i].kind, pivot, barrel_pin, rod_pin, pins.get("D"), pins.get("E"), pins.get("Q"))
+
+
+def joint_pins(scene: Scene, i: int, phi: Array) -> dict[str, Array]:
+    """Return the pins of joint `i` (0-based) by name at angles `phi` (rad), as x + iy (m) from the pivot in its carrier's axes.
+
+    The rod pin is ``Q`` in kind B1, ``R`` in the other six-bars, ``rod_pin`` in kind A. NaN where the links do not meet.
+    """
+    row = linkage(scene, i)
+    e = np.asarray(_complex(turned(phi, row.ex, row.ey)))
+    pins = {"the pivot": np.zeros_like(e), "C" if i else "cylinder_pin": np.full_like(e, complex(row.cx, row.cy))}
+    if i == 0:
+        return pins | {"rod_pin": e}
+    with np.errstate(invalid="ignore"):
+        left, right = link_angles(row, phi)
+    d = complex(row.dx, row.dy)
+    pins |= {"D": np.full_like(e, d), "E": e, "Q": np.asarray(d + row.length_l * np.exp(1j * left))}
+    if scene.joints[i].kind != "B1":
+        base, angle = (d, left) if row.mount == LINK_L else (e, right)
+        pins["R"] = np.asarray(base + _complex(turned(angle, row.along, row.left)))
+    return pins
+
+
+def rod_pin_of(pins: dict[str, Array]) -> str:
+    """Return the name of the pin of a joint that holds the rod."""
+    return next(name for name in ("R", "Q", "rod_pin") if name in pins)
+
+
+def _complex(point: tuple[Array, Array]) -> Array:
+    return np.asarray(point[0] + 1j * point[1])

@@ -16,10 +16,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from ..kernels.elements.pin_contact import LAWS, restitution_of
 from ..system.summary_display import SummaryDisplay, numbers
 
-LARGEST = 1e30  # of any value, in its unit; products of larger ones leave the range of numbers
-Finite = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, le=LARGEST, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, le=LARGEST, allow_inf_nan=False)]
+LARGEST_VALUE = 1e30  # of any value, in its unit; products of larger ones leave the range of numbers
+Finite = Annotated[float, Field(ge=-LARGEST_VALUE, le=LARGEST_VALUE, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=LARGEST_VALUE, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST_VALUE, allow_inf_nan=False)]
 Point = tuple[Finite, Finite]
 Modes = Annotated[int, Field(ge=0, le=10)]
 Mass = Annotated[NotNegative, Field(description="the mass in kg")]
@@ -334,8 +334,8 @@ class Scene(SummaryDisplay, Part):
         return self.sections[index].beam is not None and self.modes_of(index) > 0
 
 
-DEEP = 2.4  # depth of a drawn section over its radius of gyration: about that of a thin-walled box
-SHARE = 0.05  # of its length, where a section has no A and I
+DEPTH_BY_GYRATION = 2.4  # depth of a drawn section over its radius of gyration: about that of a thin-walled box
+DEPTH_BY_LENGTH = 0.05  # of its length, where a section has no A and I
 
 
 def section_depth(scene: Scene, i: int) -> float:
@@ -344,5 +344,5 @@ def section_depth(scene: Scene, i: int) -> float:
     if section.height is not None:
         return section.height
     if section.A is None or section.I is None:
-        return SHARE * section.length
-    return DEEP * math.sqrt(section.I / section.A)
+        return DEPTH_BY_LENGTH * section.length
+    return DEPTH_BY_GYRATION * math.sqrt(section.I / section.A)

@@ -1,8 +1,8 @@
 """Split a section's beam into the parts that bend: at the pins of cylinders, and evenly on short booms.
 
-The fewer parts bend, the higher does each of them reach into the spectrum. With fewer than `LEAST` parts along the boom the
-longest ones are cut into equal pieces, one cut after the other, so that the lowest six frequencies keep their accuracy with
-the default modes: on 133 random booms of one to three sections the worst of modes 1 to 4 is off by 0.17 %, of 5 and 6 by 0.9 %.
+The fewer parts bend, the higher does each of them reach into the spectrum. With fewer than `LEAST_PARTS` along the boom the
+longest ones are cut into equal pieces, one cut after the other. So the lowest six frequencies keep their accuracy with the
+default modes: on 133 random booms of one to three sections the worst of modes 1 to 4 is off by 0.17 %, of 5 and 6 by 0.9 %.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from .schema import Scene
 
 SAME_PLACE = 1e-9  # m
-LEAST = 7  # flexible parts along a boom
+LEAST_PARTS = 7  # flexible parts along a boom
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,12 +67,12 @@ class _Span:
 
 
 def _cut_spans(scene: Scene) -> list[_Span]:
-    """Return all parts between pins, base to tip; the longest pieces cut until there are `LEAST`."""
+    """Return all parts between pins, base to tip; the longest pieces cut until there are `LEAST_PARTS`."""
     spans = []
     for index, section in enumerate(scene.sections):
         if section.beam is not None and scene.is_flexible(index):
             ends = sorted({*section.beam, *(split.x for split in splits(scene, index))})
             spans += [_Span(index, start, stop) for start, stop in pairwise(ends)]
-    while spans and sum(span.cuts for span in spans) < LEAST:
+    while spans and sum(span.cuts for span in spans) < LEAST_PARTS:
         max(spans, key=lambda span: span.piece).cuts += 1
     return spans

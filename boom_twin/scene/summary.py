@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from .checks.linkages import LinkageAccount, linkage_account
-from .kinematics import stroke_range
+from .kinematics import RANGE_SAMPLES, stroke_range
 from .oil_spring import stiffness_over_stroke
 from .schema import IDEAL_BELOW, Joint, Pin, Scene
 from .segmentation import Split, flexible_parts, splits
@@ -84,7 +84,6 @@ def _absent(block: str, items: list[dict[str, str]]) -> list[LeftOut]:
 
 
 UNKNOWNS_A, UNKNOWNS_B, UNKNOWNS_PIN = 2, 6, 2
-SAMPLES = 721  # of a joint's range
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +218,7 @@ def _section(scene: Scene, i: int) -> SectionAccount:
 def _joint(scene: Scene, i: int) -> JointAccount:
     joint = scene.joints[i]
     cylinder = joint.cylinder
-    low, high = stroke_range(scene, i, SAMPLES)
+    low, high = stroke_range(scene, i, RANGE_SAMPLES)
     return JointAccount(
         number=i + 1,
         kind=joint.kind,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from mcap.opcode import Opcode
 
-from ...config.yaml_text import LARGEST
+from ...config.yaml_text import LARGEST_FILE
 from ...errors import BagError
 from ...system.atomic_files import write_atomic
 from ...system.received_files import holds_file, open_received
@@ -182,9 +182,9 @@ def _key(bag: BagWriter, keys: dict[tuple[str, str, bytes], int], topic: Recorde
 def _copy_sheet(path: Path, out: Path) -> None:
     """Copy ``session.yaml``, whose scene and mapping a replay needs."""
     sheet = sheet_path(path)
-    if holds_file(sheet) and sheet.stat().st_size <= LARGEST:
+    if holds_file(sheet) and sheet.stat().st_size <= LARGEST_FILE:
         with open_received(sheet) as file:
-            write_atomic(out / sheet.name, file.read(LARGEST))
+            write_atomic(out / sheet.name, file.read(LARGEST_FILE))
 
 
 def _count(out: Path) -> Counter[str]:

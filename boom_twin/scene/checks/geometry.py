@@ -21,7 +21,7 @@ from ..schema import Joint, Point, Section
 from . import Draft, Findings
 from .values import NEEDED
 
-TOLERANCE = 1e-9  # m, deg
+ROUNDING = 1e-9  # m, deg
 RIGID = (math.inf, -math.inf)  # ends of the flexible part of a rigid section: every pin is on its root and on its head
 STEP_DEG = 0.1
 TRANSMISSION_DEG = 5.0  # least angle between the links at Q; forces in them are then 11 times those across
@@ -44,11 +44,11 @@ def placed_pins(draft: Draft) -> Findings:
             remedy = "C is measured from the OUTBOARD pivot of the section before, so its x is negative."
             yield draft.warning(("joints", i, "C"), joint.C, bound, remedy)
         first = -math.inf if before is None else _bending(draft, before)[1] - before.length
-        if before is not None and joint.D is not None and joint.D[0] < first - TOLERANCE:
+        if before is not None and joint.D is not None and joint.D[0] < first - ROUNDING:
             bound = f"D must lie on the rigid head of sections[{i - 1}], x >= {first:.6g} m from its outboard pivot"
             remedy = f"Move D, or end the beam of sections[{i - 1}] at x1 <= {before.length + joint.D[0]:.6g} m."
             yield draft.fault(("joints", i, "D"), joint.D, bound, remedy)
-        if own is not None and joint.E is not None and joint.E[0] > (last := _bending(draft, own)[0]) + TOLERANCE:
+        if own is not None and joint.E is not None and joint.E[0] > (last := _bending(draft, own)[0]) + ROUNDING:
             bound = f"E must lie on the rigid root of sections[{i}], x <= {last:.6g} m from its inboard pivot"
             remedy = f"Move E, or start the beam of sections[{i}] at x0 >= {joint.E[0]:.6g} m."
             yield draft.fault(("joints", i, "E"), joint.E, bound, remedy)
@@ -75,7 +75,7 @@ def thin_parts(draft: Draft) -> Findings:
 def _sliver(draft: Draft, section: Section, place: Place, value: Point, x: float) -> Findings:
     beam = _bending(draft, section)
     for end in beam:
-        if TOLERANCE < abs(x - end) < 0.01 * section.length and beam[0] < x < beam[1]:
+        if ROUNDING < abs(x - end) < 0.01 * section.length and beam[0] < x < beam[1]:
             bound = f"the pin splits the beam {abs(x - end) * 1e3:.3g} mm from its end, at x = {end:g} m"
             yield draft.warning(place, value, bound, f"Let the beam end at the pin, x = {x:.6g} m, or move the pin.")
 
@@ -276,7 +276,7 @@ def geometry_of(draft: Draft, i: int) -> np.record | None:
 def _reached(joint: Joint, lengths: Array) -> Mask:
     """Return a mask of the angles at which the cylinder can be as long as the geometry asks; False where links do not meet."""
     strokes = lengths - joint.cylinder.closed_length
-    return (strokes >= -TOLERANCE) & (strokes <= joint.cylinder.max_stroke + TOLERANCE)
+    return (strokes >= -ROUNDING) & (strokes <= joint.cylinder.max_stroke + ROUNDING)
 
 
 def _postures(draft: Draft, i: int) -> Iterator[tuple[str, float]]:
@@ -292,7 +292,7 @@ def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, r
     place, value = ("postures", name, i), draft.postures[name][i]
     low, high = joint.range_deg
     says = f"posture `{name}` turns joint {i + 1} to {degrees:g} deg"
-    if not low - TOLERANCE <= degrees <= high + TOLERANCE:
+    if not low - ROUNDING <= degrees <= high + ROUNDING:
         bound = f"{says}, outside its range_deg [{low:g}, {high:g}]"
         remedy = "Change the posture or the range; a joint angle is the difference of neighbouring section angles."
         yield draft.fault(place, value, bound, remedy)
@@ -302,7 +302,7 @@ def _posture(draft: Draft, who: tuple[str, int], joint: Joint, degrees: float, r
             stroke = float(cylinder_length(row, math.radians(degrees))[0]) - joint.cylinder.closed_length
         if math.isnan(stroke):
             yield draft.fault(place, value, f"{says}, where its links do not meet", "Change the posture or the links.")
-        elif not -TOLERANCE <= stroke <= most + TOLERANCE:
+        elif not -ROUNDING <= stroke <= most + ROUNDING:
             bound = f"{says}, a stroke of {stroke:.4g} m; cylinder {i + 1} has 0 to {most:g} m"
             yield draft.fault(place, value, bound, "Change the posture, closed_length or max_stroke.")
 

@@ -18,17 +18,15 @@ import numpy as np
 
 from ...config.yaml_text import Place
 from ...errors import Fault
-from ...kernels.elements.linkage import LINK_L, cylinder_length, link_angles
-from ...kernels.plane_algebra import turned
+from ...kernels.elements.linkage import cylinder_length
 from ...types import Array
-from ..kinematics import linkage, transmission_angles
+from ..kinematics import RANGE_SAMPLES, joint_pins, linkage, rod_pin_of, transmission_angles
 from ..schema import Cylinder, Oil, Scene, section_depth
 from . import Draft, Findings
 from .geometry import Mask, grid_of, usable
 
 PIN = 0.5  # diameter of a pin over the bore
 BORE = 0.4  # of a cylinder without `oil`, over the depth of the section that turns
-STEPS = 721  # angles of a range
 WALL = 0.12  # of a barrel, over its bore
 BARREL = 0.9  # of the closed length; the rest is the rod's end and its eye
 ROOM = 1.25  # between the centres of two pins, over the diameter: a quarter of it is left for the eyes around them
@@ -60,7 +58,7 @@ class LinkageAccount:
 
 def linkage_account(scene: Scene, i: int) -> LinkageAccount:
     """Return what joint `i` (0-based) of a scene does over its range."""
-    row, degrees = linkage(scene, i), np.linspace(*scene.joints[i].range_deg, STEPS)
+    row, degrees = linkage(scene, i), np.linspace(*scene.joints[i].range_deg, RANGE_SAMPLES)
     pins = joint_pins(scene, i, np.radians(degrees))
     with np.errstate(invalid="ignore"):
         levers = np.abs(cylinder_length(row, np.radians(degrees))[1])
@@ -73,31 +71,6 @@ def pin_diameter(scene: Scene, i: int) -> float:
     """Return the assumed diameter (m) of the pins of joint `i` (0-based): half the bore, which is guessed without `oil`."""
     oil = scene.joints[i].cylinder.oil
     return PIN * (BORE * section_depth(scene, i) if oil is None else oil.bore)
-
-
-def joint_pins(scene: Scene, i: int, phi: Array) -> dict[str, Array]:
-    """Return the pins of joint `i` (0-based) by name at angles `phi` (rad), as x + iy (m) from the pivot in its carrier's axes.
-
-    The rod pin is ``Q`` in kind B1, ``R`` in the other six-bars, ``rod_pin`` in kind A. NaN where the links do not meet.
-    """
-    row = linkage(scene, i)
-    e = np.asarray(_complex(turned(phi, row.ex, row.ey)))
-    pins = {"the pivot": np.zeros_like(e), "C" if i else "cylinder_pin": np.full_like(e, complex(row.cx, row.cy))}
-    if i == 0:
-        return pins | {"rod_pin": e}
-    with np.errstate(invalid="ignore"):
-        left, right = link_angles(row, phi)
-    d = complex(row.dx, row.dy)
-    pins |= {"D": np.full_like(e, d), "E": e, "Q": np.asarray(d + row.length_l * np.exp(1j * left))}
-    if scene.joints[i].kind != "B1":
-        base, angle = (d, left) if row.mount == LINK_L else (e, right)
-        pins["R"] = np.asarray(base + _complex(turned(angle, row.along, row.left)))
-    return pins
-
-
-def rod_pin_of(pins: dict[str, Array]) -> str:
-    """Return the name of the pin of a joint that holds the rod."""
-    return next(name for name in ("R", "Q", "rod_pin") if name in pins)
 
 
 def nearest_pins(pins: dict[str, Array], degrees: Array) -> Nearest | None:
@@ -131,10 +104,6 @@ def _over_pivot(scene: Scene, i: int, pins: dict[str, Array], degrees: Array) ->
         if distance[at] < 0.5 * pin_diameter(scene, i):
             found.append(f"{name} at {degrees[at]:.0f} deg")
     return tuple(found)
-
-
-def _complex(point: tuple[Array, Array]) -> Array:
-    return np.asarray(point[0] + 1j * point[1])
 
 
 class Pass(NamedTuple):
