@@ -177,23 +177,18 @@ def test_nothing_but_an_earlier_result_is_replaced(tmp_path: Path, make: Callabl
     assert state() == before
 
 
-def test_a_recording_in_what_a_killed_run_left_is_kept(tmp_path: Path) -> None:
+def test_what_a_killed_run_left_keeps_a_recording_in_it_and_takes_no_session(tmp_path: Path) -> None:
+    """The next run would remove a session there, whose files have the names of those of a replay."""
     assert run(tmp_path / "out", "old", 12) == -signal.SIGKILL
+    with (
+        pytest.raises(BagError, match=r"out\.unfinished/bag: lies in an unfinished result"),
+        result_folder(tmp_path / "out.unfinished" / "bag", RIG, []),
+    ):
+        pass
     recording(tmp_path / "out.unfinished" / "mine")
     with pytest.raises(BagError, match=r"out\.unfinished: holds mine/, which replay does not write"):
         build(tmp_path / "out")
     assert (tmp_path / "out.unfinished" / "mine" / "session_0.mcap").read_bytes() == b"a recording"
-
-
-def test_no_session_is_made_in_what_a_killed_run_left(tmp_path: Path) -> None:
-    """Its files have the names of those of a replay: the next run would remove them."""
-    assert run(tmp_path / "out", "old", 12) == -signal.SIGKILL
-    with (
-        pytest.raises(BagError, match=r"out\.unfinished/bag: lies in an unfinished result"),
-        result_folder(tmp_path / "out.unfinished" / "bag", RIG, []) as building,
-    ):
-        (building.folder / "session_0.mcap").write_bytes(b"a recording")
-    build(tmp_path / "out")
 
 
 def test_a_disk_that_is_full_from_the_start_is_named_and_left_as_it_was(tmp_path: Path) -> None:
@@ -221,21 +216,10 @@ def test_no_source_is_built_over(tmp_path: Path) -> None:
         build(tmp_path, RIG, (tmp_path / "out.unfinished" / "session_0.mcap",), "session_0.mcap")
 
 
-def test_a_result_that_cannot_be_put_in_place_is_kept_and_told(tmp_path: Path) -> None:
-    with (
-        pytest.raises(BagError, match=r"holds notes\.txt.*The result is whole, and is kept in .*out\.unfinished"),
-        result_folder(tmp_path / "out", REPLAY, []) as building,
-    ):
-        write_atomic(building.folder / "summary.json", "{}")
-        (tmp_path / "out").mkdir()
-        (tmp_path / "out" / "notes.txt").write_text("mine")
-    assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
-    assert (tmp_path / "out.unfinished" / "manifest.json").is_file()
-
-
 def test_a_session_that_could_not_be_put_in_place_is_not_thrown_away(tmp_path: Path) -> None:
     """Its source may be gone by now."""
-    with pytest.raises(BagError, match="is whole, and is kept"), result_folder(tmp_path / "out", RECOVER, []) as building:
+    told = r"out: holds session_0\.mcap.*The result is whole, and is kept in .*out\.unfinished"
+    with pytest.raises(BagError, match=told), result_folder(tmp_path / "out", RECOVER, []) as building:
         (building.folder / "session_0.mcap").write_text("saved")
         recording(tmp_path / "out")
     (tmp_path / "out").rename(tmp_path / "moved")
@@ -291,49 +275,34 @@ def test_a_file_is_the_old_one_or_the_new_one(tmp_path: Path) -> None:
     assert not Path("/dev/null").is_file() and {each.name for each in tmp_path.iterdir()} == {"scene.yaml", "link"}
 
 
-def test_files_that_are_read_and_files_of_recordings_are_no_targets(tmp_path: Path) -> None:
-    recording(tmp_path / "bag")
-    for name in ("metadata.yaml", "session.yaml"):
-        (tmp_path / "bag" / name).write_text("")
-    scene = tmp_path / "scene.yaml"
-    scene.write_text("")
-    os.link(scene, tmp_path / "same.yaml")
-    for path in (scene, tmp_path / "same.yaml"):
-        with pytest.raises(UsageError, match="this file is read"):
-            check_target(path, [scene])
-    for path in (tmp_path / "bag").iterdir():
-        with pytest.raises(UsageError, match="file of a recording"):
-            check_target(path, [])
-    check_target(tmp_path / "metadata.yaml", [scene])
-
-
-def test_files_of_a_recording_that_rosbag2_packed_are_no_targets(tmp_path: Path) -> None:
-    for name in ("bag_0.mcap.zstd", "metadata.yaml"):
-        (tmp_path / name).write_text("")
-    for path in tmp_path.iterdir():
-        with pytest.raises(UsageError, match="file of a recording"):
-            check_target(path, [])
-
-
-def test_a_link_to_a_file_of_a_recording_is_no_target(tmp_path: Path) -> None:
-    """Its own name tells nothing: what it leads to would be replaced."""
-    recording(tmp_path / "bag")
-    for name in ("session.yaml", "truth.csv.gz"):
+@pytest.mark.parametrize(
+    "names", [("session_0.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz"), ("bag_0.mcap.zstd", "metadata.yaml")]
+)
+def test_files_of_recordings_and_links_to_them_are_no_targets(tmp_path: Path, names: tuple[str, ...]) -> None:
+    (tmp_path / "bag").mkdir()
+    for name in names:
         (tmp_path / "bag" / name).write_text("")
     for number, path in enumerate((tmp_path / "bag").iterdir()):
-        link = tmp_path / f"results_{number}.csv"
+        link = tmp_path / f"results_{number}.csv"  # its own name tells nothing: the file that it leads to would be replaced
         link.symlink_to(path)
-        with pytest.raises(UsageError, match="file of a recording"):
-            check_target(link, [])
+        for target in (path, link):
+            with pytest.raises(UsageError, match="file of a recording"):
+                check_target(target, [])
 
 
-def test_only_an_earlier_result_is_a_target_where_that_can_be_told(tmp_path: Path) -> None:
-    path = tmp_path / "out.csv"
+def test_only_an_earlier_result_that_is_not_read_is_a_target(tmp_path: Path) -> None:
+    path, scene = tmp_path / "out.csv", tmp_path / "scene.yaml"
     path.write_text("t_s,my own notes\n")
     with pytest.raises(UsageError, match=r"out\.csv: is there already, and is no earlier result"):
         check_target(path, [], b"t_s,stroke_1_m,")
     path.write_text("t_s,stroke_1_m,joint_1_rad\n0,1,2\n")
     check_target(path, [], b"t_s,stroke_1_m,")
+    scene.write_text("")
+    os.link(scene, tmp_path / "same.yaml")
+    for read in (scene, tmp_path / "same.yaml"):
+        with pytest.raises(UsageError, match="this file is read"):
+            check_target(read, [scene])
+    check_target(tmp_path / "metadata.yaml", [scene])
 
 
 def test_a_full_disk_is_told_with_the_folder_and_a_remedy(tmp_path: Path) -> None:
