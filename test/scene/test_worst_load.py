@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.analysis.equilibrium import statics
-from boom_twin.scene import Scene, load_scene
+from boom_twin import Scene, load_scene, statics
 from boom_twin.scene.boom_table import read_table
 from boom_twin.scene.first_scene import first_scene
 from boom_twin.scene.kinematics import cylinder_length, linkage, stroke_curve

@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 
-from boom_twin.scene import load_scene
+from boom_twin import load_scene
 
 
 def run(*words):

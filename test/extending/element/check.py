@@ -6,12 +6,11 @@ from pathlib import Path
 import numpy as np
 from ruamel.yaml import YAML
 
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import Scene, load_scene, statics
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.errors import BoomTwinError
-from boom_twin.scene import load_scene
 from boom_twin.scene.load import default_text
-from boom_twin.scene.schema import Scene, Support, Tip
+from boom_twin.scene.schema import Support, Tip
 from boom_twin.scene.summary import left_out
 
 LENGTH, MASS, COM, INERTIA, ANGLE, K = 3.0, 200.0, (1.4, 0.0), 150.0, 0.4, 2.0e4
