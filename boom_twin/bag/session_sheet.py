@@ -92,8 +92,8 @@ class SessionSheet:
         }
         text = _HEAD + dump({key: value for key, value in document.items() if value not in (None, "", {})})
         path = directory / FILE_NAME
-        if len(text.encode()) > LARGEST_FILE:
-            raise BagError(f"{path}: {len(text.encode())} bytes, more than {LARGEST_FILE}. Shorten scene and mapping.")
+        if (size := len(text.encode())) > LARGEST_FILE:
+            raise BagError(f"{path}: {size} bytes, of which {LARGEST_FILE} are read again. Shorten scene and mapping.")
         write_atomic(path, text)
 
 

@@ -164,7 +164,7 @@ def test_a_scene_in_place_of_a_table_is_told_once(capsys: pytest.CaptureFixture[
 
 
 SLIPS = {
-    "a line in litres": ("rod: 125 mm}", "rod: 125 mm, cap_line: 0.5}", "joints[0].cap_line", "at most"),
+    "a line in litres": ("rod: 125 mm}", "rod: 125 mm, cap_line: 0.5}", "joints[0].cap_line", "twice what the chamber takes"),
     "a rod as radius": ("bore: 140 mm, rod: 90 mm", "bore: 140 mm, rod: 45 mm", "joints[2].rod", "not one as a radius"),
     "links in N": ("mL: 30 kg, mR: 22 kg", "mL: 300, mR: 22 kg", "joints[2].mL", "not N"),
     "aluminium with the density of steel": ("E: 210 GPa", "E: 70 GPa", "material.E", "with the density of steel"),
