@@ -20,7 +20,7 @@ from boom_twin.bag.recovery.recover import recover
 from boom_twin.bag.session_sheet import FILE_NAME as SHEET
 from boom_twin.bag.writer import SessionWriter
 from boom_twin.cli.main import main
-from boom_twin.config.yaml_text import MOST, plain
+from boom_twin.config.yaml_text import MOST_VALUES, plain
 from boom_twin.errors import BagError, SceneError
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.offline import ground_truth as truth
@@ -63,7 +63,7 @@ def test_yaml_gives_plain_values_only(tmp_path: Path, monkeypatch: pytest.Monkey
     assert not (tmp_path / "trap").exists()
     assert plain("a: 1\nb: [x, .5, 2001-01-01, null, yes, true]") == {"a": 1, "b": ["x", 0.5, "2001-01-01", None, "yes", True]}
     assert plain("") is None and plain("&a x") == "x" and plain("[&a [1], *a]") == [[1], [1]]
-    assert len(plain("[" + "1," * (MOST - 2) + "]")) == MOST - 2
+    assert len(plain("[" + "1," * (MOST_VALUES - 2) + "]")) == MOST_VALUES - 2
 
 
 @pytest.mark.parametrize("file", [METADATA, SHEET])
@@ -145,7 +145,7 @@ def test_too_many_messages_out_of_order_are_not_held(bag: Path, monkeypatch: pyt
 
 
 def test_a_truth_that_unpacks_without_end_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(truth, "LARGEST_FILE", 10_000)
+    monkeypatch.setattr(truth, "LARGEST", 10_000)
     (tmp_path / truth.FILE_NAME).write_bytes(gzip.compress(b"t_s\n" + b"0\n" * 100_000))
     with pytest.raises(BagError, match="more than 10000 bytes unpacked"):
         truth.load_truth(tmp_path)

@@ -22,7 +22,7 @@ from boom_twin.kernels.tables import State
 from boom_twin.kernels.transfer.time_step import run
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.scene.schema import Scene
-from boom_twin.scene.segmentation import LEAST
+from boom_twin.scene.segmentation import LEAST_PARTS
 from boom_twin.validation.study.long_booms import long_boom
 
 SECTIONS = (2, 5, 10, 20, 50, 100, 150, 200)
@@ -75,7 +75,7 @@ def line(counts: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
     Beams of booms of few sections are cut into more parts, so those are left out of the line: NaN.
     """
-    terms, whole = np.stack([np.ones(len(counts)), counts], axis=1), counts >= LEAST
+    terms, whole = np.stack([np.ones(len(counts)), counts], axis=1), counts >= LEAST_PARTS
     share = np.linalg.lstsq((terms / seconds[:, None])[whole], np.ones(whole.sum()), rcond=None)[0]
     return share, np.where(whole, seconds / (terms @ share) - 1.0, np.nan)
 

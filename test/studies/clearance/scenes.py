@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-from boom_twin.scene.checks.pins import names_of
 from ruamel.yaml import YAML
 
+from boom_twin.scene.checks.values import names_of
 from boom_twin.scene.load import clearance_text
 from boom_twin.scene.schema import Clearance, Pin, Scene
 
