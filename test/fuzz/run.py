@@ -1,172 +1,139 @@
 """Broken, hostile and absurd input, at random: ``PYTHONPATH=test python -m fuzz.run [--seconds 600] [--seed 1]``.
 
-Two workers judge cases at a time; this process ends one that hangs, counts it, and starts another behind that case. What is not
-wanted is kept in ``--out``, with the command that repeats it: ``python -m fuzz.run --target NAME --case PATH``.
+Two processes judge cases at a time. What is not wanted is kept in ``--out``, with the command that repeats it:
+``python -m fuzz.run --target NAME --case PATH``. A case that ends its process, or never returns, is kept too.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import re
+import resource
 import signal
 import subprocess
 import sys
-import tempfile
 import time
+import traceback
 from argparse import ArgumentParser
 from collections import Counter
-from contextlib import suppress
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
-from selectors import EVENT_READ, DefaultSelector
 from shutil import rmtree
+from types import ModuleType
+
+import numpy as np
 
 from .verdict import Kind, Verdict, table
-from .worker import LONGEST, TARGETS, judged, make, module
 
 ROOT = Path(__file__).parents[2]
 SHARES = {"scenes": 0.35, "bags": 0.3, "messages": 0.25, "page": 0.1}
+"""Targets with their shares of the time."""
+TARGETS = tuple(SHARES)
 WORKERS = 2
-LONGEST_WAIT = 180.0
-"""Seconds of the clock: a case that waits for nothing takes no processor. The machine may have other work."""
-START = 300.0
-"""Seconds in which a worker begins: it may compile."""
-LOOK = 0.25
-TICKS = os.sysconf("SC_CLK_TCK")
+CASE_TIME = 10.0
+"""Seconds of a processor that a case may take."""
+CASE_MEMORY = 2**30
+"""Bytes by which the memory may grow in one case."""
+GUARD = 4 * 2**30
+"""Address space beyond what a worker has at first: a bomb is to be counted, not to take the machine down."""
+START = 480.0
+"""Seconds in which a worker begins, for it may compile, and ends its last case. The machine may have other work."""
 
 
-@dataclass
-class Findings:
-    """What was not wanted, with the words of each."""
+def module(target: str) -> ModuleType:
+    """Return the module of a target, with ``begin()``, ``make(random, path)`` and ``judge(path)``."""
+    return import_module(f".{target}", __package__)
 
-    seed: int
-    out: Path
-    counts: dict[str, Counter[str]] = field(default_factory=dict)
-    cases: list[tuple[str, int, Verdict]] = field(default_factory=list)
 
-    def count(self, target: str, number: int, verdict: Verdict) -> None:
-        """Count a case; keep it if it is a finding."""
-        self.counts.setdefault(target, Counter())[verdict.kind] += 1
-        if not verdict.is_finding:
-            return
-        self.cases.append((target, number, verdict))
-        folder = self.out / f"{target}_{self.seed}_{number}"
+def judged(target: str, path: Path) -> Verdict:
+    """Return the verdict on one case; exceptions, time and memory are judged here."""
+    before = _memory("VmRSS")
+    Path("/proc/self/clear_refs").write_text("5", encoding="ascii")  # forgets the peak
+    try:
+        with _limited():
+            verdict = module(target).judge(path)
+    except _Hang:
+        return Verdict(Kind.HANG, traceback.format_exc())
+    except MemoryError:
+        return Verdict(Kind.GROWTH, "MemoryError")
+    except Exception:
+        return Verdict(Kind.TRACEBACK, traceback.format_exc())
+    grown = _memory("VmHWM") - before
+    return Verdict(Kind.GROWTH, f"{grown >> 20} MiB") if grown > CASE_MEMORY else verdict
+
+
+class _Hang(BaseException):
+    """The time is over; no handler of exceptions is to take it for one."""
+
+
+@contextmanager
+def _limited() -> Iterator[None]:
+    def stop(*_: object) -> None:
+        raise _Hang
+
+    signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, CASE_TIME)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+
+
+def _memory(name: str) -> int:
+    """Return bytes by ``/proc/self/status``."""
+    found = re.search(rf"{name}:\s*(\d+)", Path("/proc/self/status").read_text(encoding="ascii"))
+    assert found is not None
+    return int(found[1]) * 1024
+
+
+def work(target: str, seconds: float, seed: int, number: int, out: Path) -> None:
+    """Judge every `WORKERS`-th case from `number` on; print the counts. Cases are the same for the same seed and number."""
+    stdout, sys.stdout = sys.stdout, sys.stderr  # what the judged code prints is not a count
+    module(target).begin()
+    resource.setrlimit(resource.RLIMIT_AS, (_memory("VmSize") + GUARD,) * 2)
+    counts, end = Counter[str](), time.monotonic() + seconds
+    while not counts or time.monotonic() < end:
+        folder = out / f"{target}_{seed}_{number}"
         rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
-        command = f"PYTHONPATH=test python -m fuzz.run --target {target} --case {make(target, self.seed, number, folder)}"
-        (folder / "finding.txt").write_text(f"{verdict.kind}\n{command}\n{verdict.words}\n", encoding="utf-8")
-        print(f"{verdict.kind}: {command}\n  {_last_line(verdict.words)}", file=sys.stderr)
-
-
-def _last_line(words: str) -> str:
-    return (words.strip().splitlines() or [""])[-1][:300]
-
-
-class Worker:
-    """One process that judges every `WORKERS`-th case of a target, begun anew behind a case that ended it.
-
-    Parameters
-    ----------
-    target : str
-    place : int
-        Of this worker among all: its first case.
-    findings : Findings
-    folder : Path
-        For the cases while they are judged.
-    """
-
-    def __init__(self, target: str, place: int, findings: Findings, folder: Path) -> None:
-        self._target, self._findings, self._folder = target, findings, folder
-        self._number, self._last_words = place, ""
-        self._begin()
-
-    def _begin(self) -> None:
-        numbers = map(str, (self._findings.seed, self._number, WORKERS))
-        command = [sys.executable, "-m", "fuzz.worker", self._target, *numbers, str(self._folder)]
-        path = {**os.environ, "PYTHONPATH": str(ROOT / "test")}
-        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed by end()
-        self._process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=self._log, cwd=ROOT, env=path, start_new_session=True
-        )
-        assert self._process.stdout is not None
-        self.stream = self._process.stdout
-        self._since, self._busy, self._is_at_case = time.monotonic(), 0.0, False
-
-    def read(self) -> None:
-        """Take one line of it, or begin anew where it has ended."""
-        line = self.stream.readline()
-        if not line:
-            self._process.wait()
-            self._log.seek(0)
-            words = self._log.read().decode(errors="replace")[-3000:]
-            if not self._is_at_case:
-                raise SystemExit(f"{self._target}: the worker does not begin\n{words}")
-            self._give_up(Verdict(Kind.TRACEBACK, f"the process ended with {self._process.returncode}\n{words}"))
-            return
-        told = json.loads(line)
-        if "kind" in told:
-            self._findings.count(self._target, told["number"], Verdict(Kind(told["kind"]), told["words"]))
-            self._number, self._is_at_case = told["number"] + WORKERS, False
+        path = module(target).make(np.random.default_rng((seed, TARGETS.index(target), number)), folder / folder.name)
+        command = f"PYTHONPATH=test python -m fuzz.run --target {target} --case {path}"
+        (folder / "finding.txt").write_text(f"{command}\nended the process, or never returned\n")
+        verdict = judged(target, path)
+        counts[verdict.kind] += 1
+        if verdict.is_finding:
+            (folder / "finding.txt").write_text(f"{command}\n{verdict.kind}\n{verdict.words}\n", encoding="utf-8")
+            print(f"{verdict.kind}: {command}\n  {verdict.words.strip()[-300:]}", file=sys.stderr)
         else:
-            self._is_at_case = True
-        self._since, self._busy = time.monotonic(), self._processor()
+            rmtree(folder)
+        number += WORKERS
+    print(json.dumps(counts), file=stdout)
 
-    def look(self) -> None:
-        """End it where a case takes too long."""
-        waited = time.monotonic() - self._since
-        if not self._is_at_case:
-            if waited > START:
-                raise SystemExit(f"{self._target}: the worker does not begin")
-        elif (took := self._processor() - self._busy) > 2 * LONGEST or waited > LONGEST_WAIT:
-            self._give_up(Verdict(Kind.HANG, f"{took:.0f} s of a processor, {waited:.0f} s of the clock"))
 
-    def _give_up(self, verdict: Verdict) -> None:
-        self.end()
-        self._findings.count(self._target, self._number, verdict)
-        self._number += WORKERS
-        self._begin()
-
-    def _processor(self) -> float:
-        """Seconds of a processor that it and all that it started have taken."""
-        total = 0
-        for file in Path("/proc").glob("[0-9]*/stat"):
+def fuzz(target: str, seconds: float, seed: int, out: Path) -> Counter[str]:
+    """Return the counts of the verdicts on the cases of one target, judged for so long."""
+    command = [sys.executable, "-m", "fuzz.run", "--target", target, "--seed", str(seed), "--out", str(out)]
+    options = {"stdout": subprocess.PIPE, "cwd": ROOT, "start_new_session": True}
+    env = {**os.environ, "PYTHONPATH": str(ROOT / "test")}
+    places = (["--seconds", str(seconds), "--worker", str(place)] for place in range(WORKERS))
+    workers = [subprocess.Popen(command + place, env=env, **options) for place in places]
+    counts = Counter[str]()
+    try:
+        for worker in workers:
             try:
-                fields = file.read_text(errors="replace").rpartition(")")[2].split()
-            except OSError:  # ended meanwhile
-                continue
-            if int(fields[3]) == self._process.pid:  # session
-                total += sum(map(int, fields[11:15]))
-        return total / TICKS
-
-    def end(self) -> None:
-        """End it and all that it started."""
-        with suppress(ProcessLookupError):
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait()
-        self.stream.close()
-        self._log.close()
-
-
-def fuzz(target: str, seconds: float, findings: Findings) -> None:
-    """Judge cases of one target for so long; the time counts from the first verdict."""
-    findings.counts.setdefault(target, Counter())
-    with tempfile.TemporaryDirectory(prefix="boom_twin_fuzz_") as folder:
-        workers = [Worker(target, place, findings, Path(folder)) for place in range(WORKERS)]
-        try:
-            end = None
-            while end is None or time.monotonic() < end:
-                with DefaultSelector() as selector:
-                    for worker in workers:
-                        selector.register(worker.stream, EVENT_READ, worker)
-                    for key, _ in selector.select(LOOK):
-                        key.data.read()
-                for worker in workers:
-                    worker.look()
-                if end is None and findings.counts[target]:
-                    end = time.monotonic() + seconds
-        finally:
-            for worker in workers:
-                worker.end()
+                told, _ = worker.communicate(timeout=START + seconds)
+                counts.update(json.loads(told) if worker.returncode == 0 else {Kind.TRACEBACK: 1})
+            except subprocess.TimeoutExpired:
+                counts[Kind.HANG] += 1
+    finally:
+        for worker in workers:
+            with suppress(ProcessLookupError):
+                os.killpg(worker.pid, signal.SIGKILL)  # with all that it started
+            worker.wait()
+    return counts
 
 
 def main() -> int:
@@ -177,17 +144,20 @@ def main() -> int:
     parser.add_argument("--target", nargs="+", choices=TARGETS, default=list(TARGETS))
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "fuzz", help="where findings are kept")
     parser.add_argument("--case", type=Path, help="judge this one of --target, in this process")
+    parser.add_argument("--worker", type=int, help="begin with this case of --target, in this process")
     args = parser.parse_args()
     if args.case is not None:
         module(args.target[0]).begin()
         verdict = judged(args.target[0], args.case)
         print(f"{verdict.kind}: {verdict.words}")
         return int(verdict.is_finding)
-    findings = Findings(args.seed, args.out)
-    for target in args.target:
-        fuzz(target, args.seconds * SHARES[target] / sum(SHARES[each] for each in args.target), findings)
-    print(table(findings.counts))
-    return int(bool(findings.cases))
+    if args.worker is not None:
+        work(args.target[0], args.seconds, args.seed, args.worker, args.out)
+        return 0
+    whole = sum(SHARES[each] for each in args.target)
+    counts = {each: fuzz(each, args.seconds * SHARES[each] / whole, args.seed, args.out.resolve()) for each in args.target}
+    print(table(counts))
+    return int(any(Kind(kind).is_finding for found in counts.values() for kind in found))
 
 
 if __name__ == "__main__":

@@ -9,12 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from . import worker
-from .run import ROOT
+from .run import ROOT, TARGETS, judged, module
 from .verdict import Kind
 
 CORPUS = Path(__file__).parent / "corpus"
-CASES = [(target, path) for target in worker.TARGETS for path in sorted((CORPUS / target).iterdir())]
+CASES = [(target, path) for target in TARGETS for path in sorted((CORPUS / target).iterdir())]
 SECONDS = 40
 """The workers take some 20 more to start."""
 
@@ -22,8 +21,8 @@ SECONDS = 40
 @pytest.mark.parametrize(("target", "path"), CASES, ids=[f"{target}-{path.stem}" for target, path in CASES])
 def test_the_corpus(target: str, path: Path) -> None:
     """What was once a finding, or nearly so; what is cut off is refused, or told."""
-    worker.module(target).begin()
-    verdict = worker.judged(target, path)
+    module(target).begin()
+    verdict = judged(target, path)
     assert not verdict.is_finding, verdict.words
     if path.name.startswith("cut_"):
         assert verdict.kind in (Kind.REFUSED, Kind.TOLD)

@@ -13,20 +13,21 @@ from boom_twin.cli.main import main
 
 
 class Kind(StrEnum):
-    """What became of a case; what is promised of each is written in docs/reliability.md."""
+    """What became of a case, the worst first; what is promised of each is written in docs/reliability.md."""
 
-    REFUSED = "refused"
-    EQUAL = "equal"
-    TOLD = "altered and told"
-    OTHER = "other content"
-    SILENT = "silent"
     TRACEBACK = "traceback"
     HANG = "hang"
     GROWTH = "growth"
+    SILENT = "silent"
+    TOLD = "altered and told"
+    REFUSED = "refused"
+    OTHER = "other content"
+    EQUAL = "equal"
 
-
-FINDINGS = (Kind.SILENT, Kind.TRACEBACK, Kind.HANG, Kind.GROWTH)
-"""None of these is wanted."""
+    @property
+    def is_finding(self) -> bool:
+        """Return True if it shows a defect."""
+        return self in (Kind.TRACEBACK, Kind.HANG, Kind.GROWTH, Kind.SILENT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,15 +39,12 @@ class Verdict:
 
     @property
     def is_finding(self) -> bool:
-        """Whether this case shows a defect."""
-        return self.kind in FINDINGS
-
-
-ORDER = (Kind.TRACEBACK, Kind.SILENT, Kind.TOLD, Kind.REFUSED, Kind.OTHER, Kind.EQUAL)
+        """Return True if this case shows a defect."""
+        return self.kind.is_finding
 
 
 def printed(*arguments: str) -> tuple[int, str]:
-    """Exit code of a command, and what it writes; AssertionError if that would steer a terminal."""
+    """Return the exit code of a command, and what it writes; AssertionError if that would steer a terminal."""
     out = StringIO()
     with redirect_stdout(out), redirect_stderr(out):
         code = main(arguments)
@@ -57,12 +55,12 @@ def printed(*arguments: str) -> tuple[int, str]:
 
 
 def worst(*verdicts: Verdict) -> Verdict:
-    """The verdict on a case that was looked at in several ways."""
-    return min(verdicts, key=lambda verdict: ORDER.index(verdict.kind))
+    """Return the verdict on a case that was looked at in several ways."""
+    return min(verdicts, key=lambda verdict: list(Kind).index(verdict.kind))
 
 
 def table(counts: Mapping[str, Counter[str]]) -> str:
-    """The counts by target as a table in Markdown."""
+    """Return the counts by target as a table in Markdown."""
     lines = ["| target | cases | " + " | ".join(Kind) + " |", "|---" * (len(Kind) + 2) + "|"]
     for target, found in counts.items():
         lines.append(f"| {target} | {found.total()} | " + " | ".join(str(found[kind]) for kind in Kind) + " |")

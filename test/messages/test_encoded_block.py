@@ -53,17 +53,6 @@ def test_a_block_gives_the_messages_of_its_reports(rig: Told, size: int) -> None
     assert in_blocks(many, reports, size, rig.joints) == expected
 
 
-def test_blocks_and_reports_in_turn() -> None:
-    """The trace of the tip goes on from one to the other."""
-    reports = random_reports(1, 400, Told(3))
-    one, other = (ReportEncoder(boom(3), Settings()) for _ in range(2))
-    found = []
-    for first in range(0, 400, 40):
-        part = reports[first : first + 40]
-        found += in_blocks(other, part, 40, 3) if first % 80 else one_by_one(other, part)
-    assert found == one_by_one(one, reports)
-
-
 def test_a_block_without_messages() -> None:
     (block,) = pack([Report(5, True), Report(6, True)], 3)
     assert isinstance(block, ReportBlock)

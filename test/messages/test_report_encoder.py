@@ -10,7 +10,7 @@ import pytest
 
 from boom_twin.config.settings import Settings
 from boom_twin.deviation.estimate_row import COORDINATES, RATES, WIDTH
-from boom_twin.messages.report_encoder import ReportEncoder
+from boom_twin.messages.report_encoder import ReportEncoder, decode_health
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output
 from boom_twin.messages.type_store import jazzy, new_message
@@ -82,52 +82,47 @@ def decoded(messages: list[tuple[Output, bytes]]) -> dict[Output, Any]:
     return {key: jazzy().deserialize_cdr(data, TYPES[key]) for key, data in messages}
 
 
-@pytest.fixture(scope="module")
-def filled() -> dict[Output, Any]:
-    return decoded(encoder().fill(report()))
-
-
-def test_displacement(filled: dict[Output, Any]) -> None:
-    vector = filled[Output.TIP_DISPLACEMENT].vector
-    assert (vector.x, vector.y, vector.z) == (0.01, 0.0, -0.12)
-
-
-def test_position(filled: dict[Output, Any]) -> None:
-    point = filled[Output.TIP_POSITION].point
-    assert (point.x, point.y, point.z) == (12.5, 0.0, 3.25)
-
-
-def test_acceleration_turns_about_minus_y(filled: dict[Output, Any]) -> None:
-    accel = filled[Output.TIP_ACCELERATION].accel
-    assert (accel.linear.x, accel.linear.y, accel.linear.z) == (0.5, 0.0, -0.6)
-    assert (accel.angular.x, accel.angular.y, accel.angular.z) == (0.0, -0.7, 0.0)
-
-
-def test_angular_sign_fits_the_axes() -> None:
-    """A turn that speeds up anticlockwise in the model lifts a point ahead: omega' x r must point up in base_link."""
-    accel = decoded(encoder().fill(report()))[Output.TIP_ACCELERATION].accel
-    lift = np.cross([accel.angular.x, accel.angular.y, accel.angular.z], [1.0, 0.0, 0.0])
-    np.testing.assert_allclose(lift, [0.0, 0.0, 0.7])
-
-
 TIP = ["tip_dx", "tip_dz", "tip_pitch"]
 SWIVELS = ["cylinder_1_swivel", *(f"{name}_{i}_swivel" for i in (2, 3) for name in ("cylinder", "link_l", "link_r"))]
 
 
-def test_joint_states(filled: dict[Output, Any]) -> None:
-    msg = filled[Output.JOINT_STATES]
-    assert list(msg.name) == ["joint_1", "joint_2", "joint_3", "cylinder_1", "cylinder_2", "cylinder_3", *TIP, *SWIVELS]
-    assert msg.position.tolist()[:6] == [1.0, -0.5, -0.25, 0.31, 0.22, 0.13]
-    assert np.all(np.abs(msg.position[9:]) <= np.pi)
-    assert len(msg.velocity) == 0
-    np.testing.assert_array_equal(msg.effort, [np.nan, np.nan, np.nan, -9e4, 8e3, 7e2, *[np.nan] * len([*TIP, *SWIVELS])])
+def xyz(vector: Any) -> tuple[float, float, float]:
+    return vector.x, vector.y, vector.z
 
 
-def test_passive_joints_come_with_a_shape_only() -> None:
-    """Both lengths in turn, from one outlet."""
+def test_a_prediction_is_told_in_the_axes_of_the_base() -> None:
+    """Model x is x and model y is z; a turn that lifts a point ahead is one about -y."""
+    found = decoded(encoder().fill(report()))
+    assert xyz(found[Output.TIP_DISPLACEMENT].vector) == (0.01, 0.0, -0.12)
+    assert xyz(found[Output.TIP_POSITION].point) == (12.5, 0.0, 3.25)
+    accel = found[Output.TIP_ACCELERATION].accel
+    assert xyz(accel.linear) == (0.5, 0.0, -0.6) and xyz(accel.angular) == (0.0, -0.7, 0.0)
+    np.testing.assert_allclose(np.cross(xyz(accel.angular), [1.0, 0.0, 0.0]), [0.0, 0.0, 0.7])
+    joints = found[Output.JOINT_STATES]
+    assert list(joints.name) == ["joint_1", "joint_2", "joint_3", "cylinder_1", "cylinder_2", "cylinder_3", *TIP, *SWIVELS]
+    assert joints.position.tolist()[:6] == [1.0, -0.5, -0.25, 0.31, 0.22, 0.13]
+    assert np.all(np.abs(joints.position[9:]) <= np.pi) and len(joints.velocity) == 0
+    np.testing.assert_array_equal(joints.effort, [np.nan, np.nan, np.nan, -9e4, 8e3, 7e2, *[np.nan] * len([*TIP, *SWIVELS])])
+    residuals = found[Output.RESIDUALS]
+    assert (list(residuals.name), residuals.position.tolist()) == (["joint_1", "joint_2"], [2e-4, -3e-4])
+    np.testing.assert_allclose(residuals.velocity, [2.0, -1.5])
+    assert residuals.effort.tolist() == [1e-4, 2e-4]
+    markers = found.pop(Output.SHAPE).markers
+    headers = [*(msg.header for msg in found.values()), *(marker.header for marker in markers)]
+    assert {header.frame_id for header in headers} == {"base_link"}
+    assert stamp_of(found.pop(Output.RESIDUALS)) == STAMP - 1_000_000
+    assert len(found) == 4 and {*map(stamp_of, found.values()), *map(stamp_of, markers)} == {STAMP}
+
+
+def test_shape_and_passive_joints_come_with_a_line_only() -> None:
+    """Both lengths in turn, from one encoder."""
     own, bare = encoder(), replace(report(), prediction=replace(prediction(), shape=None))
-    counts = [len(decoded(own.fill(each))[Output.JOINT_STATES].name) for each in (report(), bare, report())]
-    assert counts == [16, 9, 16]
+    found = [decoded(own.fill(each)) for each in (report(), bare, report())]
+    assert [len(each[Output.JOINT_STATES].name) for each in found] == [16, 9, 16]
+    assert [Output.SHAPE in each for each in found] == [True, False, True]
+    alone = Report(stamp=STAMP, accepted=True, residuals=report().residuals)
+    assert [key for key, _ in own.fill(alone)] == [Output.RESIDUALS]
+    assert own.fill(Report(stamp=STAMP, accepted=False)) == []
 
 
 def test_an_estimate_tells_velocity_and_modes_along_the_axes_of_the_base() -> None:
@@ -146,14 +141,6 @@ def test_an_estimate_tells_velocity_and_modes_along_the_axes_of_the_base() -> No
     np.testing.assert_array_equal([modes.position, modes.velocity], [estimate.modes, estimate.mode_rates])
     assert np.isnan(modes.position).tolist() == [False] * 5 + [True]
     assert {stamp_of(told[key]) for key in (Output.ESTIMATE_TWIST, Output.ESTIMATE_MODES)} == {STAMP}
-
-
-def test_residuals_are_named(filled: dict[Output, Any]) -> None:
-    msg = filled[Output.RESIDUALS]
-    assert list(msg.name) == ["joint_1", "joint_2"]
-    assert msg.position.tolist() == [2e-4, -3e-4]
-    np.testing.assert_allclose(msg.velocity, [2.0, -1.5])
-    assert msg.effort.tolist() == [1e-4, 2e-4]
 
 
 def test_an_alarm_is_told_in_words_and_numbers() -> None:
@@ -176,39 +163,30 @@ def test_an_alarm_is_told_in_words_and_numbers() -> None:
     }
 
 
-def test_levels_of_alarms() -> None:
+def test_levels_of_alarms_and_how_far_off_the_tip_may_be() -> None:
     unknown, ended = replace(ALARM, cause=None), replace(ALARM, until=STAMP)
-    msg = decoded(encoder().fill(judged(ALARM, unknown, ended)))[Output.HEALTH]
-    assert [status.level for status in msg.status] == [2, 1, 0]
-    assert {pair.key: pair.value for pair in msg.status[2].values}["to_s"] == "1700000000.123"
-
-
-def test_how_far_off_the_tip_may_be() -> None:
-    found = decoded(encoder().fill(judged()))
-    vector = found[Output.TIP_UNCERTAINTY].vector
-    assert (vector.x, vector.y, vector.z) == (0.001, 0.0, 0.004)
+    found = decoded(encoder().fill(judged(ALARM, unknown, ended)))
+    assert [status.level for status in found[Output.HEALTH].status] == [2, 1, 0]
+    assert {pair.key: pair.value for pair in found[Output.HEALTH].status[2].values}["to_s"] == "1700000000.123"
+    assert xyz(found[Output.TIP_UNCERTAINTY].vector) == (0.001, 0.0, 0.004)
     assert {stamp_of(found[key]) for key in (Output.HEALTH, Output.TIP_UNCERTAINTY)} == {STAMP - 100_000_000}
-    assert not found[Output.HEALTH].status
+    assert not decoded(encoder().fill(judged()))[Output.HEALTH].status
 
 
-def test_every_message_has_the_stamp_of_its_cause(filled: dict[Output, Any]) -> None:
-    markers = filled[Output.SHAPE].markers
-    stamps = {key: stamp_of(msg) for key, msg in filled.items() if key is not Output.SHAPE}
-    assert stamps.pop(Output.RESIDUALS) == STAMP - 1_000_000
-    assert len(stamps) == 4 and {*stamps.values(), *map(stamp_of, markers)} == {STAMP}
-    headers = [msg.header for key, msg in filled.items() if key is not Output.SHAPE]
-    assert {header.frame_id for header in [*headers, *(marker.header for marker in markers)]} == {"base_link"}
-
-
-def test_without_prediction_only_residuals() -> None:
-    bare = Report(stamp=STAMP, accepted=True, residuals=report().residuals)
-    assert [key for key, _ in encoder().fill(bare)] == [Output.RESIDUALS]
-    assert encoder().fill(Report(stamp=STAMP, accepted=False)) == []
-
-
-def test_no_shape_without_a_line() -> None:
-    bare = replace(report(), prediction=replace(report().prediction, shape=None))
-    assert Output.SHAPE not in dict(encoder().fill(bare))
+def test_alarms_come_back_from_their_message_to_the_millisecond() -> None:
+    """Without the sizes of what may be wrong. A status that is no alarm is left out."""
+    ended = Alarm("joint_3", "stuck", STAMP - 5, STAMP, "joint_3.sensor", "repeats one value")
+    message = decoded(encoder().fill(judged(ALARM, ended)))[Output.HEALTH]
+    found = decode_health(message)
+    for alarm, sent in zip(found, (ALARM, ended), strict=True):
+        bare = tuple(replace(each, parts=()) for each in sent.ranked)
+        assert abs(alarm.since - sent.since) < 10**6 and replace(alarm, since=0, until=0) == replace(
+            sent, since=0, until=0, ranked=bare
+        )
+    assert found[0].until is None and abs(found[1].until - STAMP) < 10**6
+    for text in ("nan", "1e400", "soon"):
+        message.status[0].values[2].value = text
+        assert decode_health(message) == found[1:]
 
 
 @pytest.mark.parametrize("type_name", sorted(set(TYPES.values())))

@@ -83,43 +83,26 @@ def boom(request: pytest.FixtureRequest) -> tuple[Scene, Element]:
     return scene, ElementTree.fromstring(urdf(scene))
 
 
-def test_it_keeps_to_the_format(boom: tuple[Scene, Element]) -> None:
-    check(boom[1])
-
-
-def test_it_is_a_tree_from_base_link(boom: tuple[Scene, Element]) -> None:
-    links = [link.attrib["name"] for link in boom[1].findall("link")]
-    names = [joint.attrib["name"] for joint in boom[1].findall("joint")]
-    children = [joint.find("child").attrib["link"] for joint in boom[1].findall("joint")]
-    parents = [joint.find("parent").attrib["link"] for joint in boom[1].findall("joint")]
-    assert len(set(links)) == len(links) and len(set(names)) == len(names)
-    assert sorted([*children, "base_link"]) == sorted(links) and set(parents) <= set(links)
-    colours = {material.attrib["name"] for material in boom[1].findall("material")}
-    assert {material.attrib["name"] for material in boom[1].findall("link/visual/material")} <= colours
-    frames(boom[1], {})  # reaches every link
-
-
-def test_links_are_those_of_the_comment(boom: tuple[Scene, Element]) -> None:
+def test_it_is_a_tree_from_base_link_with_the_joints_of_the_scene(boom: tuple[Scene, Element]) -> None:
     scene, robot = boom
+    check(robot)
+    links = [link.attrib["name"] for link in robot.findall("link")]
+    names = [joint.attrib["name"] for joint in robot.findall("joint")]
+    assert len(set(links)) == len(links) and len(set(names)) == len(names)
+    assert frames(robot, {}).keys() == set(links)
     n = range(1, len(scene.sections) + 1)
-    six_bars = [i for i in n if scene.joints[i - 1].kind != "A"]
     expected = {"base_link", "tip_rigid", "tip_along", "tip_across", "tip", "imu_link", *(f"section_{i}" for i in n)}
     expected |= {f"cylinder_{i}_{part}" for i in n for part in ("barrel", "rod")}
-    expected |= {f"link_{side}_{i}" for i in six_bars for side in "lr"}
-    assert {link.attrib["name"] for link in robot.findall("link")} == expected
-
-
-def test_every_revolute_joint_turns_about_minus_y(boom: tuple[Scene, Element]) -> None:
-    axes = {(joint.attrib["type"], joint.find("axis").attrib["xyz"]) for joint in boom[1].findall("joint[axis]")}
+    expected |= {f"link_{side}_{i}" for i in n if scene.joints[i - 1].kind != "A" for side in "lr"}
+    assert set(links) == expected
+    colours = {material.attrib["name"] for material in robot.findall("material")}
+    assert {material.attrib["name"] for material in robot.findall("link/visual/material")} <= colours
+    axes = {(joint.attrib["type"], joint.find("axis").attrib["xyz"]) for joint in robot.findall("joint[axis]")}
     assert axes == {("revolute", "0 -1 0"), ("continuous", "0 -1 0"), ("prismatic", "1 0 0"), ("prismatic", "0 0 1")}
-
-
-def test_limits_are_those_of_the_scene(boom: tuple[Scene, Element]) -> None:
-    for i, joint in enumerate(boom[0].joints, start=1):
-        limit = boom[1].find(f"joint[@name='joint_{i}']/limit").attrib
-        np.testing.assert_allclose(np.degrees([float(limit["lower"]), float(limit["upper"])]), joint.range_deg)
-        limit = boom[1].find(f"joint[@name='cylinder_{i}']/limit").attrib
-        assert (float(limit["lower"]), float(limit["upper"])) == (0.0, joint.cylinder.max_stroke)
+    for i, joint in enumerate(scene.joints, start=1):
+        angles, strokes = (robot.find(f"joint[@name='{kind}_{i}']/limit").attrib for kind in ("joint", "cylinder"))
+        np.testing.assert_allclose(np.degrees([float(angles["lower"]), float(angles["upper"])]), joint.range_deg)
+        assert (float(strokes["lower"]), float(strokes["upper"])) == (0.0, joint.cylinder.max_stroke)
 
 
 def frames(robot: Element, positions: dict[str, float]) -> dict[str, np.ndarray]:
