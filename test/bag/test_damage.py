@@ -15,6 +15,7 @@ from mcap.writer import CompressionType, IndexType
 
 from boom_twin.bag.reader import Session, read, scan
 from boom_twin.bag.writer import FILE_NAME, SessionWriter
+from boom_twin.cli.main import main
 from boom_twin.errors import BagError
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.types import Stream
@@ -60,51 +61,40 @@ def test_a_flipped_bit_is_never_read_as_data(
     assert refused > 10
 
 
-@pytest.mark.parametrize("kept", [0, 5, 8, 30, 1000, 0.5, 0.9, -1])
-def test_a_file_cut_off_is_refused_by_name(bag: Path, kept: float, content: Content) -> None:
+@pytest.mark.parametrize("kept", [0, 5, 8, 30, 1000, 0.5, 0.9, -100, -1])
+def test_a_file_cut_off_is_refused_by_name_with_its_remedy(
+    bag: Path, kept: float, content: Content, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = bag / FILE_NAME
     whole = file.read_bytes()
     file.write_bytes(whole[: int(kept * len(whole)) if isinstance(kept, float) else kept])
-    assert str(file) in refusal(bag, content)
-
-
-def test_a_cut_file_names_the_remedy(bag: Path, content: Content) -> None:
-    (bag / FILE_NAME).write_bytes((bag / FILE_NAME).read_bytes()[:-100])
     message = refusal(bag, content)
-    assert "the end is missing" in message and "boom_twin recover" in message
+    assert str(file) in message and ("boom_twin recover" in message or kept in (0, 5))
+    assert main(["info", str(bag)]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
 
 
-def test_counts_of_metadata_and_file_are_compared(bag: Path, content: Content) -> None:
-    metadata = bag / "metadata.yaml"
-    metadata.write_text(metadata.read_text().replace("message_count: 40", "message_count: 41", 1))
-    assert "/cylinder_strokes: metadata.yaml 41, files 40" in refusal(bag, content)
-
-
-def test_a_topic_that_only_metadata_knows_is_a_difference(bag: Path, content: Content) -> None:
-    metadata = bag / "metadata.yaml"
-    metadata.write_text(metadata.read_text().replace("name: /tip_imu", "name: /imu"))
-    message = refusal(bag, content)
-    assert "/imu: metadata.yaml 40, files 0" in message and "/tip_imu: metadata.yaml 0, files 40" in message
-
-
-def test_counts_of_statistics_and_messages_are_compared(bag: Path, content: Content) -> None:
-    session = scan(bag)
+def test_counts_are_compared(bag: Path, content: Content) -> None:
+    session, metadata = scan(bag), bag / "metadata.yaml"
+    for old, new, told in (
+        ("message_count: 40", "message_count: 41", ["/cylinder_strokes: metadata.yaml 41, files 40"]),
+        ("name: /tip_imu", "name: /imu", ["/imu: metadata.yaml 40, files 0", "/tip_imu: metadata.yaml 0, files 40"]),
+    ):
+        text = metadata.read_text()
+        metadata.write_text(text.replace(old, new, 1))
+        message = refusal(bag, content)
+        assert all(words in message for words in told)
+        metadata.write_text(text)
     file = session.files[0]
     file.counts[next(iter(file.counts))] += 1
     with pytest.raises(BagError, match="statistics 41, read 40"):
         content(session)
 
 
-def test_a_missing_topic_names_those_that_are_there(bag: Path) -> None:
-    with pytest.raises(BagError) as caught:
+def test_a_topic_that_is_not_there_or_of_another_type_is_refused(bag: Path) -> None:
+    with pytest.raises(BagError, match=r"no topic joint_angels;.*/cylinder_strokes, .* Did you mean /joint_angles\?"):
         read(scan(bag), {"joint_angels": JOINT_STATE})
-    message = str(caught.value)
-    assert "no topic joint_angels" in message and "/cylinder_strokes, /joint_angles, /tip_imu" in message
-    assert "Did you mean /joint_angles?" in message
-
-
-def test_another_type_is_refused(bag: Path) -> None:
-    with pytest.raises(BagError, match=r"/tip_imu has type 'sensor_msgs/msg/Imu', not sensor_msgs/msg/JointState"):
+    with pytest.raises(BagError, match="/tip_imu has type 'sensor_msgs/msg/Imu', not sensor_msgs/msg/JointState"):
         read(scan(bag), {"tip_imu": JOINT_STATE})
 
 
@@ -124,10 +114,6 @@ def test_what_is_not_ros2_is_refused(
     path = rewritten(bag, **options)
     message = refusal(path, content)
     assert words in message and str(path) in message
-
-
-def test_an_empty_definition_is_taken_by_its_name(bag: Path, rewritten: Callable[..., Path], content: Content) -> None:
-    assert content(scan(rewritten(bag, change=lambda text: b""))) == content(scan(bag))
 
 
 @pytest.mark.parametrize(
