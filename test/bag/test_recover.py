@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import zstandard
 from fuzz.mcap_files import joined, records
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -29,7 +28,6 @@ from rosbags.highlevel import AnyReader
 from boom_twin.bag import mcap_records as content
 from boom_twin.bag.reader import scan
 from boom_twin.bag.recovery.recover import Recovery, recover
-from boom_twin.bag.session_files import write_session
 from boom_twin.bag.writer import FILE_NAME
 from boom_twin.cli.main import main
 from boom_twin.errors import BagError
@@ -88,17 +86,14 @@ def rescue(tmp_path: Path, data: bytes, **options: Any) -> tuple[Recovery, Path]
     return outcome, out
 
 
-# 0 is cut, 1 has flipped bits; 2 has both
-@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), pytest.param(1, marks=pytest.mark.slow), 2])
-def test_the_bundled_session_cut_and_with_flipped_bits(real: tuple[bytes, list[Row]], tmp_path: Path, seed: int) -> None:
-    random = np.random.default_rng(seed)
-    data = bytearray(real[0])
-    for place in random.integers(0, len(data), 3 * seed):
+def test_the_bundled_session_cut_and_with_flipped_bits(real: tuple[bytes, list[Row]], tmp_path: Path) -> None:
+    random, data = np.random.default_rng(2), bytearray(real[0])
+    for place in random.integers(0, len(data), 6):
         data[place] ^= 1 << int(random.integers(8))
-    kept = len(data) if seed == 1 else int(random.integers(200_000, len(data)))
+    kept = int(random.integers(200_000, len(data)))
     outcome, out = rescue(tmp_path, bytes(data[:kept]))
     check(outcome, out, real[1])
-    assert outcome.saved.total() > len(real[1]) * (kept / len(data) - (1 + 3 * seed) / 60)
+    assert outcome.saved.total() > len(real[1]) * (kept / len(data) - 7 / 60)
 
 
 @pytest.mark.slow
@@ -163,30 +158,20 @@ def test_cut_off_at_every_kind_of_place(bag: Path, tmp_path: Path, rewritten: Ca
     assert best == len(whole)
 
 
-@pytest.mark.parametrize("cut", [1.0, 0.6])
-def test_a_file_without_chunks_or_checksums_is_saved_as_it_stands(
-    bag: Path, tmp_path: Path, rewritten: Callable[..., Path], cut: float
-) -> None:
-    path = rewritten(bag, use_chunking=False)
-    data, whole = path.read_bytes(), rows(path)
-    outcome, out = rescue(tmp_path, data[: int(cut * len(data))])
-    check(outcome, out, whole)
-    assert outcome.unvouched == outcome.saved and outcome.saved.total() >= int(cut * len(whole)) - 6
-
-
-def test_a_file_without_chunks_is_read_again_behind_damage(bag: Path, tmp_path: Path, rewritten: Callable[..., Path]) -> None:
-    path = rewritten(bag, use_chunking=False)
-    data, whole = bytearray(path.read_bytes()), rows(path)
-    data[len(data) // 2 : len(data) // 2 + 40] = bytes(40)
-    outcome, out = rescue(tmp_path, bytes(data))
-    assert len(whole) - 4 <= outcome.saved.total() <= len(whole)
-    assert outcome.fault_count >= 0 and outcome.lost is not None
-    assert len(set(rows(out / FILE_NAME)) - set(whole)) <= 1  # the bytes that were hit; nothing vouched for them
-
-
-def test_a_checksum_over_all_vouches_for_messages_outside_chunks(
+def test_a_file_without_chunks_is_saved_up_to_its_end_and_behind_damage(
     bag: Path, tmp_path: Path, rewritten: Callable[..., Path]
 ) -> None:
+    """Nothing vouches for its messages, unless a checksum over all of them fits."""
+    path = rewritten(bag, use_chunking=False)
+    data, whole = path.read_bytes(), rows(path)
+    for cut in (1.0, 0.6):
+        outcome, out = rescue(tmp_path, data[: int(cut * len(data))])
+        check(outcome, out, whole)
+        assert outcome.unvouched == outcome.saved and outcome.saved.total() >= int(cut * len(whole)) - 6
+    middle = len(data) // 2
+    outcome, out = rescue(tmp_path, data[:middle] + bytes(40) + data[middle + 40 :])
+    assert len(whole) - 4 <= outcome.saved.total() <= len(whole) and outcome.lost is not None
+    assert len(set(rows(out / FILE_NAME)) - set(whole)) <= 1  # the bytes that were hit
     outcome, _ = rescue(tmp_path, rewritten(bag, use_chunking=False, enable_data_crcs=True).read_bytes())
     assert outcome.unvouched.total() == 0 and outcome.saved.total() == 120
 
@@ -250,22 +235,6 @@ def test_the_command_tells_the_count(bag: Path, tmp_path: Path, capsys: pytest.C
     assert "no such file" in capsys.readouterr().err
 
 
-def bomb(size: int, stated: int) -> bytes:
-    """A chunk that unpacks to `size` zero bytes and says that it is of `stated`."""
-    packed = zstandard.compress(bytes(size))
-    body = struct.pack("<QQQII", 0, 1, stated, 1, 4) + b"zstd" + struct.pack("<Q", len(packed)) + packed
-    return struct.pack("<BQ", 6, len(body)) + body
-
-
-@pytest.mark.parametrize("stated", [100, 2**20, 2**40, 2**63])
-def test_a_bomb_is_not_unpacked(bag: Path, tmp_path: Path, stated: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(content, "LARGEST", 2**20)
-    data = (bag / FILE_NAME).read_bytes()
-    head = 8 + 9 + int.from_bytes(data[9:17], "little")
-    outcome, _ = rescue(tmp_path, data[:head] + bomb(2**24, stated) + data[head:])
-    assert outcome.saved.total() == 120 and outcome.fault_count == 1
-
-
 @pytest.mark.parametrize(
     "data",
     [b"", b"x", bytes(100_000), b"\x06" * 100_000, struct.pack("<BQ", 6, 2**62) * 3000, b"\x05" + bytes(8) + b"\xff" * 9000],
@@ -277,22 +246,16 @@ def test_bytes_that_are_no_bag(tmp_path: Path, data: bytes) -> None:
 
 
 @pytest.mark.parametrize("start", [2**64 - 1, 2**63, 10**6, 10**4 + 1])
-def test_a_summary_that_is_said_to_be_elsewhere_costs_nothing(tmp_path, start):
+def test_a_summary_that_is_said_to_be_elsewhere_costs_nothing(bag: Path, tmp_path: Path, start: int) -> None:
     """The footer of a file that is whole otherwise names a byte that is not that of the summary."""
-    write_session(tmp_path / "bag", *_rows(), {"origin": "synthetic, made for a test"})
-    file = tmp_path / "bag" / FILE_NAME
+    file = bag / FILE_NAME
     whole, data = rows(file), bytearray(file.read_bytes())
     struct.pack_into("<Q", data, len(data) - 28, start)
     file.write_bytes(data)
     with pytest.raises(BagError, match="boom_twin recover BAG"):
-        scan(tmp_path / "bag")
-    outcome = recover(tmp_path / "bag", tmp_path / "out")
+        scan(bag)
+    outcome = recover(bag, tmp_path / "out")
     assert outcome.saved.total() == len(whole)
-
-
-def _rows() -> tuple[np.ndarray, ...]:
-    """Stamps, strokes, angles and tip IMU of a boom at rest."""
-    return 10**18 + np.arange(40) * 5_000_000, np.full((40, 4), 0.2), np.zeros((40, 4)), np.zeros((40, 2))
 
 
 def chunks_of(found: list[tuple[int, bytes]]) -> list[int]:
