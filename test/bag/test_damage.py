@@ -22,6 +22,7 @@ from boom_twin.types import Stream
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
 JOINT_STATE = "sensor_msgs/msg/JointState"
+IDL = b"module sensor_msgs { module msg { struct JointState { sequence<float> position; }; }; };"
 
 
 def refusal(path: Path, content: Content) -> str:
@@ -106,6 +107,7 @@ def test_a_topic_that_is_not_there_or_of_another_type_is_refused(bag: Path) -> N
         ({"schema_encoding": "jsonschema"}, "schema encoding 'jsonschema'"),
         ({"change": lambda text: text.replace(b"float64[] velocity", b"float32[] velocity")}, "defined otherwise"),
         ({"change": lambda text: b"} no definition {"}, "cannot be parsed"),
+        ({"schema_encoding": "ros2idl", "change": lambda text: IDL}, "defined otherwise"),
     ],
 )
 def test_what_is_not_ros2_is_refused(

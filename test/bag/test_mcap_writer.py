@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections import Counter
 from io import BytesIO
 from itertools import pairwise
@@ -16,7 +14,6 @@ from mcap.writer import CompressionType, Writer
 from rosbags.highlevel import AnyReader
 
 from boom_twin.bag.mcap_writer import McapWriter
-from boom_twin.bag.recovery.recover import recover
 from boom_twin.bag.writer import FILE_NAME, SessionWriter
 from boom_twin.messages.encoded_block import EncodedBlock, EncodedRows
 from boom_twin.messages.topic_table import Qos, Topic
@@ -146,31 +143,3 @@ def test_a_bag_in_blocks(tmp_path: Path) -> None:
     with AnyReader([tmp_path / "other"]) as reader:
         assert {connection.topic: connection.msgcount for connection in reader.connections} == counts
         assert sorted(bytes(data) for _, _, data in reader.messages()) == sorted(data for *_, data in messages)
-
-
-FULL = """
-import resource, sys
-from pathlib import Path
-sys.path.insert(0, {tests!r})
-from bag.test_mcap_writer import TOPICS, block_of, random_messages
-from boom_twin.bag.writer import SessionWriter
-from boom_twin.errors import BagError
-try:
-    with SessionWriter(Path({bag!r}), TOPICS) as writer:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
-        for number in range(100):
-            writer.write_block(block_of(random_messages(number)))
-except BagError as error:
-    print(error, flush=True)
-    sys.exit(1)
-"""
-
-
-@pytest.mark.system
-def test_a_disk_that_fills_up_under_a_block(tmp_path: Path) -> None:
-    """The limit on the size of a file stands for the disk's."""
-    program = FULL.format(tests=str(Path(__file__).parents[1]), bag=str(tmp_path / "bag"))
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120)
-    assert done.returncode == 1 and done.stderr == ""
-    assert "session_0.mcap: cannot be written (File too large). Make room" in done.stdout and done.stdout.count("\n") == 1
-    assert recover(tmp_path / "bag", tmp_path / "out").saved.total() > 300

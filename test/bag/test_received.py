@@ -7,7 +7,9 @@ import shutil
 import socket
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -54,43 +56,28 @@ def kind(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-@pytest.mark.parametrize("name", [MCAP, METADATA])
-def test_files_of_a_bag(bag: Path, name: str, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    put(bag / name, kind, monkeypatch)
-    words = f"{bag / name}: {KINDS[kind]}, not opened"
-    with pytest.raises(BagError, match=words):
-        scan(bag)
-    with pytest.raises(BagError, match=words):
-        recover(bag, tmp_path / "out")
+def test_what_is_no_file_is_refused_by_its_name(bag: Path, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside a bag, in it, and in the folder of a replay."""
+
+    def refused(path: Path, *readers: Callable[[], Any]) -> None:
+        put(path, kind, monkeypatch)
+        for reader in readers:
+            with pytest.raises(BagError, match=f"{path}: {KINDS[kind]}"):
+                reader()
+
+    def rescue() -> Any:
+        return recover(bag, tmp_path / "out")
+
+    result = tmp_path / "replay"
+    result.mkdir()
+    refused(result / SUMMARY, lambda: side_of(result, lambda path: path))
+    refused(result / QUANTITIES, lambda: read(result))
+    refused(bag / TRUTH, lambda: load_truth(bag))
+    refused(bag / SHEET, lambda: mapping_of(bag), rescue)
+    refused(bag / METADATA, lambda: scan(bag), rescue)
+    (bag / METADATA).unlink() if kind != "folder" else (bag / METADATA).rmdir()
+    refused(bag / MCAP, lambda: scan(bag), rescue)
     assert not (tmp_path / "out").exists()
-
-
-def test_a_bag_without_metadata(bag: Path, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    (bag / METADATA).unlink()
-    put(bag / MCAP, kind, monkeypatch)
-    with pytest.raises(BagError, match=f"{bag / MCAP}: {KINDS[kind]}"):
-        scan(bag)
-
-
-def test_files_beside_a_bag(bag: Path, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    put(bag / SHEET, kind, monkeypatch)
-    put(bag / TRUTH, kind, monkeypatch)
-    with pytest.raises(BagError, match=f"{bag / SHEET}: {KINDS[kind]}"):
-        mapping_of(bag)
-    with pytest.raises(BagError, match=f"{bag / TRUTH}: {KINDS[kind]}"):
-        load_truth(bag)
-    with pytest.raises(BagError, match=f"{bag / SHEET}: {KINDS[kind]}"):
-        recover(bag, tmp_path / "out")
-
-
-def test_files_of_a_replay(tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "replay").mkdir()
-    put(tmp_path / "replay" / SUMMARY, kind, monkeypatch)
-    put(tmp_path / "replay" / QUANTITIES, kind, monkeypatch)
-    with pytest.raises(BagError, match=f"{tmp_path / 'replay' / SUMMARY}: {KINDS[kind]}"):
-        side_of(tmp_path / "replay", lambda path: path)
-    with pytest.raises(BagError, match=f"{tmp_path / 'replay' / QUANTITIES}: {KINDS[kind]}"):
-        read(tmp_path / "replay")
 
 
 COMMANDS = (

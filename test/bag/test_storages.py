@@ -113,6 +113,7 @@ def table_of(session: Path, out: Path) -> bytes:
     return (out / "samples.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_replays_of_one_session_from_four_storages_give_the_same_table(tmp_path: Path) -> None:
     source = moving(tmp_path / "mcap")
     others = [stored(source, "db3", tmp_path), stored(source, "ros1", tmp_path)]
@@ -145,7 +146,7 @@ CSV = "t_s,stroke_1_m,stroke_2_m,joint_1_rad\n0,0.1,0.2,0.3\n0.1,0.1,0.2,\n"
         ("t_s,stroke_1_m\n" + "".join(f"{17 * 10**17 + 5 * 10**6 * k},0.1\n" for k in range(3)), "as if in ns"),
         (CSV.replace("\n0.1,", "\n0,"), "Both have this time: give each its own, or take one out."),
         (CSV.replace("joint_1_rad", "joint_3_rad"), "no column stroke_3_m in its first line"),
-        (CSV.replace("joint_1_rad", "stroke_4_m"), "no column stroke_3_m in its first line"),
+        ("1," * 100_000, "line 1 is longer than 65536 characters"),
     ],
 )
 def test_a_csv_that_cannot_be_read_is_refused_by_line_and_column(tmp_path: Path, text: str, words: str) -> None:
@@ -169,24 +170,19 @@ def test_a_csv_is_read_in_the_encoding_that_its_mark_says_or_refused_because_of_
 
 def test_rows_of_one_time_with_other_columns_are_one_row(tmp_path: Path) -> None:
     """A plot program exports a row for each topic; cells without a value are written in many ways."""
-    rows = "".join(f"{k},0.1,,NaN\n{k},-,0.2,null\n{k},,,0.3\n" for k in range(3000))
-    (tmp_path / "s.csv").write_text("t_s,stroke_1_m,stroke_2_m,joint_1_rad\n" + rows.replace(",", ".5,", 0))
-    with pytest.raises(BagError, match="goes on by 1 s"):
-        scan(tmp_path / "s.csv")
     rows = "".join(f"{0.005 * k:.3f},0.1,,NaN\n{0.005 * k:.3f},-,0.2,null\n{0.005 * k:.3f},,,0.3\n" for k in range(3000))
     (tmp_path / "s.csv").write_text("t_s,stroke_1_m,stroke_2_m,joint_1_rad\n" + rows)
     assert [topic.count for topic in scan(tmp_path / "s.csv").topics] == [3000, 3000]
 
 
-def long_csv(file: Path, rows: int) -> Path:
-    file.write_text("t_s,stroke_1_m,joint_1_rad\n" + "".join(f"{5 + 0.005 * k:.3f},0.{k % 997:03d},0.1\n" for k in range(rows)))
-    return file
-
-
 def test_a_csv_takes_as_little_memory_as_one_stretch_of_it(tmp_path: Path) -> None:
     """So days of data may come as CSV."""
-    file = long_csv(tmp_path / "s.csv", 40_000)
-    scan(long_csv(tmp_path / "short.csv", 10))
+    file = tmp_path / "s.csv"
+    for rows in (10, 40_000):  # the first scan imports what both need
+        lines = (f"{5 + 0.005 * k:.3f},0.{k % 997:03d},0.1\n" for k in range(rows))
+        file.write_text("t_s,stroke_1_m,joint_1_rad\n" + "".join(lines))
+        if rows == 10:
+            scan(file)
     tracemalloc.start()
     session = scan(file)
     _, peak = tracemalloc.get_traced_memory()
@@ -194,24 +190,11 @@ def test_a_csv_takes_as_little_memory_as_one_stretch_of_it(tmp_path: Path) -> No
     assert peak < 12e6, "all rows at once take more"
     assert [topic.count for topic in session.topics] == [40_000, 40_000]
     assert (session.start, session.end) == (5_000_000_000, 204_995_000_000)
-
-
-@pytest.mark.parametrize(
-    ("row", "time", "told"), [(4097, "5", "is not after the row before"), (9000, "x", "is not a time in s")]
-)
-def test_a_row_far_down_a_csv_is_refused_by_its_line(tmp_path: Path, row: int, time: str, told: str) -> None:
-    file = long_csv(tmp_path / "s.csv", 9_500)
     lines = file.read_text().splitlines()
-    lines[row] = time + lines[row][lines[row].index(",") :]
+    lines[9000] = "x" + lines[9000]
     file.write_text("\n".join(lines))
-    with pytest.raises(BagError, match=rf"line {row + 1}: t_s = '?{time}'? {told}"):
+    with pytest.raises(BagError, match="line 9001: t_s = 'x"):
         scan(file)
-
-
-def test_a_csv_without_ends_of_lines_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "s.csv").write_text("1," * 100_000)
-    with pytest.raises(BagError, match="line 1 is longer than 65536 characters"):
-        scan(tmp_path / "s.csv")
 
 
 @pytest.mark.parametrize("kind", ["db3 file", "ros1"])
@@ -251,7 +234,9 @@ def test_no_link_is_followed_and_no_other_database_is_taken(bag: Path, tmp_path:
         scan(tmp_path / "other.db3")
 
 
-def test_recover_says_what_it_reads_and_batch_finds_all(bag: Path, tmp_path: Path) -> None:
+def test_recover_says_what_it_reads_and_batch_and_info_find_all(
+    bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     file = stored(bag, "db3 file", tmp_path)
     with pytest.raises(BagError, match=r"only \.mcap files are recovered"):
         recover(file, tmp_path / "saved")
@@ -259,10 +244,7 @@ def test_recover_says_what_it_reads_and_batch_finds_all(bag: Path, tmp_path: Pat
     (tmp_path / "s.csv").write_text(CSV)
     stored(bag, "ros1", tmp_path)
     assert [path.name for path in sessions_of([f"{tmp_path}/*"])] == ["bag", "one.bag", "s.csv", "two"]
-
-
-def test_info_tells_how_a_session_is_stored(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["info", str(stored(bag, "ros1", tmp_path))]) == 0
+    assert main(["info", str(tmp_path / "one.bag")]) == 0
     assert "stored     ros1, 1 file" in capsys.readouterr().out
 
 
@@ -279,7 +261,9 @@ def test_a_window_is_a_part_of_the_session_and_starts_at_rest(tmp_path: Path, ca
     assert main([*arguments, "--start", "5"]) == 1
     assert "no message from 5 s on; the session lasts 2.0 s" in capsys.readouterr().err
     assert main(["info", str(source), "--json", "--start", "1", "--duration", "0.5"]) == 0
-    assert '"counts": [100, 100]' in capsys.readouterr().out
+    told = json.loads(capsys.readouterr().out)
+    assert told["counts"] == [100, 100] and told["start_ns"] == 1_700_000_001_000_000_000
+    assert [told["duration_s"], told["session_duration_s"]] == pytest.approx([0.495, 1.995])
 
 
 def test_the_truth_goes_with_the_window(tmp_path: Path) -> None:
@@ -301,15 +285,3 @@ def test_a_database_has_the_origin_of_the_sheet_beside_it(tmp_path: Path, capsys
     assert "made by    synthetic, a test (synthetic)" in capsys.readouterr().out
     (file.parent / "session.yaml").write_text("origin: [broken\n")
     assert "origin" not in scan(file).notes
-
-
-def test_info_tells_the_length_of_the_window(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = str(moving(tmp_path / "mcap"))
-    assert main(["info", source, "--start", "1", "--duration", "0.5", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["duration_s"] == pytest.approx(0.495) and told["session_duration_s"] == pytest.approx(1.995)
-    assert told["start_ns"] == 1_700_000_001_000_000_000
-    assert main(["info", source, "--start", "1", "--duration", "0.5"]) == 0
-    assert "lasts      0.495 s, 200 messages: the part from 1 s on, of 1.995 s" in capsys.readouterr().out
-    assert main(["info", source]) == 0
-    assert "lasts      1.995 s, 800 messages\n" in capsys.readouterr().out
