@@ -44,8 +44,6 @@ class Tally:
         Log time minus stamp, ns: smallest, largest and sum over `skewed` messages.
     names : Counter
         Number of messages by their joint names.
-    unreadable : int
-        Number of joint states whose names cannot be read.
     """
 
     name: str
@@ -62,7 +60,6 @@ class Tally:
     skewed: int = 0
     skews: list[int] = field(default_factory=lambda: [0, 0, 0])
     names: Counter[tuple[str, ...]] = field(default_factory=Counter)
-    unreadable: int = 0
     _before: int | None = None
     _known: tuple[bytes, tuple[str, ...]] | None = None
 
@@ -109,8 +106,7 @@ class Tally:
             try:
                 names, end = names_in(data)
             except (ValueError, KeyError, struct.error):
-                self.unreadable += 1
-                return
+                return  # not a whole joint state
             self._known = data[12:end], names
         names = self._known[1]
         if names in self.names or len(self.names) < VARIANTS:

@@ -41,8 +41,6 @@ from .session_file import PARSE_ERRORS, SessionFile, as_bag_error
 PROFILE = "ros2"
 NOTES = "boom_twin"
 """Name of the metadata record that holds the notes on a session."""
-ENOUGH = 256
-"""Lower limit for the number of messages in a block, except the last."""
 
 _RUN = 2**20
 """Size of a piece of messages outside chunks, bytes."""
@@ -100,23 +98,10 @@ class McapFile(SessionFile):
                 yield _places(block, number), block.sources, block.log_times
 
     def blocks(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
-        """Yield blocks as in `SessionFile`. Messages of equal time keep the order of the file."""
-        waiting: list[MessageBlock] = []
-        try:
-            for block in self._in_order(passed, clock):
-                waiting.append(block)
-                if sum(map(len, waiting)) >= ENOUGH:
-                    yield joined(waiting)
-                    waiting = []
-        except Exception:
-            if waiting:
-                yield joined(waiting)  # what comes before the fault
-            raise
-        if waiting:
-            yield joined(waiting)
+        """Yield blocks as in `SessionFile`, one piece after the other. Messages of equal time keep the order of the file.
 
-    def _in_order(self, passed: Set[int], clock: LogClock) -> Iterator[MessageBlock]:
-        """Yield the messages of one piece after the other. Only pieces that overlap in time are held together."""
+        Only pieces that overlap in time are held together.
+        """
         held: dict[int, MessageBlock] = {}
         pieces = list(enumerate(self.pieces))
         if not clock.is_set_back:

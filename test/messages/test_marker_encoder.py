@@ -14,8 +14,8 @@ from boom_twin.messages.marker_encoder import TRACE, ShapeMarkers, force_colour
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output
 from boom_twin.messages.type_store import jazzy
+from boom_twin.predictions import Prediction
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.types import Prediction
 
 FACTOR, FULL = 7.5, 5.0e4  # N
 PERIOD = 5_000_000  # ns

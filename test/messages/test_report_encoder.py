@@ -14,9 +14,10 @@ from boom_twin.messages.report_encoder import ReportEncoder, decode_health
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output
 from boom_twin.messages.type_store import jazzy, new_message
+from boom_twin.predictions import Prediction
 from boom_twin.scene import load_scene
 from boom_twin.twin.blocks import estimate_of
-from boom_twin.types import Alarm, Health, Prediction, Ranked, Report, Residuals, Stream
+from boom_twin.types import Alarm, Health, Ranked, Report, Residuals, Stream
 
 STAMP = 1_700_000_000_123_456_789
 

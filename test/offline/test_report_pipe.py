@@ -20,10 +20,11 @@ from boom_twin.config.settings import Settings
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.offline.writer_process import ReportWriter, pack
+from boom_twin.predictions import Prediction
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.schema import Clearance, Pin
 from boom_twin.twin.blocks import PredictionBlock, ReportBlock
-from boom_twin.types import Prediction, Report
+from boom_twin.types import Report
 
 
 def test_every_field_of_a_prediction_has_its_place() -> None:
