@@ -14,8 +14,9 @@ import numpy as np
 
 from ..compiler.compile import compile_scene
 from ..errors import BoomTwinError, UsageError
+from ..predictions import Estimate, Prediction
 from ..scene.schema import Scene
-from ..types import Array, Estimate, Prediction, StrokeReading
+from ..types import Array, StrokeReading
 from .bending_moments import Station, increments_by_tip_force, moments_by_unknowns, stations
 from .cylinder_drives import drives_as_read
 from .equilibrium import settle

@@ -22,11 +22,12 @@ from ..errors import SolverError
 from ..kernels.jit import hold
 from ..kernels.result_row import PIN, places_in, prediction_width
 from ..kernels.tables import OK, SENTENCES, State, Tables, Work
+from ..predictions import Outline, Prediction
 from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
-from ..types import SENSORS, Array, Mount, Outline, Prediction, Stream, StrokeReading, channels_of
+from ..types import SENSORS, Array, Mount, Stream, StrokeReading, channels_of
 from .estimate_row import MODES
 from .models import start_models
 from .posture import Posture, linearise, new_posture

@@ -14,8 +14,9 @@ from ..deviation.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms, repeated, values_of
 from ..health.deviations import KIND as DEVIATION
 from ..health.sensor_monitor import noise_as_text
+from ..predictions import Estimate, Prediction
 from ..scene.schema import Scene
-from ..types import SECOND, Alarm, Array, Estimate, Health, Prediction, Report, StrokeReading
+from ..types import SECOND, Alarm, Array, Health, Report, StrokeReading
 from .levels import Bounds, ComponentJudge, Level, Status
 
 HOLD = 1.0

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..types import Array, Prediction
+from ..predictions import Prediction
+from ..types import Array
 from .cdr_encoder import NumberFields, Template, stamped
 from .message_fields import FRAME, fill_xz
 from .topic_table import TYPES, Output

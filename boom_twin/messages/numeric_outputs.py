@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..deviation.estimate_row import FORCE_VARIANCE, MODES
+from ..predictions import Estimate, Prediction
 from ..twin.blocks import EstimateBlock, Integers, PredictionBlock, row_of
-from ..types import Array, Estimate, Prediction
+from ..types import Array
 from .cdr_encoder import NumberFields
 from .message_fields import TIP_JOINTS, fill_xz
 from .topic_table import Output

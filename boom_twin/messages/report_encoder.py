@@ -11,10 +11,11 @@ import numpy as np
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..health.alarms import alarm_of, values_of
+from ..predictions import Estimate, Prediction
 from ..scene.kinematics import PassiveJoints
 from ..scene.schema import Scene
 from ..twin.blocks import STREAMS, EstimateBlock, Integers, PredictionBlock, ReportBlock, ResidualBlock
-from ..types import Alarm, Array, Change, Estimate, Health, Prediction, Report, channels_of
+from ..types import Alarm, Array, Change, Health, Report, channels_of
 from .cdr_encoder import NumberFields, Template, stamped
 from .encoded_block import Bytes, EncodedBlock, EncodedBlockBuilder
 from .marker_encoder import ShapeMarkers

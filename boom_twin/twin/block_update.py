@@ -18,8 +18,9 @@ from ..health.blocks import MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
 from ..kernels.jit import SameTypes, hold
 from ..kernels.result_row import PIN
+from ..predictions import Outline
 from ..scene.schema import Scene
-from ..types import NANO, SECOND, Array, Health, Outline, Report, Residuals, Stream, channels_of
+from ..types import NANO, SECOND, Array, Health, Report, Residuals, Stream, channels_of
 from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
 from .health_rows import copy_predictions, copy_residuals, count_residuals
 from .load_shedding import LoadShedding

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..deviation import estimate_row as row_at
-from ..types import Array, Estimate, Health, Outline, Prediction, Report, Residuals, Sample, Stream, channels_of
+from ..predictions import Estimate, Outline, Prediction
+from ..types import Array, Health, Report, Residuals, Sample, Stream, channels_of
 
 Integers = NDArray[np.int64]
 
