@@ -16,6 +16,7 @@ from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 from ruamel.yaml import YAML
 
+from boom_twin import Stream
 from boom_twin.bag.inspect import inspect
 from boom_twin.bag.metadata import read_metadata, write_metadata
 from boom_twin.bag.reader import Session, read, scan
@@ -25,7 +26,6 @@ from boom_twin.bag.writer import FILE_NAME, SessionWriter
 from boom_twin.errors import BagError, UsageError
 from boom_twin.messages.topic_table import Qos, Topic, load_topics
 from boom_twin.messages.type_store import jazzy, new_message
-from boom_twin.types import Stream
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
 POINT = Topic(

@@ -17,6 +17,7 @@ import pytest
 import zstandard
 from mcap.writer import MCAP0_MAGIC
 
+from boom_twin import Stream
 from boom_twin.bag import mcap_file, mcap_records
 from boom_twin.bag.mcap_records import LARGEST
 from boom_twin.bag.metadata import FILE_NAME as METADATA
@@ -29,7 +30,6 @@ from boom_twin.config.yaml_text import MOST_VALUES, plain
 from boom_twin.errors import BagError
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.offline import ground_truth as truth
-from boom_twin.types import Stream
 
 ROOT = Path(__file__).parents[2]
 MEGABYTES = 400  # most that a command may take on any of these

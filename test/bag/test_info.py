@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
+from ros_messages import joint_state
 
+from boom_twin import Stream
 from boom_twin.bag.writer import FILE_NAME, SessionWriter
 from boom_twin.cli.main import main
-from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import new_message
-from boom_twin.types import Stream
 
 ROOT = Path(__file__).parents[2]
 START, STEP = 10**18, 5_000_000
@@ -50,10 +49,7 @@ def write(directory: Path, rows: list[Row]) -> Path:
     topics = {stream: load_topics().inputs[stream] for stream in dict.fromkeys(stream for stream, *_ in rows)}
     with SessionWriter(directory, {stream.value: topic for stream, topic in topics.items()}) as bag:
         for stream, log_time, stamp, names in rows:
-            msg = new_message(topics[stream].type)
-            fill_header(msg.header, stamp, "base_link")
-            msg.name, msg.position = names, np.zeros(len(names))
-            bag.write(stream.value, log_time, msg)
+            bag.write(stream.value, log_time, joint_state(names, np.zeros(len(names)), stamp))
     return directory
 
 

@@ -14,11 +14,12 @@ from dataclasses import replace
 from pathlib import Path
 from threading import Event
 
-import numpy as np
 import pytest
 from mcap.writer import CompressionType
+from ros_messages import encoded, joint_state
 from rosbags.highlevel import AnyReader
 
+from boom_twin import Stream
 from boom_twin.bag import async_writer as module
 from boom_twin.bag.async_writer import FileSplit, Storage
 from boom_twin.bag.metadata import Recorded, read_metadata
@@ -27,18 +28,13 @@ from boom_twin.bag.recovery.recover import recover
 from boom_twin.bag.writer import BagWriter, recorded
 from boom_twin.errors import BagError
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import jazzy, new_message
-from boom_twin.types import Stream
 
 TOPIC = load_topics().inputs[Stream.STROKES]
 STEP = 5_000_000
 
 
 def message(number: int) -> bytes:
-    msg = new_message(TOPIC.type)
-    msg.header.stamp.sec = number
-    msg.position = np.array([0.1 * number])
-    return bytes(jazzy().serialize_cdr(msg, TOPIC.type))
+    return encoded(joint_state([], [0.1 * number], number * 10**9))
 
 
 def numbers(path: Path) -> list[int]:

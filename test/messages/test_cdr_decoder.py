@@ -7,23 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ros_messages import encoded, imu, joint_state
 
 from boom_twin.messages.cdr_decoder import CdrDecoder
-from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import TYPES
-from boom_twin.messages.type_store import decode, jazzy, new_message
+from boom_twin.messages.type_store import decode
 from boom_twin.types import SENSORS, Stream
 
 CYLINDERS = [f"cylinder_{i}" for i in (3, 1, 4, 2)]
-
-
-def encoded(stream: Stream, stamp: int, frame: str, **values: Any) -> bytes:
-    msg = new_message(TYPES[stream])
-    fill_header(msg.header, stamp, frame)
-    for name, value in values.items():
-        setattr(msg, name, value)
-    return bytes(jazzy().serialize_cdr(msg, TYPES[stream]))
 
 
 class Wire:
@@ -55,18 +47,14 @@ def test_joint_states_of_every_layout(stream: str, read: str, other: str) -> Non
     heads = list(product(("", "base_link", "x" * 7), ([], ["boom_é"], ["a", "bb", "ccc"])))
     for (frame, more), count, others, k in product(heads, (0, 4, 9), (0, 3), range(3)):
         arrays = {read: random.normal(size=count), other: np.arange(float(others))}
-        wire.check(encoded(wire.stream, k, frame, name=CYLINDERS + more, **arrays))
+        wire.check(encoded(joint_state(CYLINDERS + more, stamp=k, frame=frame, **arrays)))
     assert wire.whole == len(heads), "each frame with each list of names is decoded once"
 
 
 def test_accelerations_of_every_frame() -> None:
     wire = Wire(Stream.IMU)
     for frame, (k, covariance) in product(("", "tip", "tip_link", "base_footprint"), enumerate((0.0, -1.0, 0.2))):
-        msg = new_message(TYPES[Stream.IMU])
-        fill_header(msg.header, 10**18 + k, frame)
-        msg.linear_acceleration.x, msg.linear_acceleration.z = 0.1 * k, -9.0
-        msg.linear_acceleration_covariance[0] = covariance
-        wire.check(bytes(jazzy().serialize_cdr(msg, TYPES[Stream.IMU])))
+        wire.check(encoded(imu(0.1 * k, -9.0, 10**18 + k, frame, covariance)))
     assert wire.whole == 4
 
 
@@ -74,14 +62,14 @@ def test_names_of_the_same_length_that_take_turns_are_remembered() -> None:
     """As of joints in messages of their own."""
     wire = Wire(Stream.ANGLES)
     for names in (["joint_1", "joint_2"], ["joint_2", "joint_1"], ["joint_1", "joint_2"]):
-        wire.check(encoded(Stream.ANGLES, 5, "", name=names, position=np.array([1.0, 2.0])))
+        wire.check(encoded(joint_state(names, [1.0, 2.0], 5)))
     assert wire.whole == 2
 
 
 def test_a_message_that_is_not_whole_is_refused_and_the_next_one_read() -> None:
     """Lengths behind the numbers count too: else a recording is taken that can never be replayed."""
     wire = Wire(Stream.STROKES)
-    data = encoded(Stream.STROKES, 7, "", name=["cylinder_1", "cylinder_2"], position=np.array([1.0, 2.0]))
+    data = encoded(joint_state(["cylinder_1", "cylinder_2"], [1.0, 2.0], 7))
     wire.check(data)
     velocity = len(data) - 8
     long = [data[:place] + b"\xff\xff\xff\x7f" + data[place + 4 :] for place in (velocity, velocity + 4)]
@@ -95,7 +83,7 @@ def test_names_that_are_not_utf_8_have_question_marks() -> None:
     """Layouts known or not, and many names of one message; numbers that happen to have the same bytes stay."""
     wire = Wire(Stream.STROKES)
     for k in range(3):
-        values = {"name": ["cylinder_1", "Druck_X", "X", "cylinder_2"], "position": np.array([0.1, 9.0, 9.0, 0.2])}
-        msg = wire.check(encoded(Stream.STROKES, k + 1, "Rahmen X", **values).replace(b"X\0", b"\xfc\0"))
+        sent = joint_state(["cylinder_1", "Druck_X", "X", "cylinder_2"], [0.1, 9.0, 9.0, 0.2], k + 1, "Rahmen X")
+        msg = wire.check(encoded(sent).replace(b"X\0", b"\xfc\0"))
         assert list(msg.name) == ["cylinder_1", "Druck_?", "?", "cylinder_2"] and list(msg.position) == [0.1, 9.0, 9.0, 0.2]
     assert wire.whole == 1

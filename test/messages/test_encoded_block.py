@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from messages.random_reports import Told, boom, random_reports
 
+from boom_twin import Report
 from boom_twin.config.settings import Settings
 from boom_twin.messages.encoded_block import EncodedBlock
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import Output
 from boom_twin.offline.writer_process import pack
 from boom_twin.twin.blocks import ReportBlock
-from boom_twin.types import Report
 
 Messages = list[tuple[str, int, bytes]]
 

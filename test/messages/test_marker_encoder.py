@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from drive_twin import drive_twin
+from ros_messages import decoded
 
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.messages.marker_encoder import TRACE, ShapeMarkers, force_colour
 from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.messages.topic_table import TYPES, Output
-from boom_twin.messages.type_store import jazzy
+from boom_twin.messages.topic_table import Output
 from boom_twin.predictions import Prediction
 from boom_twin.scene.kinematics import strokes_of_posture
 
@@ -41,7 +41,7 @@ def predictions(scene: Any) -> list[Prediction]:
 def drawn(predictions: list[Prediction]) -> list[dict[tuple[str, int], Any]]:
     """Return the markers of every message, by namespace and id."""
     markers = ShapeMarkers(FACTOR, FULL)
-    messages = [jazzy().deserialize_cdr(markers.fill(prediction), TYPES[Output.SHAPE]) for prediction in predictions]
+    messages = [decoded(markers.fill(prediction), Output.SHAPE) for prediction in predictions]
     return [{(marker.ns, marker.id): marker for marker in message.markers} for message in messages]
 
 

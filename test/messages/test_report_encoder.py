@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ros_messages import decoded, encoded
 
 from boom_twin.config.settings import Settings
 from boom_twin.deviation.estimate_row import COORDINATES, RATES, WIDTH
@@ -79,8 +80,9 @@ def encoder() -> ReportEncoder:
     return ReportEncoder(three, Settings())
 
 
-def decoded(messages: list[tuple[Output, bytes]]) -> dict[Output, Any]:
-    return {key: jazzy().deserialize_cdr(data, TYPES[key]) for key, data in messages}
+def filled(report: Report) -> dict[Output, Any]:
+    """Return the decoded messages of one report."""
+    return {key: decoded(data, key) for key, data in encoder().fill(report)}
 
 
 TIP = ["tip_dx", "tip_dz", "tip_pitch"]
@@ -93,7 +95,7 @@ def xyz(vector: Any) -> tuple[float, float, float]:
 
 def test_a_prediction_is_told_in_the_axes_of_the_base() -> None:
     """Model x is x and model y is z; a turn that lifts a point ahead is one about -y."""
-    found = decoded(encoder().fill(report()))
+    found = filled(report())
     assert xyz(found[Output.TIP_DISPLACEMENT].vector) == (0.01, 0.0, -0.12)
     assert xyz(found[Output.TIP_POSITION].point) == (12.5, 0.0, 3.25)
     accel = found[Output.TIP_ACCELERATION].accel
@@ -118,7 +120,7 @@ def test_a_prediction_is_told_in_the_axes_of_the_base() -> None:
 def test_shape_and_passive_joints_come_with_a_line_only() -> None:
     """Both lengths in turn, from one encoder."""
     own, bare = encoder(), replace(report(), prediction=replace(prediction(), shape=None))
-    found = [decoded(own.fill(each)) for each in (report(), bare, report())]
+    found = [{key: decoded(data, key) for key, data in own.fill(each)} for each in (report(), bare, report())]
     assert [len(each[Output.JOINT_STATES].name) for each in found] == [16, 9, 16]
     assert [Output.SHAPE in each for each in found] == [True, False, True]
     alone = Report(stamp=STAMP, accepted=True, residuals=report().residuals)
@@ -130,7 +132,7 @@ def test_an_estimate_tells_velocity_and_modes_along_the_axes_of_the_base() -> No
     row = 0.1 * np.arange(WIDTH)
     row[[COORDINATES + 5, RATES + 5]] = np.nan
     estimate = estimate_of(STAMP, row)
-    told = decoded(encoder().fill(replace(report(), estimate=estimate)))
+    told = filled(replace(report(), estimate=estimate))
     twist, modes = told[Output.ESTIMATE_TWIST].twist, told[Output.ESTIMATE_MODES]
     (x, y, a), (xx, xy, xa, yy, ya, aa) = estimate.velocity, estimate.velocity_covariance
     linear, angular = twist.twist.linear, twist.twist.angular
@@ -145,7 +147,7 @@ def test_an_estimate_tells_velocity_and_modes_along_the_axes_of_the_base() -> No
 
 
 def test_an_alarm_is_told_in_words_and_numbers() -> None:
-    msg = decoded(encoder().fill(judged(ALARM)))[Output.HEALTH]
+    msg = filled(judged(ALARM))[Output.HEALTH]
     (status,) = msg.status
     assert (status.name, status.level, status.message) == ("joint_2", 2, "cylinder_2.k is 29 % softer")
     assert {pair.key: pair.value for pair in status.values} == {
@@ -166,18 +168,18 @@ def test_an_alarm_is_told_in_words_and_numbers() -> None:
 
 def test_levels_of_alarms_and_how_far_off_the_tip_may_be() -> None:
     unknown, ended = replace(ALARM, cause=None), replace(ALARM, until=STAMP)
-    found = decoded(encoder().fill(judged(ALARM, unknown, ended)))
+    found = filled(judged(ALARM, unknown, ended))
     assert [status.level for status in found[Output.HEALTH].status] == [2, 1, 0]
     assert {pair.key: pair.value for pair in found[Output.HEALTH].status[2].values}["to_s"] == "1700000000.123"
     assert xyz(found[Output.TIP_UNCERTAINTY].vector) == (0.001, 0.0, 0.004)
     assert {stamp_of(found[key]) for key in (Output.HEALTH, Output.TIP_UNCERTAINTY)} == {STAMP - 100_000_000}
-    assert not decoded(encoder().fill(judged()))[Output.HEALTH].status
+    assert not filled(judged())[Output.HEALTH].status
 
 
 def test_alarms_come_back_from_their_message_to_the_millisecond() -> None:
     """Without the sizes of what may be wrong. A status that is no alarm is left out."""
     ended = Alarm("joint_3", "stuck", STAMP - 5, STAMP, "joint_3.sensor", "repeats one value")
-    message = decoded(encoder().fill(judged(ALARM, ended)))[Output.HEALTH]
+    message = filled(judged(ALARM, ended))[Output.HEALTH]
     found = decode_health(message)
     for alarm, sent in zip(found, (ALARM, ended), strict=True):
         bare = tuple(replace(each, parts=()) for each in sent.ranked)
@@ -192,9 +194,8 @@ def test_alarms_come_back_from_their_message_to_the_millisecond() -> None:
 
 @pytest.mark.parametrize("type_name", sorted(set(TYPES.values())))
 def test_factory_makes_what_can_be_encoded(type_name: str) -> None:
-    store = jazzy()
-    data = bytes(store.serialize_cdr(new_message(type_name), type_name))
-    assert bytes(store.serialize_cdr(store.deserialize_cdr(data, type_name), type_name)) == data
+    data = encoded(new_message(type_name))
+    assert encoded(jazzy().deserialize_cdr(data, type_name)) == data
     assert not any(data[4:].replace(b"\x01\x00\x00\x00\x00", b""))
 
 
@@ -209,8 +210,7 @@ def test_the_bytes_are_those_of_rosbags() -> None:
     own = encoder()
     for number in range(60):
         for key, data in own.fill(replace(judged(ALARM), prediction=prediction(STAMP + 100_000_000 * number))):
-            msg = jazzy().deserialize_cdr(data, TYPES[key])
-            assert bytes(jazzy().serialize_cdr(msg, TYPES[key])) == data, key
+            assert encoded(decoded(data, key)) == data, key
 
 
 def test_rclpy_reads_the_same_numbers() -> None:
@@ -218,7 +218,7 @@ def test_rclpy_reads_the_same_numbers() -> None:
     types = pytest.importorskip("boom_twin.ros.runtime")
     for key, data in encoder().fill(judged(ALARM)):
         assert_same(
-            jazzy().deserialize_cdr(data, TYPES[key]),
+            decoded(data, key),
             serialization.deserialize_message(data, types.message_class(TYPES[key])),
             key.value,
         )

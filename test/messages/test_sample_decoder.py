@@ -9,26 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ros_messages import imu, joint_state
 
 from boom_twin.messages.sample_decoder import LONGEST, ODDITIES, SampleDecoder
 from boom_twin.messages.topic_table import Sensor, Topics, load_topics, usual
-from boom_twin.messages.type_store import new_message
 from boom_twin.types import SENSORS, Stream
 
 FINITE = st.floats(-1e6, 1e6)
 OTHER_NAMES = st.text(max_size=12).filter(lambda name: not name.startswith(("joint_", "cylinder_")))
-
-
-def joint_state(names: list[str], positions: list[float]) -> Any:
-    msg = new_message("sensor_msgs/msg/JointState")
-    msg.name, msg.position = names, np.array(positions)
-    return msg
-
-
-def imu(x: float, z: float) -> Any:
-    msg = new_message("sensor_msgs/msg/Imu")
-    msg.linear_acceleration.x, msg.linear_acceleration.y, msg.linear_acceleration.z = x, 77.0, z
-    return msg
 
 
 @settings(deadline=None)
@@ -109,9 +97,8 @@ def test_names_that_are_not_the_scenes_are_noted_beside_those_that_are_not_there
     [(0.25, 0.0, [0.25, 9.81], {}), (0.25, -1.0, None, {"no measurement": 1}), (nan, 0.0, [nan, 9.81], {"not finite": 1})],
 )
 def test_an_imu_gives_x_and_z(x: float, covariance: float, values: list[float] | None, oddities: dict[str, int]) -> None:
-    decoder, msg = SampleDecoder(4), imu(x, 9.81)
-    msg.linear_acceleration_covariance[0] = covariance
-    sample = decoder.put(Stream.IMU, 9, msg)
+    decoder = SampleDecoder(4)
+    sample = decoder.put(Stream.IMU, 9, imu(x, 9.81, covariance=covariance))
     assert (sample is None) == (values is None) and dict(decoder.oddities) == oddities
     if sample is not None:
         np.testing.assert_array_equal(sample.values, values)
@@ -130,9 +117,7 @@ def test_real_messages_of_rclpy_are_taken() -> None:
 @pytest.mark.parametrize(("stamp", "name"), [(-1, "impossible stamp"), (2**31 * 10**9, "impossible stamp"), (0, "no stamp")])
 def test_impossible_stamps_give_no_sample(stamp: int, name: str) -> None:
     decoder = SampleDecoder(1)
-    message = new_message("sensor_msgs/msg/JointState")
-    message.name, message.position = ["cylinder_1"], np.array([0.1])
-    assert decoder.put(Stream.STROKES, stamp, message) is None
+    assert decoder.put(Stream.STROKES, stamp, joint_state(["cylinder_1"], [0.1])) is None
     assert decoder.oddities == {name: 1}
 
 
@@ -269,7 +254,5 @@ def test_coarse_stamps_of_one_source_are_no_second_source() -> None:
 def test_two_frames_of_imus_on_one_topic_are_told_and_neither_is_used() -> None:
     decoder, found = SampleDecoder(1), []
     for k in range(200):
-        message = imu(0.0, 9.8)
-        message.header.frame_id = "tip" if k % 2 == 0 else "base"
-        found += decoder.samples([Stream.IMU], 5 * MS * (k + 1), message)
+        found += decoder.samples([Stream.IMU], 5 * MS * (k + 1), imu(0.0, 9.8, frame="base" if k % 2 else "tip"))
     assert len(found) == 1 and decoder.oddities == {"two sources": 199}

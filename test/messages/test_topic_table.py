@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from boom_twin import Stream
 from boom_twin.messages.topic_table import Output, load_topics
-from boom_twin.types import Stream
 
 
 def test_defaults_are_those_of_the_interface() -> None:

@@ -9,13 +9,13 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pytest
 from drive_twin import drive_twin
+from ros_messages import decoded
 
 from boom_twin import Report, Sample, Stream, load_scene
 from boom_twin.cli.main import main
 from boom_twin.config.settings import Settings
 from boom_twin.messages.report_encoder import ReportEncoder
-from boom_twin.messages.topic_table import TYPES, Output
-from boom_twin.messages.type_store import jazzy
+from boom_twin.messages.topic_table import Output
 from boom_twin.messages.urdf import urdf
 from boom_twin.scene.kinematics import PassiveJoints, skeleton, stroke_curve, strokes_of_posture
 from boom_twin.scene.load import examine_text, example_text
@@ -173,7 +173,7 @@ def test_joint_states_drive_every_joint() -> None:
     scene = load_scene()
     twin, encoder = drive_twin(scene), ReportEncoder(scene, Settings())
     report: Report = twin.update(Sample(Stream.STROKES, 0, strokes_of_posture(scene, "arch")))
-    msg = jazzy().deserialize_cdr(dict(encoder.fill(report))[Output.JOINT_STATES], TYPES[Output.JOINT_STATES])
+    msg = decoded(dict(encoder.fill(report))[Output.JOINT_STATES], Output.JOINT_STATES)
     robot = ElementTree.fromstring(urdf(scene))
     assert set(msg.name) == {j.attrib["name"] for j in robot.findall("joint") if j.attrib["type"] != "fixed"}
     positions = dict(zip(msg.name, msg.position.tolist(), strict=True))
@@ -198,7 +198,7 @@ def test_the_joints_lead_to_the_tip_that_is_predicted(name: str) -> None:
         report = twin.update(Sample(Stream.STROKES, k * 5_000_000, begin + 1e-3 * np.sin(0.3 * k)))
         predicted = report.prediction
         assert predicted is not None
-        msg = jazzy().deserialize_cdr(dict(encoder.fill(report))[Output.JOINT_STATES], TYPES[Output.JOINT_STATES])
+        msg = decoded(dict(encoder.fill(report))[Output.JOINT_STATES], Output.JOINT_STATES)
         poses = frames(robot, dict(zip(msg.name, msg.position.tolist(), strict=True)))
         at(poses["tip"], (0.0, 0.0), predicted.tip_position)
         along = [np.cos(predicted.tip_angle), 0.0, np.sin(predicted.tip_angle)]

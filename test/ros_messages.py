@@ -1,0 +1,43 @@
+"""Messages of sensors and their bytes, without ROS: by rosbags."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from boom_twin import Stream
+from boom_twin.messages.message_fields import fill_header
+from boom_twin.messages.topic_table import TYPES, Output
+from boom_twin.messages.type_store import jazzy, new_message
+
+JOINT_STATE, IMU = TYPES[Stream.STROKES], TYPES[Stream.IMU]
+
+
+def joint_state(names: list[str], position: Any, stamp: int = 0, frame: str = "", **arrays: Any) -> Any:
+    """Return a sensor_msgs/JointState; `arrays` are velocity and effort."""
+    msg = new_message(JOINT_STATE)
+    fill_header(msg.header, stamp, frame)
+    msg.name = names
+    for name, values in {"position": position, **arrays}.items():
+        setattr(msg, name, np.array(values, dtype=float))
+    return msg
+
+
+def imu(x: float, z: float, stamp: int = 0, frame: str = "", covariance: float = 0.0) -> Any:
+    """Return a sensor_msgs/Imu that also has an acceleration across the model's plane."""
+    msg = new_message(IMU)
+    fill_header(msg.header, stamp, frame)
+    msg.linear_acceleration.x, msg.linear_acceleration.y, msg.linear_acceleration.z = x, 77.0, z
+    msg.linear_acceleration_covariance[0] = covariance
+    return msg
+
+
+def encoded(msg: Any, little_endian: bool = True) -> bytes:
+    """Return a message in CDR."""
+    return bytes(jazzy().serialize_cdr(msg, msg.__msgtype__, little_endian=little_endian))
+
+
+def decoded(data: bytes, role: Stream | Output) -> Any:
+    """Return the message of a role from CDR."""
+    return jazzy().deserialize_cdr(data, TYPES[role])
