@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from boom_twin import Stream
-from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.topic_table import TYPES, Output
-from boom_twin.messages.type_store import jazzy, new_message
+from boom_twin.messages.type_store import fill_header, jazzy, new_message
 
 JOINT_STATE, IMU = TYPES[Stream.STROKES], TYPES[Stream.IMU]
 

@@ -81,7 +81,7 @@ STALL = 5.0
 """Time without an answer of the disk before it is reported, s."""
 PATIENCE = 30.0
 """Time for the disk to complete the bag at the end, s."""
-MOST = 256 * 2**20
+MOST_WAITING = 256 * 2**20
 """Bytes of messages that may wait in memory."""
 
 MOST_FILES = 2000
@@ -161,8 +161,8 @@ class Storage:
         elif silent < STALL and self._is_late:
             self._tell(f"{self._bag.directory}: the disk answers again; nothing was lost")
         self._is_late = silent > STALL
-        if self._put - self._taken > MOST:
-            raise self._stalled(f"{MOST // 2**20} MiB of messages wait in memory")
+        if self._put - self._taken > MOST_WAITING:
+            raise self._stalled(f"{MOST_WAITING // 2**20} MiB of messages wait in memory")
 
     def state(self) -> DiskState:
         """Return the state of the disk: delay, waiting and written bytes, free space and time until it is full."""

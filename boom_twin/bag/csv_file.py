@@ -29,7 +29,7 @@ TIME = "t_s"
 STROKE = "stroke_{}_m"
 _NUMBERED = re.compile(r"(?:stroke_(\d{1,3})_m|joint_(\d{1,3})_rad|cylinder_force_(\d{1,3})_N)")
 IMU = ("imu_x_m_s2", "imu_z_m_s2")
-FEWEST, SLOWEST, FASTEST = 20, 1.0, 1e-4  # rows; s from row to row, by which the unit of the times is known
+ROWS_TO_JUDGE, SLOWEST_STEP, FASTEST_STEP = 20, 1.0, 1e-4  # rows; s from row to row, by which the unit of the times is known
 UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # of which a second has so many
 NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}
 """Channel number of every stream."""
@@ -48,13 +48,7 @@ class CsvFile(SessionFile):
 
 
 def summarise(path: Path) -> CsvFile:
-    """Read one file.
-
-    Raises
-    ------
-    BagError
-        The file is missing, or a column or value cannot be used; the message names it and its line.
-    """
+    """Return the content of one file. A BagError names a column or value that cannot be used, and its line."""
     try:
         open_received(path).close()
     except OSError as error:
@@ -155,10 +149,10 @@ def _stamps(table: CsvTable, last: int | None) -> list[int]:
 def _refuse_other_units(table: CsvTable, stamps: list[int]) -> None:
     """Refuse times whose step is that of ms, us or ns, or that are too large for a stamp."""
     step = float(np.median(np.diff(stamps))) / SECOND if len(stamps) > 1 else 0.0
-    if stamps[-1] < 2**31 * SECOND and (len(stamps) < FEWEST or step < SLOWEST):
+    if stamps[-1] < 2**31 * SECOND and (len(stamps) < ROWS_TO_JUDGE or step < SLOWEST_STEP):
         return
     told = f"{TIME} goes on by {step:g} s from row to row up to {stamps[-1] / SECOND:.10g} s"
-    unit = next((unit for unit, count in UNITS.items() if FASTEST <= step / count < SLOWEST), None)
+    unit = next((unit for unit, count in UNITS.items() if FASTEST_STEP <= step / count < SLOWEST_STEP), None)
     remedy = "Divide it by 1000 if it is in ms, by 1e6 if in us, by 1e9 if in ns." if unit is None else ""
     if unit is not None:
         told, remedy = f"{told}, as if in {unit}", f"Divide it by {UNITS[unit]:g}."

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from ..errors import BagError
-from ..messages.sample_decoder import LONGEST
+from ..messages.sample_decoder import MOST_NAMES
 from ..messages.topic_table import Topics
 from ..types import SENSORS, Stream
 from .reader import Session, read
 
-WINDOW = 5_000_000_000
+NAMING_TIME = 5_000_000_000
 """Time from the first message of strokes or angles in which all names are checked, ns of log time."""
 
 KINDS = {stream: kind.named for stream, kind in SENSORS.items() if not kind.ends}
-MOST = 12
+NAMES_TOLD = 12
 """Limit for the number of names in a sentence."""
 
 
@@ -76,7 +76,7 @@ def _scene(source: str) -> str:
 
 def _listed(names: Iterable[str]) -> str:
     first = list(dict.fromkeys(names))
-    return ", ".join(first[:MOST]) + (f" and {len(first) - MOST} more" if len(first) > MOST else "")
+    return ", ".join(first[:NAMES_TOLD]) + (f" and {len(first) - NAMES_TOLD} more" if len(first) > NAMES_TOLD else "")
 
 
 def _counted(number: int, kind: str) -> str:
@@ -84,7 +84,7 @@ def _counted(number: int, kind: str) -> str:
 
 
 def _names(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[str, None]]:
-    """Return the names in messages of strokes and angles, read for `WINDOW` and on until every cylinder was named."""
+    """Return the names in messages of strokes and angles, read for `NAMING_TIME` and on until every cylinder was named."""
     heard = {name: [stream for stream in streams if stream in KINDS] for name, streams in topics.heard.items()}
     present = {name: streams for name, streams in heard.items() if streams and (t := session.find(name)) and t.count}
     if not present:
@@ -95,8 +95,8 @@ def _names(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[s
     for name, log, message in read(session, {name: topics.inputs[streams[0]].type for name, streams in present.items()}):
         first = log if first is None else first
         for stream in present[name]:
-            if len(found[stream]) < LONGEST:
-                found[stream].update(dict.fromkeys(message.name[:LONGEST]))
-        if log - first > WINDOW and needed <= found.get(Stream.STROKES, {}).keys():
+            if len(found[stream]) < MOST_NAMES:
+                found[stream].update(dict.fromkeys(message.name[:MOST_NAMES]))
+        if log - first > NAMING_TIME and needed <= found.get(Stream.STROKES, {}).keys():
             break
     return found

@@ -15,7 +15,7 @@ Piece = tuple[Integers, Integers, NDArray[np.uint64]]
 """Places, channels and log times (ns) of many messages in the order of the file."""
 OUT_OF_ORDER = 0.25
 """Share of steps back among a file's messages at which its order is not that of recording; a random order has half."""
-MOST = 0.5
+MAJORITY = 0.5
 """Share of messages in topics that step back at which the clock is the cause, because all topics share the clock."""
 
 
@@ -57,7 +57,7 @@ class LogClock:
                 lasting[channel] += int((back & (own[2:] < own[:-2])).sum())
                 newest[channel] = own[-2:]
         known = {channel for channel, count in lasting.items() if count and steps[channel] < OUT_OF_ORDER * counts[channel]}
-        is_set_back = sum(counts[channel] for channel in known) > MOST * counts.total()
+        is_set_back = sum(counts[channel] for channel in known) > MAJORITY * counts.total()
         return cls(*_steps(pieces())) if is_set_back else NEVER_SET_BACK
 
     @property

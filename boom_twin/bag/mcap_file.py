@@ -25,7 +25,7 @@ from ..messages.message_block import Integers, MessageBlock, by_log_time, gather
 from ..system.received_files import open_received
 from .log_clock import NEVER_SET_BACK, LogClock, Piece
 from .mcap_records import (
-    LARGEST,
+    LARGEST_SUMMARY,
     MESSAGE_HEAD,
     MOST_HELD,
     MOST_TOGETHER,
@@ -128,17 +128,11 @@ class McapFile(SessionFile):
 
 
 def summarise(path: Path) -> McapFile:
-    """Return the content of one file, from its summary if that is complete, else from all of its records.
-
-    Raises
-    ------
-    BagError
-        The file is missing, not MCAP, cut off, damaged, or of another profile than ros2.
-    """
+    """Return the content of one file, from its summary if that is complete, else from all of its records."""
     with as_bag_error(path), open_received(path) as file:
         check_ends(path, file)
         file.seek(0)
-        reader = SeekingReader(file, record_size_limit=min(LARGEST, path.stat().st_size))
+        reader = SeekingReader(file, record_size_limit=min(LARGEST_SUMMARY, path.stat().st_size))
         header, summary = reader.get_header(), reader.get_summary()
         if header.profile not in (PROFILE, ""):
             raise BagError(f"{path}: profile = {header.profile!r}: only {PROFILE!r} is read. Record the session with ROS 2.")

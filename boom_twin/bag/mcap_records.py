@@ -22,7 +22,7 @@ from ..errors import BagError
 from ..system.received_files import open_received
 from .session_file import REMEDY
 
-LARGEST = 64 * 2**20
+LARGEST_SUMMARY = 64 * 2**20
 """Size limit of one record of a summary, and of all definitions together, bytes."""
 MOST_HELD = 2**30
 """Size limit of one message or one unpacked chunk in memory, bytes."""

@@ -43,13 +43,7 @@ class Ros1File(SessionFile):
 
 
 def summarise(path: Path) -> Ros1File:
-    """Return the content of one file.
-
-    Raises
-    ------
-    BagError
-        The file is missing, no ``.bag`` of version 2.0, damaged, or has no index.
-    """
+    """Return the content of one file, which must have an index; see `storages.summarise`."""
     with _reader(path) as reader:
         connections = reader.connections
         return Ros1File(

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..messages.message_fields import FRAME, fill_header
-from ..messages.topic_table import load_topics
-from ..messages.type_store import new_message
+from ..messages.topic_table import FRAME, load_topics
+from ..messages.type_store import fill_header, new_message
 from ..types import SENSORS, Array, Sample, Stream, channels_of
 from .writer import SessionWriter
 

@@ -64,13 +64,7 @@ class SqliteFile(SessionFile):
 
 
 def summarise(path: Path) -> SqliteFile:
-    """Return the content of one file.
-
-    Raises
-    ------
-    BagError
-        The file is missing, damaged, not closed by its recorder, or no storage of rosbag2.
-    """
+    """Return the content of one file; see `storages.summarise`."""
     with _database(path) as database:
         tables = {str(name) for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
         if not {"messages", "topics"} <= tables:

@@ -10,8 +10,8 @@ import numpy as np
 from ..twin.blocks import Integers
 from ..types import SECOND, Array
 from .encoded_block import Bytes
-from .message_fields import FRAME, fill_header
-from .type_store import jazzy
+from .topic_table import FRAME
+from .type_store import fill_header, jazzy
 
 ORIGIN = 4
 """Bytes of encapsulation, from after which CDR aligns."""

@@ -11,9 +11,8 @@ import numpy as np
 from ..predictions import Prediction
 from ..types import Array
 from .cdr_encoder import NumberFields, Template, stamped
-from .message_fields import FRAME, fill_xz
-from .topic_table import TYPES, Output
-from .type_store import new_message
+from .topic_table import FRAME, TYPES, Output
+from .type_store import fill_xz, new_message
 
 POINT = struct.Struct("<3d")
 LINE_STRIP, TEXT, ADD = 4, 9, 0

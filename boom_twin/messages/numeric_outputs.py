@@ -17,8 +17,8 @@ from ..predictions import Estimate, Prediction
 from ..twin.blocks import EstimateBlock, Integers, PredictionBlock, row_of
 from ..types import Array
 from .cdr_encoder import NumberFields
-from .message_fields import TIP_JOINTS, fill_xz
-from .topic_table import Output
+from .topic_table import TIP_JOINTS, Output
+from .type_store import fill_xz
 
 TIP_NUMBERS = (
     "tip_x", "tip_y", "tip_angle",

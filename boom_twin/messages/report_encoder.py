@@ -19,11 +19,10 @@ from ..types import Alarm, Array, Change, Health, Report, channels_of
 from .cdr_encoder import NumberFields, Template, stamped
 from .encoded_block import Bytes, EncodedBlock, EncodedBlockBuilder
 from .marker_encoder import ShapeMarkers
-from .message_fields import FRAME, TIP_JOINTS, fill_header
 from .numeric_outputs import ESTIMATED, JOINTS, PREDICTED, Chain, number_rows, put_vector, selection
 from .sample_decoder import stamp_of
-from .topic_table import TYPES, Output
-from .type_store import jazzy, new_message
+from .topic_table import FRAME, TIP_JOINTS, TYPES, Output
+from .type_store import fill_header, jazzy, new_message
 
 OK, WARN, ERROR = range(3)
 """Levels of diagnostic_msgs/DiagnosticStatus: the alarm has ended; its cause is unknown; its cause is named."""

@@ -20,7 +20,7 @@ from .topic_table import Topics, factor, load_topics
 LATEST = 2**31 * SECOND
 """First stamp beyond the range of a message, ns."""
 
-LONGEST = 1000
+MOST_NAMES = 1000
 """Limit for the number of names in a message; a machine has some tens of them."""
 
 KEPT = 16
@@ -108,7 +108,7 @@ ODDITIES = {
     "two sources": "messages of one topic contradict each other at equal stamps or in their frame_id; none is used: end one",
     "unknown names only": "none of the scene's cylinders or joints is in the message, which is left out",
     "names of another boom": "cylinders or joints that the scene does not have; the message is left out",
-    "too many names": f"more than {LONGEST} in a message, which is left out",
+    "too many names": f"more than {MOST_NAMES} in a message, which is left out",
     "not finite": "NaN or infinity in a message; that value is left out",
     "absurd magnitude": f"above {LIMIT:g} in a message; that value is left out",
     "no measurement": "an Imu says by linear_acceleration_covariance[0] = -1 that it has none (REP-145); it is left out",
@@ -194,7 +194,7 @@ class SampleDecoder:
 
     def _places(self, stream: Stream, names: Sequence[str], end: int) -> tuple[list[int] | None, list[str], bool]:
         """Return places of the channels among `end` readings (-1 without one), what is odd, and if all sensors are named."""
-        if len(names) > LONGEST:
+        if len(names) > MOST_NAMES:
             return None, ["too many names"], True
         places, twice, lacking, beyond, is_regular = self._channels[stream].look(tuple(names))
         if is_regular and end == len(names):

@@ -87,6 +87,10 @@ def set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Iterat
 
 
 NODE = "boom_twin"
+FRAME = "base_link"
+"""Frame of the base, in which outputs are given unless a mapping or a parameter names another."""
+TIP_JOINTS = ("tip_dx", "tip_dz", "tip_pitch")
+"""Displacement of the tip from that of rigid sections: along and across the last section, m, and its rotation, rad."""
 DEFAULT_FILE = Path(__file__).parent.parent / "msg_config" / "topics.yaml"
 
 

@@ -1,9 +1,9 @@
-"""Message types of ROS 2 Jazzy: the type store, decoding of whole messages, and new messages by type name."""
+"""Message types of ROS 2 Jazzy: the type store, decoding of whole messages, new messages by type name and their fields."""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 from operator import call
 from typing import Any
@@ -13,6 +13,9 @@ from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
+
+from ..types import SECOND, Array
+from .topic_table import FRAME
 
 PADDING = 12
 """Bytes that may stand behind the last field of a message, whatever they are.
@@ -111,3 +114,14 @@ def _field_maker(description: Any) -> Maker:
         return partial(np.zeros, length, dtype=kind)
     single = _field_maker(element)
     return lambda: [single() for _ in range(length)]
+
+
+def fill_header(header: Any, stamp: int, frame: str = FRAME) -> None:
+    """Put a stamp (nanoseconds) and a frame into a ``std_msgs/Header``."""
+    header.stamp.sec, header.stamp.nanosec = divmod(stamp, SECOND)
+    header.frame_id = frame
+
+
+def fill_xz(target: Any, values: Array | Sequence[float]) -> None:
+    """Write model x to x and model y to z; y stays 0."""
+    target.x, target.y, target.z = float(values[0]), 0.0, float(values[1])

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 from ..kernels.elements.linkage import LINK_L
 from ..scene.kinematics import CYLINDER, LEFT, RIGHT, linkage
 from ..scene.schema import Cylinder, Scene, section_depth
-from .message_fields import FRAME, TIP_JOINTS
+from .topic_table import FRAME, TIP_JOINTS
 
 NAME = "boom"
 TIP, TIP_RIGID, TIP_ALONG, TIP_ACROSS, IMU = "tip", "tip_rigid", "tip_along", "tip_across", "imu_link"

@@ -6,8 +6,7 @@ import re
 from importlib.resources import files
 from pathlib import Path
 
-from .message_fields import FRAME
-from .topic_table import load_topics
+from .topic_table import FRAME, load_topics
 
 FOLDER = Path(str(files("boom_twin") / "msg_config"))
 RVIZ, FOXGLOVE, PLOTJUGGLER = (FOLDER / name for name in ("boom_twin.rviz", "foxglove.json", "plotjuggler.xml"))

@@ -19,7 +19,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from boom_twin import Stream
 from boom_twin.bag import mcap_file, mcap_records
-from boom_twin.bag.mcap_records import LARGEST
+from boom_twin.bag.mcap_records import LARGEST_SUMMARY
 from boom_twin.bag.metadata import FILE_NAME as METADATA
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.recovery.recover import recover
@@ -202,7 +202,7 @@ def bomb(file: Path, content: bytes, compression: str, crc: int) -> Path:
 @pytest.mark.system
 @pytest.mark.parametrize(("compression", "is_summed"), [("zstd", True), ("lz4", False)])
 def test_recovery_of_a_bomb_takes_little_memory(tmp_path: Path, compression: str, is_summed: bool) -> None:
-    zeros = bytes(LARGEST)
+    zeros = bytes(LARGEST_SUMMARY)
     path = bomb(tmp_path / "bomb.mcap", zeros, compression, zlib.crc32(zeros) if is_summed else 0)
     words = refused_in_little_memory(tmp_path, "recover", path, "--out", tmp_path / "out", "--unverified")
     assert "there is none" in words

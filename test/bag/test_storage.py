@@ -81,6 +81,18 @@ def test_metadata_is_there_after_each_split_and_a_lost_rest_is_noticed(tmp_path:
     assert numbers(tmp_path / "out") == [1, 2]
 
 
+def test_many_files_do_not_hold_up_the_recorder(tmp_path: Path) -> None:
+    """The list of all files is not written with every one of them; it is whole at the end."""
+    bag, synced = BagWriter(tmp_path / "bag"), []
+    bag.sync = synced.append
+    (key,) = bag.add(recorded(TOPIC))
+    for number in range(200):
+        bag.write(key, number, message(number))
+        bag.split()
+    bag.close()
+    assert len(synced) < 300 and len(read_metadata(tmp_path / "bag" / "metadata.yaml").files) == 201
+
+
 def test_the_last_file_that_can_be_listed_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_FILES", 3)
     told: list[str] = []
@@ -194,7 +206,7 @@ def test_a_disk_that_never_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         answers.wait(60.0)
         return flush(bag)
 
-    monkeypatch.setattr(module, "MOST", 10_000)
+    monkeypatch.setattr(module, "MOST_WAITING", 10_000)
     monkeypatch.setattr(module, "FLUSH", 0.01)
     monkeypatch.setattr(module, "PATIENCE", 0.2)
     monkeypatch.setattr(BagWriter, "flush", stuck)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ros_messages import imu, joint_state
 
-from boom_twin.messages.sample_decoder import LONGEST, ODDITIES, SampleDecoder
+from boom_twin.messages.sample_decoder import MOST_NAMES, ODDITIES, SampleDecoder
 from boom_twin.messages.topic_table import Sensor, Topics, load_topics, usual
 from boom_twin.types import SENSORS, Stream
 
@@ -123,10 +123,10 @@ def test_impossible_stamps_give_no_sample(stamp: int, name: str) -> None:
 
 def test_a_flood_of_names_is_not_looked_through() -> None:
     decoder = SampleDecoder(1)
-    names = [*(f"x{i}" for i in range(LONGEST)), "cylinder_1"]
+    names = [*(f"x{i}" for i in range(MOST_NAMES)), "cylinder_1"]
     assert decoder.put(Stream.STROKES, 1, joint_state(names, [0.1] * len(names))) is None
-    assert decoder.oddities == {"too many names": 1} and f"more than {LONGEST}" in ODDITIES["too many names"]
-    assert decoder.put(Stream.STROKES, 2, joint_state(names[1:], [0.1] * LONGEST)) is not None
+    assert decoder.oddities == {"too many names": 1} and f"more than {MOST_NAMES}" in ODDITIES["too many names"]
+    assert decoder.put(Stream.STROKES, 2, joint_state(names[1:], [0.1] * MOST_NAMES)) is not None
 
 
 def mapped(sensors: dict[str, Any], **names: str) -> Topics:

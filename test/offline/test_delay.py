@@ -12,10 +12,9 @@ from boom_twin.bag.reader import read, read_both, scan
 from boom_twin.bag.session_sheet import SessionSheet
 from boom_twin.bag.writer import SessionWriter
 from boom_twin.messages.mapping import mapping_from
-from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import TYPES, load_topics
-from boom_twin.messages.type_store import jazzy, new_message
+from boom_twin.messages.type_store import fill_header, jazzy, new_message
 from boom_twin.types import NANO, SECOND, Stream
 
 SESSION = Path(__file__).parents[2] / "bags" / "pump_session"

@@ -14,9 +14,8 @@ from boom_twin.bag.session_sheet import SessionSheet
 from boom_twin.bag.writer import SessionWriter
 from boom_twin.cli.main import main
 from boom_twin.errors import UsageError
-from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import new_message
+from boom_twin.messages.type_store import fill_header, new_message
 from boom_twin.types import Stream
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"

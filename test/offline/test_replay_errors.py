@@ -12,9 +12,8 @@ from boom_twin.bag.session_files import write_session
 from boom_twin.bag.writer import SessionWriter
 from boom_twin.cli.replay import as_text
 from boom_twin.errors import BagError
-from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import new_message
+from boom_twin.messages.type_store import fill_header, new_message
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.types import Stream
 

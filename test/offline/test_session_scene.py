@@ -22,10 +22,9 @@ from boom_twin.cli.output import open_session_settings, warn_incomplete
 from boom_twin.config.settings import Settings, Thresholds, load_thresholds
 from boom_twin.diagnostics.boom_mismatch import FAR, WINDOW, OtherBoom
 from boom_twin.errors import BagError, UsageError
-from boom_twin.messages.message_fields import fill_header
 from boom_twin.messages.sample_decoder import SampleDecoder
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import new_message
+from boom_twin.messages.type_store import fill_header, new_message
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.scene.load import DEFAULT_NAME, default_text
 from boom_twin.types import Report, Residuals, Sample, Stream

@@ -12,7 +12,7 @@ from mcap.records import Channel, ChunkIndex, DataEnd, Header, Metadata, Schema,
 from ...errors import BagError
 from ...system.received_files import open_received
 from ..mcap_file import NOTES, PROFILE
-from ..mcap_records import LARGEST, checksum_of, parts, record_of, summary_start
+from ..mcap_records import LARGEST_SUMMARY, checksum_of, parts, record_of, summary_start
 from ..metadata import BagMetadata, Recorded, offered_qos, profiles
 from ..session_file import by_topic
 from .scanner import SoundRecords, scan_damaged
@@ -76,12 +76,12 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
     Raises
     ------
     BagError
-        The profile is ros1 or px4, or definitions exceed `LARGEST`.
+        The profile is ros1 or px4, or definitions exceed `LARGEST_SUMMARY`.
     """
     definitions, unvouched = FileDefinitions(), FileDefinitions()
     statistics: Statistics | None = None
     summary = summary_start(path)
-    budget, is_data = LARGEST, True
+    budget, is_data = LARGEST_SUMMARY, True
     for piece in scan_damaged(path, unverified):
         if not isinstance(piece, SoundRecords):
             continue
@@ -92,7 +92,9 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
             if opcode in _DEFINITIONS and (target is definitions or is_data):
                 budget -= len(body)
                 if budget < 0:
-                    raise BagError(f"{path}: more than {LARGEST} bytes of definitions. It is not the work of a recorder.")
+                    raise BagError(
+                        f"{path}: more than {LARGEST_SUMMARY} bytes of definitions. It is not the work of a recorder."
+                    )
             elif opcode not in others:
                 continue
             match record_of(opcode, body):

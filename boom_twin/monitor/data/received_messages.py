@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from math import isnan
 from typing import Any
 
-from ...messages.sample_decoder import LATEST, LONGEST, stamp_of
+from ...messages.sample_decoder import LATEST, MOST_NAMES, stamp_of
 from ...system.terminal_text import printable
 from ...types import SENSORS, Stream, stream_of
 
@@ -99,7 +99,7 @@ def check_residuals(names: Sequence[str]) -> Stream:
 
 def check_arrays(msg: Any, *fields: str) -> None:
     """Raise MalformedError unless every array in `fields` of a sensor_msgs/JointState has one value for every name."""
-    check_count("names", len(msg.name), LONGEST)
+    check_count("names", len(msg.name), MOST_NAMES)
     found = {field: len(getattr(msg, field)) for field in fields}
     if any(length != len(msg.name) for length in found.values()):
         lengths = ", ".join(f"{length} of {field}" for field, length in found.items())
