@@ -9,7 +9,7 @@ from typing import Any
 
 from ..errors import BagError
 from ..messages.topic_table import Qos, Topic, Topics
-from ..types import NANO, SENSORS, Stream
+from ..types import SENSORS, Stream
 from .inspect import BagInfo, Tally
 from .joint_names import other_names
 from .metadata import profiles
@@ -93,19 +93,18 @@ def remarks(info: BagInfo, topics: Topics) -> list[str]:
     inputs = topics.inputs.values()
     for topic in inputs:
         found += _passed_over(info.session, topic)
-    known = [tally for topic in inputs if (tally := info.tally(topic.name)) and tally.skewed]
-    if known and abs(skew := known[0].skews[2] / known[0].skewed * NANO) > SKEW:
+    known = [(tally.name, tally.skew.mean) for topic in inputs if (tally := info.tally(topic.name)) and tally.skew]
+    if known and abs(skew := known[0][1]) > SKEW:
         side = "after" if skew > 0.0 else "before"
         found.append(
-            f"Log times are on average {abs(skew):.3f} s {side} the stamps of {known[0].name}. Results go by the stamps."
+            f"Log times are on average {abs(skew):.3f} s {side} the stamps of {known[0][0]}. Results go by the stamps."
         )
-    for one, other in pairwise(known):
-        apart = (other.skews[2] / other.skewed - one.skews[2] / one.skewed) * NANO
-        if abs(apart) > SKEW:
+    for (one, skew), (other, other_skew) in pairwise(known):
+        if abs(apart := other_skew - skew) > SKEW:
             where = "before" if apart > 0.0 else "after"
             found.append(
-                f"Clocks of {one.name} and {other.name} differ: on average {other.name} is stamped {abs(apart):.3f} s {where} "
-                f"its log time, compared with {one.name}. Synchronise the sensors' clocks."
+                f"Clocks of {one} and {other} differ: on average {other} is stamped {abs(apart):.3f} s {where} "
+                f"its log time, compared with {one}. Synchronise the sensors' clocks."
             )
     return found
 

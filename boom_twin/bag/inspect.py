@@ -7,6 +7,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from operator import attrgetter
 from pathlib import Path
+from typing import NamedTuple
 
 from ..messages.cdr_decoder import has_header, names_in, stamp_in
 from ..messages.topic_table import TYPES
@@ -18,6 +19,14 @@ from .time_window import WHOLE, TimeWindow
 
 VARIANTS = 100
 """Largest number of different name lists counted in one topic."""
+
+
+class Skew(NamedTuple):
+    """Log time minus stamp, s: smallest, mean and largest."""
+
+    least: float
+    mean: float
+    most: float
 
 
 @dataclass(slots=True)
@@ -40,8 +49,6 @@ class Tally:
         Number of messages whose stamp is not after that of the message before.
     unset : int
         Number of messages with a stamp of 0 or too short for a stamp.
-    skews : list of int
-        Log time minus stamp, ns: smallest, largest and sum over `skewed` messages.
     names : Counter
         Number of messages by their joint names.
     """
@@ -57,9 +64,11 @@ class Tally:
     gap_after: int = 0
     not_increasing: int = 0
     unset: int = 0
-    skewed: int = 0
-    skews: list[int] = field(default_factory=lambda: [0, 0, 0])
     names: Counter[tuple[str, ...]] = field(default_factory=Counter)
+    _skewed: int = 0  # messages whose log time is compared with their stamp
+    _skew_least: int = 0
+    _skew_most: int = 0
+    _skew_sum: int = 0
     _before: int | None = None
     _known: tuple[bytes, tuple[str, ...]] | None = None
 
@@ -87,6 +96,13 @@ class Tally:
         """Messages per second of log time; None for fewer than two, or no time between them."""
         return (self.count - 1) / ((self.last - self.first) * NANO) if self.last > self.first else None
 
+    @property
+    def skew(self) -> Skew | None:
+        """Log time minus stamp of its messages; None for messages without stamps."""
+        if not self._skewed:
+            return None
+        return Skew(self._skew_least * NANO, self._skew_sum * NANO / self._skewed, self._skew_most * NANO)
+
     def _step(self, stamp: int, log_before: int) -> None:
         if self._before is not None:
             if stamp <= self._before:
@@ -96,9 +112,10 @@ class Tally:
         self._before = stamp
 
     def _compare(self, skew: int) -> None:
-        least, most, total = self.skews if self.skewed else (skew, skew, 0)
-        self.skews = [min(least, skew), max(most, skew), total + skew]
-        self.skewed += 1
+        self._skew_least = min(self._skew_least, skew) if self._skewed else skew
+        self._skew_most = max(self._skew_most, skew) if self._skewed else skew
+        self._skew_sum += skew
+        self._skewed += 1
 
     def _read_names(self, data: bytes) -> None:
         """Count the joint names of a message. Unchanged bytes are not decoded again."""

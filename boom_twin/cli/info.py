@@ -72,9 +72,9 @@ def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: Session
         "largest_gaps_at_s": [_gap_at(tally, session.start) for tally in tallies],
         "stamps_not_increasing": [tally.not_increasing for tally in tallies],
         "stamps_unset": [tally.unset for tally in tallies],
-        "log_minus_stamp_min_s": [_skew(tally, 0) for tally in tallies],
-        "log_minus_stamp_mean_s": [_skew(tally, 2) for tally in tallies],
-        "log_minus_stamp_max_s": [_skew(tally, 1) for tally in tallies],
+        "log_minus_stamp_min_s": [tally.skew and tally.skew.least for tally in tallies],
+        "log_minus_stamp_mean_s": [tally.skew and tally.skew.mean for tally in tallies],
+        "log_minus_stamp_max_s": [tally.skew and tally.skew.most for tally in tallies],
         "names_missing": names_missing(info, topics, joints),
         "names_extra": names_extra(info, topics, joints),
         "scene": scene.source,
@@ -90,13 +90,6 @@ def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: Session
 def _gap_at(tally: Tally, start: int) -> float | None:
     """Return where the largest gap begins, in seconds after the first log time of the session."""
     return (tally.gap_after - start) * NANO if tally.gap else None
-
-
-def _skew(tally: Tally, which: int) -> float | None:
-    """Return log time minus stamp, s: least (0), most (1) or mean (2)."""
-    if not tally.skewed:
-        return None
-    return tally.skews[which] * NANO / (tally.skewed if which == 2 else 1)
 
 
 def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[str]:
@@ -147,7 +140,7 @@ def _table(info: BagInfo) -> list[str]:
     ]
     for tally in info.tallies:
         gap = (tally.gap * 1e-6 if tally.gap else None, _gap_at(tally, info.session.start))
-        skew = [None if (value := _skew(tally, which)) is None else value * 1e3 for which in (0, 2, 1)]
+        skew = [value and value * 1e3 for value in tally.skew or (None, None, None)]
         lines.append(
             f"{tally.name:{wide}}  {tally.type:{kind}}  {tally.count:8d}  {_number(tally.rate, 8, 2)}  "
             f"{_number(gap[0], 8, 2)} {_number(gap[1], 10, 3)}  {tally.not_increasing:6d}  {tally.unset:6d}  "
