@@ -104,7 +104,7 @@ def test_what_is_of_another_type_or_encoding_is_passed_over(
     assert "no header.stamp" not in said and "std_msgs/msg/String and std_msgs/msg/Float64" in said
 
 
-@pytest.mark.parametrize("chunk", [2**16, 2**30], ids=["small chunks", "one chunk"])
+@pytest.mark.parametrize("chunk", [pytest.param(2**16, marks=pytest.mark.slow), 2**30], ids=["small chunks", "one chunk"])
 def test_large_messages_of_other_topics_hold_up_nothing(
     bag: Path, tmp_path: Path, content: Content, chunk: int, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -26,7 +26,7 @@ from boom_twin.bag.recovery.recover import recover
 from boom_twin.bag.session_sheet import FILE_NAME as SHEET
 from boom_twin.bag.writer import SessionWriter
 from boom_twin.cli.main import main
-from boom_twin.config.yaml_text import MOST_VALUES, plain
+from boom_twin.config.yaml_text import plain
 from boom_twin.errors import BagError
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.offline import ground_truth as truth
@@ -56,13 +56,12 @@ BOMBS = {
 
 def test_yaml_gives_plain_values_of_bounded_size_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    for name in BOMBS.keys() - {"large"}:
+    for name in BOMBS.keys() - {"large", "list"}:  # these take seconds; beside a bag they are tested below
         with pytest.raises(ValueError, match=r"more than|nested|limit|tag|kind of key|this is no whole number"):
             plain(BOMBS[name])
     assert not (tmp_path / "trap").exists()
     assert plain("a: 1\nb: [x, .5, 2001-01-01, null, yes, true]") == {"a": 1, "b": ["x", 0.5, "2001-01-01", None, "yes", True]}
     assert plain("") is None and plain("&a x") == "x" and plain("[&a [1], *a]") == [[1], [1]]
-    assert len(plain("[" + "1," * (MOST_VALUES - 2) + "]")) == MOST_VALUES - 2
 
 
 @pytest.mark.parametrize("file", [METADATA, SHEET])

@@ -266,6 +266,7 @@ def test_a_window_is_a_part_of_the_session_and_starts_at_rest(tmp_path: Path, ca
     assert [told["duration_s"], told["session_duration_s"]] == pytest.approx([0.495, 1.995])
 
 
+@pytest.mark.slow
 def test_the_truth_goes_with_the_window(tmp_path: Path) -> None:
     session = Path(__file__).parents[2] / "bags" / "arch_session"
     part = replay(session, None, tmp_path / "part", health=False, window=TimeWindow(20.0, 5.0))

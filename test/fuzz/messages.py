@@ -15,9 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from drive_twin import drive_twin
 from numpy.random import Generator
+from ros_messages import encoded
 
-from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin import Sample, Stream, load_scene
 from boom_twin.bag.session_file import PARSE_ERRORS
 from boom_twin.bag.session_files import sensor_message
 from boom_twin.config.settings import Settings
@@ -26,12 +28,12 @@ from boom_twin.messages.cdr_decoder import CdrDecoder
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import SampleDecoder
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
-from boom_twin.messages.type_store import PADDING, decode, jazzy
+from boom_twin.messages.type_store import PADDING, decode
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import alarms, dump, layout, state
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.types import SENSORS, StrokeReading
+from boom_twin.types import SENSORS
 
 from .mutate import damaged, pick
 from .verdict import Kind, Verdict
@@ -71,18 +73,15 @@ def _true(random: Generator, number: int, stream: Stream) -> Sample:
 
 
 def _encoded(sample: Sample, little_endian: bool = True) -> bytes:
-    return bytes(jazzy().serialize_cdr(sensor_message(sample), TYPES[sample.stream], little_endian=little_endian))
+    return encoded(sensor_message(sample), little_endian)
 
 
 @cache
 def _outputs() -> dict[str, list[bytes]]:
     """What a twin publishes, by role."""
     random, scene = np.random.default_rng(3), load_scene()
-    twin, encoder, found = (
-        Twin(scene, baseline=load_baseline(None), reads=StrokeReading.DRIVE),
-        ReportEncoder(scene, Settings()),
-        {},
-    )
+    twin, encoder = drive_twin(scene, baseline=load_baseline(None)), ReportEncoder(scene, Settings())
+    found: dict[str, list[bytes]] = {}
     for number in range(400):
         for stream in Stream:
             for key, data in encoder.fill(twin.update(_true(random, number, stream))):
@@ -125,8 +124,11 @@ def _hostile(random: Generator, number: int, stream: Stream) -> list[Any]:
         return [stream.name, random.bytes(int(random.integers(200))).hex()]
     if how < 0.55:
         return [stream.name, _mangled(random, _encoded(true)).hex()]
-    if how < 0.6:
-        return [stream.name, _padded(random, true).hex()]
+    if how < 0.6:  # of either byte order, with as much behind its end as may stand there, or more
+        return [
+            stream.name,
+            (_encoded(true, bool(random.integers(2))) + random.bytes(int(random.integers(1, 2 * PADDING)))).hex(),
+        ]
     stamp = _stamp(random, true.stamp)
     values = true.values.copy()
     if random.random() < 0.6:
@@ -156,11 +158,6 @@ def _mangled(random: Generator, data: bytes) -> bytes:
     return data[:at] + number + data[at + size :]
 
 
-def _padded(random: Generator, sample: Sample) -> bytes:
-    """Of either byte order, with as much behind its end as may stand there, or more."""
-    return _encoded(sample, bool(random.integers(2))) + random.bytes(int(random.integers(1, 2 * PADDING)))
-
-
 # -- judging --------------------------------------------------------------------------------------------------------------
 
 
@@ -180,10 +177,7 @@ class _Listener:
     def __init__(self) -> None:
         self.odd = 0
         scene, topics = load_scene(), load_topics()
-        self._twin, self._decoder = (
-            Twin(scene, baseline=load_baseline(None), reads=StrokeReading.DRIVE),
-            SampleDecoder(4, topics),
-        )
+        self._twin, self._decoder = drive_twin(scene, baseline=load_baseline(None)), SampleDecoder(4, topics)
         self._wires = {stream: CdrDecoder(TYPES[stream], field=kind.field) for stream, kind in SENSORS.items()}
         self._feed, self._topics = Feed("fuzz", Store(2000), topics, scene), topics
 

@@ -13,12 +13,16 @@ from .run import ROOT, TARGETS, judged, module
 from .verdict import Kind
 
 CORPUS = Path(__file__).parent / "corpus"
-CASES = [(target, path) for target in TARGETS for path in sorted((CORPUS / target).iterdir())]
+CASES = [
+    pytest.param(target, path, id=f"{target}-{path.stem}", marks=[pytest.mark.system] * (target == "page"))
+    for target in TARGETS
+    for path in sorted((CORPUS / target).iterdir())
+]
 SECONDS = 40
 """The workers take some 20 more to start."""
 
 
-@pytest.mark.parametrize(("target", "path"), CASES, ids=[f"{target}-{path.stem}" for target, path in CASES])
+@pytest.mark.parametrize(("target", "path"), CASES)
 def test_the_corpus(target: str, path: Path) -> None:
     """What was once a finding, or nearly so; what is cut off is refused, or told."""
     module(target).begin()
