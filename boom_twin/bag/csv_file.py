@@ -26,9 +26,7 @@ from .session_file import SessionFile, channel_of, schema_of
 from .session_files import samples_of, sensor_message
 
 TIME = "t_s"
-STROKE = "stroke_{}_m"
 _NUMBERED = re.compile(r"(?:stroke_(\d{1,3})_m|joint_(\d{1,3})_rad|cylinder_force_(\d{1,3})_N)")
-IMU = ("imu_x_m_s2", "imu_z_m_s2")
 ROWS_TO_JUDGE, SLOWEST_STEP, FASTEST_STEP = 20, 1.0, 1e-4  # rows; s from row to row, by which the unit of the times is known
 UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # of which a second has so many
 NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}
@@ -97,21 +95,16 @@ def _columns_of(table: CsvTable) -> dict[Stream, list[str]]:
     """Return the column names of every stream; refuse a header that lacks a required column or has an unknown one."""
     numbers = [max(map(int, filter(None, found.groups()))) for name in table.names if (found := _NUMBERED.fullmatch(name))]
     joints = max(numbers, default=1)
-    table.require([TIME, *(STROKE.format(number) for number in range(1, joints + 1))])
-    columns = _columns(joints)
-    _refuse_unknown(table, [TIME, *(name for names in columns.values() for name in names)])
-    return columns
-
-
-def _columns(joints: int) -> dict[Stream, list[str]]:
-    """Return the column names of every stream."""
     channels = channels_of(joints)
-    return {
-        Stream.STROKES: [STROKE.format(number) for number in range(1, joints + 1)],
+    columns = {
+        Stream.STROKES: [f"stroke_{number}_m" for number in range(1, joints + 1)],
         Stream.ANGLES: [f"{name}_rad" for name in channels[Stream.ANGLES]],
-        Stream.IMU: list(IMU),
+        Stream.IMU: ["imu_x_m_s2", "imu_z_m_s2"],
         Stream.FORCES: [f"{name}_N" for name in channels[Stream.FORCES]],
     }
+    table.require([TIME, *columns[Stream.STROKES]])
+    _refuse_unknown(table, [TIME, *(name for names in columns.values() for name in names)])
+    return columns
 
 
 def _refuse_unknown(table: CsvTable, known: list[str]) -> None:

@@ -108,7 +108,8 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
                     definitions.notes |= notes
                 case DataEnd(data_section_crc=checksum):
                     is_data = False
-                    definitions.is_summed = checksum != 0 and checksum == _checksum_before(path, piece.offset)
+                    with open_received(path) as file:
+                        definitions.is_summed = checksum != 0 and checksum == checksum_of(file, 0, piece.offset)
                 case Statistics() as found:
                     statistics = found
                 case ChunkIndex() as index:
@@ -118,8 +119,3 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
     if statistics is not None and statistics.channel_message_counts.keys() <= definitions.channels.keys():
         definitions.told = by_topic(statistics.channel_message_counts, definitions.channels)
     return definitions
-
-
-def _checksum_before(path: Path, offset: int) -> int:
-    with open_received(path) as file:
-        return checksum_of(file, 0, offset)

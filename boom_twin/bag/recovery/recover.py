@@ -16,7 +16,7 @@ from ...system.atomic_files import write_atomic
 from ...system.received_files import holds_file, open_received
 from ...system.result_folder import RECOVER, result_folder
 from ..mcap_records import MESSAGE_HEAD, parts
-from ..metadata import BagMetadata, Recorded
+from ..metadata import BagMetadata
 from ..reader import RECOVERED, scan, sources
 from ..session_file import as_bag_error
 from ..session_sheet import sheet_path
@@ -150,7 +150,10 @@ def _copy(
                 if topic is None:
                     outcome.nameless += 1
                     continue
-                own[channel] = _key(bag, keys, topic)
+                identity = topic.topic, topic.type, topic.definition  # two channels of one topic become one
+                if identity not in keys:
+                    (keys[identity],) = bag.add(topic)
+                own[channel] = keys[identity]
             key = own[channel]
             bag.write(key, log_time, body[MESSAGE_HEAD.size :], publish_time, sequence)
             if not (piece.vouched or definitions.is_summed):
@@ -169,14 +172,6 @@ def _is_copy(piece: SoundRecords, definitions: FileDefinitions, seen: Counter[by
     digest = sha256(piece.content).digest()
     seen[digest] += 1
     return seen[digest] > max(1, definitions.listed[chunk.message_start_time, chunk.message_end_time, chunk.uncompressed_size])
-
-
-def _key(bag: BagWriter, keys: dict[tuple[str, str, bytes], int], topic: Recorded) -> int:
-    """Return the key of a topic in the new bag. Two channels of one topic become one."""
-    identity = topic.topic, topic.type, topic.definition
-    if identity not in keys:
-        (keys[identity],) = bag.add(topic)
-    return keys[identity]
 
 
 def _copy_sheet(path: Path, out: Path) -> None:
