@@ -17,11 +17,10 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
-from boom_twin import load_scene, replay
+from boom_twin import TimeWindow, load_scene, replay
 from boom_twin.bag.reader import Session, read_both, scan
 from boom_twin.bag.recovery.recover import recover
 from boom_twin.bag.session_files import write_session
-from boom_twin.bag.time_window import TimeWindow
 from boom_twin.batch.sources import sessions_of
 from boom_twin.cli.main import main
 from boom_twin.errors import BagError
@@ -266,7 +265,6 @@ def test_a_window_is_a_part_of_the_session_and_starts_at_rest(tmp_path: Path, ca
     assert [told["duration_s"], told["session_duration_s"]] == pytest.approx([0.495, 1.995])
 
 
-@pytest.mark.slow
 def test_the_truth_goes_with_the_window(tmp_path: Path) -> None:
     session = Path(__file__).parents[2] / "bags" / "arch_session"
     part = replay(session, None, tmp_path / "part", health=False, window=TimeWindow(20.0, 5.0))

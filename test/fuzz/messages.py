@@ -19,10 +19,9 @@ from drive_twin import drive_twin
 from numpy.random import Generator
 from ros_messages import encoded
 
-from boom_twin import Sample, Stream, load_scene
+from boom_twin import Sample, Settings, Stream, load_scene
 from boom_twin.bag.session_file import PARSE_ERRORS
 from boom_twin.bag.session_files import sensor_message
-from boom_twin.config.settings import Settings
 from boom_twin.health.baseline import load_baseline
 from boom_twin.messages.cdr_decoder import CdrDecoder
 from boom_twin.messages.report_encoder import ReportEncoder

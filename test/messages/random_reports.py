@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from boom_twin import load_scene
+from boom_twin import Report, Scene, Stream, load_scene
 from boom_twin.deviation.estimate_row import WIDTH
 from boom_twin.predictions import Prediction
-from boom_twin.scene.schema import Scene
 from boom_twin.twin.blocks import estimate_of
-from boom_twin.types import Alarm, Array, Change, Health, Ranked, Report, Residuals, Stream, channels_of
+from boom_twin.types import Alarm, Array, Change, Health, Ranked, Residuals, channels_of
 
 START, STEP = 1_700_000_000_000_000_000, 1_666_667
 POINTS = 7

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from ros_messages import encoded, imu, joint_state
 
+from boom_twin import Stream
 from boom_twin.messages.cdr_decoder import CdrDecoder
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import TYPES
 from boom_twin.messages.type_store import decode
-from boom_twin.types import SENSORS, Stream
+from boom_twin.types import SENSORS
 
 CYLINDERS = [f"cylinder_{i}" for i in (3, 1, 4, 2)]
 

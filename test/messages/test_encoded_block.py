@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from messages.random_reports import Told, boom, random_reports
 
-from boom_twin import Report
-from boom_twin.config.settings import Settings
+from boom_twin import Report, Settings
 from boom_twin.messages.encoded_block import EncodedBlock
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import Output

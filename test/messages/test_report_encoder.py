@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 from ros_messages import decoded, encoded
 
-from boom_twin.config.settings import Settings
+from boom_twin import Report, Settings, Stream, load_scene
 from boom_twin.deviation.estimate_row import COORDINATES, RATES, WIDTH
 from boom_twin.messages.report_encoder import ReportEncoder, decode_health
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output
 from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.predictions import Prediction
-from boom_twin.scene import load_scene
 from boom_twin.twin.blocks import estimate_of
-from boom_twin.types import Alarm, Health, Ranked, Report, Residuals, Stream
+from boom_twin.types import Alarm, Health, Ranked, Residuals
 
 STAMP = 1_700_000_000_123_456_789
 

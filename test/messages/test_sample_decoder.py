@@ -11,9 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ros_messages import imu, joint_state
 
+from boom_twin import Stream
 from boom_twin.messages.sample_decoder import MOST_NAMES, ODDITIES, SampleDecoder
 from boom_twin.messages.topic_table import Sensor, Topics, load_topics, usual
-from boom_twin.types import SENSORS, Stream
+from boom_twin.types import SENSORS
 
 FINITE = st.floats(-1e6, 1e6)
 OTHER_NAMES = st.text(max_size=12).filter(lambda name: not name.startswith(("joint_", "cylinder_")))

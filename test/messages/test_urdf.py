@@ -11,15 +11,13 @@ import pytest
 from drive_twin import drive_twin
 from ros_messages import decoded
 
-from boom_twin import Report, Sample, Stream, load_scene
+from boom_twin import Report, Sample, Scene, Settings, Stream, load_scene
 from boom_twin.cli.main import main
-from boom_twin.config.settings import Settings
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import Output
 from boom_twin.messages.urdf import urdf
 from boom_twin.scene.kinematics import PassiveJoints, skeleton, stroke_curve, strokes_of_posture
 from boom_twin.scene.load import examine_text, example_text
-from boom_twin.scene.schema import Scene
 
 # What urdf.xsd of urdfdom and the wiki's page say of the elements used here: attributes, children
 # (name: fewest, most), all else refused.
