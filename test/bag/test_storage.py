@@ -134,7 +134,7 @@ FULL = """
 import sys
 from pathlib import Path
 sys.path.insert(0, {here!r})
-from test_storage import BagError, BagWriter, FileSplit, Storage, message, recorded, TOPIC
+from bag.test_storage import BagError, BagWriter, FileSplit, Storage, message, recorded, TOPIC
 import resource, time
 storage = Storage(BagWriter(Path({bag!r})), FileSplit(), print)
 key = storage.add(recorded(TOPIC))
@@ -155,7 +155,7 @@ except BagError as error:
 def test_a_disk_that_fills_up(tmp_path: Path) -> None:
     """The limit on the size of a file stands for the disk's."""
     bag = tmp_path / "bag"
-    program = FULL.format(here=str(Path(__file__).parent), bag=str(bag))
+    program = FULL.format(here=str(Path(__file__).parents[1]), bag=str(bag))
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120)
     assert done.returncode == 1 and done.stderr == ""
     assert "session_0.mcap: cannot be written (File too large). Make room" in done.stdout and done.stdout.count("\n") == 1
@@ -227,7 +227,7 @@ KILLED = """
 import sys, time
 from pathlib import Path
 sys.path.insert(0, {here!r})
-from test_storage import BagWriter, FileSplit, Storage, message, recorded, TOPIC
+from bag.test_storage import BagWriter, FileSplit, Storage, message, recorded, TOPIC
 storage = Storage(BagWriter(Path({bag!r})), FileSplit({size}, None), print)
 key = storage.add(recorded(TOPIC))
 began = time.monotonic()
@@ -246,7 +246,7 @@ for number in range(10**6):
 def test_a_kill_costs_little(tmp_path: Path, delay: float, size: int | None) -> None:
     """A recording of 200 Hz is killed after so long; what is left is what was put, up to less than a second before."""
     bag = tmp_path / "bag"
-    program = KILLED.format(here=str(Path(__file__).parent), bag=str(bag), size=size)
+    program = KILLED.format(here=str(Path(__file__).parents[1]), bag=str(bag), size=size)
     child = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
     assert child.stdout is not None
     child.stdout.readline()
