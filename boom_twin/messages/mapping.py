@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
-from ..types import SENSORS, Stream, stream_of
+from ..types import SENSORS, Stream, channels_of, sensor_kind, stream_of
 from .topic_table import (
     TYPES,
     InputTopic,
@@ -21,9 +21,7 @@ from .topic_table import (
     Topic,
     Topics,
     default_document,
-    kind_faults,
     load_topics,
-    set_faults,
     usual,
 )
 
@@ -84,7 +82,7 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
     except ValidationError as error:
         faults += [_fault(detail) for detail in error.errors(include_url=False)]
     if joints is not None:
-        faults += set_faults(names, joints, topics is not None and topics.is_shared)
+        faults += _set_faults(names, joints, topics is not None and topics.is_shared)
     if faults or topics is None:
         count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
         raise UsageError("\n".join([f"{source}: {count}", *(f"  {fault}" for fault in faults)]))
@@ -136,12 +134,44 @@ def _sensors(values: Any) -> tuple[dict[str, Sensor], dict[str, str], list[Fault
         merged = _merged(usual(channel), given or {})
         if isinstance(merged, dict):
             names[channel] = str(merged["name"])
-            faults += kind_faults(channel, merged)
+            faults += _kind_faults(channel, merged)
         try:
             sensors[channel] = Sensor.model_validate(merged)
         except ValidationError as error:
             faults += [_fault(detail, "sensors", channel) for detail in error.errors(include_url=False)]
     return sensors, names, faults
+
+
+def _kind_faults(channel: str, given: Mapping[str, Any]) -> Iterator[Fault]:
+    """Yield faults for keys, as in the file, that a channel of this kind cannot have."""
+    kind, place = sensor_kind(channel), f"sensors.{channel}"
+    if (unit := given.get("unit", kind.unit)) not in list(kind.units):
+        yield Fault(f"{place}.unit", unit, f"it must be one of {', '.join(kind.units)}", "Use scale for any other.")
+    if kind is not SENSORS[Stream.ANGLES] and (mount := given.get("absolute")) is not None:
+        yield Fault(f"{place}.absolute", mount, "only an angle (joint_i) can be absolute", "Remove the key.")
+    if kind.is_imu and (name := given.get("name", "x")) not in ("x", "y", "z"):
+        yield Fault(f"{place}.name", name, "it must be x, y or z", "Give the axis of linear_acceleration.")
+
+
+def _set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Iterator[Fault]:
+    """Yield faults for channels beyond the joints, and for names that two channels of one topic share.
+
+    `names` are those that a mapping lists by channel; `is_shared` is True if strokes and angles come by one topic.
+    """
+    known = channels_of(joints)
+    for channel in names:
+        if not any(channel in group for group in known.values()):
+            bound = f"the scene has {joints} joints, so channels end at {sensor_kind(channel).stem}_{joints}"
+            yield Fault(f"sensors.{channel}", channel, bound, "Remove it, or use the scene that this mapping is for.")
+    first, second, *others = known.values()
+    for group in [first + second, *others] if is_shared else known.values():
+        users: dict[str, str] = {}
+        for channel in group:
+            name = names.get(channel, usual(channel)["name"])
+            if name in users:
+                bound = f"{users[name]} has this name too, in the same messages"
+                yield Fault(f"sensors.{channel}.name", name, bound, "Give each channel its own name.")
+            users.setdefault(name, channel)
 
 
 def _known_channels() -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from enum import StrEnum
 from functools import cache
 from math import radians
@@ -13,10 +13,8 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field
 
 from ..config.yaml_text import read_plain
-from ..errors import Fault, UsageError
-from ..types import GIVE, NUMBER, SECOND, SENSORS, Mount, Stream, StrokeReading, channels_of, sensor_kind
-
-AXES = ("x", "y", "z")
+from ..errors import UsageError
+from ..types import GIVE, NUMBER, SECOND, SENSORS, Mount, Stream, StrokeReading, sensor_kind
 
 
 class Sensor(BaseModel):
@@ -32,11 +30,6 @@ class Sensor(BaseModel):
     absolute: Mount | None = None
 
 
-def number_of(channel: str) -> int:
-    """Return the number i of a channel or name such as ``cylinder_i`` or ``joint_i``."""
-    return int(channel.rpartition("_")[2])
-
-
 def usual(channel: str) -> dict[str, Any]:
     """Return the default name and unit of a channel."""
     kind, end = sensor_kind(channel), channel.rpartition("_")[2]
@@ -46,44 +39,6 @@ def usual(channel: str) -> dict[str, Any]:
 def factor(channel: str, sensor: Sensor) -> float:
     """Return the factor of (reading - zero): sign, scale and conversion of the unit to SI."""
     return sensor.sign * sensor.scale * sensor_kind(channel).units[sensor.unit]
-
-
-def kind_faults(channel: str, given: Mapping[str, Any]) -> Iterator[Fault]:
-    """Yield faults for keys, as in the file, that a channel of this kind cannot have."""
-    kind, place = sensor_kind(channel), f"sensors.{channel}"
-    if (unit := given.get("unit", kind.unit)) not in list(kind.units):
-        yield Fault(f"{place}.unit", unit, f"it must be one of {', '.join(kind.units)}", "Use scale for any other.")
-    if kind is not SENSORS[Stream.ANGLES] and (mount := given.get("absolute")) is not None:
-        yield Fault(f"{place}.absolute", mount, "only an angle (joint_i) can be absolute", "Remove the key.")
-    if kind.is_imu and (name := given.get("name", "x")) not in AXES:
-        yield Fault(f"{place}.name", name, "it must be x, y or z", "Give the axis of linear_acceleration.")
-
-
-def set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Iterator[Fault]:
-    """Yield faults for channels beyond the joints of the boom, and for names that two channels of one topic share.
-
-    Parameters
-    ----------
-    names : mapping of str to str
-        Names of the channels that a mapping lists; all others have their default names.
-    joints : int
-    is_shared : bool
-        True if strokes and angles come by one topic.
-    """
-    known = channels_of(joints)
-    for channel in names:
-        if not any(channel in group for group in known.values()):
-            bound = f"the scene has {joints} joints, so channels end at {sensor_kind(channel).stem}_{joints}"
-            yield Fault(f"sensors.{channel}", channel, bound, "Remove it, or use the scene that this mapping is for.")
-    first, second, *others = known.values()
-    for group in [first + second, *others] if is_shared else known.values():
-        users: dict[str, str] = {}
-        for channel in group:
-            name = names.get(channel, usual(channel)["name"])
-            if name in users:
-                bound = f"{users[name]} has this name too, in the same messages"
-                yield Fault(f"sensors.{channel}.name", name, bound, "Give each channel its own name.")
-            users.setdefault(name, channel)
 
 
 NODE = "boom_twin"
@@ -247,7 +202,9 @@ class Topics(_Entry):
             return []
         used = {sensor.name for sensor in self.sensors_of(stream, joints).values()}
         numbered = re.compile(rf"{kind.named}_{NUMBER.pattern}")
-        return [name for name in names if numbered.fullmatch(name) and number_of(name) > joints and name not in used]
+        return [
+            name for name in names if numbered.fullmatch(name) and int(name.rpartition("_")[2]) > joints and name not in used
+        ]
 
     def reading(self, reads: StrokeReading) -> Topics:
         """Return these topics with stroke transducers that read the quantity `reads`."""
