@@ -16,7 +16,7 @@ from ..bag.reader import Session, check_topic, files_sha256, scan
 from ..bag.time_window import WHOLE, TimeWindow
 from ..errors import BagError
 from ..messages.topic_table import Topics
-from ..offline.reader_process import SampleReader
+from ..offline.session_samples import SampleReader
 from ..types import SENSORS, Array, Change, Sample, Stream, channels_of
 
 NEEDED = (Stream.STROKES,)  # streams without which nothing can be estimated

@@ -1,6 +1,6 @@
 """Replay: run the twin over a recorded session, message by message as the node would.
 
-Reading and writing run in processes of their own (`boom_twin.offline.reader_process`, `boom_twin.offline.writer_process`).
+Reading and writing run in processes of their own (`boom_twin.offline.session_samples`, `boom_twin.offline.writer_process`).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from ..types import NANO, Array, Change, Report, Stream, StrokeReading, channels
 from .ground_truth import TipErrors, TipTruth, load_truth
 from .process_pipe import Pipe
 from .progress import Progress
-from .reader_process import SampleReader
+from .session_samples import SampleReader
 from .recording import Recording, Stretch
 from .refused_strokes import RefusedStrokes
 from .sample_table import RowsInMemory, SampleTable, columns_of

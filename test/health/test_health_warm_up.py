@@ -19,7 +19,7 @@ from boom_twin.bag.reader import scan
 from boom_twin.bag.session_model import baseline_of, mapping_of, scene_of, strokes_of
 from boom_twin.health.sensor_findings import find
 from boom_twin.health.sensor_survey import summarise, survey
-from boom_twin.offline.reader_process import items_of
+from boom_twin.offline.session_samples import items_of
 from boom_twin.twin.blocks import ReportBlock, SampleBlock
 from boom_twin.twin.health_rows import copy_predictions, copy_residuals, count_residuals
 from boom_twin.twin.twin import Twin

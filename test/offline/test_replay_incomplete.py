@@ -155,7 +155,7 @@ def test_compare_replays_over_none_of_what_it_compares(
     assert before == {path: path.read_bytes() for path in earlier.rglob("*") if path.is_file()}
 
 
-@pytest.mark.parametrize("which", ["reader_process", "writer_process"])
+@pytest.mark.parametrize("which", ["session_samples", "writer_process"])
 @pytest.mark.system
 def test_a_process_of_a_replay_that_dies_is_an_error(
     session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, which: str
@@ -190,7 +190,7 @@ def test_a_process_of_a_replay_that_dies_is_an_error(
 
 def test_a_pipe_that_breaks_off_is_no_end() -> None:
     """Also where the process says that all is well."""
-    pipe = Pipe("boom_twin.offline.reader_process")
+    pipe = Pipe("boom_twin.offline.session_samples")
     pipe._process.kill()
     pipe._process.wait()
     pipe._process.returncode = 0

@@ -23,7 +23,7 @@ from ...errors import BagError, BoomTwinError
 from ...health.baseline import Baseline
 from ...messages.report_encoder import ReportEncoder
 from ...messages.topic_table import NODE, Output, Topic, Topics
-from ...offline.reader_process import SampleReader
+from ...offline.session_samples import SampleReader
 from ...offline.replay import scene_for
 from ...scene.schema import Scene
 from ...twin.driver import Step, drive

@@ -18,7 +18,7 @@ from boom_twin.messages.report_encoder import decode_changes, encode_changes
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import TYPES, Output, Topics, load_topics
 from boom_twin.messages.type_store import decode, jazzy
-from boom_twin.offline.reader_process import Changes, SampleReader, items_of
+from boom_twin.offline.session_samples import Changes, SampleReader, items_of
 from boom_twin.twin.blocks import SampleBlock, samples_in
 from boom_twin.types import Change, Sample, Stream
 
@@ -289,7 +289,7 @@ def test_a_topic_is_decoded_by_itself_only_where_its_layout_is_new(tmp_path: Pat
         decoded.append(len(data))
         return decode(data, type_name)
 
-    monkeypatch.setattr("boom_twin.offline.reader_process.decode", counted)
+    monkeypatch.setattr("boom_twin.offline.session_samples.decode", counted)
     compare(tmp_path / "bag", topics, Expected(tmp_path / "bag", [entries], topics))
     assert 4 <= len(decoded) <= 12
 
