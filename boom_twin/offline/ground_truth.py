@@ -11,10 +11,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bag.reader import Session, read
+from ..bag.time_window import WHOLE, TimeWindow
 from ..errors import BagError
+from ..messages.sample_decoder import stamp_of
+from ..messages.topic_table import Topics
 from ..system.received_files import holds_file, open_received
 from ..twin.blocks import EstimateBlock, PredictionBlock
-from ..types import NANO, Array
+from ..types import NANO, Array, Stream
 
 FILE_NAME = "truth.csv.gz"
 LARGEST = 64 * 2**20
@@ -144,3 +148,20 @@ def load_truth(folder: Path) -> TipTruth | None:
         np.column_stack([values["tip_ax_m_s2"], values["tip_ay_m_s2"]]),
         np.column_stack(loads),
     )
+
+
+def truth_in(window: TimeWindow, session: Session, topics: Topics, wanted: list[str]) -> TipTruth | None:
+    """Return the truth of a session from the first strokes in the window on."""
+    truth = load_truth(session.path)
+    if truth is None or window == WHOLE:
+        return truth
+    first, begin = (_first_stroke_stamp(session, topics, wanted, part) for part in (WHOLE, window))
+    found = truth.since((begin - first) * NANO)
+    return found if len(found.times) else None
+
+
+def _first_stroke_stamp(session: Session, topics: Topics, wanted: list[str], window: TimeWindow) -> int:
+    """Return the stamp of the first message of strokes in a window, ns; 0 if there is none."""
+    types = {name: topics.inputs[topics.heard[name][0]].type for name in wanted}
+    messages = read(session, types, window)
+    return next((stamp_of(message) for name, _, message in messages if Stream.STROKES in topics.heard[name]), 0)

@@ -28,15 +28,23 @@ class RefusedStrokes:
         self._closed = np.array([joint.cylinder.closed_length for joint in scene.joints])
         self._travel = np.array([joint.cylinder.max_stroke for joint in scene.joints])
         self._first: Array | None = None
+        self._is_read = np.zeros(len(scene.joints), bool)
 
     def take(self, block: SampleBlock) -> None:
         """Look at samples."""
+        strokes = block.values[block.streams == CODES[Stream.STROKES], : len(self._names)]
+        self._is_read |= np.isfinite(strokes).any(axis=0)
         if self._first is not None:
             return
-        strokes = block.values[block.streams == CODES[Stream.STROKES], : len(self._names)]
         outside = np.flatnonzero(((strokes < 0.0) | (strokes > self._travel)).any(axis=1))
         if len(outside):
             self._first = strokes[outside[0]]
+
+    @property
+    def never_read(self) -> str:
+        """Clause on the cylinders that never had a value, if others had; else empty."""
+        silent = [name for name, is_read in zip(self._names, self._is_read, strict=True) if not is_read]
+        return f", because {', '.join(silent)} never had a value" if silent and self._is_read.any() else ""
 
     @property
     def told(self) -> str:

@@ -1,26 +1,21 @@
-"""Reader process of a replay: reads a session and decodes its messages to samples and recorded changes."""
+"""Samples of a session in blocks, and the changes that were made while it was recorded, in the order of log times."""
 
 from __future__ import annotations
 
-import pickle
-import sys
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from itertools import repeat
-from pathlib import Path
 
-from ..bag.reader import Session, read, read_blocks, scan
+from ..bag.reader import Session, read, read_blocks
 from ..bag.session_file import PARSE_ERRORS
 from ..bag.time_window import WHOLE, TimeWindow
-from ..errors import BoomTwinError
 from ..messages.cdr_decoder import CdrDecoder
 from ..messages.report_encoder import decode_changes
 from ..messages.sample_decoder import SampleDecoder
 from ..messages.topic_table import TYPES, Output, Topics
-from ..messages.type_store import decode, jazzy
+from ..messages.type_store import decode
 from ..twin.blocks import SampleBlock, block_of, samples_in
 from ..types import SENSORS, Change, Sample, Stream
-from .process_pipe import END, Pipe, post, say_ready
 
 NEAR = 2_000_000_000
 """Nanoseconds, of log time and of stamps, within which a change and its stroke sample are looked for.
@@ -77,19 +72,16 @@ def recorded_changes(session: Session, topics: Topics) -> Changes:
     return Changes((log, decode_changes(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))
 
 
-Item = SampleBlock | Change | int | Counter[str]
-"""Item that goes up the pipe, see `items_of`."""
 BATCH = 400
-"""Messages in one block up the pipe, at least."""
+"""Messages in one block, at least."""
 
 
-class SampleReader:
+class SessionSamples:
     """Samples of a session, many at a time; iterate once.
 
     Parameters
     ----------
-    path : Path
-        Of the session.
+    session : Session
     topics : Topics
         How its topics and sensors are named, and read.
     wanted : list of str
@@ -98,135 +90,71 @@ class SampleReader:
         Of the scene.
     window : TimeWindow, optional
         The part of the session that is read.
-    process : Pipe, optional
-        From `started`, where it was begun before all of this was known.
 
     Attributes
     ----------
     oddities : Counter
-        Of the decoder, once the iteration has ended.
+        Of the decoder, up to now.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        topics: Topics,
-        wanted: list[str],
-        joints: int,
-        window: TimeWindow = WHOLE,
-        process: Pipe | None = None,
-    ) -> None:
-        self._pipe = process or self.started()
-        self._pipe.send((path, topics, wanted, joints, window))
-        self._joints = joints
-        self.oddities: Counter[str] = Counter()
+    def __init__(self, session: Session, topics: Topics, wanted: list[str], joints: int, window: TimeWindow = WHOLE) -> None:
+        self._session, self._topics, self._wanted, self._window = session, topics, wanted, window
+        self._joints, self._decoder = joints, SampleDecoder(joints, topics)
+        self._waiting: list[Sample] = []
+        self._refused = 0  # messages that were told
 
-    @staticmethod
-    def started() -> Pipe:
-        """Return the pipe of the process, which begins its imports."""
-        return Pipe(__name__)
-
-    def wait_ready(self) -> None:
-        """Wait until the process can begin."""
-        self._pipe.wait_ready()
+    @property
+    def oddities(self) -> Counter[str]:
+        """Oddities of the messages that were read."""
+        return self._decoder.oddities
 
     def __iter__(self) -> Iterator[SampleBlock | Change | None]:
         """Yield samples in the order of log times, each change before its sample.
 
         After a block comes one None for each of its messages that could not be used.
+
+        Raises
+        ------
+        BagError
+            The session cannot be read.
         """
-        for item in self._pipe.receive():
-            if isinstance(item, Counter):
-                self.oddities = item
-            elif isinstance(item, int):
-                yield from repeat(None, item)
-            else:
-                yield item
-        self._pipe.finish()
+        heard, decoder, session = self._topics.heard, self._decoder, self._session
+        changes = recorded_changes(session, self._topics)
+        types = {name: self._topics.inputs[heard[name][0]].type for name in self._wanted}
+        blocks, count = read_blocks(session, types, self._window), 0
+        streams = [heard[source.name] for source in blocks.sources]
+        wires = [CdrDecoder(TYPES[group[0]], decode, SENSORS[group[0]].field) for group in streams]
+        for block in blocks:
+            for row, source in enumerate(block.sources.tolist()):
+                try:
+                    stamp, message = wires[source].read(block.data(row))
+                except PARSE_ERRORS:
+                    blocks.decoded(block, row)  # raises it with its place
+                    raise
+                if changes.are_left and Stream.STROKES in streams[source]:
+                    for change in changes.due(int(block.log_times[row]), stamp):
+                        yield from self._batch()
+                        yield change
+                self._waiting += decoder.samples(streams[source], stamp, message)
+                count += 1
+                if count >= BATCH:
+                    count = 0
+                    yield from self._batch()
+        self._waiting += decoder.assembler.rest()
+        yield from self._batch()
+
+    def _batch(self) -> Iterator[SampleBlock | None]:
+        """Yield the samples that wait, and None for each message that was refused since the last batch."""
+        if self._waiting:
+            yield block_of(self._waiting, self._joints)
+            self._waiting.clear()
+        refused, self._refused = self._decoder.refused - self._refused, self._decoder.refused
+        yield from repeat(None, refused)
 
     def samples(self) -> Iterator[Sample | Change | None]:
-        """Yield samples, changes and None as in an iteration of the reader, but one sample at a time."""
+        """Yield samples, changes and None as an iteration does, but one sample at a time."""
         for item in self:
             if isinstance(item, SampleBlock):
                 yield from samples_in(item, self._joints)
             else:
                 yield item
-
-    def stop(self) -> None:
-        """End the process."""
-        self._pipe.stop()
-
-
-def items_of(path: Path, topics: Topics, wanted: list[str], joints: int, window: TimeWindow = WHOLE) -> Iterator[Item]:
-    """Yield the items that go up the pipe, for `SampleReader` to unpack.
-
-    A whole number stands for as many None. The last item is the count of oddities.
-
-    Raises
-    ------
-    BagError
-        The session cannot be read.
-    """
-    heard: dict[str, list[Stream]] = topics.heard
-    session, decoder = scan(path), SampleDecoder(joints, topics)
-    changes = recorded_changes(session, topics)
-    blocks = read_blocks(session, {name: topics.inputs[heard[name][0]].type for name in wanted}, window)
-    streams = [heard[source.name] for source in blocks.sources]
-    wires = [CdrDecoder(TYPES[group[0]], decode, SENSORS[group[0]].field) for group in streams]
-    waiting, count, told = list[Sample](), 0, 0
-
-    def batch() -> Iterator[Item]:
-        """Yield the samples that wait, and how many messages were refused since the last batch."""
-        nonlocal count, told
-        if waiting:
-            yield block_of(waiting, joints)
-            waiting.clear()
-        if refused := decoder.refused - told:
-            yield refused
-        count, told = 0, decoder.refused
-
-    for block in blocks:
-        for row, source in enumerate(block.sources.tolist()):
-            try:
-                stamp, message = wires[source].read(block.data(row))
-            except PARSE_ERRORS:
-                blocks.decoded(block, row)  # raises it with its place
-                raise
-            if changes.are_left and Stream.STROKES in streams[source]:
-                for change in changes.due(int(block.log_times[row]), stamp):
-                    yield from batch()
-                    yield change
-            waiting += decoder.samples(streams[source], stamp, message)
-            count += 1
-            if count >= BATCH:
-                yield from batch()
-    waiting += decoder.assembler.rest()
-    yield from batch()
-    yield decoder.oddities
-
-
-def _ready_items(task: tuple[Path, Topics, list[str], int, TimeWindow]) -> Iterator[Item]:
-    """Return the items that go up the pipe; compile the decoders first."""
-    for kind in SENSORS.values():
-        jazzy().get_msgdef(kind.message)  # compiles its decoder
-    return items_of(*task)
-
-
-def main() -> int:
-    """Send the samples of a session up the pipe; exit code 1 with the reason on stderr if it cannot be read."""
-    try:
-        items = _ready_items(pickle.load(sys.stdin.buffer))
-        say_ready()
-        for item in items:
-            post([item])
-        post([END])
-    except BrokenPipeError:
-        return 0
-    except BoomTwinError as error:
-        print(error, file=sys.stderr)
-        return 1
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

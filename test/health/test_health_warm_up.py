@@ -19,7 +19,7 @@ from boom_twin.bag.reader import scan
 from boom_twin.bag.session_model import baseline_of, mapping_of, scene_of, strokes_of
 from boom_twin.health.sensor_findings import find
 from boom_twin.health.sensor_survey import summarise, survey
-from boom_twin.offline.session_samples import items_of
+from boom_twin.offline.session_samples import SessionSamples
 from boom_twin.twin.blocks import ReportBlock, SampleBlock
 from boom_twin.twin.health_rows import copy_predictions, copy_residuals, count_residuals
 from boom_twin.twin.twin import Twin
@@ -35,7 +35,7 @@ ready = [len(kernel.dispatcher.signatures) for kernel in kernels]
 session = scan(path)
 wanted = [name for name in topics.heard if (found := session.find(name)) is not None and found.count]
 told = 0
-for item in items_of(path, topics, wanted, 4):
+for item in SessionSamples(session, topics, wanted, 4):
     if isinstance(item, SampleBlock) and told < 3:
         found = [each for each in twin.update_block(item) if isinstance(each, ReportBlock)]
         told += sum(len(each.health) for each in found)

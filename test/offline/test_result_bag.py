@@ -1,10 +1,10 @@
-"""What goes down the pipe to the writer comes out of it: every number of a prediction; the same bag from blocks and reports."""
+"""The result bag of a replay: every number of a prediction, the same bytes from blocks and from single reports."""
 
 from __future__ import annotations
 
 import os
-import pickle
-from dataclasses import fields, replace
+from dataclasses import fields
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +19,10 @@ from boom_twin.bag.writer import FILE_NAME, RESULT_CHUNK_SIZE, SessionWriter
 from boom_twin.config.settings import Settings
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import Output, load_topics
-from boom_twin.offline.writer_process import ReportWriter, pack
+from boom_twin.offline.threads import result_bag
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.schema import Clearance, Pin
-from boom_twin.twin.blocks import PredictionBlock, ReportBlock
+from boom_twin.twin.blocks import PredictionBlock, ReportBlock, report_block
 from boom_twin.types import Prediction, Report
 
 
@@ -38,9 +38,7 @@ def test_a_prediction_with_clearance_comes_through_whole() -> None:
     scene = scene.model_copy(update={"clearance": Clearance(pins=(worn,))})
     twin, strokes = drive_twin(scene), strokes_of_posture(scene, "arch")
     given = [twin.update(Sample(Stream.STROKES, k * 5_000_000, strokes)) for k in range(30)]
-    (block,) = pickle.loads(pickle.dumps(pack([replace(report, change=None) for report in given], 4)))
-    assert isinstance(block, ReportBlock)
-    got = block.reports(len(scene.joints))
+    got = report_block(given, 4).reports(len(scene.joints))
     assert sum(report.prediction is not None and report.prediction.shape is not None for report in got) == 2
     for one, other in ((a.prediction, b.prediction) for a, b in zip(given, got, strict=True)):
         assert one is not None and other is not None
@@ -52,7 +50,7 @@ def test_a_prediction_with_clearance_comes_through_whole() -> None:
 
 
 @pytest.mark.parametrize("size", [0, 37, 400])
-def test_the_process_writes_the_bytes_of_message_by_message(tmp_path: Path, size: int) -> None:
+def test_the_bag_has_the_bytes_of_message_by_message(tmp_path: Path, size: int) -> None:
     """From reports (0), and from blocks of so many with single reports of changes between them."""
     reports = random_reports(size, 1500, Told(3, pins=1, changes=0.01))
     scene, notes = boom(3), {"origin": "synthetic, a test"}
@@ -62,13 +60,9 @@ def test_the_process_writes_the_bytes_of_message_by_message(tmp_path: Path, size
         for report in reports:
             for key, data in encoder.fill(report):
                 expected.write_encoded(key, report.stamp, data)
-    with (tmp_path / "lock").open("w") as lock:
-        process = ReportWriter.started(tmp_path / "bag", lock.fileno())
-        writer = ReportWriter(process, notes, load_topics(), scene, Settings())
-        writer.wait_ready()
+    with result_bag(tmp_path / "bag", notes, load_topics(), scene, Settings()) as put:
         for item in _items(reports, size, 3):
-            writer.put(item)
-        writer.close()
+            put([item])
     for name in (FILE_NAME, "metadata.yaml"):
         assert (tmp_path / "bag" / name).read_bytes() == (tmp_path / "expected" / name).read_bytes()
     with (tmp_path / "bag" / FILE_NAME).open("rb") as file:
@@ -81,6 +75,9 @@ def test_the_process_writes_the_bytes_of_message_by_message(tmp_path: Path, size
 
 
 def _items(reports: list[Report], size: int, joints: int) -> list[ReportBlock | Report]:
-    if size == 0:
-        return list(reports)
-    return [item for first in range(0, len(reports), size) for item in pack(reports[first : first + size], joints)]
+    found: list[ReportBlock | Report] = []
+    for has_change, run in groupby(reports, lambda report: report.change is not None):
+        own = list(run)
+        is_single = has_change or size == 0
+        found += own if is_single else [report_block(own[k : k + size], joints) for k in range(0, len(own), size)]
+    return found
