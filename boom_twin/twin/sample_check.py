@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..types import Array, Sample, Stream
+from .regular import SHORTEST_STEP
 
 FLOAT = np.dtype(float)
-FIRST = 100  # samples of strokes that differ in their stamps by less than
-SHORTEST = 20_000  # ns from one to the next are no rig's
-LIMIT = 2**63  # ns
+DECIDING = 100  # samples of strokes whose stamps decide if they are nanoseconds
+LARGEST_STAMP = 2**63  # ns
 
 
 class SampleCheck:
@@ -30,7 +30,7 @@ class SampleCheck:
     def __init__(self, channels: Mapping[Stream, tuple[str, ...]]) -> None:
         self._shapes = {stream: (len(names),) for stream, names in channels.items()}
         self._names = {stream: f"{names[0]}..{names[-1]}" for stream, names in channels.items()}
-        self._count, self._low, self._high = 0, LIMIT, -LIMIT
+        self._count, self._low, self._high = 0, LARGEST_STAMP, -LARGEST_STAMP
         self.is_sure = False
 
     def checked(self, sample: Sample) -> Sample:
@@ -49,7 +49,7 @@ class SampleCheck:
             and type(values) is np.ndarray
             and values.dtype is FLOAT
             and type(stream) is Stream
-            and -LIMIT <= stamp < LIMIT
+            and -LARGEST_STAMP <= stamp < LARGEST_STAMP
             and values.shape == self._shapes[stream]
             and values.flags.carray
         ):
@@ -63,10 +63,10 @@ class SampleCheck:
 
     def look_at(self, stamps: NDArray[np.int64]) -> None:
         """Accept the stamps (ns) of strokes as nanoseconds before their block is taken, if they suffice to decide."""
-        deciding = stamps[: FIRST - self._count]
-        if not self.is_sure and 0 < len(deciding) == FIRST - self._count:
+        deciding = stamps[: DECIDING - self._count]
+        if not self.is_sure and 0 < len(deciding) == DECIDING - self._count:
             span = max(self._high, int(deciding.max())) - min(self._low, int(deciding.min()))
-            self.is_sure = span >= FIRST * SHORTEST
+            self.is_sure = span >= DECIDING * SHORTEST_STEP
 
     def _look(self, stamp: int) -> None:
         """Raise UsageError if the stamps are too close together to be nanoseconds.
@@ -75,13 +75,13 @@ class SampleCheck:
         """
         self._count += 1
         self._low, self._high = min(self._low, stamp), max(self._high, stamp)
-        if self._count < FIRST or self._low == self._high:
+        if self._count < DECIDING or self._low == self._high:
             return
-        self.is_sure = self._high - self._low >= self._count * SHORTEST
+        self.is_sure = self._high - self._low >= self._count * SHORTEST_STEP
         if not self.is_sure:
             first, last, count, self._count = self._low, self._high, self._count, 0
             raise UsageError(
-                f"stamps of {count} strokes go from {first} to {last}: less than {SHORTEST} ns from one to the next. "
+                f"stamps of {count} strokes go from {first} to {last}: less than {SHORTEST_STEP} ns from one to the next. "
                 "A stamp is a whole number of nanoseconds: give round(seconds * 1e9)."
             )
 
@@ -115,7 +115,7 @@ def _stamp(stamp: Any) -> int:
         found = operator.index(stamp)
     except TypeError:
         raise UsageError(f"stamp is {_short(stamp)}, a {type(stamp).__name__}. {remedy}") from None
-    if not -LIMIT <= found < LIMIT:
+    if not -LARGEST_STAMP <= found < LARGEST_STAMP:
         raise UsageError(f"stamp is {_short(found)}, more than 64 bits. {remedy}")
     return found
 

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from ..config.settings import Settings
 from ..types import NANO, Array
+from .regular import NOISE_REACH, reach_of_strokes
 from .state import CHECKED, OTHERS, TRUSTED
 
 MOST = 5  # readings in a row that are not believed though none jumps from the one before; the next one is
-FAR = 8.0  # deviations of the noise
 SILENT = 100_000_000  # ns after which a missing stroke is told
 LASTING = 1_000_000_000  # ns after which readings that jumped elsewhere, and stay there, are believed
 USUAL_RATE = 0.05  # m/s, which a cylinder may have gone at meanwhile, beside twice what it was going at: then it is back
@@ -46,8 +46,8 @@ class StrokeCheck:
 
     def _limit(self, stamp: int, settings: Settings) -> float:
         """Return the allowed difference of strokes from their estimates, m."""
-        span = (stamp - int(self._clock[CHECKED])) * NANO
-        return float(FAR * settings.stroke_variance**0.5 + settings.stroke_rate * span)
+        far, span = NOISE_REACH * settings.stroke_variance**0.5, stamp - int(self._clock[CHECKED])
+        return float(reach_of_strokes(far, settings.stroke_rate, span))
 
     def of(
         self, stamp: int, values: Array, before: Array, estimate: Array | None, rates: Array, settings: Settings

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from boom_twin.config.settings import Settings
+from boom_twin.twin.regular import NOISE_REACH
 from boom_twin.twin.state import new_state
-from boom_twin.twin.stroke_check import FAR, LASTING, MOST, SILENT, StrokeCheck
+from boom_twin.twin.stroke_check import LASTING, MOST, SILENT, StrokeCheck
 
 MS, SETTINGS = 1_000_000, Settings()
-LIMIT = FAR * SETTINGS.stroke_variance**0.5 + SETTINGS.stroke_rate * 0.005
+LIMIT = NOISE_REACH * SETTINGS.stroke_variance**0.5 + SETTINGS.stroke_rate * 0.005
 
 
 class Run:
