@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..bag.joint_names import refuse_other_names
-from ..bag.reader import Session, scan
-from ..bag.session_model import SessionScene, baseline_of, mapping_of, scene_of, settings_of, strokes_of
+from ..bag.reader import Session
+from ..bag.session_model import SessionScene
 from ..bag.session_sheet import SessionSheet
 from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME
@@ -26,9 +24,8 @@ from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
 from ..health.fault_twins import FaultTwins, Hypothesis
 from ..messages.sample_decoder import ODDITIES
-from ..messages.topic_table import Topics
-from ..scene.edit import anew, loaded
-from ..scene.load import SceneSource, as_scene
+from ..scene.edit import loaded
+from ..scene.load import SceneSource
 from ..system.atomic_files import write_atomic
 from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
 from ..system.summary_display import SummaryDisplay, data_frame
@@ -36,8 +33,9 @@ from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..twin.events import EVENTS
 from ..twin.twin import Twin
-from ..types import NANO, Array, Change, Report, Stream
+from ..types import Array, Change, Report, Stream
 from .ground_truth import TipErrors, TipTruth, truth_in
+from .inputs import USUAL, ReplayOptions, replay_inputs
 from .progress import Progress
 from .recording import Recording, Stretch
 from .refused_strokes import RefusedStrokes
@@ -45,27 +43,6 @@ from .sample_table import RowsInMemory, SampleTable, columns_of
 from .session_samples import SessionSamples
 from .summary import alarm_as_text, summary_of
 from .threads import read_ahead, result_bag
-
-GIVEN = "given as a Scene"
-"""Source of a scene that came by no file."""
-
-
-@dataclass(frozen=True)
-class ReplayOptions:
-    """Options of a replay, see the parameters of `replay`."""
-
-    progress: Progress | None = None
-    mapping: str | Path | None = None
-    changes: bool = True
-    health: bool = True
-    baseline: str | Path | None = None
-    window: TimeWindow = WHOLE
-    namespace: str = ""
-    with_bag: bool = True
-    causes: bool = False
-
-
-USUAL = ReplayOptions()
 
 
 @dataclass(frozen=True, repr=False)
@@ -203,32 +180,22 @@ def replay_into(
 
     With `take`, memory stays the same however long the session is: it is given one `Stretch` after the other, and none is kept.
     """
-    session, out, settings = scan(Path(bag)), building.folder, settings or settings_of(Path(bag)).settings
-    taken = scene_for(session.path, scene)
-    scene, joints = taken.scene, len(taken.scene.joints)
-    mapped = mapping_of(session.path, Path(options.mapping) if options.mapping else None, joints, options.namespace)
-    topics, wanted = mapped.topics.of_joints(joint.range_deg for joint in scene.joints), _wanted(session, mapped.topics)
-    strokes = strokes_of(session.path, mapped)
-    refuse_other_names(session, topics, joints, taken.source)
-    baseline = Path(options.baseline) if options.baseline else None
-    usual = baseline_of(session.path, baseline) if options.health else None
-    window = options.window
-    truth = truth_in(window, session, topics, wanted)
+    given, out = replay_inputs(Path(bag), scene, settings, options), building.folder
+    session, joints = given.session, len(given.scene.joints)
+    truth = truth_in(options.window, session, given.topics, given.wanted)
     errors = None if truth is None else TipErrors(truth)
     taking = None if take is None else _Timed(take)
-    recording = Recording(joints, taking, errors, strokes.reading)
-    other_boom, refused = OtherBoom(), RefusedStrokes(scene, taken.source)
-    samples = SessionSamples(session, topics, wanted, joints, window)
+    recording = Recording(joints, taking, errors, given.strokes.reading)
+    other_boom, refused = OtherBoom(), RefusedStrokes(given.scene, given.kept.source)
+    samples = SessionSamples(session, given.topics, given.wanted, joints, options.window)
     with ExitStack() as stack:
-        stack.enter_context(_unhurried_collector())
-        mounts, reading = topics.mounts(joints), strokes.reading
-        twin = Twin(scene, settings, mounts, None if usual is None else usual.baseline, reading, topics.absent)
+        twin, put = given.twin(), None
         twin.warm_up()
-        put = None
         if options.with_bag:
-            put = stack.enter_context(result_bag(out / "bag", session.notes, topics, scene, settings))
+            bag_of = result_bag(out / "bag", session.notes, given.topics, given.scene, given.settings)
+            put = stack.enter_context(bag_of)
         fault_twins = _fault_twins(twin) if options.causes else None
-        bar = options.progress(_expected(session, wanted, window)) if options.progress else None
+        bar = options.progress(given.expected) if options.progress else None
         began = time.perf_counter()
         items = stack.enter_context(closing(read_ahead(samples)))
         for step in drive_blocks(twin, _followed(items, options.changes, fault_twins)):
@@ -245,8 +212,8 @@ def replay_into(
                 put(found)
             if recording.is_empty:
                 refused.take(block)
-            _refuse(session, taken, other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
-        _refuse(session, taken, other_boom.judge())
+            given.refuse(other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
+        given.refuse(other_boom.judge())
     if bar is not None:
         bar.close()
     wall = time.perf_counter() - began - (taking.spent if taking else 0.0)
@@ -254,7 +221,7 @@ def replay_into(
     if recording.is_empty:
         raise BagError(
             f"{session.path}: no stroke sample could be used ({_told(twin)}){refused.never_read}. "
-            f"It needs names cylinder_1..{twin.plan.joints}, or those of a mapping, values within the cylinders' travel, "
+            f"It needs names cylinder_1..{joints}, or those of a mapping, values within the cylinders' travel, "
             f"and stamps.{_explained(samples.oddities)}{refused.told}"
         )
     recording.close()
@@ -266,19 +233,9 @@ def replay_into(
             f"{_explained(twin.counts)}"
         )
     if options.with_bag:
-        SessionSheet(__version__, taken.text, strokes=strokes.reading).write(out / "bag")
-    summary = summary_of(recording, twin.counts, wall, out / "bag" / FILE_NAME if options.with_bag else None) | {
-        "scene": taken.source,
-        "scene_sha256": taken.sha256,
-        "baseline": None if usual is None else usual.source,
-        "mapping": mapped.source,
-        "strokes": strokes.reading,
-        "strokes_source": strokes.source,
-    }
-    if window != WHOLE:
-        summary |= {"window_start_s": window.start, "window_duration_s": window.duration}
-    if session.incomplete:
-        summary["session_incomplete"] = session.incomplete
+        SessionSheet(__version__, given.kept.text, strokes=given.strokes.reading).write(out / "bag")
+    file = out / "bag" / FILE_NAME if options.with_bag else None
+    summary = summary_of(recording, twin.counts, wall, file) | given.summary
     if errors is not None:
         summary |= errors.rms
     write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
@@ -295,18 +252,7 @@ class _Timed:
     def __call__(self, stretch: Stretch) -> None:
         began = time.perf_counter()
         self._take(stretch)
-        gc.collect()  # which does not run by itself, see `_unhurried_collector`
         self.spent += time.perf_counter() - began
-
-
-def scene_for(session: Path, scene: SceneSource | SessionScene) -> SessionScene:
-    """Return the scene to read a session with: `scene`, or if None that of `boom_twin.bag.session_model.scene_of`."""
-    if scene is None or isinstance(scene, str | Path):
-        return scene_of(session, scene)
-    if isinstance(scene, SessionScene):
-        return scene
-    given = as_scene(scene)
-    return SessionScene(given, anew(given), GIVEN)
 
 
 def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) -> tuple[Array, list[Array]]:
@@ -319,27 +265,6 @@ def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) 
         else:
             residuals += list(each.residuals.values[each.residuals.streams == code, :joints])
     return block.values[block.streams == code, :joints], residuals
-
-
-def _refuse(session: Session, scene: SessionScene, reason: str) -> None:
-    """Raise BagError if there is a `reason` for which the session is of another boom than the scene."""
-    if reason:
-        raise BagError(
-            f"{session.path}: {reason}. The scene ({scene.source}) is of another boom, or the sensors' zeros and units are "
-            "others: give the scene by --scene, or those by --mapping."
-        )
-
-
-def _wanted(session: Session, topics: Topics) -> list[str]:
-    """Return the topics to read: that of the strokes, and those of other inputs with messages."""
-    found = {name: session.find(name) for name in topics.heard}
-    return [name for name, topic in found.items() if Stream.STROKES in topics.heard[name] or (topic and topic.count)]
-
-
-def _expected(session: Session, wanted: list[str], window: TimeWindow) -> int:
-    """Return the approximate number of messages to read."""
-    count = sum(topic.count for name in wanted if (topic := session.find(name)) is not None)
-    return round(count * window.share((session.end - session.start) * NANO))
 
 
 def _fault_twins(twin: Twin) -> FaultTwins:
@@ -366,18 +291,6 @@ def _followed(
         elif each is not None and twins is not None:
             twins.take(each)
         yield each
-
-
-@contextmanager
-def _unhurried_collector() -> Iterator[None]:
-    """Freeze and disable the garbage collector: a replay makes many small objects that last."""
-    gc.freeze()
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
-        gc.unfreeze()
 
 
 def _explained(counts: Counter[str]) -> str:

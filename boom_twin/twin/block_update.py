@@ -65,7 +65,6 @@ class _UpdateExtras:
 
 
 NO_EXTRAS = _UpdateExtras()
-
 _Code = tuple[Callable[..., tuple[int, int]], Callable[..., bool]]
 """`update` and `measure`, compiled for a scene's types."""
 _Held = tuple[_Code, tuple[tuple[Any, ...], tuple[Any, ...], Any]]

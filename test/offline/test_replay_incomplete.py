@@ -21,7 +21,8 @@ from boom_twin.cli.main import main
 from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError
 from boom_twin.monitor.data.bag_feed import bag_feed
-from boom_twin.offline.replay import ReplayOptions, replay_into
+from boom_twin.offline.inputs import ReplayOptions
+from boom_twin.offline.replay import replay_into
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.system.result_folder import REPLAY, result_folder
 

@@ -23,7 +23,7 @@ from ...errors import BagError, BoomTwinError
 from ...health.baseline import Baseline
 from ...messages.report_encoder import ReportEncoder
 from ...messages.topic_table import NODE, Output, Topic, Topics
-from ...offline.replay import scene_for
+from ...offline.inputs import scene_for
 from ...offline.session_samples import SessionSamples
 from ...scene.schema import Scene
 from ...twin.driver import Step, drive
