@@ -20,7 +20,7 @@ from ..twin.blocks import EstimateBlock, PredictionBlock
 from ..types import NANO, Array, Stream
 
 FILE_NAME = "truth.csv.gz"
-LARGEST = 64 * 2**20
+LARGEST_TRUTH = 64 * 2**20
 """Bytes of an unpacked file that are read: about an hour at 200 Hz."""
 COLUMNS = ("t_s", "tip_x_m", "tip_y_m", "tip_ax_m_s2", "tip_ay_m_s2")
 LOAD_COLUMNS = ("tip_load_x_N", "tip_load_y_N")
@@ -108,9 +108,9 @@ def load_truth(folder: Path) -> TipTruth | None:
         return None
     try:
         with open_received(path) as packed, gzip.open(packed) as file:
-            text = file.read(LARGEST + 1)
-        if len(text) > LARGEST:
-            raise ValueError(f"more than {LARGEST} bytes unpacked")
+            text = file.read(LARGEST_TRUTH + 1)
+        if len(text) > LARGEST_TRUTH:
+            raise ValueError(f"more than {LARGEST_TRUTH} bytes unpacked")
         table = np.genfromtxt(BytesIO(text), delimiter=",", names=True)
         values = {name: table[name] for name in COLUMNS}
         names = table.dtype.names or ()

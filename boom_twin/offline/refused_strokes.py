@@ -9,7 +9,7 @@ from ..scene.schema import Scene
 from ..twin.blocks import CODES, SampleBlock
 from ..types import SENSORS, Array, Stream, channels_of
 
-NEAR = 5.0  # times the travel: within that a stroke is rather one of another boom than in another unit
+OTHER_BOOM = 5.0  # times the travel: within that a stroke is rather one of another boom than in another unit
 
 
 class RefusedStrokes:
@@ -57,7 +57,7 @@ class RefusedStrokes:
             return f"{said} {self._remedy(1.0, 'm', self._closed)}"
         if self._fits_in_other_order():
             return f"{said} In another order the strokes would fit: look for cylinders whose names or columns are swapped."
-        if self._is_default and self._first[i] < NEAR * self._travel[i]:
+        if self._is_default and self._first[i] < OTHER_BOOM * self._travel[i]:
             return f"{said} The session names no scene and was read with the {DEFAULT_NAME}: for another boom give --scene."
         units = sorted(SENSORS[Stream.STROKES].units.items(), key=lambda pair: -pair[1])[1:]
         fits = ((factor, unit, closed) for closed in (0.0, self._closed) for unit, factor in units[:-1])

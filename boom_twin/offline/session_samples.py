@@ -17,7 +17,7 @@ from ..messages.type_store import decode
 from ..twin.blocks import SampleBlock, block_of, samples_in
 from ..types import SENSORS, Change, Sample, Stream
 
-NEAR = 2_000_000_000
+CHANGE_SPAN = 2_000_000_000
 """Nanoseconds, of log time and of stamps, within which a change and its stroke sample are looked for.
 
 A looped session repeats stamps; a stray stamp is far from its stream.
@@ -52,9 +52,9 @@ class Changes:
         return bool(self._waiting)
 
     def _begins(self, logged: int, change: Change, log: int, stamp: int) -> bool:
-        if abs(log - logged) > NEAR:
+        if abs(log - logged) > CHANGE_SPAN:
             return log > logged
-        return stamp == change.stamp or self._before < change.stamp < stamp < change.stamp + NEAR
+        return stamp == change.stamp or self._before < change.stamp < stamp < change.stamp + CHANGE_SPAN
 
 
 def recorded_changes(session: Session, topics: Topics) -> Changes:

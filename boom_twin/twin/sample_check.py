@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping
+from reprlib import repr as repr_of
 from typing import Any
 
 import numpy as np
@@ -86,40 +87,29 @@ class SampleCheck:
             )
 
     def _values(self, stream: Stream, given: Any) -> Array:
-        names, (count,) = self._names[stream], self._shapes[stream]
-        wanted = f"Give {count} numbers, {names} of this boom, NaN where there is none."
+        (count,) = self._shapes[stream]
         try:
             values = np.array(np.ma.filled(given.astype(float), np.nan) if isinstance(given, np.ma.MaskedArray) else given)
-            if values.dtype.kind not in "iufO":
+            if values.dtype.kind not in "iufO" or values.shape != (count,):
                 raise TypeError
-            values = values.astype(float)
+            return values.astype(float)
         except (TypeError, ValueError):
-            raise UsageError(f"values of {stream.value} are no numbers: {_short(given)}. {wanted}") from None
-        if values.shape != (count,):
-            raise UsageError(f"values of {stream.value} have shape {values.shape}: {_short(given)}. {wanted}")
-        return values
+            wanted = f"{count} numbers, {self._names[stream]} of this boom, NaN where there is none"
+            raise UsageError(f"values of {stream.value} are {repr_of(given)}. Give {wanted}.") from None
 
 
 def _stream(stream: Any) -> Stream:
     if isinstance(stream, Stream):
         return stream
     named = next((each for each in Stream if stream in (each.value, each.name)), Stream.STROKES)
-    raise UsageError(f"stream is {_short(stream)}, not a Stream. Give Stream.{named.name}.")
+    raise UsageError(f"stream is {repr_of(stream)}, not a Stream. Give Stream.{named.name}.")
 
 
 def _stamp(stamp: Any) -> int:
-    remedy = "Give a whole number of nanoseconds: round(seconds * 1e9)."
-    if isinstance(stamp, bool | np.bool_):
-        raise UsageError(f"stamp is {stamp}. {remedy}")
     try:
-        found = operator.index(stamp)
+        found = LARGEST_STAMP if isinstance(stamp, bool | np.bool_) else operator.index(stamp)
     except TypeError:
-        raise UsageError(f"stamp is {_short(stamp)}, a {type(stamp).__name__}. {remedy}") from None
+        found = LARGEST_STAMP
     if not -LARGEST_STAMP <= found < LARGEST_STAMP:
-        raise UsageError(f"stamp is {_short(found)}, more than 64 bits. {remedy}")
+        raise UsageError(f"stamp is {repr_of(stamp)}: give a whole number of nanoseconds, 64 bits: round(seconds * 1e9).")
     return found
-
-
-def _short(value: Any, width: int = 60) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= width else f"{text[:width]} .."
