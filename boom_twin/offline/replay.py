@@ -42,7 +42,7 @@ from .refused_strokes import RefusedStrokes
 from .sample_table import RowsInMemory, SampleTable, columns_of
 from .session_samples import SessionSamples
 from .summary import alarm_as_text, summary_of
-from .threads import read_ahead, result_bag
+from .threads import quick_switches, read_ahead, result_bag
 
 
 @dataclass(frozen=True, repr=False)
@@ -197,6 +197,7 @@ def replay_into(
         fault_twins = _fault_twins(twin) if options.causes else None
         bar = options.progress(given.expected) if options.progress else None
         began = time.perf_counter()
+        stack.enter_context(quick_switches())
         items = stack.enter_context(closing(read_ahead(samples)))
         for step in drive_blocks(twin, _followed(items, options.changes, fault_twins)):
             if bar is not None:

@@ -6,6 +6,7 @@ order and bytes are those of doing it all in one place.
 
 from __future__ import annotations
 
+import sys
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -23,7 +24,20 @@ from ..types import Report
 
 ITEMS_AHEAD = 8
 """Blocks of samples, or of reports, that wait between two threads."""
+SWITCH_INTERVAL = 2e-5
+"""Time (s) that a thread keeps the interpreter's lock while another wants it: a call of the twin's kernel takes 1 ms."""
 Item = TypeVar("Item")
+
+
+@contextmanager
+def quick_switches() -> Iterator[None]:
+    """Let threads take turns so quickly that the twin does not wait for the decoder of messages."""
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(usual)
 
 
 def read_ahead(items: Iterable[Item]) -> Generator[Item]:
