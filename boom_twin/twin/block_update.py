@@ -88,10 +88,6 @@ class BlockUpdate:
         Asked what is left out.
     before : BlockUpdate, optional
         Of the same scene under another load, whose arrays are taken over.
-
-    Attributes
-    ----------
-    limits : Limits
     """
 
     def __init__(
@@ -109,8 +105,8 @@ class BlockUpdate:
         self._judge, self._told_counts = judge, counts
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
         self._measured = [(code, int(width)) for code, width in enumerate(limits.channels) if code]
-        sizes = self._joints, boom.width, boom.stations, limits.channels
-        self._found: UpdateOutput = new_output(2 * CAPACITY, *sizes) if before is None else before._found
+        sizes = 2 * CAPACITY, self._joints, boom.width, boom.stations, limits.channels
+        self._found: UpdateOutput = new_output(*sizes) if before is None else before._found
         self._found.counts[:] = 0
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
         self._due: Run | None = None  # whose newest slot is still to be judged
@@ -152,7 +148,19 @@ class BlockUpdate:
         """
         self.judge()
         self.make_room()
-        reason, row = self._advance_strokes(run, block, trusted)
+        row, size = 0, len(block.stamps)
+        assert run is not None
+        (advance, _), (arguments, _, found) = self._held or self._hold()
+        while True:
+            reason, row = advance(*arguments, *block, row, trusted, found)
+            if reason != LOOK:
+                break
+            self._look_around(run, row)
+            row += 1
+            if row == size:  # the judgement, if one is due, is for who asked to take
+                reason = DONE
+                break
+            self._take_judgement(row - 1)
         self._count_unmatched()
         return reason, row
 
@@ -201,20 +209,6 @@ class BlockUpdate:
             self._tell_health()
             self._found.counts[:] = 0
             self._begin = self._told = 0, 0
-
-    def _advance_strokes(self, run: Run | None, block: SampleBlock, trusted: bool) -> tuple[int, int]:
-        row, size = 0, len(block.stamps)
-        assert run is not None
-        (advance, _), (arguments, _, found) = self._held or self._hold()
-        while True:
-            reason, row = advance(*arguments, *block, row, trusted, found)
-            if reason != LOOK:
-                return reason, row
-            self._look_around(run, row)
-            row += 1
-            if row == size:
-                return DONE, row  # the judgement, if one is due, is for who asked to take
-            self._take_judgement(row - 1)
 
     def _look_around(self, run: Run, row: int) -> None:
         """Add the shape, event and health request of a prediction that begins a slot or is outside the model's validity."""
