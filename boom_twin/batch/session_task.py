@@ -88,7 +88,7 @@ def row_of(task: SessionTask) -> Row:
     from ..bag.session_model import scene_of, settings_of
     from ..bag.time_window import TimeWindow
     from ..offline.history import draw
-    from ..offline.replay import ReplayOptions
+    from ..offline.inputs import ReplayOptions
     from ..report.evaluation import evaluated_replay
     from ..report.page import write_report
     from ..report.quantities import read

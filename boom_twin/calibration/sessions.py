@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from heapq import merge
 from pathlib import Path
@@ -16,7 +15,7 @@ from ..bag.reader import Session, check_topic, files_sha256, scan
 from ..bag.time_window import WHOLE, TimeWindow
 from ..errors import BagError
 from ..messages.topic_table import Topics
-from ..offline.reader_process import SampleReader
+from ..offline.session_samples import SessionSamples
 from ..types import SENSORS, Array, Change, Sample, Stream, channels_of
 
 NEEDED = (Stream.STROKES,)  # streams without which nothing can be estimated
@@ -71,7 +70,7 @@ class MeasuredSession:
 
 
 def read_sessions(paths: Sequence[Path], topics: Topics, joints: int, window: TimeWindow = WHOLE) -> list[MeasuredSession]:
-    """Read sessions, all at once, the same window of each.
+    """Read sessions, the same window of each.
 
     Raises
     ------
@@ -82,12 +81,8 @@ def read_sessions(paths: Sequence[Path], topics: Topics, joints: int, window: Ti
     for session in sessions:
         refuse_other_names(session, topics, joints)
     wanted = [_wanted(session, topics) for session in sessions]
-    with ExitStack() as stack:
-        readers = []
-        for session, names in zip(sessions, wanted, strict=True):
-            readers.append(SampleReader(session.path, topics, names, joints, window))
-            stack.callback(readers[-1].stop)
-        return [_measured(session, reader, joints) for session, reader in zip(sessions, readers, strict=True)]
+    pairs = zip(sessions, wanted, strict=True)
+    return [_measured(each, SessionSamples(each, topics, names, joints, window), joints) for each, names in pairs]
 
 
 def _wanted(session: Session, topics: Topics) -> list[str]:
@@ -103,10 +98,9 @@ def _wanted(session: Session, topics: Topics) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _measured(session: Session, samples: SampleReader, joints: int) -> MeasuredSession:
+def _measured(session: Session, samples: SessionSamples, joints: int) -> MeasuredSession:
     found: dict[Stream, list[Sample]] = {stream: [] for stream in Stream}
     changed = False
-    samples.wait_ready()
     for sample in samples.samples():
         if isinstance(sample, Change):
             changed |= any(sample.zeros.values()) or max(sample.settings.get(load, -1.0) for load in LOADS) >= 0.0
@@ -134,5 +128,5 @@ def _series(samples: list[Sample]) -> Series:
     return Series(stamps, np.array([samples[i].values for i in first]))
 
 
-def _told(samples: SampleReader) -> str:
+def _told(samples: SessionSamples) -> str:
     return ", ".join(f"{name}: {count}" for name, count in samples.oddities.items()) or "nothing"

@@ -51,7 +51,7 @@ def run(args: Namespace) -> int:
 
 
 def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) -> ComparedSession:
-    from ..offline.replay import ReplayOptions
+    from ..offline.inputs import ReplayOptions
     from ..report.compare import side_of
     from ..report.evaluation import evaluated_replay
 

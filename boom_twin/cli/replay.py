@@ -66,7 +66,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Replay, draw, and print the result."""
-    from ..offline.replay import ReplayOptions
+    from ..offline.inputs import ReplayOptions
     from ..offline.sample_table import SampleTable, check_kind, table_file
     from ..report.evaluation import evaluated_replay
     from ..report.quantities import section_heights

@@ -9,15 +9,18 @@ from math import sqrt
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..bag.reader import Session, read
+from ..bag.time_window import WHOLE, TimeWindow
 from ..errors import BagError
+from ..messages.sample_decoder import stamp_of
+from ..messages.topic_table import Topics
 from ..system.received_files import holds_file, open_received
 from ..twin.blocks import EstimateBlock, PredictionBlock
-from ..types import NANO, Array
+from ..types import NANO, Array, Stream
 
 FILE_NAME = "truth.csv.gz"
-LARGEST = 64 * 2**20
+LARGEST_TRUTH = 64 * 2**20
 """Bytes of an unpacked file that are read: about an hour at 200 Hz."""
 COLUMNS = ("t_s", "tip_x_m", "tip_y_m", "tip_ax_m_s2", "tip_ay_m_s2")
 LOAD_COLUMNS = ("tip_load_x_N", "tip_load_y_N")
@@ -41,30 +44,6 @@ class TipTruth:
     position: Array
     acceleration: Array
     load: Array
-
-    def errors(self, predictions: PredictionBlock, rows: slice) -> dict[str, float]:
-        """Return the root mean square errors of predicted position (m) and acceleration (m/s^2), as vectors.
-
-        The rows must be of one clock.
-        """
-        found = TipErrors(self)
-        found.add(predictions, rows)
-        return found.rms
-
-    def position_error(self, stamps: NDArray[np.int64], first: int, position: Array) -> float:
-        """Return the root mean square distance to `position` (k, 2), m, told at `stamps` (ns).
-
-        The truth begins at `first` (ns).
-        """
-        return self._rms_off(stamps, first, position, self.position)
-
-    def acceleration_error(self, stamps: NDArray[np.int64], first: int, acceleration: Array) -> float:
-        """Return the root mean square error of `acceleration` (k, 2), m/s^2; see `position_error`."""
-        return self._rms_off(stamps, first, acceleration, self.acceleration)
-
-    def _rms_off(self, stamps: NDArray[np.int64], first: int, told: Array, true: Array) -> float:
-        times = (stamps - first) * NANO + self.times[0]
-        return float(np.sqrt(np.mean(np.sum((told - self.at(times, true)) ** 2, axis=1))))
 
     def since(self, offset: float) -> TipTruth:
         """Return the truth from `offset` (s) after its beginning on."""
@@ -129,9 +108,9 @@ def load_truth(folder: Path) -> TipTruth | None:
         return None
     try:
         with open_received(path) as packed, gzip.open(packed) as file:
-            text = file.read(LARGEST + 1)
-        if len(text) > LARGEST:
-            raise ValueError(f"more than {LARGEST} bytes unpacked")
+            text = file.read(LARGEST_TRUTH + 1)
+        if len(text) > LARGEST_TRUTH:
+            raise ValueError(f"more than {LARGEST_TRUTH} bytes unpacked")
         table = np.genfromtxt(BytesIO(text), delimiter=",", names=True)
         values = {name: table[name] for name in COLUMNS}
         names = table.dtype.names or ()
@@ -144,3 +123,20 @@ def load_truth(folder: Path) -> TipTruth | None:
         np.column_stack([values["tip_ax_m_s2"], values["tip_ay_m_s2"]]),
         np.column_stack(loads),
     )
+
+
+def truth_in(window: TimeWindow, session: Session, topics: Topics, wanted: list[str]) -> TipTruth | None:
+    """Return the truth of a session from the first strokes in the window on."""
+    truth = load_truth(session.path)
+    if truth is None or window == WHOLE:
+        return truth
+    first, begin = (_first_stroke_stamp(session, topics, wanted, part) for part in (WHOLE, window))
+    found = truth.since((begin - first) * NANO)
+    return found if len(found.times) else None
+
+
+def _first_stroke_stamp(session: Session, topics: Topics, wanted: list[str], window: TimeWindow) -> int:
+    """Return the stamp of the first message of strokes in a window, ns; 0 if there is none."""
+    types = {name: topics.inputs[topics.heard[name][0]].type for name in wanted}
+    messages = read(session, types, window)
+    return next((stamp_of(message) for name, _, message in messages if Stream.STROKES in topics.heard[name]), 0)

@@ -312,16 +312,11 @@ class Recording:
         span = (self._newest or 0) - self._first
         return (span - sum(after - before for before, after in self.clock_sets)) * NANO
 
-    @property
-    def by_first_clock(self) -> slice:
-        """Rows of the predictions before a clock was set.
+    def _by_first_clock(self, before: int) -> slice:
+        """Return the rows before a clock was set, in a stretch with so many predictions before it.
 
         Their stamps tell the time since the first one.
         """
-        return self._by_first_clock(0)
-
-    def _by_first_clock(self, before: int) -> slice:
-        """Return the rows before a clock was set, in a stretch with so many predictions before it."""
         return slice(None if self._rows_by_first_clock is None else max(0, self._rows_by_first_clock - before))
 
     def add_alarm(self, alarm: Alarm) -> None:

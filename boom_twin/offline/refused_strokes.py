@@ -9,7 +9,7 @@ from ..scene.schema import Scene
 from ..twin.blocks import CODES, SampleBlock
 from ..types import SENSORS, Array, Stream, channels_of
 
-NEAR = 5.0  # times the travel: within that a stroke is rather one of another boom than in another unit
+OTHER_BOOM = 5.0  # times the travel: within that a stroke is rather one of another boom than in another unit
 
 
 class RefusedStrokes:
@@ -28,15 +28,23 @@ class RefusedStrokes:
         self._closed = np.array([joint.cylinder.closed_length for joint in scene.joints])
         self._travel = np.array([joint.cylinder.max_stroke for joint in scene.joints])
         self._first: Array | None = None
+        self._is_read = np.zeros(len(scene.joints), bool)
 
     def take(self, block: SampleBlock) -> None:
         """Look at samples."""
+        strokes = block.values[block.streams == CODES[Stream.STROKES], : len(self._names)]
+        self._is_read |= np.isfinite(strokes).any(axis=0)
         if self._first is not None:
             return
-        strokes = block.values[block.streams == CODES[Stream.STROKES], : len(self._names)]
         outside = np.flatnonzero(((strokes < 0.0) | (strokes > self._travel)).any(axis=1))
         if len(outside):
             self._first = strokes[outside[0]]
+
+    @property
+    def never_read(self) -> str:
+        """Clause on the cylinders that never had a value, if others had; else empty."""
+        silent = [name for name, is_read in zip(self._names, self._is_read, strict=True) if not is_read]
+        return f", because {', '.join(silent)} never had a value" if silent and self._is_read.any() else ""
 
     @property
     def told(self) -> str:
@@ -49,7 +57,7 @@ class RefusedStrokes:
             return f"{said} {self._remedy(1.0, 'm', self._closed)}"
         if self._fits_in_other_order():
             return f"{said} In another order the strokes would fit: look for cylinders whose names or columns are swapped."
-        if self._is_default and self._first[i] < NEAR * self._travel[i]:
+        if self._is_default and self._first[i] < OTHER_BOOM * self._travel[i]:
             return f"{said} The session names no scene and was read with the {DEFAULT_NAME}: for another boom give --scene."
         units = sorted(SENSORS[Stream.STROKES].units.items(), key=lambda pair: -pair[1])[1:]
         fits = ((factor, unit, closed) for closed in (0.0, self._closed) for unit, factor in units[:-1])

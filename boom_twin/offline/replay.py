@@ -1,81 +1,48 @@
-"""Replay: run the twin over a recorded session, message by message as the node would.
-
-Reading and writing run in processes of their own (`boom_twin.offline.reader_process`, `boom_twin.offline.writer_process`).
-"""
+"""Replay: run the twin over a recorded session, message by message as the node would."""
 
 from __future__ import annotations
 
-import gc
 import json
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import __version__
-from ..bag.joint_names import refuse_other_names
-from ..bag.reader import Session, read, scan
-from ..bag.session_model import SessionScene, baseline_of, mapping_of, scene_of, settings_of, strokes_of
+from ..bag.reader import Session
+from ..bag.session_model import SessionScene
 from ..bag.session_sheet import SessionSheet
 from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
 from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
-from ..health.baseline import Baseline
 from ..health.fault_twins import FaultTwins, Hypothesis
-from ..messages.sample_decoder import ODDITIES, stamp_of
-from ..messages.topic_table import Topics
-from ..scene.edit import anew, loaded
-from ..scene.load import SceneSource, as_scene
-from ..scene.schema import Scene
+from ..messages.sample_decoder import ODDITIES
+from ..scene.edit import loaded
+from ..scene.load import SceneSource
 from ..system.atomic_files import write_atomic
 from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
 from ..system.summary_display import SummaryDisplay, data_frame
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..twin.events import EVENTS
-from ..types import NANO, Array, Change, Report, Stream, StrokeReading, channels_of
-from .ground_truth import TipErrors, TipTruth, load_truth
-from .process_pipe import Pipe
+from ..twin.twin import Twin
+from ..types import Array, Change, Report, Stream
+from .ground_truth import TipErrors, TipTruth, truth_in
+from .inputs import USUAL, ReplayOptions, replay_inputs
 from .progress import Progress
-from .reader_process import SampleReader
 from .recording import Recording, Stretch
 from .refused_strokes import RefusedStrokes
 from .sample_table import RowsInMemory, SampleTable, columns_of
+from .session_samples import SessionSamples
 from .summary import alarm_as_text, summary_of
-from .writer_process import ReportWriter
-
-if TYPE_CHECKING:
-    from ..twin.twin import Twin
-
-
-GIVEN = "given as a Scene"
-"""Source of a scene that came by no file."""
-
-
-@dataclass(frozen=True)
-class ReplayOptions:
-    """Options of a replay, see the parameters of `replay`."""
-
-    progress: Progress | None = None
-    mapping: str | Path | None = None
-    changes: bool = True
-    health: bool = True
-    baseline: str | Path | None = None
-    window: TimeWindow = WHOLE
-    namespace: str = ""
-    with_bag: bool = True
-    causes: bool = False
-
-
-USUAL = ReplayOptions()
+from .threads import quick_switches, read_ahead, result_bag
 
 
 @dataclass(frozen=True, repr=False)
@@ -213,94 +180,67 @@ def replay_into(
 
     With `take`, memory stays the same however long the session is: it is given one `Stretch` after the other, and none is kept.
     """
-    with _processes(building, options.with_bag) as (reader, writer):
-        session, out, settings = scan(Path(bag)), building.folder, settings or settings_of(Path(bag)).settings
-        taken = scene_for(session.path, scene)
-        scene, joints = taken.scene, len(taken.scene.joints)
-        mapped = mapping_of(session.path, Path(options.mapping) if options.mapping else None, joints, options.namespace)
-        topics, wanted = mapped.topics.of_joints(joint.range_deg for joint in scene.joints), _wanted(session, mapped.topics)
-        strokes = strokes_of(session.path, mapped)
-        refuse_other_names(session, topics, joints, taken.source)
-        baseline = Path(options.baseline) if options.baseline else None
-        usual = baseline_of(session.path, baseline) if options.health else None
-        window = options.window
-        truth = _truth_in(window, session, topics, wanted)
-        errors = None if truth is None else TipErrors(truth)
-        taking = None if take is None else _Timed(take)
-        recording = Recording(joints, taking, errors, strokes.reading)
-        other_boom, read = OtherBoom(), np.zeros(joints, dtype=bool)
-        refused = RefusedStrokes(scene, taken.source)
-        expected = _expected(session, wanted, window)
-        ahead = SampleReader(session.path, topics, wanted, joints, window, reader)
-        behind = None if writer is None else ReportWriter(writer, session.notes, topics, scene, settings)
-        with _unhurried_collector():
-            twin = _ready_twin(scene, settings, topics, None if usual is None else usual.baseline, strokes.reading)
-            ahead.wait_ready()
-            if behind is not None:
-                behind.wait_ready()
-            samples: Iterator[SampleBlock | Change | None] = iter(ahead)
-            bar = options.progress(expected) if options.progress else None
-            began = time.perf_counter()
-            if not options.changes:
-                samples = (sample for sample in samples if not isinstance(sample, Change))
-            fault_twins = _fault_twins(twin) if options.causes else None
-            if fault_twins is not None:
-                samples = _followed(samples, fault_twins)
-            for step in drive_blocks(twin, samples):
-                if bar is not None:
-                    bar.update(1 if step is None else len(step[0].stamps))
-                if step is None:
-                    recording.refused += 1
-                    continue
-                block, found = step
-                recording.add_samples(block)
-                for each in found:
-                    recording.add(each)
-                    if behind is not None:
-                        behind.put(each)
-                if recording.is_empty:
-                    refused.take(block)
-                    read |= np.isfinite(block.values[block.streams == CODES[Stream.STROKES], :joints]).any(axis=0)
-                _refuse(session, taken, other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
-            _refuse(session, taken, other_boom.judge())
-            if behind is not None:
-                behind.close()
-            if bar is not None:
-                bar.close()
-            wall = time.perf_counter() - began - (taking.spent if taking else 0.0)
-        twin.counts.update(ahead.oddities)
-        if recording.is_empty:
-            raise BagError(
-                f"{session.path}: no stroke sample could be used ({_told(twin)}){_never_read(read)}. "
-                f"It needs names cylinder_1..{twin.plan.joints}, or those of a mapping, values within the cylinders' travel, "
-                f"and stamps.{_explained(ahead.oddities)}{refused.told}"
-            )
-        recording.close()
-        if fault_twins is not None and (named := fault_twins.judge()) is not None:
-            recording.add_alarm(named)
-        if recording.totals.samples == 1 < recording.refused:
-            raise BagError(
-                f"{session.path}: of {1 + recording.refused} stroke samples only the first could be used ({_told(twin)})."
-                f"{_explained(twin.counts)}"
-            )
+    given, out = replay_inputs(Path(bag), scene, settings, options), building.folder
+    session, joints = given.session, len(given.scene.joints)
+    truth = truth_in(options.window, session, given.topics, given.wanted)
+    errors = None if truth is None else TipErrors(truth)
+    taking = None if take is None else _Timed(take)
+    recording = Recording(joints, taking, errors, given.strokes.reading)
+    other_boom, refused = OtherBoom(), RefusedStrokes(given.scene, given.kept.source)
+    samples = SessionSamples(session, given.topics, given.wanted, joints, options.window)
+    with ExitStack() as stack:
+        twin, put = given.twin(), None
+        twin.warm_up()
         if options.with_bag:
-            SessionSheet(__version__, taken.text, strokes=strokes.reading).write(out / "bag")
-        summary = summary_of(recording, twin.counts, wall, out / "bag" / FILE_NAME if options.with_bag else None) | {
-            "scene": taken.source,
-            "scene_sha256": taken.sha256,
-            "baseline": None if usual is None else usual.source,
-            "mapping": mapped.source,
-            "strokes": strokes.reading,
-            "strokes_source": strokes.source,
-        }
-        if window != WHOLE:
-            summary |= {"window_start_s": window.start, "window_duration_s": window.duration}
-        if session.incomplete:
-            summary["session_incomplete"] = session.incomplete
-        if errors is not None:
-            summary |= errors.rms
-        write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
-        return Replay(summary, recording, session, truth)
+            bag_of = result_bag(out / "bag", session.notes, given.topics, given.scene, given.settings)
+            put = stack.enter_context(bag_of)
+        fault_twins = _fault_twins(twin) if options.causes else None
+        bar = options.progress(given.expected) if options.progress else None
+        began = time.perf_counter()
+        stack.enter_context(quick_switches())
+        items = stack.enter_context(closing(read_ahead(samples)))
+        for step in drive_blocks(twin, _followed(items, options.changes, fault_twins)):
+            if bar is not None:
+                bar.update(1 if step is None else len(step[0].stamps))
+            if step is None:
+                recording.refused += 1
+                continue
+            block, found = step
+            recording.add_samples(block)
+            for each in found:
+                recording.add(each)
+            if put is not None:
+                put(found)
+            if recording.is_empty:
+                refused.take(block)
+            given.refuse(other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
+        given.refuse(other_boom.judge())
+    if bar is not None:
+        bar.close()
+    wall = time.perf_counter() - began - (taking.spent if taking else 0.0)
+    twin.counts.update(samples.oddities)
+    if recording.is_empty:
+        raise BagError(
+            f"{session.path}: no stroke sample could be used ({_told(twin)}){refused.never_read}. "
+            f"It needs names cylinder_1..{joints}, or those of a mapping, values within the cylinders' travel, "
+            f"and stamps.{_explained(samples.oddities)}{refused.told}"
+        )
+    recording.close()
+    if fault_twins is not None and (named := fault_twins.judge()) is not None:
+        recording.add_alarm(named)
+    if recording.totals.samples == 1 < recording.refused:
+        raise BagError(
+            f"{session.path}: of {1 + recording.refused} stroke samples only the first could be used ({_told(twin)})."
+            f"{_explained(twin.counts)}"
+        )
+    if options.with_bag:
+        SessionSheet(__version__, given.kept.text, strokes=given.strokes.reading).write(out / "bag")
+    file = out / "bag" / FILE_NAME if options.with_bag else None
+    summary = summary_of(recording, twin.counts, wall, file) | given.summary
+    if errors is not None:
+        summary |= errors.rms
+    write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
+    return Replay(summary, recording, session, truth)
 
 
 class _Timed:
@@ -313,18 +253,7 @@ class _Timed:
     def __call__(self, stretch: Stretch) -> None:
         began = time.perf_counter()
         self._take(stretch)
-        gc.collect()  # which does not run by itself, see `_unhurried_collector`
         self.spent += time.perf_counter() - began
-
-
-def scene_for(session: Path, scene: SceneSource | SessionScene) -> SessionScene:
-    """Return the scene to read a session with: `scene`, or if None that of `boom_twin.bag.session_model.scene_of`."""
-    if scene is None or isinstance(scene, str | Path):
-        return scene_of(session, scene)
-    if isinstance(scene, SessionScene):
-        return scene
-    given = as_scene(scene)
-    return SessionScene(given, anew(given), GIVEN)
 
 
 def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) -> tuple[Array, list[Array]]:
@@ -339,68 +268,6 @@ def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) 
     return block.values[block.streams == code, :joints], residuals
 
 
-def _refuse(session: Session, scene: SessionScene, reason: str) -> None:
-    """Raise BagError if there is a `reason` for which the session is of another boom than the scene."""
-    if reason:
-        raise BagError(
-            f"{session.path}: {reason}. The scene ({scene.source}) is of another boom, or the sensors' zeros and units are "
-            "others: give the scene by --scene, or those by --mapping."
-        )
-
-
-def _wanted(session: Session, topics: Topics) -> list[str]:
-    """Return the topics to read: that of the strokes, and those of other inputs with messages."""
-    found = {name: session.find(name) for name in topics.heard}
-    return [name for name, topic in found.items() if Stream.STROKES in topics.heard[name] or (topic and topic.count)]
-
-
-def _expected(session: Session, wanted: list[str], window: TimeWindow) -> int:
-    """Return the approximate number of messages to read."""
-    count = sum(topic.count for name in wanted if (topic := session.find(name)) is not None)
-    return round(count * window.share((session.end - session.start) * NANO))
-
-
-def _truth_in(window: TimeWindow, session: Session, topics: Topics, wanted: list[str]) -> TipTruth | None:
-    """Return the truth of a session from the first strokes in the window on."""
-    truth = load_truth(session.path)
-    if truth is None or window == WHOLE:
-        return truth
-    first, begin = (_first_stroke_stamp(session, topics, wanted, part) for part in (WHOLE, window))
-    found = truth.since((begin - first) * NANO)
-    return found if len(found.times) else None
-
-
-def _first_stroke_stamp(session: Session, topics: Topics, wanted: list[str], window: TimeWindow) -> int:
-    """Return the stamp of the first message of strokes in a window, ns; 0 if there is none."""
-    types = {name: topics.inputs[topics.heard[name][0]].type for name in wanted}
-    messages = read(session, types, window)
-    return next((stamp_of(message) for name, _, message in messages if Stream.STROKES in topics.heard[name]), 0)
-
-
-@contextmanager
-def _processes(building: UnfinishedResult, with_bag: bool) -> Iterator[tuple[Pipe, Pipe | None]]:
-    """Yield the pipes of the reader process and, with a bag, of the writer process.
-
-    Both processes do their imports while the session is read.
-    """
-    with ExitStack() as ended:
-        reader, writer = SampleReader.started(), None
-        ended.callback(reader.stop)
-        if with_bag:
-            writer = ReportWriter.started(building.folder / "bag", building.lock)
-            ended.callback(writer.stop)
-        yield reader, writer
-
-
-def _ready_twin(scene: Scene, settings: Settings, topics: Topics, baseline: Baseline | None, reads: StrokeReading) -> Twin:
-    """Return a twin with its compiled model; its modules are imported here, while the other processes start."""
-    from ..twin.twin import Twin
-
-    twin = Twin(scene, settings, topics.mounts(len(scene.joints)), baseline, reads=reads, absent=topics.absent)
-    twin.warm_up()
-    return twin
-
-
 def _fault_twins(twin: Twin) -> FaultTwins:
     """Return twins as `twin` of all that may be wrong with its boom."""
 
@@ -412,32 +279,19 @@ def _fault_twins(twin: Twin) -> FaultTwins:
     return FaultTwins(loaded(twin.scene, *twin.settings.load), make)
 
 
-def _followed(samples: Iterable[SampleBlock | Change | None], twins: FaultTwins) -> Iterator[SampleBlock | Change | None]:
-    """Return the samples; fault twins take them, and the changes, first."""
+def _followed(
+    samples: Iterable[SampleBlock | Change | None], with_changes: bool, twins: FaultTwins | None
+) -> Iterator[SampleBlock | Change | None]:
+    """Yield the samples, and the changes if they are wanted; fault twins take them first."""
     for each in samples:
         if isinstance(each, Change):
-            twins.change(each)
-        elif each is not None:
+            if not with_changes:
+                continue
+            if twins is not None:
+                twins.change(each)
+        elif each is not None and twins is not None:
             twins.take(each)
         yield each
-
-
-@contextmanager
-def _unhurried_collector() -> Iterator[None]:
-    """Freeze and disable the garbage collector: a replay makes many small objects that last."""
-    gc.freeze()
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
-        gc.unfreeze()
-
-
-def _never_read(read: NDArray[np.bool_]) -> str:
-    """Return a clause on the cylinders that never had a value, if others had; else empty text."""
-    silent = [name for name, came in zip(channels_of(len(read))[Stream.STROKES], read, strict=True) if not came]
-    return f", because {', '.join(silent)} never had a value" if silent and read.any() else ""
 
 
 def _explained(counts: Counter[str]) -> str:

@@ -9,8 +9,9 @@ from pathlib import Path
 from ..bag.session_model import SessionScene
 from ..config.settings import Settings
 from ..offline.history import HistoryBuilder
+from ..offline.inputs import USUAL, ReplayOptions
 from ..offline.recording import Stretch
-from ..offline.replay import USUAL, Replay, ReplayOptions, replay_into
+from ..offline.replay import Replay, replay_into
 from ..plots import History
 from ..scene.schema import Scene
 from ..system.result_folder import UnfinishedResult

@@ -1,7 +1,7 @@
 """Result folders: built beside their place, renamed when whole, replaced only by their own command; marks of incomplete ones.
 
 A command builds ``OUT.unfinished`` beside ``OUT``. In it ``unfinished.json`` names the command. That file is locked as long as
-one of the command's processes lives. So a second command is refused, and a remainder of a killed one is not taken for work in
+the command lives. So a second command is refused, and a remainder of a killed one is not taken for work in
 progress. At the end ``manifest.json`` lists every file with its SHA-256, and the folder is renamed to ``OUT``.
 
 An earlier result must be exactly as its manifest says. It is moved to ``OUT.replaced`` first and removed last. After a kill at
@@ -75,15 +75,14 @@ def study(kind: str) -> ResultKind:
 
 @dataclass(frozen=True, slots=True)
 class UnfinishedResult:
-    """A result that is being built: its folder, and the descriptor that holds the lock, for child processes to inherit."""
+    """A result that is being built: its folder."""
 
     folder: Path
-    lock: int
 
     def inner(self, name: str) -> UnfinishedResult:
         """Return a new folder in it, for a part of the result."""
         (self.folder / name).mkdir()
-        return UnfinishedResult(self.folder / name, self.lock)
+        return UnfinishedResult(self.folder / name)
 
 
 @contextmanager
@@ -126,7 +125,7 @@ def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Itera
             _check_earlier(place, kind)
             _discard(replaced)
             _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
-            yield UnfinishedResult(building, lock)
+            yield UnfinishedResult(building)
             _complete(building, kind)
         except BaseException as error:
             with suppress(OSError):

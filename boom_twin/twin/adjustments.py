@@ -63,8 +63,7 @@ class SensorZeros:
         return self._state.zeros[zeros_at(self._state, stamp), STROKES, : len(self._channels[Stream.STROKES])]
 
 
-SPAN = SECOND  # ns
-FEWEST = 5  # readings that make a mean
+FEWEST_RESIDUALS = 5  # readings that make a mean
 WHOLE = {kind.stem: kind.channels(0) for kind in SENSORS.values() if kind.ends}
 """Sensors with a zero for each of their channels; all others have one for each joint."""
 
@@ -120,10 +119,10 @@ class ResidualBuffer:
         own, place = self._places[channel]
         recent, count = self._recent, self._recent.bounds[COUNT]
         rows = (self._recent.bounds[FIRST] + np.arange(count)) % RECENT
-        rows = rows[(recent.streams[rows] == own) & (recent.stamps[rows] > now - SPAN)]
+        rows = rows[(recent.streams[rows] == own) & (recent.stamps[rows] > now - SECOND)]
         values = [value for value in recent.values[rows, place].tolist() if math.isfinite(value)]
-        if len(values) < FEWEST:
-            told = f"{channel}: {len(values)} residuals in the last second, {FEWEST} are needed"
+        if len(values) < FEWEST_RESIDUALS:
+            told = f"{channel}: {len(values)} residuals in the last second, {FEWEST_RESIDUALS} are needed"
             raise UsageError(f"{told}. Let its sensor and the strokes run, then ask again.")
         return math.fsum(values) / len(values)
 

@@ -16,17 +16,16 @@ from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor, Drawn
 from ..health.blocks import MeasuredRows, PredictionRows
 from ..health.monitor import HealthMonitor
-from ..kernels.jit import SameTypes, hold
+from ..kernels.jit import hold
 from ..kernels.result_row import PIN
 from ..predictions import Outline
 from ..scene.schema import Scene
 from ..types import NANO, SECOND, Array, Health, Report, Residuals, Stream, channels_of
 from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
-from .health_rows import copy_predictions, copy_residuals, count_residuals
 from .load_shedding import LoadShedding
+from .regular import NOISE_REACH
 from .run import Run
 from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
-from .stroke_check import FAR
 from .update import DONE, LOOK, ODD, measure, update
 
 CAPACITY = 4096  # samples that one call of the compiled update takes at most
@@ -36,7 +35,7 @@ def limits_of(scene: Scene, boom: BoomPredictor, settings: Settings, absent: Col
     """Return the limits of the compiled update for `boom`, that of `scene` with its load, and for its sensors."""
     channels = list(channels_of(boom.plan.joints).values())
     counts = np.array([len(names) for names in channels])
-    far = FAR * settings.stroke_variance**0.5
+    far = NOISE_REACH * settings.stroke_variance**0.5
     return Limits(
         gap=round(settings.gap * SECOND),
         leap=settings.leap / NANO,
@@ -67,7 +66,6 @@ class _UpdateExtras:
 
 
 NO_EXTRAS = _UpdateExtras()
-
 _Code = tuple[Callable[..., tuple[int, int]], Callable[..., bool]]
 """`update` and `measure`, compiled for a scene's types."""
 _Held = tuple[_Code, tuple[tuple[Any, ...], tuple[Any, ...], Any]]
@@ -91,10 +89,6 @@ class BlockUpdate:
         Asked what is left out.
     before : BlockUpdate, optional
         Of the same scene under another load, whose arrays are taken over.
-
-    Attributes
-    ----------
-    limits : Limits
     """
 
     def __init__(
@@ -111,12 +105,9 @@ class BlockUpdate:
         self._shedding, self._boom, self.limits, self._state, self._channels = shedding, boom, limits, state, channels
         self._judge, self._told_counts = judge, counts
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
-        self._widths = limits.channels
-        self._measured = [(code, int(width)) for code, width in enumerate(self._widths) if code]
-        self._copy_predictions, self._copy_residuals = SameTypes(copy_predictions), SameTypes(copy_residuals)
-        self._count_residuals, self._of_stream = SameTypes(count_residuals), np.zeros(len(STREAMS), np.int64)
-        sizes = self._joints, boom.width, boom.stations, limits.channels
-        self._found: UpdateOutput = new_output(2 * CAPACITY, *sizes) if before is None else before._found
+        self._measured = [(code, int(width)) for code, width in enumerate(limits.channels) if code]
+        sizes = 2 * CAPACITY, self._joints, boom.width, boom.stations, limits.channels
+        self._found: UpdateOutput = new_output(*sizes) if before is None else before._found
         self._found.counts[:] = 0
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
         self._due: Run | None = None  # whose newest slot is still to be judged
@@ -158,7 +149,19 @@ class BlockUpdate:
         """
         self.judge()
         self.make_room()
-        reason, row = self._advance_strokes(run, block, trusted)
+        row, size = 0, len(block.stamps)
+        assert run is not None
+        (advance, _), (arguments, _, found) = self._held or self._hold()
+        while True:
+            reason, row = advance(*arguments, *block, row, trusted, found)
+            if reason != LOOK:
+                break
+            self._look_around(run, row)
+            row += 1
+            if row == size:  # the judgement, if one is due, is for who asked to take
+                reason = DONE
+                break
+            self._take_judgement(row - 1)
         self._count_unmatched()
         return reason, row
 
@@ -191,15 +194,12 @@ class BlockUpdate:
     def _hold(self) -> _Held:
         """Look up the compiled code and prepare the arguments of every call; another load renews few of them."""
         self._kept = state, found = self._kept or (hold(self._state), hold(self._found))
-        limits, (one, width) = hold(self._limits), (np.zeros(1, np.int64), int(self._widths.max()))
+        limits, (one, width) = hold(self._limits), (np.zeros(1, np.int64), int(self._limits.channels.max()))
         block = one, one, np.zeros((1, width))
         together, beside = (*self._boom.held, limits, state), (*self._boom.filters_held, limits, state)
         if self._code is None:
             advance = update.for_types_of(*together, *block, 0, False, found)
             self._code = advance, measure.for_types_of(*beside, 0, 0, np.zeros(width), False, found)
-            self._copy_predictions(found, 0, self._pins, *PredictionRows.room(0, self._joints))
-            self._copy_residuals(found, 0, 0, 0, *MeasuredRows.room(0, 1))
-            self._count_residuals(found, 0, 0, self._of_stream)
         self._held = self._code, (together, beside, found)
         return self._held
 
@@ -210,20 +210,6 @@ class BlockUpdate:
             self._tell_health()
             self._found.counts[:] = 0
             self._begin = self._told = 0, 0
-
-    def _advance_strokes(self, run: Run | None, block: SampleBlock, trusted: bool) -> tuple[int, int]:
-        row, size = 0, len(block.stamps)
-        assert run is not None
-        (advance, _), (arguments, _, found) = self._held or self._hold()
-        while True:
-            reason, row = advance(*arguments, *block, row, trusted, found)
-            if reason != LOOK:
-                return reason, row
-            self._look_around(run, row)
-            row += 1
-            if row == size:
-                return DONE, row  # the judgement, if one is due, is for who asked to take
-            self._take_judgement(row - 1)
 
     def _look_around(self, run: Run, row: int) -> None:
         """Add the shape, event and health request of a prediction that begins a slot or is outside the model's validity."""
@@ -283,33 +269,25 @@ class BlockUpdate:
         for which, stamps in enumerate((found.stamps, found.residual_stamps)):
             while counts[which] > self._told[which] and stamps[counts[which] - 1] >= end:
                 counts[which] -= 1
-        _, _, held = (self._held or self._hold())[1]
         (predicted, compared), self._told = self._told, (counts[0], counts[1])
         if counts[0] > predicted:
-            followed = PredictionRows.room(counts[0] - predicted, self._joints)
-            self._copy_predictions(held, predicted, self._pins, *followed)
-            self._judge.predicted(followed)
-        if counts[1] > compared:
-            self._count_residuals(held, compared, counts[1], self._of_stream)
-            of_stream = self._of_stream.tolist()
-            for code, width in self._measured:
-                if of_stream[code]:
-                    rows = MeasuredRows.room(of_stream[code], width)
-                    self._copy_residuals(held, compared, counts[1], code, *rows)
-                    self._judge.measured(STREAMS[code], rows)
+            own = slice(predicted, counts[0])
+            variances = found.rows[own, self._boom.places.variances].copy()
+            self._judge.predicted(PredictionRows(found.stamps[own].copy(), found.measured[own].copy(), variances))
+        streams = found.residual_streams[compared : counts[1]]
+        for code, width in self._measured:
+            rows = compared + np.flatnonzero(streams == code)
+            if len(rows):
+                values = (each[rows, :width] for each in (found.raw, found.values, found.sigmas))
+                self._judge.measured(STREAMS[code], MeasuredRows(found.residual_stamps[rows], *values))
 
     def _residuals(self) -> ResidualBlock:
         found, own = self._found, slice(self._begin[1], int(self._found.counts[1]))
-        return ResidualBlock(
-            at=found.residual_at[own].copy(),
-            streams=found.residual_streams[own].copy(),
-            stamps=found.residual_stamps[own].copy(),
-            values=found.values[own].copy(),
-            sigmas=found.sigmas[own].copy(),
-        )
+        fields = found.residual_at, found.residual_streams, found.residual_stamps, found.values, found.sigmas
+        return ResidualBlock._make(each[own].copy() for each in fields)
 
-    def _predictions(self) -> PredictionBlock:
-        found, own, at = self._found, slice(self._begin[0], int(self._found.counts[0])), self._boom.places
+    def _predictions(self, own: slice) -> PredictionBlock:
+        found, at = self._found, self._boom.places
         rows = found.rows[own].copy()
         tip = rows[:, at.tip].reshape(-1, 3, 3)
         return PredictionBlock(
@@ -335,14 +313,12 @@ class BlockUpdate:
         drawn = self._news.drawn
         return dict(zip(drawn, self._boom.outlines(list(drawn.values())), strict=True)) if drawn else {}
 
-    def _estimates(self) -> EstimateBlock:
-        own = slice(self._begin[0], int(self._found.counts[0]))
-        return EstimateBlock(self._found.stamps[own].copy(), self._found.estimates[own].copy())
-
     def reports(self, stamps: NDArray[np.int64]) -> list[ReportBlock | Report]:
         """Return reports of the samples with these stamps (ns) from the results of the compiled update."""
         self._take_judgement(len(stamps) - 1)
-        block = ReportBlock(stamps, self._predictions(), self._estimates(), self._residuals(), self._news.health)
+        own = slice(self._begin[0], int(self._found.counts[0]))
+        estimates = EstimateBlock(self._found.stamps[own].copy(), self._found.estimates[own].copy())
+        block = ReportBlock(stamps, self._predictions(own), estimates, self._residuals(), self._news.health)
         if not self._news.events:
             return [block]
         reports = enumerate(block.reports(self._joints))

@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from time import perf_counter
-from typing import TYPE_CHECKING, NamedTuple, TypeVar, overload
+from typing import NamedTuple, TypeVar, overload
 
 from ..types import Change, Report, Sample
 from .blocks import ReportBlock, SampleBlock
-
-if TYPE_CHECKING:  # a replay imports this before it starts its other processes, and the model's modules beside them
-    from .twin import Twin
-
+from .twin import Twin
 
 Item = TypeVar("Item", Sample, SampleBlock)
 

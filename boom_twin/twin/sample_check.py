@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping
+from reprlib import repr as repr_of
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,11 @@ from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..types import Array, Sample, Stream
+from .regular import SHORTEST_STEP
 
 FLOAT = np.dtype(float)
-FIRST = 100  # samples of strokes that differ in their stamps by less than
-SHORTEST = 20_000  # ns from one to the next are no rig's
-LIMIT = 2**63  # ns
+DECIDING = 100  # samples of strokes whose stamps decide if they are nanoseconds
+LARGEST_STAMP = 2**63  # ns
 
 
 class SampleCheck:
@@ -30,7 +31,7 @@ class SampleCheck:
     def __init__(self, channels: Mapping[Stream, tuple[str, ...]]) -> None:
         self._shapes = {stream: (len(names),) for stream, names in channels.items()}
         self._names = {stream: f"{names[0]}..{names[-1]}" for stream, names in channels.items()}
-        self._count, self._low, self._high = 0, LIMIT, -LIMIT
+        self._count, self._low, self._high = 0, LARGEST_STAMP, -LARGEST_STAMP
         self.is_sure = False
 
     def checked(self, sample: Sample) -> Sample:
@@ -49,7 +50,7 @@ class SampleCheck:
             and type(values) is np.ndarray
             and values.dtype is FLOAT
             and type(stream) is Stream
-            and -LIMIT <= stamp < LIMIT
+            and -LARGEST_STAMP <= stamp < LARGEST_STAMP
             and values.shape == self._shapes[stream]
             and values.flags.carray
         ):
@@ -63,10 +64,10 @@ class SampleCheck:
 
     def look_at(self, stamps: NDArray[np.int64]) -> None:
         """Accept the stamps (ns) of strokes as nanoseconds before their block is taken, if they suffice to decide."""
-        deciding = stamps[: FIRST - self._count]
-        if not self.is_sure and 0 < len(deciding) == FIRST - self._count:
+        deciding = stamps[: DECIDING - self._count]
+        if not self.is_sure and 0 < len(deciding) == DECIDING - self._count:
             span = max(self._high, int(deciding.max())) - min(self._low, int(deciding.min()))
-            self.is_sure = span >= FIRST * SHORTEST
+            self.is_sure = span >= DECIDING * SHORTEST_STEP
 
     def _look(self, stamp: int) -> None:
         """Raise UsageError if the stamps are too close together to be nanoseconds.
@@ -75,51 +76,40 @@ class SampleCheck:
         """
         self._count += 1
         self._low, self._high = min(self._low, stamp), max(self._high, stamp)
-        if self._count < FIRST or self._low == self._high:
+        if self._count < DECIDING or self._low == self._high:
             return
-        self.is_sure = self._high - self._low >= self._count * SHORTEST
+        self.is_sure = self._high - self._low >= self._count * SHORTEST_STEP
         if not self.is_sure:
             first, last, count, self._count = self._low, self._high, self._count, 0
             raise UsageError(
-                f"stamps of {count} strokes go from {first} to {last}: less than {SHORTEST} ns from one to the next. "
+                f"stamps of {count} strokes go from {first} to {last}: less than {SHORTEST_STEP} ns from one to the next. "
                 "A stamp is a whole number of nanoseconds: give round(seconds * 1e9)."
             )
 
     def _values(self, stream: Stream, given: Any) -> Array:
-        names, (count,) = self._names[stream], self._shapes[stream]
-        wanted = f"Give {count} numbers, {names} of this boom, NaN where there is none."
+        (count,) = self._shapes[stream]
         try:
             values = np.array(np.ma.filled(given.astype(float), np.nan) if isinstance(given, np.ma.MaskedArray) else given)
-            if values.dtype.kind not in "iufO":
+            if values.dtype.kind not in "iufO" or values.shape != (count,):
                 raise TypeError
-            values = values.astype(float)
+            return values.astype(float)
         except (TypeError, ValueError):
-            raise UsageError(f"values of {stream.value} are no numbers: {_short(given)}. {wanted}") from None
-        if values.shape != (count,):
-            raise UsageError(f"values of {stream.value} have shape {values.shape}: {_short(given)}. {wanted}")
-        return values
+            wanted = f"{count} numbers, {self._names[stream]} of this boom, NaN where there is none"
+            raise UsageError(f"values of {stream.value} are {repr_of(given)}. Give {wanted}.") from None
 
 
 def _stream(stream: Any) -> Stream:
     if isinstance(stream, Stream):
         return stream
     named = next((each for each in Stream if stream in (each.value, each.name)), Stream.STROKES)
-    raise UsageError(f"stream is {_short(stream)}, not a Stream. Give Stream.{named.name}.")
+    raise UsageError(f"stream is {repr_of(stream)}, not a Stream. Give Stream.{named.name}.")
 
 
 def _stamp(stamp: Any) -> int:
-    remedy = "Give a whole number of nanoseconds: round(seconds * 1e9)."
-    if isinstance(stamp, bool | np.bool_):
-        raise UsageError(f"stamp is {stamp}. {remedy}")
     try:
-        found = operator.index(stamp)
+        found = LARGEST_STAMP if isinstance(stamp, bool | np.bool_) else operator.index(stamp)
     except TypeError:
-        raise UsageError(f"stamp is {_short(stamp)}, a {type(stamp).__name__}. {remedy}") from None
-    if not -LIMIT <= found < LIMIT:
-        raise UsageError(f"stamp is {_short(found)}, more than 64 bits. {remedy}")
+        found = LARGEST_STAMP
+    if not -LARGEST_STAMP <= found < LARGEST_STAMP:
+        raise UsageError(f"stamp is {repr_of(stamp)}: give a whole number of nanoseconds, 64 bits: round(seconds * 1e9).")
     return found
-
-
-def _short(value: Any, width: int = 60) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= width else f"{text[:width]} .."

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from ..config.settings import Settings
 from ..types import NANO, Array
+from .regular import NOISE_REACH, reach_of_strokes
 from .state import CHECKED, OTHERS, TRUSTED
 
-MOST = 5  # readings in a row that are not believed though none jumps from the one before; the next one is
-FAR = 8.0  # deviations of the noise
-SILENT = 100_000_000  # ns after which a missing stroke is told
-LASTING = 1_000_000_000  # ns after which readings that jumped elsewhere, and stay there, are believed
+MOST_DOUBTED = 5  # readings in a row that are not believed though none jumps from the one before; the next one is
+SILENT_AFTER = 100_000_000  # ns after which a missing stroke is told
+BELIEVED_AFTER = 1_000_000_000  # ns after which readings that jumped elsewhere, and stay there, are believed
 USUAL_RATE = 0.05  # m/s, which a cylinder may have gone at meanwhile, beside twice what it was going at: then it is back
 NEVER = -1
 Flags = NDArray[np.bool_]
@@ -35,19 +35,19 @@ class StrokeCheck:
     def is_of_others(self, stamp: int, values: Array, estimate: Array, settings: Settings) -> bool:
         """Return True if two or more strokes are out of reach of their cylinders, as of another boom.
 
-        After `MOST` such samples in a row the strokes are believed, and the result is False.
+        After `MOST_DOUBTED` such samples in a row the strokes are believed, and the result is False.
         """
         limit = self._limit(stamp, settings)
         if np.count_nonzero(_are_far(values, estimate, limit)) < 2:
             self._clock[OTHERS] = 0
             return False
         self._clock[OTHERS] += 1
-        return bool(self._clock[OTHERS] <= MOST)
+        return bool(self._clock[OTHERS] <= MOST_DOUBTED)
 
     def _limit(self, stamp: int, settings: Settings) -> float:
         """Return the allowed difference of strokes from their estimates, m."""
-        span = (stamp - int(self._clock[CHECKED])) * NANO
-        return float(FAR * settings.stroke_variance**0.5 + settings.stroke_rate * span)
+        far, span = NOISE_REACH * settings.stroke_variance**0.5, stamp - int(self._clock[CHECKED])
+        return float(reach_of_strokes(far, settings.stroke_rate, span))
 
     def of(
         self, stamp: int, values: Array, before: Array, estimate: Array | None, rates: Array, settings: Settings
@@ -99,7 +99,7 @@ class StrokeCheck:
         The model must restart: no motion leads there.
         """
         jumped = self._jumped != NEVER
-        return bool(jumped.any() and (self._before - self._jumped[jumped]).max() >= LASTING)
+        return bool(jumped.any() and (self._before - self._jumped[jumped]).max() >= BELIEVED_AFTER)
 
     def _gone(self, stamp: int, rates: Array) -> Array:
         """Return how far (m) each cylinder may have moved since its stroke jumped, shape (n,)."""
@@ -119,11 +119,11 @@ class StrokeCheck:
 
     def _doubted(self, stamp: int, values: Array, far: Flags) -> tuple[Array, list[str]]:
         self._strange = np.where(far, self._strange + 1, np.where(np.isnan(values), self._strange, 0))
-        implausible = far & ((self._strange <= MOST) | (self._jumped != NEVER))
+        implausible = far & ((self._strange <= MOST_DOUBTED) | (self._jumped != NEVER))
         taken = np.where(implausible, np.nan, values)
         self._strange[far & ~implausible] = 0
         self._seen = np.where(np.isfinite(taken), stamp, self._seen)
-        silent = np.isnan(taken) & (stamp - self._seen > SILENT)
+        silent = np.isnan(taken) & (stamp - self._seen > SILENT_AFTER)
         events = ["implausible"] if implausible.any() else []
         if silent.any():
             events.append("held")

@@ -17,25 +17,19 @@ from ..deviation.step import step_lengths, write_expected_readings, write_tip_es
 from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import OK
-from ..types import LIMIT, NANO
-from .sample_check import SHORTEST
-from .stamp_check import SMOOTHING, STEP
+from ..types import NANO
+from .regular import SMOOTHING, are_strokes_regular, is_regular, note_stamp
 from .state import (
     BEGINS_SLOT,
-    CHECKED,
     COUNT,
-    EPOCH,
     FIRST,
     IN_SLOT,
     IS_DEFLECTED,
     KEPT,
     NEWEST,
-    NONE,
-    OTHERS,
     SLOT,
     STATUS,
     STROKES,
-    TRUSTED,
     UNMATCHED,
     WAITING,
     new_row,
@@ -83,7 +77,7 @@ def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stam
             row += 1
             continue
         if not trusted:
-            if not is_ordinary(f.strokes, limits, state, stamp, values[row]):
+            if not are_strokes_regular(f.strokes, limits, state, stamp, values[row]):
                 return ODD, row
             note_stamp(state, STROKES, stamp)
         state.clock[BEGINS_SLOT] = stamp // SLOT != state.clock[IN_SLOT]
@@ -130,44 +124,6 @@ def take_residuals(limits, state, p, f, first, found):
 
 
 # -- strokes --------------------------------------------------------------------------------------------------------------
-
-
-@inner
-def is_ordinary(estimates, limits, state, stamp, values):
-    """Return True if strokes are on time, complete and within reach of their cylinders; write them to `state` then."""
-    span = stamp - state.clock[NEWEST]
-    most = STEP * state.usual[STROKES]
-    if most == 0.0:
-        most = limits.gap
-    since = stamp - state.newest[STROKES]
-    if state.held[STROKES] or span < SHORTEST or state.newest[STROKES] == NONE or not 0 < since <= most:
-        return False
-    zeros = zeros_at(state, stamp)
-    time = stamp - state.clock[EPOCH]
-    limit = limits.far + limits.rate * ((time - state.clock[CHECKED]) * NANO)
-    for i in range(state.strokes.shape[0]):
-        value = values[i] - state.zeros[zeros, STROKES, i]
-        if not abs(values[i]) <= LIMIT or not limits.shortest[i] <= value <= limits.longest[i]:
-            return False
-        if not abs(value - estimates[i, 0]) <= limit:
-            return False
-    for i in range(state.strokes.shape[0]):
-        state.strokes[i] = values[i] - state.zeros[zeros, STROKES, i]
-        state.taken[i] = state.strokes[i]
-    state.clock[CHECKED], state.clock[TRUSTED], state.clock[OTHERS] = time, time, 0
-    return True
-
-
-@inner
-def note_stamp(state, stream, stamp):
-    """Take a stream's stamp as its newest, as `boom_twin.twin.stamp_check.StampCheck.take` does."""
-    if state.newest[stream] != NONE:
-        span, usual = stamp - state.newest[stream], state.usual[stream]
-        if usual != 0.0:
-            state.usual[stream] = usual + SMOOTHING * (min(span, 2.0 * usual) - usual)
-        else:
-            state.usual[stream] = span
-    state.newest[stream] = stamp
 
 
 @inner
@@ -244,7 +200,7 @@ def compare(limits, state, stream, stamp, values, row, trusted, found):
 
     Return False, with nothing done, if the sample is irregular.
     """
-    if not trusted and not is_due(limits, state, stream, stamp, values):
+    if not trusted and not is_regular(limits, state, stream, stamp, values):
         return False
     if stamp > state.clock[NEWEST]:
         if state.waiting.bounds[COUNT] == WAITING:
@@ -256,20 +212,6 @@ def compare(limits, state, stream, stamp, values, row, trusted, found):
     if not trusted:
         note_stamp(state, stream, stamp)
     return True
-
-
-@inner
-def is_due(limits, state, stream, stamp, values):
-    """Return True if a measured sample is on time and complete."""
-    most = limits.leap
-    if state.usual[stream] != 0.0:
-        most = max(limits.gap, STEP * state.usual[stream])
-    if state.held[stream] or (state.newest[stream] != NONE and not 0 < stamp - state.newest[stream] <= most):
-        return False
-    complete = True
-    for i in range(limits.channels[stream]):
-        complete = complete and (abs(values[i]) <= LIMIT or limits.absent[limits.first[stream] + i])
-    return complete
 
 
 @inner

@@ -17,7 +17,7 @@ from boom_twin.errors import BagError
 from boom_twin.messages.report_encoder import decode_changes, encode_changes
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.messages.type_store import jazzy, new_message
-from boom_twin.offline.reader_process import Changes
+from boom_twin.offline.session_samples import Changes
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 from boom_twin.types import Change
 

@@ -24,7 +24,8 @@ from boom_twin.bag.session_files import write_session
 from boom_twin.batch.sources import sessions_of
 from boom_twin.cli.main import main
 from boom_twin.errors import BagError
-from boom_twin.offline.replay import ReplayOptions, replay_into
+from boom_twin.offline.inputs import ReplayOptions
+from boom_twin.offline.replay import replay_into
 from boom_twin.offline.sample_table import SampleTable, table_file
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.system.result_folder import REPLAY, result_folder

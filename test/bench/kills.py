@@ -1,6 +1,6 @@
 """SIGKILL at random moments: ``python test/bench/kills.py [--count 1000] [--commands replay,rig]``; also run by make soak.
 
-Real commands on short sessions, each killed once: its first process, or one of its children; half of the moments are drawn
+Real commands on short sessions, each killed once; half of the moments are drawn
 over the whole run, half over the time in which it writes. After every kill: no recording has changed, an earlier result is
 there whole or the new one is, and what is not whole says so, to ``info`` and ``compare`` too. Exit code 1 if not so.
 """
@@ -11,7 +11,6 @@ import contextlib
 import hashlib
 import io
 import json
-import os
 import random
 import shutil
 import signal
@@ -38,12 +37,8 @@ from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 
 COMMANDS = ("replay", "rig", "calibrate", "record")
-PARTING = 60.0
-"""Seconds that the children of a killed command may take to end."""
 PATIENCE = 300.0
 STEP = 5_000_000
-OF_CHILDREN = 0.25
-"""Share of the kills that hit a child."""
 JOINT_STATE = "sensor_msgs/msg/JointState"
 SCENE = """\
 description: one rigid section on an oil spring, surrogate parameters
@@ -82,41 +77,21 @@ def said(*arguments: object) -> tuple[int, str]:
 
 
 class Run:
-    """A command as a process that is the first of its group."""
+    """A command as a process."""
 
     def __init__(self, arguments: list[str], log: Path) -> None:
         self._log = log
         command = [sys.executable, "-m", "boom_twin.cli.main", *arguments]
         with log.open("w") as file:
-            self.process = subprocess.Popen(command, stdout=file, stderr=file, start_new_session=True)
+            self.process = subprocess.Popen(command, stdout=file, stderr=file)
 
-    def children(self) -> list[int]:
-        try:
-            return [int(pid) for pid in Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()]
-        except OSError:
-            return []
-
-    def kill(self, dice: random.Random) -> str:
-        """Kill the first process, or now and then one of its children; what was hit, or nothing if it had ended."""
+    def kill(self) -> str:
+        """Kill the process; say if it had ended before."""
         if self.process.poll() is not None:
             return "ended before"
-        children = self.children()
-        if children and dice.random() < OF_CHILDREN:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(dice.choice(children), signal.SIGKILL)
-            self.process.wait(PATIENCE)
-            words = self._log.read_text()
-            require("Traceback" not in words, f"a traceback after the death of a child:\n{words}")
-            return "child"
         self.process.kill()
         self.process.wait()
-        end = time.monotonic() + PARTING
-        with contextlib.suppress(ProcessLookupError):
-            while time.monotonic() < end:
-                os.killpg(self.process.pid, 0)
-                time.sleep(0.02)
-            raise Broken("children of a killed command go on")
-        return "first process"
+        return "killed"
 
     def finish(self) -> None:
         require(self.process.wait(PATIENCE) == 0, f"a run that was not killed failed:\n{self._log.read_text()}")
@@ -162,7 +137,7 @@ class Target:
         """One run with one kill."""
         run = Run(self.arguments(), self.place / "log")
         self._wait(run)
-        hit = run.kill(self.dice)
+        hit = run.kill()
         require(sums(self.sources) == self.kept, "a source has changed")
         left = self.check(hit)
         self.clear()

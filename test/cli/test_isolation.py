@@ -54,11 +54,8 @@ def test_the_page_of_a_session_runs_nothing_of_the_folder(trap: Trap, tmp_path: 
         end = time.monotonic() + 240.0
         while "open http" not in log.read_text() and process.poll() is None and time.monotonic() < end:
             time.sleep(0.1)
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        is_read = any("boom_twin.offline.reader_process" in Path(f"/proc/{pid}/cmdline").read_text() for pid in children)
         process.terminate()
     assert trap.sprung() == "" and "open http" in log.read_text(), log.read_text()
-    assert is_read
 
 
 def test_a_recorder_of_the_page_runs_nothing_of_the_folder(trap: Trap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

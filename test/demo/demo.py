@@ -144,8 +144,15 @@ def _tip_errors(session: Session, truth: TipTruth, first: int) -> dict[str, tupl
     for source, roles in TIP_SOURCES.items():
         (at, position), (when, acceleration) = (_vectors(session, outputs[role], vector_of) for role, vector_of in roles)
         if len(at) and len(when):
-            found[source] = truth.position_error(at, first, position), truth.acceleration_error(when, first, acceleration)
+            found[source] = _rms_off(truth, at, first, position), _rms_off(truth, when, first, acceleration, of_tip=False)
     return found
+
+
+def _rms_off(truth: TipTruth, stamps: NDArray[np.int64], first: int, told: Array, of_tip: bool = True) -> float:
+    """Return the root mean square distance of what was told at `stamps` (ns) from the truth, which begins at `first` (ns)."""
+    times = (stamps - first) * NANO + truth.times[0]
+    true = truth.at(times, truth.position if of_tip else truth.acceleration)
+    return float(np.sqrt(np.mean(np.sum((told - true) ** 2, axis=1))))
 
 
 def _vectors(session: Session, topic: Topic, vector_of: Callable[[Any], Any]) -> tuple[NDArray[np.int64], Array]:

@@ -11,7 +11,7 @@ from drive_twin import PUMP_DRIVES
 
 PUMP = Path(__file__).parents[2] / "bags" / "pump_session"
 
-ONCE = [1] * 9  # each kernel is compiled for one set of types
+ONCE = [1] * 6  # each kernel is compiled for one set of types
 CODE = """
 import sys
 from pathlib import Path
@@ -19,9 +19,8 @@ from boom_twin.bag.reader import scan
 from boom_twin.bag.session_model import baseline_of, mapping_of, scene_of, strokes_of
 from boom_twin.health.sensor_findings import find
 from boom_twin.health.sensor_survey import summarise, survey
-from boom_twin.offline.reader_process import items_of
+from boom_twin.offline.session_samples import SessionSamples
 from boom_twin.twin.blocks import ReportBlock, SampleBlock
-from boom_twin.twin.health_rows import copy_predictions, copy_residuals, count_residuals
 from boom_twin.twin.twin import Twin
 from boom_twin.twin.update import measure, update, write_residual
 
@@ -30,12 +29,12 @@ scene, mapped = scene_of(path, None).scene, mapping_of(path, None, 4, "")
 topics = mapped.topics
 twin = Twin(scene, baseline=baseline_of(path, None).baseline, reads=strokes_of(path, mapped).reading)
 twin.warm_up()
-kernels = update, measure, write_residual, survey, summarise, find, copy_predictions, copy_residuals, count_residuals
+kernels = update, measure, write_residual, survey, summarise, find
 ready = [len(kernel.dispatcher.signatures) for kernel in kernels]
 session = scan(path)
 wanted = [name for name in topics.heard if (found := session.find(name)) is not None and found.count]
 told = 0
-for item in items_of(path, topics, wanted, 4):
+for item in SessionSamples(session, topics, wanted, 4):
     if isinstance(item, SampleBlock) and told < 3:
         found = [each for each in twin.update_block(item) if isinstance(each, ReportBlock)]
         told += sum(len(each.health) for each in found)

@@ -12,8 +12,7 @@ from boom_twin import Report, Settings
 from boom_twin.messages.encoded_block import EncodedBlock
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import Output
-from boom_twin.offline.writer_process import pack
-from boom_twin.twin.blocks import ReportBlock
+from boom_twin.twin.blocks import report_block
 
 Messages = list[tuple[str, int, bytes]]
 
@@ -36,9 +35,7 @@ def told(block: EncodedBlock) -> Messages:
 def in_blocks(encoder: ReportEncoder, reports: list[Report], size: int, joints: int) -> Messages:
     found: Messages = []
     for first in range(0, len(reports), size):
-        (block,) = pack(reports[first : first + size], joints)
-        assert isinstance(block, ReportBlock)
-        found += told(encoder.fill_block(block))
+        found += told(encoder.fill_block(report_block(reports[first : first + size], joints)))
     return found
 
 
@@ -53,17 +50,14 @@ def test_a_block_gives_the_messages_of_its_reports(rig: Told, size: int) -> None
 
 
 def test_a_block_without_messages() -> None:
-    (block,) = pack([Report(5, True), Report(6, True)], 3)
-    assert isinstance(block, ReportBlock)
-    encoded = ReportEncoder(boom(3), Settings()).fill_block(block)
+    encoded = ReportEncoder(boom(3), Settings()).fill_block(report_block([Report(5, True), Report(6, True)], 3))
     assert encoded.rows == [] and len(encoded.log_times) == 0
 
 
 def test_a_block_says_the_same_as_its_reports() -> None:
     """Less events and status, which are not written."""
     reports = random_reports(2, 300, Told(3, pins=2, health=0.1))
-    (block,) = pack([replace(report, events=("deflected",), status="no") for report in reports], 3)
-    assert isinstance(block, ReportBlock)
+    block = report_block([replace(report, events=("deflected",), status="no") for report in reports], 3)
     encoder, other = (ReportEncoder(boom(3), Settings()) for _ in range(2))
     back = block.reports(3)
     assert one_by_one(encoder, back) == one_by_one(other, reports)
@@ -72,15 +66,3 @@ def test_a_block_says_the_same_as_its_reports() -> None:
             for name in ("clearances", "moments", "tip_velocity", "tip_angle"):
                 np.testing.assert_array_equal(getattr(given.prediction, name), getattr(got.prediction, name))
         assert (given.prediction is None) == (got.prediction is None)
-
-
-def test_a_report_with_a_change_stays_by_itself() -> None:
-    reports = random_reports(3, 300, Told(2, changes=0.05))
-    packed = pack(reports, 2)
-    changed = [report for report in reports if report.change is not None]
-    assert len(changed) > 3 and [each for each in packed if isinstance(each, Report)] == changed
-    one, other = (ReportEncoder(boom(2), Settings()) for _ in range(2))
-    found: Messages = []
-    for each in packed:
-        found += one_by_one(other, [each]) if isinstance(each, Report) else told(other.fill_block(each))
-    assert found == one_by_one(one, reports)

@@ -18,9 +18,8 @@ from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
-from boom_twin.errors import BagError, UsageError
+from boom_twin.errors import BagError
 from boom_twin.health.baseline import Baseline, load_baseline
-from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.protocol import layout
@@ -58,12 +57,6 @@ def bag(samples, tmp_path_factory):
     write_samples(path, samples, (Stream.STROKES, Stream.ANGLES, FORCES), {"origin": "synthetic, a test"})
     note_drives(path)
     return path
-
-
-def test_messages_name_cylinders_and_have_efforts(bag, samples):
-    (_, _, first), *_ = read(scan(bag), {"/cylinder_forces": JOINT_STATE})
-    assert list(first.name) == [f"cylinder_{i}" for i in range(1, 5)] and len(first.position) == 0
-    assert first.effort.tolist() == next(each for each in samples if each.stream is FORCES).values.tolist()
 
 
 def test_residuals_zeros_and_diagnostics(scene, samples):
@@ -159,10 +152,3 @@ def test_forces_of_another_boom_are_refused(scene, samples, tmp_path):
     write_samples(tmp_path / "bag", others, (Stream.STROKES, Stream.ANGLES, FORCES), {"origin": "synthetic, a test"})
     with pytest.raises(BagError, match=r"/cylinder_forces names cylinder_5; .* so this is another boom"):
         replay(tmp_path / "bag", scene, tmp_path / "out")
-
-
-def test_a_mapping_with_a_channel_too_many(tmp_path):
-    mapping = tmp_path / "mapping.yaml"
-    mapping.write_text("sensors: {cylinder_force_5: {unit: kN}}\n")
-    with pytest.raises(UsageError, match="channels end at cylinder_force_4"):
-        load_mapping(mapping, 4)

@@ -1,9 +1,8 @@
-"""Replays whose processes are killed, and what is made of sessions and results that are not whole."""
+"""Replays that are killed, and what is made of sessions and results that are not whole."""
 
 from __future__ import annotations
 
 import json
-import os
 import resource
 import shutil
 import signal
@@ -11,7 +10,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,9 +21,8 @@ from boom_twin.cli.main import main
 from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError
 from boom_twin.monitor.data.bag_feed import bag_feed
-from boom_twin.offline import writer_process as behind
-from boom_twin.offline.process_pipe import END, Pipe
-from boom_twin.offline.replay import ReplayOptions, replay_into
+from boom_twin.offline.inputs import ReplayOptions
+from boom_twin.offline.replay import replay_into
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.system.result_folder import REPLAY, result_folder
 
@@ -43,44 +40,29 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def killed(session: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder beside its result that a replay leaves when it is killed while its writer writes.
+    """The folder beside its result that a replay leaves when it is killed while it writes.
 
     Before that, a second replay into the same folder is refused at once.
     """
     out = tmp_path_factory.mktemp("killed") / "out"
     command = [sys.executable, "-m", "boom_twin.cli.main", "replay", str(session), "--out", str(out)]
     with (out.parent / "log").open("w") as log:
-        child = subprocess.Popen(command, stdout=log, stderr=log, start_new_session=True)
+        child = subprocess.Popen(command, stdout=log, stderr=log)
     file, end = out.with_name("out.unfinished") / "bag" / "session_0.mcap", time.monotonic() + 240.0
     while not file.exists() or file.stat().st_size < 200_000:
         assert child.poll() is None and time.monotonic() < end, (out.parent / "log").read_text()
         time.sleep(0.01)
-    os.killpg(child.pid, signal.SIGSTOP)
+    child.send_signal(signal.SIGSTOP)
     second = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert second.returncode == 1 and "out.unfinished: another `boom_twin replay` is at work there" in second.stderr
     child.kill()
-    os.killpg(child.pid, signal.SIGCONT)  # its children
     child.wait()
-    wait_for_group(child.pid)
     assert not out.exists()
     return file.parents[1]
 
 
-def wait_for_group(leader: int) -> None:
-    """Until all processes of a group have gone."""
-    end = time.monotonic() + 60.0
-    while time.monotonic() < end:
-        try:
-            os.killpg(leader, 0)
-        except ProcessLookupError:
-            return
-        time.sleep(0.02)
-    pytest.fail("children of a killed replay go on")
-
-
 @pytest.mark.system
 def test_a_killed_replay_says_so(killed: Path, session: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Its writer did not take the end of the pipe for the end of the session."""
     assert not (killed / "bag" / "metadata.yaml").exists() and not (killed / "summary.json").exists()
     with pytest.raises(BagError, match=r"incomplete: the end is missing.*incomplete: .*unfinished\.json"):
         scan(killed / "bag")
@@ -153,85 +135,6 @@ def test_compare_replays_over_none_of_what_it_compares(
     assert main(["compare", str(earlier), str(earlier), "--out", str(earlier)]) == 1
     assert "lies in the source, which is never touched" in capsys.readouterr().err
     assert before == {path: path.read_bytes() for path in earlier.rglob("*") if path.is_file()}
-
-
-@pytest.mark.parametrize("which", ["reader_process", "writer_process"])
-@pytest.mark.system
-def test_a_process_of_a_replay_that_dies_is_an_error(
-    session: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, which: str
-) -> None:
-    """Never a short session, whatever the exit code of the process says."""
-    started: dict[str, Pipe] = {}
-    begin = Pipe.__init__
-
-    def kept(pipe: Pipe, module: str, *arguments: str, **options: Any) -> None:
-        begin(pipe, module, *arguments, **options)
-        started[module.rsplit(".", 1)[1]] = pipe
-
-    monkeypatch.setattr(Pipe, "__init__", kept)
-    monkeypatch.setattr("boom_twin.offline.process_pipe.ROOM", 2**16)  # so that not all of this short session is sent at once
-
-    class Killing:
-        def __init__(self, total: int) -> None:
-            self.count = 0
-
-        def update(self, n: int) -> None:
-            self.count += n
-            if self.count - n < 500 <= self.count:
-                os.kill(started[which]._process.pid, signal.SIGKILL)
-
-        def close(self) -> None:
-            pass
-
-    with pytest.raises(BagError, match="ended from outside"):
-        replay(session, load_scene(), tmp_path / "out", progress=Killing, health=False)
-    assert not any(tmp_path.iterdir())
-
-
-def test_a_pipe_that_breaks_off_is_no_end() -> None:
-    """Also where the process says that all is well."""
-    pipe = Pipe("boom_twin.offline.reader_process")
-    pipe._process.kill()
-    pipe._process.wait()
-    pipe._process.returncode = 0
-    with pytest.raises(BagError, match="incomplete: a process of the replay was ended from outside"):
-        list(pipe.receive())
-
-
-ENDLESS = """
-import os, sys
-sent = os.write(1, b"no pickle")
-try:
-    while sent < 2**28:
-        sent += os.write(1, bytes(2**16))
-except BrokenPipeError:
-    pass
-sys.exit(str(sent))
-"""
-
-
-def test_what_comes_after_a_failure_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The rest of a day's session was read into memory, 1.4 GB, before the failure was told: now hardly any is even sent."""
-    monkeypatch.setattr("boom_twin.offline.process_pipe.python_command", lambda *_: [sys.executable, "-c", ENDLESS])
-    with pytest.raises(BagError) as found:
-        list(Pipe("endless").receive())
-    assert int(str(found.value)) < 2**23
-
-
-@pytest.mark.parametrize("is_told", [True, False], ids=["end told", "end not told"])
-def test_a_writer_completes_its_bag_only_when_it_is_told_the_end(tmp_path: Path, is_told: bool) -> None:
-    from boom_twin.messages.topic_table import load_topics
-
-    pipe = Pipe(behind.__name__, str(tmp_path / "bag"))
-    pipe.send(({}, load_topics(), load_scene(), Settings()))
-    pipe.wait_ready()
-    if is_told:
-        pipe.send(END)
-        pipe.finish()
-    else:
-        with pytest.raises(BagError, match="incomplete: a process of the replay was ended from outside"):
-            pipe.finish()
-    assert (tmp_path / "bag" / "metadata.yaml").exists() is is_told
 
 
 def unended(bag: Path) -> Path:

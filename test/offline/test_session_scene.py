@@ -14,14 +14,14 @@ from offline.booms_apart import as_document, scene_text, session
 
 from boom_twin import load_scene, replay
 from boom_twin.bag.reader import scan
-from boom_twin.bag.session_model import baseline_of, scene_of, settings_of
+from boom_twin.bag.session_model import baseline_of, scene_of
 from boom_twin.bag.session_sheet import FILE_NAME, SessionSheet, kept, sha256
 from boom_twin.bag.writer import SessionWriter
 from boom_twin.cli.main import main
-from boom_twin.cli.output import open_session_settings, warn_incomplete
-from boom_twin.config.settings import Settings, Thresholds, load_thresholds
+from boom_twin.cli.output import warn_incomplete
+from boom_twin.config.settings import Settings
 from boom_twin.diagnostics.boom_mismatch import FAR, WINDOW, OtherBoom
-from boom_twin.errors import BagError, UsageError
+from boom_twin.errors import BagError
 from boom_twin.messages.sample_decoder import SampleDecoder
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.messages.type_store import fill_header, new_message
@@ -258,75 +258,6 @@ def test_the_baseline_is_that_of_the_recording(four, tmp_path):
     SessionSheet("0", baseline="angle_error: -1\n").write(tmp_path)
     with pytest.raises(BagError, match=r"session\.yaml, baseline: .*--baseline"):
         baseline_of(tmp_path)
-
-
-def test_the_parameters_are_those_of_the_node_that_was_recorded(tmp_path, capsys):
-    """A replay with others was another one, without a word."""
-    assert settings_of(BUNDLED).settings == Settings()
-    SessionSheet("0", twin={"imu_sigma": 0.2, "payload": 30.0, "scene": "", "autostart": True}).write(tmp_path)
-    found = settings_of(tmp_path)
-    assert (found.settings, found.source) == (Settings(imu_sigma=0.2, payload=30.0), f"{tmp_path / FILE_NAME}, twin")
-    assert open_session_settings(tmp_path, None) == found.settings
-    assert f"parameters: {tmp_path / FILE_NAME}, twin: imu_sigma 0.2, payload 30" in capsys.readouterr().err
-    given = tmp_path / "given.yaml"
-    given.write_text("/**:\n  ros__parameters:\n    imu_sigma: 0.1\n", encoding="utf-8")
-    assert settings_of(tmp_path, given).settings == Settings(imu_sigma=0.1)
-    for wrong in ({"imu_sigma": -1.0}, {"stroke_rate": -1.0}, {"gap": "a while"}):
-        SessionSheet("0", twin=wrong).write(tmp_path)
-        with pytest.raises(BagError, match=rf"session\.yaml, twin: {next(iter(wrong))} .*--params"):
-            settings_of(tmp_path)
-
-
-BLOCKS = {
-    "beside those of all nodes": ("/**: {ros__parameters: {gap: 0.2}}\nboom_twin: {ros__parameters: {payload: 40.0}}", ""),
-    "last one wins": ("boom_twin: {ros__parameters: {payload: 1.0}}\n/**: {ros__parameters: {gap: 0.2, payload: 40.0}}", ""),
-    "behind another node": (
-        "other: {ros__parameters: {payload: 1.0}}\n/boom_twin: {ros__parameters: {payload: 40.0, gap: 0.2}}",
-        "",
-    ),
-    "below a namespace": ("front: {boom_twin: {ros__parameters: {payload: 40.0, gap: 0.2}}}", "front"),
-    "wildcard of one part": (
-        "/*/boom_twin: {ros__parameters: {payload: 40.0, gap: 0.2}}\n/*: {ros__parameters: {gap: 3.0}}",
-        "/front/",
-    ),
-    "wildcard of parts": (
-        "/a/**/boom_twin: {ros__parameters: {payload: 40.0}}\n/**: {boom_twin: {ros__parameters: {gap: 0.2}}}",
-        "a/b",
-    ),
-    "of rclpy itself": (
-        "/**: {ros__parameters: {use_sim_time: true, start_type_description_service: false, gap: 0.2, payload: 40.0,"
-        " qos_overrides: {/tip_imu: {subscription: {depth: 3}}}, scene: other.yaml}}",
-        "",
-    ),
-}
-
-
-@pytest.mark.parametrize("kind", BLOCKS)
-def test_a_parameter_file_is_resolved_as_by_the_node(kind, tmp_path):
-    """What rclpy 7.1.6 gives a node of that name and namespace."""
-    given, (text, namespace) = tmp_path / "given.yaml", BLOCKS[kind]
-    given.write_text(text, encoding="utf-8")
-    assert settings_of(BUNDLED, given, namespace).settings == Settings(gap=0.2, payload=40.0)
-    assert load_thresholds(given, namespace) == Thresholds()
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        (
-            "front: {boom_twin: {ros__parameters: {payload: 40.0}}}",
-            r"no parameters of /boom_twin, only of /front/boom_twin\. Name",
-        ),
-        ("ros__parameters: {payload: 40.0}", "not a ROS parameter file"),
-        ("boom_twin: {payload: 40.0}", "not a ROS parameter file"),
-        ("boom_twin: {ros__parameters: [payload]}", "not a ROS parameter file"),
-        ("boom_twin: {ros__parameters: {pay: {load: 40.0}}}", r"pay\.load = 40\.0: unknown\. The nearest is `payload`"),
-    ],
-)
-def test_a_parameter_file_without_any_for_the_twin_is_refused(text, told, tmp_path):
-    (given := tmp_path / "given.yaml").write_text(text, encoding="utf-8")
-    with pytest.raises(UsageError, match=told):
-        settings_of(BUNDLED, given)
 
 
 def test_what_never_reached_the_recorder_is_told(four, tmp_path, capsys):

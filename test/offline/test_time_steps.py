@@ -109,8 +109,6 @@ def as_database(source: Path, path: Path) -> Path:
 
 STORED: dict[str, dict[str, Any]] = {
     "one chunk": {"chunk_size": 2**30},
-    "small chunks": {"chunk_size": 4000},
-    "no message index": {"index_types": IndexType.CHUNK, "chunk_size": 4000},
     "no index": {"index_types": IndexType.NONE, "chunk_size": 4000},
     "no chunks": {"use_chunking": False},
     "database": {},

@@ -7,8 +7,6 @@ import json
 import os
 import resource
 import signal
-import subprocess
-import sys
 import traceback
 from collections.abc import Callable
 from itertools import count
@@ -99,21 +97,6 @@ def test_the_second_of_two_is_refused_at_once_and_a_killed_one_is_not_waited_for
         with pytest.raises(BagError, match=r"out\.unfinished: another `boom_twin replay` is at work there"):
             build(tmp_path / "out")
         assert sorted(tmp_path.rglob("*")) == before
-    build(tmp_path / "out")
-
-
-@pytest.mark.system
-def test_the_lock_lasts_as_long_as_a_child_that_inherits_it(tmp_path: Path) -> None:
-    """A writer that outlives its killed command must have ended before its folder is used again."""
-    with pytest.raises(KeyboardInterrupt), result_folder(tmp_path / "out", REPLAY, []) as building:
-        pipe = subprocess.PIPE
-        child = subprocess.Popen([sys.executable, "-S", "-c", "input()"], stdin=pipe, pass_fds=[building.lock])
-        os.rename(building.folder, tmp_path / "kept")  # as if this process had no time to clean up
-        raise KeyboardInterrupt
-    os.rename(tmp_path / "kept", tmp_path / "out.unfinished")
-    with pytest.raises(BagError, match="at work there"):
-        build(tmp_path / "out")
-    child.communicate(b"\n", timeout=60)
     build(tmp_path / "out")
 
 

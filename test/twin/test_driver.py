@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from drive_twin import drive_twin
 
-import boom_twin
 from boom_twin import Report, Sample, Settings, Stream, load_scene, statics
 from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.health.baseline import load_baseline
@@ -35,27 +32,6 @@ def items() -> Iterator[Sample | Change | None]:
             yield None
         yield Sample(Stream.STROKES, k * RATE, STROKES + 1e-3 * np.sin(0.05 * k))
         yield Sample(Stream.ANGLES, k * RATE, np.zeros(4))
-
-
-def test_drive_is_update_by_update() -> None:
-    """To the bit what `Twin.update` gives, with the change repeated before its stroke sample."""
-    twin, other = drive_twin(load_scene()), drive_twin(load_scene())
-    steps = list(drive(twin, items()))
-    assert [step is None for step in steps] == [item is None for item in items() if not isinstance(item, Change)]
-    residuals = 0
-    for step in filter(None, steps):
-        if step.sample.stream is Stream.STROKES and step.sample.stamp == CHANGE.stamp:
-            other.requests.repeat(CHANGE)
-            assert step.report.change is not None and step.report.change.settings["payload"] == 40.0
-        report = other.update(step.sample)
-        assert report.events == step.report.events and step.duration > 0.0
-        for one, two in zip(report.residuals, step.report.residuals, strict=True):
-            residuals += 1
-            assert one.values.tobytes() == two.values.tobytes()
-        if report.prediction is not None and step.report.prediction is not None:
-            assert report.prediction.tip_acceleration.tobytes() == step.report.prediction.tip_acceleration.tobytes()
-        assert (report.prediction is None) == (step.report.prediction is None)
-    assert residuals == 58  # of angles, and of strokes but for the first
 
 
 def bits(reports: list[Report]) -> list[bytes]:
@@ -85,32 +61,6 @@ def test_a_twin_that_began_anew_is_repeated_by_one_that_does() -> None:
     other.renew()
     later = [other.update(sample) for sample in samples[40:]]
     assert bits(later) == bits(fresh) and later[0].change is not None and later[0].change.is_new
-
-
-def test_no_item_is_asked_for_before_the_last_report_was_taken() -> None:
-    """A live node decodes a message only when the reports of the one before are out."""
-    asked: list[int] = []
-
-    def source() -> Iterator[Sample]:
-        for k in range(4):
-            asked.append(k)
-            yield Sample(Stream.STROKES, k * RATE, STROKES)
-
-    for k, step in enumerate(drive(drive_twin(load_scene()), source())):
-        assert step.sample.stamp == k * RATE and asked == list(range(k + 1))
-
-
-def test_there_is_one_loop() -> None:
-    """Node, replay, live page, held-out check and baseline all drive by it; none updates a twin itself."""
-    root = Path(boom_twin.__file__).parent
-    texts = {file.relative_to(root).as_posix(): file.read_text() for file in root.rglob("*.py")}
-    drives = re.compile(r"\bdrive(_blocks|_one)?\(.*twin", re.I)
-    users = {name for name, text in texts.items() if drives.search(text) and "twin.driver import" in text}
-    assert users == {
-        "calibration/validation.py", "monitor/data/bag_feed.py", "offline/replay.py",
-        "ros/node/node.py",
-    }  # fmt: skip
-    assert {name for name, text in texts.items() if re.search(r"twin\.update\(\w", text)} == {"twin/driver.py"}
 
 
 def spoilt_samples(seconds: float, noise: float = 1.0) -> Iterator[Sample]:

@@ -12,8 +12,6 @@ from drive_twin import drive_twin
 from boom_twin import Report, Sample, Stream, Twin, load_scene
 from boom_twin.errors import UsageError
 from boom_twin.health.baseline import load_baseline
-from boom_twin.health.monitor import HealthMonitor
-from boom_twin.kernels.jit import _kind
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin import loaded_model
 from boom_twin.twin.loaded_model import ModelPreparation
@@ -81,27 +79,6 @@ def test_what_is_asked_while_a_model_is_made_counts_too_and_all_takes_effect_at_
     assert twin.settings.gap == 0.3 and makers[0] == "MainThread" and set(makers[1:]) == {"model"}
 
 
-def test_what_was_asked_is_there_once_it_was_waited_for(makers: list[str]) -> None:
-    twin = drive_twin(load_scene())
-    preparation = ModelPreparation(twin)
-    preparation.tune({"payload": 40.0})
-    preparation.tune({"payload": 20.0})
-    preparation.finish()
-    assert twin.requests.settings.payload == 20.0 and twin.requests.due
-    assert twin.update(samples(1)[0]).accepted and twin.settings.payload == 20.0 and makers == ["MainThread", "model", "model"]
-
-
-def test_a_model_counts_only_with_the_settings_that_it_was_made_for(makers: list[str]) -> None:
-    twin = drive_twin(load_scene())
-    preparation = ModelPreparation(twin)
-    preparation.tune({"payload": 40.0})
-    preparation.finish()
-    assert twin.requests.model is not None
-    preparation.tune({"stroke_rate": 0.2})  # before any strokes have come; health is judged by it too
-    assert twin.update(samples(1)[0]).accepted and twin.settings.stroke_rate == 0.2 and twin.settings.payload == 40.0
-    assert makers == ["MainThread", "model", "MainThread"]
-
-
 def test_limits_need_no_model_and_what_cannot_be_is_refused_at_once(makers: list[str]) -> None:
     twin = drive_twin(load_scene())
     preparation = ModelPreparation(twin)
@@ -113,43 +90,3 @@ def test_limits_need_no_model_and_what_cannot_be_is_refused_at_once(makers: list
     preparation.close()
     preparation.take_in()
     assert twin.requests.settings.payload == -1.0
-
-
-def test_a_restart_and_another_load_leave_health_and_limits_to_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The sample's own path has neither: health begins when it is told more, limits are made beside with the model."""
-    found: list[str] = []
-    begin, limits = HealthMonitor.begin, loaded_model.limits_of
-
-    def begun(monitor: HealthMonitor) -> None:
-        found.append("health")
-        begin(monitor)
-
-    def made(*arguments: Any) -> Any:
-        found.append(f"limits in {current_thread().name}")
-        return limits(*arguments)
-
-    rows, twin = samples(60), drive_twin(load_scene(), baseline=load_baseline())
-    preparation = ModelPreparation(twin)
-    for sample in rows[:30]:
-        twin.update(sample)
-    monkeypatch.setattr(HealthMonitor, "begin", begun)
-    monkeypatch.setattr(loaded_model, "limits_of", made)
-    twin.requests.rest()
-    assert twin.update(rows[30], judged=False).change is not None and not found
-    twin.judge_health()
-    assert found == ["health"]
-    found.clear()
-    preparation.tune({"payload": 40.0})
-    preparation.finish()
-    assert found == ["health", "limits in model"] or found == ["limits in model", "health"]
-    found.clear()
-    assert twin.update(rows[31], judged=False).change is not None and not found
-
-
-def test_code_that_is_compiled_for_a_boom_takes_it_under_any_load() -> None:
-    """Its tables have the same types, so that another load does not look them up while a sample waits."""
-    twin, kinds = drive_twin(load_scene()), set()
-    for live in ({}, {"payload": 40.0}, {"line_fill": 20.0}, {"payload": 40.0, "line_fill": 20.0}):
-        model = twin.model(twin.settings.tuned(live))
-        kinds.add(_kind(model.boom.compiled))
-    assert len(kinds) == 1

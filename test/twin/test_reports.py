@@ -8,12 +8,8 @@ import pickle
 import numpy as np
 import pytest
 from drive_twin import drive_twin
-from studies.clearance.scenes import with_play
 
 from boom_twin import Sample, Stream, load_scene
-from boom_twin.config.settings import Settings
-from boom_twin.messages.report_encoder import ReportEncoder
-from boom_twin.messages.topic_table import Output
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.schema import Scene
 from boom_twin.types import Report
@@ -58,27 +54,6 @@ def test_a_report_can_be_sent_to_another_process(given: list[Report]) -> None:
 def test_later_samples_change_no_report() -> None:
     at_once = [repr(report) for report in map(drive_twin(load_scene()).update, plain())]
     assert [repr(report) for report in list(map(drive_twin(load_scene()).update, plain()))] == at_once
-
-
-@pytest.mark.parametrize("is_worn", [False, True])
-def test_all_messages_of_reports_are_encoded(is_worn: bool, given: list[Report]) -> None:
-    """Joint states have two lengths, with and without passive joints; residuals one for each stream."""
-    scene = with_play(load_scene()) if is_worn else load_scene()
-    encoder, told = ReportEncoder(scene, Settings()), set()
-    for report in reports(scene, 30) if is_worn else given:
-        told |= {(key, len(data)) for key, data in encoder.fill(report)}
-    assert {key for key, _ in told} >= {Output.SHAPE, Output.RESIDUALS, Output.ESTIMATE_POSE, Output.TIP_POSITION}
-    assert len([key for key, _ in told if key is Output.JOINT_STATES]) == 2
-    assert len([key for key, _ in told if key is Output.RESIDUALS]) == 4
-
-
-def test_only_what_is_wanted_is_encoded(given: list[Report]) -> None:
-    one, other = (ReportEncoder(load_scene(), Settings()) for _ in range(2))
-    for report in given[:20]:
-        everything = one.fill(report)
-        for wanted in (Output.TIP_POSITION, Output.ESTIMATE_LOAD, Output.RESIDUALS):
-            assert other.fill(report, wanted.__eq__) == [each for each in everything if each[0] is wanted]
-        assert other.fill(report, lambda output: False) == []
 
 
 def test_a_copy_of_a_twin_goes_on_by_itself() -> None:

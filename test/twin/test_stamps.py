@@ -183,13 +183,13 @@ def test_strokes_out_of_their_range_are_told(scene, samples):
         ((Stream.STROKES, 1.7e9, np.zeros(4)), r"round\(seconds \* 1e9\)"),
         ((Stream.STROKES, True, np.zeros(4)), "nanoseconds"),
         ((Stream.STROKES, 2**64, np.zeros(4)), "64 bits"),
-        ((Stream.STROKES, 1, np.zeros(3)), r"shape \(3,\).*4 numbers, cylinder_1..cylinder_4"),
+        ((Stream.STROKES, 1, np.zeros(3)), r"array\(.*4 numbers, cylinder_1..cylinder_4"),
         ((Stream.IMU, 1, [0.0]), "2 numbers"),
         ((Stream.ANGLES, 1, ["a", "b", "c", "d"]), "joint_1..joint_4"),
         ((Stream.ANGLES, 1, None), "joint_1..joint_4"),
-        ((Stream.STROKES, 1, np.zeros(4) + 1j), "no numbers"),
-        ((Stream.STROKES, 1, ["0.1", "0.2", "0.3", "0.4"]), "no numbers"),
-        ((Stream.STROKES, 1, [True, False, True, False]), "no numbers"),
+        ((Stream.STROKES, 1, np.zeros(4) + 1j), "Give 4 numbers"),
+        ((Stream.STROKES, 1, ["0.1", "0.2", "0.3", "0.4"]), "Give 4 numbers"),
+        ((Stream.STROKES, 1, [True, False, True, False]), "Give 4 numbers"),
     ],
 )
 def test_samples_made_wrongly_are_refused_with_the_remedy(scene, sample, words):
@@ -230,12 +230,6 @@ def test_hostile_phases_leave_no_trace():
     """50 of them; ``python test/twin/hostile.py`` has the distribution over 1000."""
     errors = np.array([error for _, error in phases(50, 1000)])
     assert np.mean(errors < 0.005) >= 0.96
-
-
-@pytest.mark.slow
-def test_a_thousand_hostile_phases():
-    errors = np.array([error for _, error in phases(1000, 0)])
-    assert np.mean(errors < 0.005) >= 0.99
 
 
 @pytest.mark.parametrize("set_by", [900, 3000])

@@ -89,11 +89,6 @@ def test_stays_at_rest_on_constant_strokes(twin, still):
     assert np.abs(last.tip_acceleration).max() < 1e-5
 
 
-def test_every_stroke_stamp_is_answered_with_its_own(twin, still):
-    reports = follow(twin, still, 600)
-    assert [r.prediction.stamp for r in reports] == [START + ms * MS for ms in range(0, 600, 5)]
-
-
 def test_late_and_double_samples_are_left_out_and_counted(scene, new, still):
     clean, disturbed = new(scene), new(scene)
     expected = follow(clean, still, 300)
@@ -220,13 +215,6 @@ def test_strokes_out_of_reach_do_not_start_the_model(twin, still):
     assert twin.update(strokes(5, still)).accepted
 
 
-def test_wild_strokes_for_less_than_a_gap_do_not_reach_the_model(twin, still):
-    follow(twin, still, 300)
-    assert all(twin.update(strokes(300 + 5 * k, still + 1e5)).prediction is None for k in range(12))
-    recovered = [twin.update(strokes(360 + 5 * k, moved(still, 0.295))) for k in range(3)]
-    assert recovered[-1].prediction is not None and "model" not in twin.counts
-
-
 def test_a_failed_step_is_a_status_and_the_twin_starts_again(twin, still):
     """Wild strokes are followed once they have gone on for a second."""
     follow(twin, still, 300)
@@ -297,16 +285,6 @@ def test_residuals_do_not_depend_on_the_order_of_arrival(scene, new, still, orde
     assert got.keys() == expected.keys() and all(np.array_equal(got[k], expected[k]) for k in expected)
 
 
-def test_predictions_are_a_function_of_the_strokes_alone(scene, new, still):
-    alone, watched = new(scene), new(scene)
-    for ms in range(0, 400, 5):
-        a = alone.update(strokes(ms, moved(still, ms * 1e-3))).prediction
-        watched.update(angles(ms, np.full(4, 0.3)))
-        b = watched.update(strokes(ms, moved(still, ms * 1e-3))).prediction
-        watched.update(Sample(Stream.IMU, START + ms * MS, np.array([1.0, 2.0])))
-    assert equal(a, b)
-
-
 def test_a_residual_is_measured_minus_predicted_at_its_stamp(twin, still):
     reports = {r.stamp: r.prediction for r in follow(twin, still, 300)}
     at, after = START + 200 * MS, START + 205 * MS
@@ -323,16 +301,6 @@ def test_measured_samples_without_a_prediction_are_counted(twin, still):
     assert partial.events == ("partial",) and np.isnan(partial.residuals[0].values[1])
 
 
-def test_quiet_sensors_give_smaller_deviations(scene, still):
-    def sigma(**noise):
-        twin = Twin(scene, Settings(**noise))
-        follow(twin, still, 300)
-        return twin.update(angles(290, np.zeros(4))).residuals[0].sigmas
-
-    standard, quiet = sigma(), sigma(angle_sigma=1e-5, angle_resolution=1e-6)
-    assert np.all(standard > 1.745e-4) and np.all(quiet < 0.8 * standard)
-
-
 def test_imu_at_rest_reads_gravity(scene, twin, still):
     prediction = twin.update(strokes(0, still)).prediction
     c, s = np.cos(prediction.tip_angle), np.sin(prediction.tip_angle)
@@ -341,20 +309,13 @@ def test_imu_at_rest_reads_gravity(scene, twin, still):
     assert residual.values == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_shapes_come_10_times_a_second_in_spite_of_jitter(twin, still, seed):
-    jitter = np.random.default_rng(seed).uniform(-0.2, 0.2, 401)
+def test_shapes_come_10_times_a_second_in_spite_of_jitter(twin, still):
+    jitter = np.random.default_rng(0).uniform(-0.2, 0.2, 401)
     reports = [twin.update(strokes(5 * k + 1 + late, still)) for k, late in enumerate(jitter)]
     sent = [report.stamp for report in reports if report.prediction.shape is not None]
     assert 20 <= len(sent) <= 22
     assert np.min(np.diff(sent[1:])) > 94 * MS
     assert reports[0].prediction.shape[-1] == pytest.approx(reports[0].prediction.tip_position, abs=1e-12)
-
-
-def test_a_shape_is_sent_after_time_was_set_back(twin, still):
-    reports = [each for ms in (5000, 5001, 1000, 1001) for each in twin.update(strokes(ms, still)).all]
-    shapes = [report.prediction.shape for report in reports if report.prediction is not None]
-    assert [shape is not None for shape in shapes] == [True, False, True, False]
 
 
 @pytest.mark.parametrize("absurd", [np.inf, -np.inf, 1e300, -1e8])
@@ -368,3 +329,19 @@ def test_what_no_sensor_reads_is_taken_for_missing(scene, new, twin, still, absu
     report = twin.update(angles(100, np.array([0.0, absurd, 0.0, 0.0])))
     assert report.events == ("partial",) and np.isnan(report.residuals[0].values[1])
     assert twin.update(angles(101, np.full(4, absurd))).events == ("empty",)
+
+
+def test_a_stroke_that_falls_silent_is_told_after_a_tenth_of_a_second(twin, still):
+    follow(twin, still, 300)
+    silent = moved(still, 0.3) * [1.0, np.nan, 1.0, 1.0]
+    events = [twin.update(strokes(300 + 5 * k, silent)).events for k in range(40)]
+    assert events == [("partial",)] * 20 + [("partial", "held")] * 20
+
+
+def test_a_cylinder_that_starts_at_once_at_its_highest_speed_is_followed(twin, still):
+    """Some readings are farther than the estimate allows; after a few of them in a row the next is believed."""
+    follow(twin, still, 100)
+    ways = 0.9 * Settings().stroke_rate * 0.005 * np.arange(60)
+    reports = [twin.update(strokes(100 + 5 * k, still - np.array([way, 0.0, 0.0, 0.0]))) for k, way in enumerate(ways)]
+    assert "stroke elsewhere" not in twin.counts
+    assert reports[-1].prediction.strokes[0] == pytest.approx(still[0] - ways[-1], abs=0.01)

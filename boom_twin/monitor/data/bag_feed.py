@@ -23,8 +23,8 @@ from ...errors import BagError, BoomTwinError
 from ...health.baseline import Baseline
 from ...messages.report_encoder import ReportEncoder
 from ...messages.topic_table import NODE, Output, Topic, Topics
-from ...offline.reader_process import SampleReader
-from ...offline.replay import scene_for
+from ...offline.inputs import scene_for
+from ...offline.session_samples import SessionSamples
 from ...scene.schema import Scene
 from ...twin.driver import Step, drive
 from ...twin.twin import Twin
@@ -142,18 +142,14 @@ def _take_predicted(
 ) -> Generator[None]:
     """Run a twin on the recorded inputs and store its predictions, one sample a step."""
     wanted = [name for name in topics.heard if "/" + name.lstrip("/") in counts]
-    ahead = SampleReader(session.path, topics, wanted, twin.twin.plan.joints, window)
-    try:
-        ahead.wait_ready()
-        for step in drive(twin.twin, ahead.samples()):
-            if step is not None:
-                twin.took(step)
-            yield
-        twin.finish()
-        if not feed.store.tables:
-            raise BagError(f"{session.path}: no stroke could be used; they need names cylinder_1 .. in m, or a mapping.")
-    finally:
-        ahead.stop()
+    samples = SessionSamples(session, topics, wanted, twin.twin.plan.joints, window).samples()
+    for step in drive(twin.twin, samples):
+        if step is not None:
+            twin.took(step)
+        yield
+    twin.finish()
+    if not feed.store.tables:
+        raise BagError(f"{session.path}: no stroke could be used; they need names cylinder_1 .. in m, or a mapping.")
 
 
 class _Twin:

@@ -1,0 +1,155 @@
+"""Inputs of a replay: the session with its scene, mapping, settings and baseline, given or as it was recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..bag.joint_names import refuse_other_names
+from ..bag.reader import Session, scan
+from ..bag.session_model import (
+    SessionBaseline,
+    SessionScene,
+    SessionStrokes,
+    baseline_of,
+    mapping_of,
+    scene_of,
+    settings_of,
+    strokes_of,
+)  # fmt: skip
+from ..bag.time_window import WHOLE, TimeWindow
+from ..config.settings import Settings
+from ..errors import BagError
+from ..messages.topic_table import Topics
+from ..scene.edit import anew
+from ..scene.load import SceneSource, as_scene
+from ..scene.schema import Scene
+from ..twin.twin import Twin
+from ..types import NANO, Stream
+from .progress import Progress
+
+GIVEN = "given as a Scene"
+"""Source of a scene that came by no file."""
+
+
+@dataclass(frozen=True)
+class ReplayOptions:
+    """Options of a replay, see the parameters of `boom_twin.offline.replay.replay`."""
+
+    progress: Progress | None = None
+    mapping: str | Path | None = None
+    changes: bool = True
+    health: bool = True
+    baseline: str | Path | None = None
+    window: TimeWindow = WHOLE
+    namespace: str = ""
+    with_bag: bool = True
+    causes: bool = False
+
+
+USUAL = ReplayOptions()
+
+
+@dataclass(frozen=True)
+class ReplayInputs:
+    """Session and all that it is read with.
+
+    Attributes
+    ----------
+    session : Session
+    kept : SessionScene
+        Scene with its text and source.
+    settings : Settings
+    mapping : str
+        Source of the mapping.
+    topics : Topics
+    wanted : list of str
+        Input topics to read: that of the strokes, and those of other inputs with messages.
+    strokes : SessionStrokes
+    baseline : SessionBaseline or None
+        None if health is not judged.
+    window : TimeWindow
+    """
+
+    session: Session
+    kept: SessionScene
+    settings: Settings
+    mapping: str
+    topics: Topics
+    wanted: list[str]
+    strokes: SessionStrokes
+    baseline: SessionBaseline | None
+    window: TimeWindow
+
+    @property
+    def scene(self) -> Scene:
+        """Scene of the session."""
+        return self.kept.scene
+
+    @property
+    def expected(self) -> int:
+        """Approximate number of messages to read."""
+        session = self.session
+        count = sum(topic.count for name in self.wanted if (topic := session.find(name)) is not None)
+        return round(count * self.window.share((session.end - session.start) * NANO))
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """Sources, for ``summary.json``."""
+        found = {
+            "scene": self.kept.source,
+            "scene_sha256": self.kept.sha256,
+            "baseline": None if self.baseline is None else self.baseline.source,
+            "mapping": self.mapping,
+            "strokes": self.strokes.reading,
+            "strokes_source": self.strokes.source,
+        }
+        window = {"window_start_s": self.window.start, "window_duration_s": self.window.duration}
+        incomplete = {"session_incomplete": self.session.incomplete} if self.session.incomplete else {}
+        return found | ({} if self.window == WHOLE else window) | incomplete
+
+    def twin(self) -> Twin:
+        """Return a twin for the session."""
+        mounts, usual = self.topics.mounts(len(self.scene.joints)), self.baseline
+        baseline = None if usual is None else usual.baseline
+        return Twin(self.scene, self.settings, mounts, baseline, self.strokes.reading, self.topics.absent)
+
+    def refuse(self, reason: str) -> None:
+        """Raise BagError if there is a `reason` for which the session is of another boom than the scene."""
+        if reason:
+            raise BagError(
+                f"{self.session.path}: {reason}. The scene ({self.kept.source}) is of another boom, or the sensors' zeros and "
+                "units are others: give the scene by --scene, or those by --mapping."
+            )
+
+
+def replay_inputs(
+    bag: Path, scene: SceneSource | SessionScene, settings: Settings | None, options: ReplayOptions
+) -> ReplayInputs:
+    """Return the inputs of a replay; for the parameters and errors see `boom_twin.offline.replay.replay`."""
+    session, settings = scan(bag), settings or settings_of(bag).settings
+    kept = scene_for(session.path, scene)
+    joints = kept.scene.joints
+    mapped = mapping_of(session.path, Path(options.mapping) if options.mapping else None, len(joints), options.namespace)
+    topics = mapped.topics.of_joints(joint.range_deg for joint in joints)
+    topics_there = {name: session.find(name) for name in mapped.topics.heard}
+    wanted = [
+        name
+        for name, topic in topics_there.items()
+        if Stream.STROKES in mapped.topics.heard[name] or (topic is not None and topic.count)
+    ]
+    strokes = strokes_of(session.path, mapped)
+    refuse_other_names(session, topics, len(joints), kept.source)
+    baseline = baseline_of(session.path, Path(options.baseline) if options.baseline else None) if options.health else None
+    return ReplayInputs(session, kept, settings, mapped.source, topics, wanted, strokes, baseline, options.window)
+
+
+def scene_for(session: Path, scene: SceneSource | SessionScene) -> SessionScene:
+    """Return the scene to read a session with: `scene`, or if None that of `boom_twin.bag.session_model.scene_of`."""
+    if scene is None or isinstance(scene, str | Path):
+        return scene_of(session, scene)
+    if isinstance(scene, SessionScene):
+        return scene
+    given = as_scene(scene)
+    return SessionScene(given, anew(given), GIVEN)

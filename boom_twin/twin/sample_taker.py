@@ -1,0 +1,312 @@
+"""Take the samples of a twin one by one: follow, refuse or hold them, start and restart the model, change it between them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..config.settings import Settings
+from ..errors import BoomTwinError, SolverError
+from ..health.baseline import Baseline
+from ..kernels.tables import SENTENCES
+from ..scene.load import SceneSource, as_scene
+from ..types import LIMIT, NANO, SECOND, Array, Change, Mount, Report, Sample, Stream, StrokeReading, channels_of
+from .adjustments import Requests, ResidualBuffer, SensorZeros
+from .block_update import BlockUpdate, limits_of
+from .blocks import CODES, SampleBlock
+from .load_shedding import LoadShedding
+from .loaded_model import LoadedModel, loaded_model
+from .regular import SHORTEST_STEP
+from .run import Run
+from .sample_check import SampleCheck
+from .stamp_check import StampCheck
+from .state import NEWEST, NONE, STATUS, UNMATCHED, drop_waiting, new_state
+from .time_steps import Action, TimeStep, verdict_on
+from .update import DONE, FAILED
+
+
+class SampleTaker:
+    """State and model of a twin, and what single samples do to them; `boom_twin.twin.twin.Twin` is the public side."""
+
+    def __init__(
+        self,
+        scene: SceneSource = None,
+        settings: Settings | None = None,
+        mounts: Sequence[Mount | None] = (),
+        baseline: Baseline | None = None,
+        reads: StrokeReading = StrokeReading.LENGTH,
+        absent: Collection[str] = (),
+        doubted: Collection[str] = (),
+    ) -> None:
+        self.reads, self.absent, scene = reads, frozenset(absent), as_scene(scene)
+        self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
+        self.counts: Counter[str] = Counter()
+        self.shedding = LoadShedding()
+        self.mounts = tuple(mounts) or (None,) * len(scene.joints)
+        self._channels = channels_of(len(scene.joints))
+        self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
+        self._widths = [len(names) for names in self._channels.values()]
+        self._edge = SampleCheck(self._channels)
+        self.requests = Requests(self.settings)
+        self._doubted = frozenset(doubted)
+        self._judged = True  # health, with the present sample
+        self._begin()
+
+    def _begin(self) -> None:
+        """Reset state, model, estimate, health and zeros to those before the first sample."""
+        self._state = new_state(len(self.scene.joints), np.array(self._widths))
+        self._state.clock[NEWEST] = NONE
+        self._adopt(self._model(self.settings))
+        self._run: Run | None = None
+        self._is_new = True
+        self._failed: int | None = None
+        self._lines = self._new_lines()
+        self._zeros = SensorZeros(self._state, self._channels)
+        self._recent = ResidualBuffer(self._state.recent, self._channels)
+
+    def _restart(self) -> None:
+        """Forget all samples; see `boom_twin.twin.twin.Twin.reset`."""
+        self._begin_anew()
+        self._lines = self._new_lines()
+        self._state.waiting.bounds[:] = 0
+
+    def _new_lines(self) -> dict[Stream, StampCheck]:
+        return {stream: StampCheck(self.settings, self._state, CODES[stream]) for stream in Stream}
+
+    def _model(self, settings: Settings) -> LoadedModel:
+        self._former: BlockUpdate | None = None
+        return loaded_model(self.scene, settings, self.mounts, self.baseline, self.reads, self.absent)
+
+    def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
+        """Use this model, which has the present load, in place of that of `before`."""
+        self._boom, self.judge = model.boom, model.judge
+        self._boom.doubt(self._doubted)
+        self.plan = self._boom.plan
+        parts = self._boom, model.limits, self._state, self._channels, self.judge
+        self._former = before  # let go of when the next model is made, which may be in a thread of its own
+        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, before)
+        self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, self.plan.joints)))  # of strokes
+
+    def _take_over(self, stamp: int) -> list[str]:
+        """Apply the requested changes; return the events. Another load, or other zeros of strokes, need a start from rest."""
+        asked, before = self.requests, self.settings
+        model, is_new = asked.model, asked.is_new and self._run is not None
+        from_rest, self.settings = asked.take(), asked.settings
+        if is_new:
+            self._begin()
+            before = self.settings
+        events = ["load"] if before.load != self.settings.load else []
+        if before.limits != self.settings.limits:
+            events.append("limits")
+            self._compiled.limits = limits_of(self.scene, self._boom, self.settings, self.absent)
+            for line in self._lines.values():
+                line.tune(self.settings)
+        if asked.zeros != self._zeros.values:
+            events.append("zero")
+            from_rest |= self._zeros.put(stamp, asked.zeros)
+        if (from_rest or "load" in events) and self._run is not None:
+            events += [] if events else ["reset"]
+            self._begin_anew_at(stamp)
+        if "load" in events:
+            self._adopt(model or self._model(self.settings), self._compiled)
+        return events
+
+    def _begin_anew_at(self, stamp: int) -> None:
+        """Start from rest with the strokes of `stamp` (ns), though the boom may be moving; measured samples since then wait."""
+        self._begin_anew()
+        drop_waiting(self._state, NONE, stamp - 1)
+
+    def _begin_anew(self) -> None:
+        self._run = None
+        self._state.clock[NEWEST] = NONE
+        self._state.past.bounds[:] = 0
+        self._zeros.forget_past()
+        self._recent.clear()
+        self._compiled.begin_health()
+
+    def _advance_one(self, sample: Sample, trusted: bool = False) -> int:
+        """Take a sample if it is regular, or `trusted`; see `BlockUpdate.advance`."""
+        if sample.stream is not Stream.STROKES:
+            return self._compiled.measure(CODES[sample.stream], sample.stamp, sample.values, trusted)
+        one = self._one
+        one.stamps[0], one.values[0] = sample.stamp, sample.values
+        reason, _ = self._compiled.advance(self._run, one, trusted)
+        return reason
+
+    def _look_at(self, sample: Sample) -> Report:
+        """Take a sample that may be irregular. It is copied, since it may be held and the caller's arrays may change."""
+        self._compiled.make_room()
+        sample = replace(sample, values=sample.values.copy())
+        complete = self._is_complete(sample)
+        if not complete:
+            usable = np.abs(sample.values) <= LIMIT
+            if not usable.any():
+                return self._refuse(sample, "empty")
+            sample = replace(sample, values=np.where(usable, sample.values, np.nan))
+        if sample.stream is Stream.STROKES:
+            return self._take_strokes(sample, complete)
+        return self._take_measured(sample, complete)
+
+    def _take_strokes(self, sample: Sample, complete: bool) -> Report:
+        line, run, values = self._lines[Stream.STROKES], self._run, self._zeroed(sample)
+        if run is None:
+            return self._follow(sample, values, complete, [])
+        if line.is_next(sample.stamp) and sample.stamp - run.newest >= SHORTEST_STEP:
+            if run.plausible.is_of_others(sample.stamp - run.epoch, values, self._boom.estimate, self.settings):
+                return self._refuse(sample, "implausible")
+            return self._follow(sample, values, complete, [])
+        verdict = verdict_on(sample, line, run, self._boom, self._compiled.limits, self.settings, self._zeroed)
+        if verdict.action is Action.FOLLOW:
+            return self._follow(sample, values, complete, [])
+        if verdict.action is Action.STEP:
+            return self._step_in_time(run, line, verdict.why)
+        return (self._refuse if verdict.action is Action.REFUSE else self._hold)(sample, verdict.event)
+
+    def _step_in_time(self, run: Run, line: StampCheck, why: TimeStep) -> Report:
+        """Follow the samples that were held, now that the newest confirms them."""
+        held, usual = self._released(line), round(line.usual)
+        span = held[0].stamp - run.newest
+        events = ["gap"] if span * NANO > self.settings.gap else []
+        if why is TimeStep.CLOCK:
+            events = ["clock set"]
+            self._rebase(run, span - usual)
+        elif why is TimeStep.NEITHER:
+            events = ["restart" if span > 0 else "jump back"]
+            self._restart()
+        elif events and why is TimeStep.EITHER:
+            self._boom.add_phase(self._boom.prediction(run.newest))
+        reports, asked = [], self._judged
+        for sample in held:
+            complete, self._judged = self._is_complete(sample), asked or sample is not held[-1]
+            reports.append(self._follow(sample, self._zeroed(sample), complete, events))
+            events = []
+        return replace(reports[-1], earlier=tuple(reports[:-1]))
+
+    def _released(self, line: StampCheck) -> list[Sample]:
+        """Return the held samples; events counted for those before the newest are uncounted."""
+        held = line.release()
+        self.counts.subtract(event for _, event in held[:-1])
+        for event in {event for _, event in held if not self.counts[event]}:
+            del self.counts[event]
+        return [sample for sample, _ in held]
+
+    def _rebase(self, run: Run, shift: int) -> None:
+        """Shift stamps by `shift` (ns) from now on; the model continues."""
+        before = run.newest
+        run.rebase(shift)
+        self._boom.rebase(shift)
+        for line in self._lines.values():
+            line.newest = None
+        self._zeros.forget_past()
+        self._recent.clear()
+        if shift < 0:
+            drop_waiting(self._state, before + 1, -NONE)
+        self._compiled.begin_health()
+
+    def _zeroed(self, sample: Sample) -> Array:
+        """Return strokes less their zeros."""
+        return sample.values - self._zeros.of_strokes(sample.stamp)
+
+    def _follow(self, sample: Sample, values: Array, complete: bool, events: list[str]) -> Report:
+        """Step to a stroke sample, whose `values` are without the sensors' zeros; start the model if it has not started."""
+        if not complete:
+            events.append("partial")
+        asked = complete and self.requests.due
+        if asked:
+            events += self._take_over(sample.stamp)
+            values = self._zeroed(sample)
+        told = asked or "clock set" in events
+        limits = self._compiled.limits
+        if ((values < limits.shortest) | (values > limits.longest)).any():
+            events.append("out of range")
+        sample = replace(sample, values=values)
+        if self._run is not None:
+            report, from_rest = self._step(self._run, sample, events), False
+        elif complete and (self._failed is None or asked or abs(sample.stamp - self._failed) >= SECOND):
+            report, from_rest = self._start(sample, events), True
+        else:
+            return self._refuse(sample, "waiting", *events)
+        if told or (from_rest and report.accepted):
+            is_new = from_rest and self._is_new
+            if from_rest and report.accepted:
+                self._is_new = False
+            return replace(report, change=Change(sample.stamp, from_rest, self.settings.live, self._zeros.values, is_new))
+        return report
+
+    def _start(self, sample: Sample, events: list[str]) -> Report:
+        try:
+            self._boom.start(sample.values, not self._is_new)
+        except BoomTwinError as error:
+            self._failed = sample.stamp if isinstance(error, SolverError) else self._failed
+            return self._refuse(sample, "model", *events, status=str(error))
+        self._run = Run(self._state, sample.stamp, not self._is_new)
+        return self._step(self._run, sample, events)
+
+    def _step(self, run: Run, sample: Sample, events: list[str]) -> Report:
+        """Step the model to checked strokes, their values less the sensors' zeros."""
+        self._lines[Stream.STROKES].take(sample.stamp)
+        estimate = self._boom.estimate if run.is_predicted else None
+        before, rates, check = self._state.strokes, self._boom.speeds, run.plausible
+        taken, oddities = check.of(sample.stamp - run.epoch, sample.values, before, estimate, rates, self.settings)
+        if check.must_restart and np.isfinite(sample.values).all():
+            self._begin_anew_at(sample.stamp)
+            return self._follow(sample, sample.values, True, [*events, "stroke elsewhere"])
+        run.is_predicted = True
+        events += oddities
+        self._state.strokes[:], self._state.taken[:] = sample.values, taken
+        if self._advance_one(sample, trusted=True) == FAILED:
+            return self._fail(sample, events)
+        self.counts.update(events)
+        return self._compiled.report(sample.stamp, events, self._judged)
+
+    def _fail(self, sample: Sample, events: list[str]) -> Report:
+        """Return the report of a stroke sample at which the model failed; reset the model."""
+        self._restart()
+        self._failed = sample.stamp
+        return self._refuse(sample, "model", *events, status=SENTENCES[int(self._state.clock[STATUS])])
+
+    # -- measured angles and accelerations ----------------------------------------------------------------------------
+
+    def _take_measured(self, sample: Sample, complete: bool) -> Report:
+        line = self._lines[sample.stream]
+        longest = line.longest if line.usual else self.settings.leap / NANO
+        if line.newest is None or 0 < sample.stamp - line.newest <= longest:
+            return self._compare(sample, complete)
+        span = (sample.stamp - line.newest) * NANO
+        if -self.settings.jump_back <= span <= 0.0:
+            return self._refuse(sample, "duplicate" if span == 0.0 else "late")
+        event = line.hold(sample, "leap")
+        if not line.is_confirmed():
+            return self._hold(sample, event)
+        held = self._released(line)
+        gone = drop_waiting(self._state, held[0].stamp, -NONE, CODES[sample.stream])  # their time comes again: a looped bag
+        self._state.clock[UNMATCHED] += gone
+        reports = [self._compare(each, self._is_complete(each)) for each in held]
+        return replace(reports[-1], earlier=tuple(reports[:-1]))
+
+    def _compare(self, sample: Sample, complete: bool) -> Report:
+        """Take a measured sample and return its report; its residuals come now or once its strokes have come."""
+        self._lines[sample.stream].take(sample.stamp)
+        events: tuple[str, ...] = ()
+        if not complete:
+            events = ("partial",)
+            self.counts.update(events)
+        if self._advance_one(sample, trusted=True) != DONE:
+            return self._refuse(sample, "unmatched", *events)
+        return self._compiled.report(sample.stamp, events)
+
+    def _hold(self, sample: Sample, event: str) -> Report:
+        """Count an event and return the report of a held sample; its values are not used for now."""
+        self.counts[event] += 1
+        return Report(sample.stamp, True, events=(event,))
+
+    def _refuse(self, sample: Sample, *events: str, status: str = "ok") -> Report:
+        self.counts.update(events)
+        return Report(sample.stamp, False, events=events, status=status)
+
+    def _is_complete(self, sample: Sample) -> bool:
+        """Return True if no sensor's reading is missing, not finite or absurd."""
+        return bool((np.abs(sample.values) <= LIMIT)[self._there[sample.stream]].all())
