@@ -40,8 +40,9 @@ export class SpectrumTab {
   rebuild() { this.chart?.close(); this.chart = null; this.isNew = true; }
 
   draw(tab) {
-    if (!this.isNew || !this.density) return;
+    if (!this.isNew) return;
     this.isNew = false;
+    if (!this.density) return;
     if (tab === "spectrogram") return this.drawSpectrogram();
     this.chart ??= new Chart(document.getElementById("density"), {
       title: `density, ${this.lines.source}, (m/s²)²/Hz`,
