@@ -14,10 +14,9 @@ from .access_control import POLICY, AccessControl
 from .actions import ViewerActions
 from .connections import Connection
 from .data.analyst import Analyst
-from .data.feed import Feed
-from .data.session_list import SessionList
+from .data.feed import Feed, SessionList
 from .data.tip_response import ResponseCompiler
-from .viewer import SessionChoice, Viewer
+from .viewer import Viewer
 
 PAGE = Path(__file__).parent / "page"
 MAX_VIEWERS = 16
@@ -78,8 +77,7 @@ class Server:
             await socket.prepare(request)
             if isinstance(request.protocol, Connection):
                 request.protocol.become_viewer()
-            choice = None if self._sessions is None else SessionChoice(self._sessions, self._choose)
-            await Viewer(socket, self._feed, self._actions, self._analyst, choice).serve()
+            await Viewer(socket, self._feed, self._actions, self._analyst, self._sessions, self._choose).serve()
         finally:
             self._viewers.discard(socket)
         return socket

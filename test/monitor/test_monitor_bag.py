@@ -26,7 +26,7 @@ from boom_twin.errors import BagError, UsageError
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.monitor.data.analyst import Analyst
-from boom_twin.monitor.data.bag_feed import ENOUGH, bag_feed
+from boom_twin.monitor.data.bag_feed import PUBLISHED_OUTPUT, bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
 from boom_twin.monitor.data.status import Severity, overall
 from boom_twin.monitor.data.tip_response import ResponseCompiler, ResponseList
@@ -189,7 +189,7 @@ def test_a_session_without_anything_to_show_is_refused(faulty: Path, tmp_path: P
 
 def test_a_malformed_message_of_a_session_is_dropped_and_told(tmp_path: Path) -> None:
     """A result bag of a few rows; one of its joint_states has no effort."""
-    displacement, states = (load_topics().outputs[role] for role in (ENOUGH, Output.JOINT_STATES))
+    displacement, states = (load_topics().outputs[role] for role in (PUBLISHED_OUTPUT, Output.JOINT_STATES))
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         kinds = (displacement, states)
         links = {topic: writer.add_connection(topic.absolute, topic.type, typestore=jazzy()) for topic in kinds}

@@ -18,7 +18,7 @@ import pytest
 from boom_twin.messages.report_encoder import encode_health
 from boom_twin.messages.topic_table import TYPES, Output, Topic, load_topics
 from boom_twin.messages.type_store import jazzy, new_message
-from boom_twin.monitor import log_limit as log
+from boom_twin.monitor import connections as log
 from boom_twin.monitor.data.analyst import Analyst
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.received_messages import LONGEST_REASON
@@ -336,12 +336,13 @@ def test_what_was_dropped_is_logged_at_a_limited_rate(capfd: Any, monkeypatch: p
         bench = Bench()
         for _ in range(1000):
             bench.send(Output.RESIDUALS, joint_state(["\x1b[2J"]), EPOCH)
-        clock[0] = log.PERIOD
+        clock[0] = log.LOG_PERIOD
         bench.send(Output.RESIDUALS, joint_state(["\x1b[2J"]), EPOCH)
     finally:
         logging.getLogger().handlers[:] = handlers
     lines = capfd.readouterr().err.splitlines()
-    assert len(lines) == log.MAX_RECORDS + 1 and f"({1000 - log.MAX_RECORDS} lines before this were left out)" in lines[-1]
+    most = log.MAX_LOG_LINES
+    assert len(lines) == most + 1 and f"({1000 - most} lines before this were left out)" in lines[-1]
     assert "dropped message 1001 of /boom_twin/residuals" in lines[-1] and "\x1b" not in "".join(lines)
 
 
@@ -349,4 +350,4 @@ def test_parts_that_wait_for_others_are_bounded() -> None:
     parts = PartsOfRows(("measured", "residual"))
     for stamp in range(0, 6000, 2):
         assert parts.put("measured", stamp, [1.0]) is None and parts.put("residual", stamp + 1, [0.1]) is None
-    assert len(parts) == MAX_WAITING + 1 and parts.put("residual", 5998, [0.2]) == [[1.0], [0.2]]
+    assert len(parts.waiting) == MAX_WAITING + 1 and parts.put("residual", 5998, [0.2]) == [[1.0], [0.2]]

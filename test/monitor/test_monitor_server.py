@@ -24,8 +24,7 @@ from boom_twin.monitor.access_control import AccessControl
 from boom_twin.monitor.actions import ViewerActions
 from boom_twin.monitor.data.analyst import PREDICTION, SIGNALS
 from boom_twin.monitor.data.bag_feed import BagFeed
-from boom_twin.monitor.data.feed import Feed
-from boom_twin.monitor.data.session_list import SessionList, sessions_in
+from boom_twin.monitor.data.feed import Feed, SessionList, sessions_in
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.server import MAX_VIEWERS, Server
 from boom_twin.scene import load_scene

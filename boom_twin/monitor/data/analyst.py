@@ -13,7 +13,7 @@ from ...analysis.posture_modes import MOVED, ModeList
 from ...deviation.load_spectrum import tip_load
 from ..protocol import RESPONSE, SPECTROGRAM, SPECTRUM, pack
 from .feed import Feed
-from .spectrum import SEGMENT, STEP, WINDOW, Peak, spectrogram, spectrum
+from .spectrum import COLUMN_STEP, SEGMENT, SPECTRUM_SPAN, Peak, spectrogram, spectrum
 from .tip_response import ResponseCompiler, ResponseList, TipResponses
 from .topic_rows import ESTIMATE
 
@@ -44,7 +44,7 @@ MODE_DISTANCE = 0.2
 
 
 class Analyst:
-    """Analysis of one feed, one computation of a kind at a time, because the model's workspace is one."""
+    """Analysis of one feed, one computation of a kind at a time, because the model has one workspace."""
 
     def __init__(self, feed: Feed, compiler: ResponseCompiler) -> None:
         self._feed, self._compiler = feed, compiler
@@ -66,7 +66,7 @@ class Analyst:
             key = (store.generation, end)
             if self._known is not None and self._known[0] == key:
                 return self._known[1]
-            times, values = table.rows(table.until(time - WINDOW), end)
+            times, values = table.rows(table.until(time - SPECTRUM_SPAN), end)
             found = await asyncio.to_thread(spectrum, times, values[:, signal.columns].astype(float))
             if found is None:
                 return None
@@ -82,7 +82,7 @@ class Analyst:
     async def response_at(self, time: float) -> TipResponses:
         """Return the tip's response to loads in the posture at `time` (s); the same object while the boom has not moved.
 
-        It has a boom of its own, so that no spectrum waits for it: the first on a computer compiles for half a minute.
+        It has a model of its own, so that no spectrum waits for the first one, which compiles for half a minute.
         """
         async with self._response_turn:
             scene, strokes = self._feed.scene(), self._feed.strokes(time)
@@ -100,17 +100,17 @@ class Analyst:
         table = self._feed.store.tables.get(ESTIMATE)
         if table is None:
             return None
-        times, values = table.rows(table.until(time - WINDOW), table.until(time))
+        times, values = table.rows(table.until(time - SPECTRUM_SPAN), table.until(time))
         found = await asyncio.to_thread(tip_load, times, values[:, -2:].astype(float))
         return None if found is None else {"kind": "load", "words": f"load at the tip: {found.text}"}
 
     async def spectrogram_between(self, after: float, until: float) -> tuple[float, bytes] | None:
         """Return time (s) of the newest column of the spectrogram between two times, and the block of all its columns."""
-        signal = self._signal(until := STEP * floor(until / STEP))
+        signal = self._signal(until := COLUMN_STEP * floor(until / COLUMN_STEP))
         table = self._feed.store.tables.get(signal.table)
         if table is None:
             return None
-        ends = STEP * np.unique(np.ceil(table.rows(table.until(after), table.until(until))[0] / STEP))
+        ends = COLUMN_STEP * np.unique(np.ceil(table.rows(table.until(after), table.until(until))[0] / COLUMN_STEP))
         ends = ends[(ends > max(after, SEGMENT)) & (ends <= until)]  # none in a pause, which may last for days
         if not len(ends):
             return None
@@ -130,7 +130,7 @@ class Analyst:
 
     def _moved(self, time: float) -> float:
         """Return the largest motion (m) of a cylinder within the window before `time` (s)."""
-        strokes = self._feed.strokes_between(time - WINDOW, time)
+        strokes = self._feed.strokes_between(time - SPECTRUM_SPAN, time)
         return float(np.ptp(strokes, axis=0).max()) if len(strokes) else 0.0
 
     def _placed(self, peak: Peak, natural: list[float], time: float, has_moved: bool) -> dict[str, Any]:

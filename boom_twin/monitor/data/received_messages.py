@@ -34,7 +34,7 @@ class TopicLoss:
 
 
 class DroppedMessages:
-    """Counter of dropped messages; each is logged, see `boom_twin.monitor.log_limit` for the rate of these lines."""
+    """Counter of dropped messages; each is logged, at the rate of `boom_twin.monitor.connections.LogRateLimit`."""
 
     def __init__(self) -> None:
         self.by_topic: dict[str, TopicLoss] = {}
