@@ -165,8 +165,6 @@ class Viewer:
                 lines, block = found
                 await self._send_text(lines)
                 await self._socket.send_bytes(block)
-            if (load := await self._analyst.load_at(position)) is not None:
-                await self._send_text(load)
             await self._send_spectrogram(position)
             await asyncio.sleep(SPECTRUM_PERIOD)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import shutil
 from pathlib import Path
@@ -21,16 +20,14 @@ from boom_twin.bag.session_files import write_session
 from boom_twin.bag.session_sheet import SessionSheet
 from boom_twin.bag.time_window import TimeWindow
 from boom_twin.config.settings import Settings
-from boom_twin.deviation.load_spectrum import tip_load
 from boom_twin.errors import BagError, UsageError
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.messages.type_store import jazzy, new_message
-from boom_twin.monitor.data.analyst import Analyst
 from boom_twin.monitor.data.bag_feed import PUBLISHED_OUTPUT, bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
 from boom_twin.monitor.data.status import Severity, overall
-from boom_twin.monitor.data.tip_response import ResponseCompiler, ResponseList
-from boom_twin.monitor.protocol import dump, state
+from boom_twin.monitor.data.tip_response import ResponseList
+from boom_twin.monitor.protocol import state
 from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
@@ -77,13 +74,9 @@ def test_rows_are_those_of_the_replay(feed: Feed, replayed: Path) -> None:
         for p, d, e, a, f in zip(position, *(messages(replayed, role) for role in roles), strict=True)
         if f.wrench.force.x or f.wrench.force.z
     ]
-    times, values = tables["estimate"].rows(0, ALL)
+    values = tables["estimate"].rows(0, ALL)[1]
     assert len(values) == len(expected) > 0.99 * len(position)
     assert values == pytest.approx(np.array(expected), rel=1e-5, abs=1e-6)
-    found = asyncio.run(Analyst(feed, ResponseCompiler()).load_at(14.0))
-    before = tip_load(times[times <= 14.0], values[times <= 14.0, -2:].astype(float))
-    assert before is not None and found == {"kind": "load", "words": f"load at the tip: {before.text}"}
-    assert json.loads(dump(found)) == found
 
 
 def test_without_an_estimate_there_is_no_table_of_it(tmp_path: Path) -> None:
@@ -94,7 +87,6 @@ def test_without_an_estimate_there_is_no_table_of_it(tmp_path: Path) -> None:
     note_drives(tmp_path / "strokes")
     feed = read_all(bag_feed(tmp_path / "strokes", load_scene(), Settings()))
     assert feed.store.tables["displacement"].count == 100 and "estimate" not in feed.store.tables
-    assert asyncio.run(Analyst(feed, ResponseCompiler()).load_at(0.5)) is None
 
 
 @pytest.mark.slow

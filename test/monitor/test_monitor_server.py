@@ -6,6 +6,7 @@ import asyncio
 import json
 import struct
 from collections.abc import Awaitable, Callable, Iterator
+from functools import partial
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -64,6 +65,23 @@ def serve(feed: Feed, talk: Talk, permitted: tuple[str, ...] = (), access: Acces
     asyncio.run(_serve(Server(feed, ViewerActions(feed, frozenset(permitted)), access or AccessControl("127.0.0.1")), talk))
 
 
+Story = Callable[[Made, ClientSession, str], Awaitable[None]]
+
+
+def served(permitted: tuple[str, ...] = (), end: float | None = None) -> Callable[[Story], Callable[[], None]]:
+    """Make a test of a story that is given a feed, a session and the address of the feed's server."""
+
+    def test_of(story: Story) -> Callable[[], None]:
+        def test() -> None:
+            feed = Made(end)
+            serve(feed, partial(story, feed), permitted)
+
+        test.__doc__ = story.__doc__
+        return test
+
+    return test_of
+
+
 async def _serve(server: Server, talk: Talk) -> None:
     async with TestServer(server.application()) as served, ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
         await asyncio.wait_for(talk(session, str(served.make_url("/"))), 60.0)
@@ -96,135 +114,121 @@ async def until(socket: ClientWebSocketResponse, kind: str, accept: Callable[[An
             return found
 
 
-def test_a_viewer_gets_layout_state_history_and_what_comes() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            assert (await until(socket, "hello"))["end"] is None
-            layout = await until(socket, "layout")
-            assert layout["tables"] == [{"name": "acceleration", "columns": ["x_m_s2", "z_m_s2"]}]
-            assert (await until(socket, "state"))["level"] == "OK"
-            assert (await until(socket, "rows"))["head"] == (1, 0, 2, 2000)
-            feed.rows(10)
-            rows = await until(socket, "rows")
-            assert rows["head"][3] == 10 and rows["times"][0] == pytest.approx(10.0)
-
-    feed = Made()
-    serve(feed, talk)
-
-
-def test_a_response_comes_once_as_long_as_the_posture_is_the_same() -> None:
-    """And before it why there is none, until the strokes are known."""
-
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            assert await until(socket, "loads") == {"kind": "loads", "names": [], "trouble": "the strokes are not known yet"}
-            strokes = strokes_of_posture(load_scene(), "arch")
-            feed.store.append("shape", [f"stroke_{i + 1}" for i in range(4)], 10**18 + 10**10, strokes)
-            loads = await until(socket, "loads")
-            assert loads["trouble"] == "" and loads["names"][1:] == [f"1 mm of cylinder {i}" for i in range(1, 5)]
-            assert (await until(socket, "response"))["head"] == (4, 0, 5, 400)
-            feed.store.append("shape", [f"stroke_{i + 1}" for i in range(4)], 10**18 + 2 * 10**10, strokes + 0.05)
-            assert (await until(socket, "response"))["head"] == (4, 0, 5, 400)
-
-    feed = Made()
-    serve(feed, talk)
+@served()
+async def test_a_viewer_gets_layout_state_history_and_what_comes(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as socket:
+        assert (await until(socket, "hello"))["end"] is None
+        layout = await until(socket, "layout")
+        assert layout["tables"] == [{"name": "acceleration", "columns": ["x_m_s2", "z_m_s2"]}]
+        assert (await until(socket, "state"))["level"] == "OK"
+        assert (await until(socket, "rows"))["head"] == (1, 0, 2, 2000)
+        feed.rows(10)
+        rows = await until(socket, "rows")
+        assert rows["head"][3] == 10 and rows["times"][0] == pytest.approx(10.0)
+        feed.store.clear()  # time was set back
+        feed.rows(5)
+        await until(socket, "reset")
+        assert (await until(socket, "rows"))["head"][3] == 5
 
 
-def test_the_spectrogram_since_before_the_page_was_opened_comes_once_and_then_what_is_new() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            past = await until(socket, "past")
-            assert past["times"].tolist() == [10.0] and SIGNALS[past["head"][1]] is PREDICTION  # there is no IMU
-            feed.rows(900)
-            assert (await until(socket, "past"))["times"].tolist() == [12.0, 14.0]
-            feed.store.clear()
-            feed.rows(2500)
-            assert (await until(socket, "past"))["times"].tolist() == [10.0, 12.0]
+@served()
+async def test_a_response_comes_once_as_long_as_the_posture_is_the_same(feed: Made, session: ClientSession, url: str) -> None:
+    """Before it comes why there is none, until the strokes are known."""
+    async with connect(session, url) as socket:
+        assert await until(socket, "loads") == {"kind": "loads", "names": [], "trouble": "the strokes are not known yet"}
+        strokes = strokes_of_posture(load_scene(), "arch")
+        feed.store.append("shape", [f"stroke_{i + 1}" for i in range(4)], 10**18 + 10**10, strokes)
+        loads = await until(socket, "loads")
+        assert loads["trouble"] == "" and loads["names"][1:] == [f"1 mm of cylinder {i}" for i in range(1, 5)]
+        assert (await until(socket, "response"))["head"] == (4, 0, 5, 400)
+        feed.store.append("shape", [f"stroke_{i + 1}" for i in range(4)], 10**18 + 2 * 10**10, strokes + 0.05)
+        assert (await until(socket, "response"))["head"] == (4, 0, 5, 400)
 
-    feed = Made()
+
+@served()
+async def test_the_spectrogram_comes_from_before_the_page_was_opened_and_then_once(
+    feed: Made, session: ClientSession, url: str
+) -> None:
     feed.rows(100)
-    serve(feed, talk)
+    async with connect(session, url) as socket:
+        past = await until(socket, "past")
+        assert past["times"].tolist() == [10.0] and SIGNALS[past["head"][1]] is PREDICTION  # there is no IMU
+        feed.rows(900)
+        assert (await until(socket, "past"))["times"].tolist() == [12.0, 14.0]
+        feed.store.clear()
+        feed.rows(2500)
+        assert (await until(socket, "past"))["times"].tolist() == [10.0, 12.0]
 
 
-def test_one_that_does_not_read_loses_rows_but_never_a_lamp() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            await until(socket, "rows")
-            transport = socket._response.connection.transport  # type: ignore[union-attr]
-            transport.pause_reading()
-            for _ in range(50):
-                feed.rows(2000)
-                await asyncio.sleep(0.01)
-            feed.tell(ERROR)
-            feed.rows(15_000)
-            await asyncio.sleep(0.3)
-            transport.resume_reading()
-            assert (await until(socket, "alarms", lambda found: found["alarms"]))["alarms"][0]["level"] == "ERROR"
-            assert (await until(socket, "state", lambda state: state["level"] == "ERROR"))["time"] == feed.store.newest
-            feed.rows(1)
-            rows = await until(socket, "rows", lambda rows: rows["times"][-1] == feed.store.newest)
-            assert rows["head"][3] < 2000
-
-    feed = Made()
-    serve(feed, talk)
+@served()
+async def test_one_that_does_not_read_loses_rows_but_never_a_lamp(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as socket:
+        await until(socket, "rows")
+        transport = socket._response.connection.transport  # type: ignore[union-attr]
+        transport.pause_reading()
+        for _ in range(50):
+            feed.rows(2000)
+            await asyncio.sleep(0.01)
+        feed.tell(ERROR)
+        feed.rows(15_000)
+        await asyncio.sleep(0.3)
+        transport.resume_reading()
+        assert (await until(socket, "alarms", lambda found: found["alarms"]))["alarms"][0]["level"] == "ERROR"
+        assert (await until(socket, "state", lambda state: state["level"] == "ERROR"))["time"] == feed.store.newest
+        feed.rows(1)
+        rows = await until(socket, "rows", lambda rows: rows["times"][-1] == feed.store.newest)
+        assert rows["head"][3] < 2000
 
 
-REQUESTS = ['{"do": "format"}', '{"do": "seek", "value": 1}', '{"do": "acknowledge"}']
+GARBAGE = ("", "{", "[]", "null", "x" * 5000, b"\0", "[" * 4000)
+REQUESTS = ('{"do": "format"}', '{"do": "seek", "value": 1}', '{"do": "acknowledge"}')
 
 
-@pytest.mark.parametrize("garbage", ["", "{", "[]", "null", *REQUESTS, "x" * 5000, b"\0", "[" * 4000])
-def test_garbage_is_shown_out_and_the_others_stay(garbage: str | bytes) -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as good, connect(session, url) as bad:
-            await (bad.send_bytes(garbage) if isinstance(garbage, bytes) else bad.send_str(garbage))
-            assert await closed(bad) in (1008, 1009)
+@served(permitted=("acknowledge",))
+async def test_garbage_is_shown_out_and_the_others_stay(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as good:
+        for garbage in (*GARBAGE, *REQUESTS):
+            async with connect(session, url) as bad:
+                await (bad.send_bytes(garbage) if isinstance(garbage, bytes) else bad.send_str(garbage))
+                assert await closed(bad) in (1008, 1009), garbage
             await until(good, "state")
 
-    serve(Made(), talk, permitted=("acknowledge",))
+
+@served(permitted=("mark",))
+async def test_a_flood_of_requests_is_shown_out(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as socket:
+        for _ in range(200):
+            await socket.send_str('{"do": "mark", "note": "x"}')
+        assert await closed(socket) == 1008 and len(feed.published) <= 50
 
 
-def test_a_flood_of_requests_is_shown_out() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            for _ in range(200):
-                await socket.send_str('{"do": "mark", "note": "x"}')
-            assert await closed(socket) == 1008 and len(feed.published) <= 50
-
-    feed = Made()
-    serve(feed, talk, permitted=("mark",))
-
-
-def test_a_thousand_connections_leave_room_for_nobody_more_and_harm_nobody() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as good:
-            opened = await asyncio.gather(*(connect(session, url) for _ in range(1000)), return_exceptions=True)
-            sockets = [each for each in opened if isinstance(each, ClientWebSocketResponse)]
-            refused = [each for each in opened if isinstance(each, WSServerHandshakeError)]
-            assert len(sockets) == MAX_VIEWERS - 1 and {each.status for each in refused} == {503}
-            await until(good, "state")
-            await asyncio.gather(*(each.close() for each in sockets))
-            async with connect(session, url) as another:
-                await until(another, "state")
-
-    serve(Made(), talk)
+@served()
+async def test_a_thousand_connections_harm_nobody(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as good:
+        opened = await asyncio.gather(*(connect(session, url) for _ in range(1000)), return_exceptions=True)
+        sockets = [each for each in opened if isinstance(each, ClientWebSocketResponse)]
+        refused = [each for each in opened if isinstance(each, WSServerHandshakeError)]
+        assert len(sockets) == MAX_VIEWERS - 1 and {each.status for each in refused} == {503}
+        await until(good, "state")
+        await asyncio.gather(*(each.close() for each in sockets))
+        async with connect(session, url) as another:
+            await until(another, "state")
 
 
-def test_only_a_page_of_this_server_connects_by_a_name_of_this_machine_and_only_the_page_is_served() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        for origin in ("http://evil.example", "null", "", "http://127.0.0.1"):
-            with pytest.raises(WSServerHandshakeError) as caught:
-                await connect(session, url, headers={"Origin": origin})
-            assert caught.value.status == 403
-        for host, expected in (("evil.example:80", 403), ("localhost:80", 200), ("[::1]:80", 200)):
-            async with session.get(url, headers={"Host": host}) as response:
-                assert response.status == expected, host
-        response = await session.get(url)
-        assert "default-src 'self'" in response.headers["Content-Security-Policy"] and "http" not in await response.text()
-        for path in ("page/../server.py", "page/%2e%2e/server.py", "server.py", "page/"):
-            assert (await session.get(url + path)).status in (403, 404), path
-        assert (await session.post(url)).status == 405
-
-    serve(Made(), talk)
+@served()
+async def test_only_a_page_of_this_server_connects_and_only_it_is_served(feed: Made, session: ClientSession, url: str) -> None:
+    for origin in ("http://evil.example", "null", "", "http://127.0.0.1"):
+        with pytest.raises(WSServerHandshakeError) as caught:
+            await connect(session, url, headers={"Origin": origin})
+        assert caught.value.status == 403
+    for host, expected in (("evil.example:80", 403), ("localhost:80", 200), ("[::1]:80", 200)):
+        async with session.get(url, headers={"Host": host}) as response:
+            assert response.status == expected, host
+    response = await session.get(url)
+    assert "default-src 'self'" in response.headers["Content-Security-Policy"] and "http" not in await response.text()
+    for path in ("page/../server.py", "page/%2e%2e/server.py", "server.py", "page/"):
+        assert (await session.get(url + path)).status in (403, 404), path
+    assert (await session.post(url)).status == 405
 
 
 def test_elsewhere_than_on_loopback_a_token_is_needed_that_leads_to_the_page_and_nowhere_else() -> None:
@@ -259,63 +263,42 @@ async def ask(url: str, path: str, header: str = "X: y") -> str:
     return answer.partition(b"\r\n\r\n")[0].decode("latin-1") + "\r\n"
 
 
-def test_nothing_is_done_that_was_not_permitted() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            assert (await until(socket, "hello"))["permitted"] == []
-            for request in ({"do": "mark", "note": "x"}, {"do": "record", "on": True}, {"do": "acknowledge", "number": 1}):
-                await socket.send_json(request)
-                assert not (await until(socket, "answer"))["done"]
-        assert feed.published == []
-
-    feed = Made()
-    serve(feed, talk)
+@served()
+async def test_nothing_is_done_that_was_not_permitted(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as socket:
+        assert (await until(socket, "hello"))["permitted"] == []
+        for request in ({"do": "mark", "note": "x"}, {"do": "record", "on": True}, {"do": "acknowledge", "number": 1}):
+            await socket.send_json(request)
+            assert not (await until(socket, "answer"))["done"]
+    assert feed.published == []
 
 
-def test_a_mark_and_an_acknowledgement_are_published() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        feed.tell(ERROR)
-        async with connect(session, url) as socket:
-            number = (await until(socket, "alarms", lambda found: found["alarms"]))["alarms"][0]["number"]
-            await socket.send_json({"do": "mark", "note": "hose moved"})
-            assert (await until(socket, "answer"))["done"]
-            await socket.send_json({"do": "acknowledge", "number": number})
-            assert await until(socket, "alarms", lambda found: found["alarms"][0]["is_acknowledged"])
-        assert feed.published == ["mark: hose moved", "acknowledged: sensor joint_1: frozen"]
-
-    feed = Made()
-    serve(feed, talk, permitted=("mark", "acknowledge"))
+@served(permitted=("mark", "acknowledge"))
+async def test_a_mark_and_an_acknowledgement_are_published(feed: Made, session: ClientSession, url: str) -> None:
+    feed.tell(ERROR)
+    async with connect(session, url) as socket:
+        number = (await until(socket, "alarms", lambda found: found["alarms"]))["alarms"][0]["number"]
+        await socket.send_json({"do": "mark", "note": "hose moved"})
+        assert (await until(socket, "answer"))["done"]
+        await socket.send_json({"do": "acknowledge", "number": number})
+        assert await until(socket, "alarms", lambda found: found["alarms"][0]["is_acknowledged"])
+    assert feed.published == ["mark: hose moved", "acknowledged: sensor joint_1: frozen"]
 
 
-def test_a_recorded_session_is_steered_by_each_viewer_alone() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as one, connect(session, url) as other:
-            await one.send_json({"do": "hold", "value": 1})
-            await one.send_json({"do": "seek", "value": 5.0})
-            state = await until(one, "state", lambda state: state["position"] == 5.0)
-            assert state["is_held"]
-            assert (await until(other, "state", lambda state: state["position"] > 0.4))["position"] < 4.0
-            await one.send_json({"do": "seek", "value": 2.0})
-            await until(one, "reset")
-            rows = await until(one, "rows")
-            assert rows["times"][-1] == pytest.approx(2.0)
-            await other.send_json({"do": "speed", "value": 10.0})
-            assert (await until(other, "state", lambda state: state["position"] == 9.0))["is_held"]
-
-    serve(Made(end=9.0), talk)
-
-
-def test_when_time_is_set_back_the_page_begins_anew() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            await until(socket, "rows")
-            feed.store.clear()
-            feed.rows(5)
-            await until(socket, "reset")
-            assert (await until(socket, "rows"))["head"][3] == 5
-
-    feed = Made()
-    serve(feed, talk)
+@served(end=9.0)
+async def test_a_recorded_session_is_steered_by_each_viewer_alone(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as one, connect(session, url) as other:
+        await one.send_json({"do": "hold", "value": 1})
+        await one.send_json({"do": "seek", "value": 5.0})
+        state = await until(one, "state", lambda state: state["position"] == 5.0)
+        assert state["is_held"]
+        assert (await until(other, "state", lambda state: state["position"] > 0.4))["position"] < 4.0
+        await one.send_json({"do": "seek", "value": 2.0})
+        await until(one, "reset")
+        rows = await until(one, "rows")
+        assert rows["times"][-1] == pytest.approx(2.0)
+        await other.send_json({"do": "speed", "value": 10.0})
+        assert (await until(other, "state", lambda state: state["position"] == 9.0))["is_held"]
 
 
 def shaken(feed: Made, frequency: float) -> None:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ...analysis.posture_modes import MOVED, ModeList
-from ...deviation.load_spectrum import tip_load
 from ..protocol import RESPONSE, SPECTROGRAM, SPECTRUM, pack
 from .feed import Feed
 from .spectrum import COLUMN_STEP, SEGMENT, SPECTRUM_SPAN, Peak, spectrogram, spectrum
@@ -94,15 +93,6 @@ class Analyst:
                 await self._compiler.finish()
                 self._responses = ResponseList(scene)
             return await asyncio.to_thread(self._responses.at, strokes)
-
-    async def load_at(self, time: float) -> dict[str, Any] | None:
-        """Return text message ``load`` on the load at the tip before `time` (s), in words; None without a load."""
-        table = self._feed.store.tables.get(ESTIMATE)
-        if table is None:
-            return None
-        times, values = table.rows(table.until(time - SPECTRUM_SPAN), table.until(time))
-        found = await asyncio.to_thread(tip_load, times, values[:, -2:].astype(float))
-        return None if found is None else {"kind": "load", "words": f"load at the tip: {found.text}"}
 
     async def spectrogram_between(self, after: float, until: float) -> tuple[float, bytes] | None:
         """Return time (s) of the newest column of the spectrogram between two times, and the block of all its columns."""
