@@ -16,10 +16,9 @@ from typing import Any
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from .actions import ViewerActions
-from .data.analyst import Analyst, response_messages
+from .data.analyst import Analyst, TipResponses, response_messages
 from .data.feed import Feed, Playback, SessionList
 from .data.store import Table
-from .data.tip_response import TipResponses
 from .protocol import ROWS, alarms, dump, layout, pack, state
 
 PERIOD = 1.0 / 30.0

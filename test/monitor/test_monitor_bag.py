@@ -23,10 +23,10 @@ from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError, UsageError
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.messages.type_store import jazzy, new_message
+from boom_twin.monitor.data.analyst import ResponseList
 from boom_twin.monitor.data.bag_feed import PUBLISHED_OUTPUT, bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
 from boom_twin.monitor.data.status import Severity, overall
-from boom_twin.monitor.data.tip_response import ResponseList
 from boom_twin.monitor.protocol import state
 from boom_twin.offline.replay import replay
 from boom_twin.scene import load_scene

@@ -25,7 +25,6 @@ from boom_twin.monitor.data.received_messages import LONGEST_REASON
 from boom_twin.monitor.data.spectrum import spectrogram, spectrum
 from boom_twin.monitor.data.status import MAX_NODES
 from boom_twin.monitor.data.store import Store
-from boom_twin.monitor.data.tip_response import ResponseCompiler
 from boom_twin.monitor.data.topic_rows import MAX_WAITING, PartsOfRows
 from boom_twin.monitor.protocol import dump, layout, state
 from boom_twin.types import Alarm, Health, Ranked, Stream
@@ -275,7 +274,7 @@ def test_a_burst_of_stamps_costs_no_memory(name: str) -> None:
     bench = Bench()
 
     async def look() -> None:
-        analyst = Analyst(bench.feed, ResponseCompiler())
+        analyst = Analyst(bench.feed)
         for row in range(3000):
             bench.send(Output.TIP_ACCELERATION, vector(Output.TIP_ACCELERATION, row % 7), EPOCH + BURSTS[name](row))
             if row % 500 == 499:

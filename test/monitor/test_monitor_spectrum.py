@@ -8,9 +8,8 @@ from scipy.signal import lfilter, welch
 
 from boom_twin import frequency_response
 from boom_twin.analysis.posture_modes import ModeList
+from boom_twin.monitor.data.analyst import RESPONSE_FREQUENCIES, ResponseList
 from boom_twin.monitor.data.spectrum import FREQUENCIES, SEGMENT, spectrogram, spectrum
-from boom_twin.monitor.data.tip_response import FREQUENCIES as ASKED
-from boom_twin.monitor.data.tip_response import ResponseList
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 
@@ -76,8 +75,8 @@ def test_modes_and_responses_follow_the_posture() -> None:
     natural, first = modes.at(strokes), responses.at(strokes)
     assert natural == pytest.approx([1.0618, 2.3006, 5.3833, 11.0895, 41.996, 47.265], rel=1e-3)
     assert first.loads == ("1 N at the tip, up", *(f"1 mm of cylinder {i}" for i in range(1, 5))) and not first.trouble
-    by_force = frequency_response(scene, ASKED, strokes=strokes).tip_acceleration
-    by_drive = frequency_response(scene, ASKED, strokes=strokes, drive=3).tip_acceleration
+    by_force = frequency_response(scene, RESPONSE_FREQUENCIES, strokes=strokes).tip_acceleration
+    by_drive = frequency_response(scene, RESPONSE_FREQUENCIES, strokes=strokes, drive=3).tip_acceleration
     assert first.accelerations[:, 0] == pytest.approx(np.linalg.norm(by_force, axis=1), rel=1e-9)
     assert first.accelerations[:, 3] == pytest.approx(1e-3 * np.linalg.norm(by_drive, axis=1), rel=1e-9)
     assert responses.at(strokes + 0.001) is first and modes.at(strokes + 0.001) is natural

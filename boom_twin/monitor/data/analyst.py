@@ -1,19 +1,22 @@
-"""Analysis beside the server: spectrum, and the model's natural frequencies and response, for what was just shown."""
+"""Analysis beside the server, of what is shown: spectrum, natural frequencies of the model, response of the tip to loads."""
 
 from __future__ import annotations
 
 import asyncio
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from math import floor
 from typing import Any
 
 import numpy as np
 
-from ...analysis.posture_modes import MOVED, ModeList
+from ...analysis.frequency_response import UPWARD, linearised_boom
+from ...analysis.posture_modes import MOVED, ModeList, PresentPosture
+from ...errors import BoomTwinError
+from ...scene.schema import Scene
+from ...types import Array
 from ..protocol import RESPONSE, SPECTROGRAM, SPECTRUM, pack
 from .feed import Feed
 from .spectrum import COLUMN_STEP, SEGMENT, SPECTRUM_SPAN, Peak, spectrogram, spectrum
-from .tip_response import ResponseCompiler, ResponseList, TipResponses
 from .topic_rows import ESTIMATE
 
 
@@ -34,6 +37,40 @@ SIGNALS = (
     PREDICTION,
 )
 """The best first: the prediction knows nothing of what shakes the boom."""
+RESPONSE_FREQUENCIES = np.geomspace(0.25, 30.0, 400)
+"""Frequencies of the responses, Hz."""
+MILLIMETRE = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TipResponses:
+    """Amplitude of the tip's acceleration under harmonic loads."""
+
+    loads: tuple[str, ...] = ()  # in words
+    frequencies: Array = field(default_factory=lambda: np.zeros(0))  # (k,), Hz
+    accelerations: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, loads), both directions together, m/s^2
+    trouble: str = ""  # why there are none
+
+
+class ResponseList(PresentPosture[TipResponses]):
+    """Frequency response of the tip to 1 N at the tip, and to 1 mm of every cylinder's drive."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__()
+        self._scene = scene
+
+    def _work_out(self, strokes: Array) -> TipResponses:
+        try:
+            boom = linearised_boom(self._scene, strokes)
+            drives = range(boom.plan.joints)
+            loads = [boom.load(UPWARD), *(MILLIMETRE * boom.load(drive=i) for i in drives)]
+            columns = [np.linalg.norm(boom.respond(RESPONSE_FREQUENCIES, load).tip_acceleration, axis=1) for load in loads]
+        except BoomTwinError as error:
+            return TipResponses(trouble=str(error))
+        names = ("1 N at the tip, up", *(f"1 mm of cylinder {i + 1}" for i in drives))
+        return TipResponses(names, RESPONSE_FREQUENCIES, np.column_stack(columns))
+
+
 UNKNOWN_SCENE = TipResponses(trouble="the model is not known: give --scene")
 UNKNOWN_POSTURE = TipResponses(trouble="the strokes are not known yet")
 KNOWN_SHARE = 0.9
@@ -45,8 +82,8 @@ MODE_DISTANCE = 0.2
 class Analyst:
     """Analysis of one feed, one computation of a kind at a time, because the model has one workspace."""
 
-    def __init__(self, feed: Feed, compiler: ResponseCompiler) -> None:
-        self._feed, self._compiler = feed, compiler
+    def __init__(self, feed: Feed) -> None:
+        self._feed = feed
         self._modes: ModeList | None = None
         self._responses: ResponseList | None = None
         self._turn, self._response_turn = asyncio.Lock(), asyncio.Lock()
@@ -89,9 +126,7 @@ class Analyst:
                 return UNKNOWN_SCENE
             if len(strokes) != len(scene.joints):
                 return UNKNOWN_POSTURE
-            if self._responses is None:
-                await self._compiler.finish()
-                self._responses = ResponseList(scene)
+            self._responses = self._responses or ResponseList(scene)
             return await asyncio.to_thread(self._responses.at, strokes)
 
     async def spectrogram_between(self, after: float, until: float) -> tuple[float, bytes] | None:
