@@ -9,7 +9,7 @@ import numpy as np
 
 from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Thresholds
-from ..types import Health, Report, Residuals, Sample, Stream
+from ..types import Health, Report, Sample, Stream
 from .levels import ComponentJudge, Evaluation, Level, Status
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, stress_status
 from .sensor_status import SensorSpec, sensor_status
@@ -64,7 +64,7 @@ class TwinWatch:
         self._looked = self._monotonic()
         self._judges: dict[str, ComponentJudge] = {}
         self._model, self._load = ModelWatch(self._looked), LoadWatch()
-        self._rows: dict[tuple[str, ...], tuple[Rows, Rows]] = {}  # residuals and their deviations, by channels
+        self._rows: dict[tuple[str, ...], Rows] = {}  # normalised residuals, by channels
         self._residuals: dict[str, ResidualWindow] = {}
         self._newest: Report | None = None  # that has a prediction
         self._silent: set[Stream] = set()
@@ -82,19 +82,13 @@ class TwinWatch:
         for each in report.all:
             self._model.took(each, duration if each is report else 0.0)
             for residuals in each.residuals:
-                self._keep(residuals)
+                rows = self._rows.setdefault(residuals.names, Rows(len(residuals.names)))
+                rows.append(residuals.normalised)
             if each.prediction is not None:
                 self._newest = each
             if self._load.is_due(each.stamp) and each.estimate is not None:
                 self._load.took(each.estimate)
             self.judged(each.health, 0.0)
-
-    def _keep(self, residuals: Residuals) -> None:
-        kept = self._rows.get(residuals.names)
-        if kept is None:
-            kept = self._rows[residuals.names] = Rows(len(residuals.names)), Rows(len(residuals.names))
-        kept[0].append(residuals.values)
-        kept[1].append(residuals.sigmas)
 
     def judged(self, health: Health | None, duration: float) -> None:
         """Take the result of a look at the rig's health, which took `duration` seconds; None if there is no news."""
@@ -200,8 +194,7 @@ class TwinWatch:
         rows, self._rows = self._rows, {}
         for names, kept in rows.items():
             yield
-            values, sigmas = (each.table() for each in kept)
-            for name, column in zip(names, (values / sigmas).T, strict=True):
+            for name, column in zip(names, kept.table().T, strict=True):
                 window = self._residuals.setdefault(name, ResidualWindow(self._looked))
                 window.take(column, self._monotonic())
         at = Evaluation(self.thresholds, self._monotonic(), clock)
