@@ -75,6 +75,7 @@ class Store:
         self._capacity, self._keeps_statuses = capacity, keeps_statuses
         self.generation = 0  # incremented when a clock set back deletes all rows
         self.epoch = 0  # first stamp (ns), origin of times
+        self.newest = 0.0  # newest time of all tables, s
         self.tables: dict[str, Table] = {}  # in the order of their first row
         self.alarms = AlarmList()
         self._statuses: list[tuple[float, StatusTable]] = []
@@ -84,7 +85,7 @@ class Store:
     def clear(self) -> None:
         """Delete all rows and the epoch; keep the lamps."""
         self.generation += 1
-        self.epoch = 0
+        self.epoch, self.newest = 0, 0.0
         self.tables, self._last, self._held = {}, {}, {}
 
     def time(self, stamp: int) -> float:
@@ -131,11 +132,7 @@ class Store:
         if name == EVERY_STROKE and table.count and time - table.newest > GAP:
             self.alarms.add("cylinder_strokes", Severity.WARN, f"gap of {time - table.newest:.2f} s", table.newest, time)
         table.append(time, values)
-
-    @property
-    def newest(self) -> float:
-        """Newest time of all tables, s; 0 if empty."""
-        return max((table.newest for table in self.tables.values()), default=0.0)
+        self.newest = max(self.newest, time)
 
     def set_statuses(self, time: float, statuses: StatusTable) -> None:
         """Set the lamps from `time` (s, lamps' clock) on and update the alarms."""
