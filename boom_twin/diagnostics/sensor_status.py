@@ -59,7 +59,7 @@ def sensors_of(
 def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats, age: float) -> Status:
     """Return the status of a sensor by its statistics; `age` (s): since its last reading.
 
-    A fault has the sentence of its alarm in `boom_twin.health`, with the figures of this look.
+    A fault has the words of its alarm in `boom_twin.health`, with the figures of this look.
     """
     thresholds, unit = judge.at.thresholds, sensor.unit
     if not stats.stamp and not sensor.required:
@@ -74,9 +74,9 @@ def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats
         judge.note({f"low_{unit}": sensor.low, f"high_{unit}": sensor.high})
         span = f"{sensor.low:.6g} to {sensor.high:.6g} {unit}"
         told = f"{stats.outside:.1%} of them out of {span}, newest {stats.value:.6g}"
-        judge.check("outside_share", stats.outside, share, f"{sensor.name}.sensor {TOLD['range']}: {told}")
+        judge.check("outside_share", stats.outside, share, f"{TOLD['range']}: {told}")
     period = 0.0 if isnan(stats.rate) else 1.0 / stats.rate
     needed = readings_of_frozen(sensor.sigma, sensor.resolution, thresholds.frozen_false_alarm)
     stuck, unchanged = Bounds(error=max(thresholds.frozen_after, needed * period)), stats.unchanged * period
-    judge.check("unchanged_s", unchanged, stuck, f"{sensor.name}.sensor {TOLD['stuck']}: unchanged for {unchanged:.1f} s")
+    judge.check("unchanged_s", unchanged, stuck, f"{TOLD['stuck']}: unchanged for {unchanged:.1f} s")
     return judge.finish("measuring" if stats.stamp else "waiting for a reading")

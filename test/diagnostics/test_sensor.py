@@ -68,8 +68,8 @@ def test_a_stream_gives_each_channel_its_own_and_lags_tell_how_clocks_are_apart(
 SENSOR = SensorSpec("joint_1", "rad", -4.0, 4.0, 1.0, 0.1)
 GOOD = ChannelStats(value=0.1, stamp=1, rate=200.0, gap=0.005, gaps=0, missing=0.0, outside=0.0, unchanged=1)
 OPTIONAL = SensorSpec("tip_imu_x", "m_s2", -inf, inf, 0.05, 0.0, False)
-STUCK = "joint_1.sensor repeats one reading again and again: unchanged for 2.0 s"
-RANGE = "joint_1.sensor reads out of its range: 80.0% of them out of -4 to 4 rad, newest 7"
+STUCK = "repeats one reading again and again: unchanged for 2.0 s"
+RANGE = "reads out of its range: 80.0% of them out of -4 to 4 rad, newest 7"
 
 
 @pytest.mark.parametrize(
