@@ -73,7 +73,7 @@ def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats
     if sensor.high < inf:
         judge.note({f"low_{unit}": sensor.low, f"high_{unit}": sensor.high})
         span = f"{sensor.low:.6g} to {sensor.high:.6g} {unit}"
-        told = f"{stats.outside:.1%} of them out of {span}, newest {stats.value:.6g}"
+        told = f"{stats.outside:.1%} of the readings out of {span}, newest {stats.value:.6g}"
         judge.check("outside_share", stats.outside, share, f"{TOLD['range']}: {told}")
     period = 0.0 if isnan(stats.rate) else 1.0 / stats.rate
     needed = readings_of_frozen(sensor.sigma, sensor.resolution, thresholds.frozen_false_alarm)

@@ -69,7 +69,7 @@ SENSOR = SensorSpec("joint_1", "rad", -4.0, 4.0, 1.0, 0.1)
 GOOD = ChannelStats(value=0.1, stamp=1, rate=200.0, gap=0.005, gaps=0, missing=0.0, outside=0.0, unchanged=1)
 OPTIONAL = SensorSpec("tip_imu_x", "m_s2", -inf, inf, 0.05, 0.0, False)
 STUCK = "repeats one reading again and again: unchanged for 2.0 s"
-RANGE = "reads out of its range: 80.0% of them out of -4 to 4 rad, newest 7"
+RANGE = "reads out of its range: 80.0% of the readings out of -4 to 4 rad, newest 7"
 
 
 @pytest.mark.parametrize(
