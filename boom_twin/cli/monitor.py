@@ -18,8 +18,7 @@ from .arguments import add_file, add_mapping, add_params, add_ros_args, add_sess
 from .output import open_scene, open_session_scene, open_session_settings, tell, warn_incomplete
 
 if TYPE_CHECKING:
-    from ..monitor.data.feed import Feed
-    from ..monitor.data.session_list import SessionList
+    from ..monitor.data.feed import Feed, SessionList
 
 
 PORT = 8420
@@ -66,7 +65,7 @@ def run(args: Namespace) -> int:
     if find_spec("aiohttp") is None:
         raise UsageError('aiohttp is not installed, and the page needs it. Run `pip install "boom_twin[monitor]"`.')
     from ..monitor.actions import RecorderProcess, ViewerActions
-    from ..monitor.log_limit import write_log
+    from ..monitor.connections import write_log
 
     _lower_priority()
     write_log()
@@ -102,7 +101,7 @@ def _sessions(args: Namespace) -> SessionList:
     """Return the sessions of ``--bag``, the first one open."""
     from ..bag.reader import scan
     from ..monitor.data.bag_feed import bag_feed
-    from ..monitor.data.session_list import SessionList, sessions_in
+    from ..monitor.data.feed import SessionList, sessions_in
 
     window = window_of(args)
 

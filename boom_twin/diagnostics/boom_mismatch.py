@@ -10,12 +10,12 @@ import numpy as np
 
 from ..types import Array, Report, Sample, Stream
 
-WINDOW = 5_000_000_000
+JUDGED_TIME = 5_000_000_000
 """Time (ns) over which angles are judged together."""
-FEWEST = 10
+FEWEST_RESIDUALS = 10
 """Residuals of a joint within it that are judged."""
-FAR = radians(10.0)
-"""Difference of an angle from what the strokes say that no sag, load or wrong stiffness makes, and few encoders' zeros."""
+LARGEST_RESIDUAL = radians(10.0)
+"""Residual of an angle that no sag, load or wrong stiffness exceeds, and few encoders' zeros."""
 
 
 class OtherBoom:
@@ -41,33 +41,33 @@ class OtherBoom:
         return self.take(sample.stamp, values, found)
 
     def take(self, stamp: int, values: Iterable[Array], residuals: Iterable[Array]) -> str:
-        """Take several samples and return as `took`: newest stamp (ns), rows of angles and of their residuals (n,) in rad."""
+        """Take rows of angles and of their residuals (n,) in rad up to a `stamp` (ns); return as `took`."""
         if self._is_judged:
             return ""
         self._values.extend(values)
         self._residuals.extend(residuals)
         self._begin = self._begin or stamp
-        return self.judge() if stamp - self._begin > WINDOW else ""
+        return self.judge() if stamp - self._begin > JUDGED_TIME else ""
 
     def judge(self) -> str:
         """Return why the session up to now is of another boom, empty if it is not shown; forget what was judged."""
         values, residuals = self._values, self._residuals
         self._begin, self._values, self._residuals = 0, [], []
-        if self._is_judged or len(values) < FEWEST or len(residuals) < FEWEST:
+        if self._is_judged or len(values) < FEWEST_RESIDUALS or len(residuals) < FEWEST_RESIDUALS:
             return ""
         table, off = np.array(values), np.array(residuals)
         counts = np.isfinite(off).sum(axis=0)
-        heard = [i for i in range(len(counts)) if counts[i] >= FEWEST]
+        heard = [i for i in range(len(counts)) if counts[i] >= FEWEST_RESIDUALS]
         live = [i for i in heard if np.nanmax(table[:, i]) > np.nanmin(table[:, i])]
         if 2 * len(live) <= len(heard):
             return ""
         self._is_judged = True
         medians = {i: float(np.nanmedian(off[:, i])) for i in live}
-        far = {i: value for i, value in medians.items() if abs(value) > FAR}
+        far = {i: value for i, value in medians.items() if abs(value) > LARGEST_RESIDUAL}
         if 2 * len(far) <= len(live):
             return ""
         told = ", ".join(f"joint_{i + 1} by {degrees(value):+.1f} deg" for i, value in far.items())
-        bound = f"{told} off what the strokes say, and at most {degrees(FAR):g} deg can be a fault of the rig"
+        bound = f"{told} off what the strokes say, and at most {degrees(LARGEST_RESIDUAL):g} deg can be a fault of the rig"
         return bound + _likely({i: (float(np.nanmedian(table[:, i])), value) for i, value in far.items()})
 
 
@@ -77,7 +77,7 @@ def _likely(readings: Mapping[int, tuple[float, float]]) -> str:
     `readings` holds reading and residual (rad) by joint, 0-based.
     """
     for key, read in (("unit: deg", radians), ("sign: -1", neg)):
-        if all(abs(read(value) - (value - off)) < FAR for value, off in readings.values()):
+        if all(abs(read(value) - (value - off)) < LARGEST_RESIDUAL for value, off in readings.values()):
             mapping = f"sensors: {{joint_{min(readings) + 1}: {{{key}}}}}"
             return f". With `{key}` they would fit: give by --mapping `{mapping}`, others likewise"
     return ""

@@ -81,12 +81,7 @@ class Evaluation:
 class ComponentJudge:
     """Judge of one component, used again and again: `begin`, any number of `check`, `note` and `fault`, `finish`.
 
-    Attributes
-    ----------
-    level : Level or None
-        Reported last; None before the first report.
-    at : Evaluation
-        The one that was begun last.
+    Its `level` is the one reported last, None before the first report; `at` is the evaluation that was begun last.
     """
 
     def __init__(self, name: str) -> None:
@@ -106,17 +101,9 @@ class ComponentJudge:
         self._values |= values
 
     def check(self, key: str, value: float, bounds: Bounds, words: str, at_once: bool = False) -> None:
-        """Judge a value, and report it with its bounds.
+        """Judge a value, and report it with its bounds; with `at_once` a worse level needs no debounce time.
 
-        Parameters
-        ----------
-        key : str
-        value : float
-        bounds : Bounds
-        words : str
-            What is wrong if it is; those that were true last are told as long as the level is held.
-        at_once : bool
-            A worse level counts at once.
+        `words` say what is wrong if it is. While a level is held, the words that were true last are reported.
         """
         limits = {f"{key}_warn": bounds.warn, f"{key}_error": bounds.error}
         self._values |= {key: value} | {name: limit for name, limit in limits.items() if isfinite(limit)}

@@ -19,7 +19,7 @@ from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Health, Report, StrokeReading
 from .levels import Bounds, ComponentJudge, Level, Status
 
-HOLD = 1.0
+FAILURE_SHOWN = 1.0
 """Seconds for which a failure is shown."""
 LOAD_WINDOW, LOAD_INTERVAL = 40 * SECOND, SECOND // 50
 """Window and interval of the estimates of the load at the tip, ns."""
@@ -34,7 +34,7 @@ class ModelWatch:
         self._predicted_at = self._unfed_at = now  # newest looks with a prediction, and without strokes
         self._counts: Mapping[str, str | int] = {}  # of that with a prediction
         self._is_deflected = False
-        self._failure, self._failed_at, self.has_news = "", -HOLD, False
+        self._failure, self._failed_at, self.has_news = "", -FAILURE_SHOWN, False
         self._looked, self._steps = now, 0
         self._busy, self._longest = 0.0, 0.0
 
@@ -62,17 +62,9 @@ class ModelWatch:
     def status(
         self, judge: ComponentJudge, counts: Mapping[str, str | int], is_active: bool, is_fed: bool, words: Mapping[str, str]
     ) -> Status:
-        """Return the status of the model.
+        """Return the status of the model; the twin listens if `is_active`, and strokes come if it `is_fed`.
 
-        Parameters
-        ----------
-        judge : ComponentJudge
-        counts : dict
-            Told too; counts of what is out of the ordinary among them.
-        is_active, is_fed : bool
-            Whether the twin listens, and strokes come.
-        words : dict of str to str
-            What those counts are of.
+        `counts` are reported too. `words` say what those of irregular samples are of.
         """
         now, stale_after = judge.at.now, judge.at.thresholds.stale_after
         judge.note(counts)
@@ -86,7 +78,7 @@ class ModelWatch:
         silent = now - max(self._predicted_at, self._unfed_at)
         if not is_active:
             judge.fault(Level.WARN, "not active")
-        elif now - self._failed_at <= HOLD:
+        elif now - self._failed_at <= FAILURE_SHOWN:
             judge.fault(Level.ERROR, self._failure)
         elif not is_fed or (not self._predictions and silent <= stale_after):
             judge.fault(Level.WARN, "waiting for strokes")
@@ -123,16 +115,10 @@ class ModelWatch:
 
 
 class LoadWatch:
-    """Disturbance force at the tip, as estimated in the last `LOAD_WINDOW`; it is never a fault.
-
-    Attributes
-    ----------
-    explanation : str
-        Of residuals that are larger than noise, in words; empty while there was no load at the last look.
-    """
+    """Disturbance force at the tip, as estimated in the last `LOAD_WINDOW`; it is never a fault."""
 
     def __init__(self) -> None:
-        self.explanation = ""
+        self.explanation = ""  # of residuals larger than noise, in words; empty without a load at the last look
         self._loads: deque[tuple[int, Array]] = deque()
 
     def is_due(self, stamp: int) -> bool:
@@ -183,14 +169,8 @@ class ResidualWindow:
     ) -> Status:
         """Return the status of the channel, with level and words of its alarm if there is one.
 
-        Parameters
-        ----------
-        judge : ComponentJudge
-        alarm : tuple of Level and str, optional
-        explained : str
-            By an alarm or a load, in words; then its size is not judged.
-        is_judged : bool
-            Whether the rig's health is: then it says what is a fault, and the size of a residual is none by itself.
+        The size of the residual is not judged if it is `explained` by an alarm or a load, in words. If the rig's health
+        `is_judged`, health says what is a fault, and the size is a warning at most.
         """
         thresholds, now = judge.at.thresholds, judge.at.now
         while self._window and self._window[0][0] <= now - thresholds.residual_window:
@@ -214,18 +194,12 @@ class ResidualWindow:
 
 
 class HealthWatch:
-    """Health of the rig: active alarms, and ended ones that are not acknowledged.
-
-    Attributes
-    ----------
-    has_news : bool
-        Whether an alarm began since the last look.
-    """
+    """Health of the rig: active alarms, and ended ones that are not acknowledged."""
 
     def __init__(self) -> None:
         self._alarms, self._noise = Alarms(), dict[str, float]()
         self._before = Counter[tuple[str, str, str | None]]()  # of ended alarms: how often they had come and gone before
-        self.has_news = False
+        self.has_news = False  # an alarm began since the last look
 
     def took(self, health: Health) -> None:
         """Take the twin's report on the rig's health."""

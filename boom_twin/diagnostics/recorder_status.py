@@ -13,36 +13,23 @@ ENDED = "ended"
 
 @dataclass(frozen=True, slots=True)
 class DiskState:
-    """State of a recording's files and of the disk.
-
-    Attributes
-    ----------
-    lag : float
-        Age of the oldest message that a power failure would lose, s.
-    waiting, written, free : int
-        Bytes of messages in memory, of all files, and free on the disk.
-    left : float
-        Time until the disk is full at this recording's mean rate, s.
-    """
+    """State of a recording's files and of the disk."""
 
     lag: float
+    """Age of the oldest message that a power failure would lose, s."""
     waiting: int
+    """Bytes of messages in memory."""
     written: int
+    """Bytes of all files."""
     free: int
+    """Free bytes of the disk."""
     left: float
+    """Time until the disk is full at this recording's mean rate, s."""
 
 
 @dataclass(frozen=True, slots=True)
 class TopicCount:
-    """Message counts of one topic.
-
-    Attributes
-    ----------
-    topic : str
-    received, written : int
-    missed : int or None
-        Messages left out, or not received (by sequence numbers). None unless there was one publisher.
-    """
+    """Message counts of one topic; `missed` ones were left out or not received, None unless there was one publisher."""
 
     topic: str
     received: int

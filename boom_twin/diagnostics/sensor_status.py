@@ -1,4 +1,4 @@
-"""Status of every sensor: whether it measures, is frozen, or silent."""
+"""Status of every sensor: it measures, is stuck, or is silent."""
 
 from __future__ import annotations
 
@@ -8,21 +8,19 @@ from math import inf, isnan
 
 from ..config.settings import Settings
 from ..health.sensor_check import readings_of_frozen, sensor_ranges
+from ..health.sensor_monitor import TOLD
 from ..scene.schema import Scene
 from ..types import SENSORS, Mount, Stream
 from .levels import Bounds, ComponentJudge, Status
 from .stream_stats import ChannelStats
 
-SLACK = 5.0
-"""Deviations of its noise by which a sensor may read beyond the range of what it measures."""
+RANGE_MARGIN = 5.0
+"""Standard deviations of its noise by which a sensor may read beyond its range."""
 
 
 @dataclass(frozen=True, slots=True)
 class SensorSpec:
-    """Specification of a sensor: name of its status, range, noise and resolution, in its own unit.
-
-    ``unit`` stands at the end of the keys of its values: ``rad``, ``m``, ``m_s2``.
-    """
+    """Specification of a sensor: name of its channel; unit as the end of a key (``m_s2``); range, noise, resolution."""
 
     name: str
     unit: str
@@ -42,24 +40,14 @@ def sensors_of(
 ) -> dict[Stream, list[SensorSpec]]:
     """Return the sensors of every stream, in the order of a sample's values.
 
-    Parameters
-    ----------
-    scene : Scene
-        Gives the ranges, see `boom_twin.health.sensor_check.sensor_ranges`.
-    settings : Settings
-        Noise and resolution.
-    required : dict of Stream to bool
-        Whether the twin needs the stream.
-    mounts : sequence of Mount or None
-        Of the sensor of each joint; an inclinometer (not None) has no range of its own.
-    absent : collection of str
-        Channels without a sensor.
+    Ranges are those of `boom_twin.health.sensor_check.sensor_ranges`. `required` says which streams the twin needs, `absent`
+    which channels have no sensor.
     """
     found = {}
     ranges = sensor_ranges(scene, mounts)
     for stream, kind in SENSORS.items():
         sigma, resolution = settings.noise(kind)
-        unit, over = kind.unit_suffix, SLACK * sigma
+        unit, over = kind.unit_suffix, RANGE_MARGIN * sigma
         bounds = zip(kind.channels(len(scene.joints)), *(bound.tolist() for bound in ranges[stream]), strict=True)
         found[stream] = [
             SensorSpec(name, unit, low - over, high + over, sigma, resolution, required[stream] and name not in absent)
@@ -69,7 +57,10 @@ def sensors_of(
 
 
 def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats, age: float) -> Status:
-    """Return the status of a sensor by its statistics; `age` (s): since its last reading."""
+    """Return the status of a sensor by its statistics; `age` (s): since its last reading.
+
+    A fault has the words of its alarm in `boom_twin.health`, with the figures of this look.
+    """
     thresholds, unit = judge.at.thresholds, sensor.unit
     if not stats.stamp and not sensor.required:
         return judge.finish("not there; optional")
@@ -83,9 +74,9 @@ def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats
         judge.note({f"low_{unit}": sensor.low, f"high_{unit}": sensor.high})
         span = f"{sensor.low:.6g} to {sensor.high:.6g} {unit}"
         told = f"{stats.outside:.1%} of the readings out of {span}, newest {stats.value:.6g}"
-        judge.check("outside_share", stats.outside, share, told)
+        judge.check("outside_share", stats.outside, share, f"{TOLD['range']}: {told}")
     period = 0.0 if isnan(stats.rate) else 1.0 / stats.rate
     needed = readings_of_frozen(sensor.sigma, sensor.resolution, thresholds.frozen_false_alarm)
-    frozen, unchanged = Bounds(error=max(thresholds.frozen_after, needed * period)), stats.unchanged * period
-    judge.check("unchanged_s", unchanged, frozen, f"the reading has not changed for {unchanged:.1f} s: frozen")
+    stuck, unchanged = Bounds(error=max(thresholds.frozen_after, needed * period)), stats.unchanged * period
+    judge.check("unchanged_s", unchanged, stuck, f"{TOLD['stuck']}: unchanged for {unchanged:.1f} s")
     return judge.finish("measuring" if stats.stamp else "waiting for a reading")

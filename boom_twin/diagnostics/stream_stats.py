@@ -13,40 +13,30 @@ from numpy.typing import NDArray
 
 from ..types import NANO, Array, Sample
 
-LONGEST = 10.0
-"""Longest step between two stamps (s) that is taken for a pause of the sensor, and not for a jump of its clock."""
+LONGEST_PAUSE = 10.0
+"""Longest step between two stamps (s) that is a pause of the sensor; a longer one is a jump of its clock."""
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelStats:
-    """Statistics of one sensor since the last look.
-
-    Attributes
-    ----------
-    value : float
-        Newest reading, in the sensor's unit; NaN before the first one.
-    stamp : int
-        Its stamp, ns.
-    rate : float
-        Readings a second, by their stamps; NaN where fewer than two are known.
-    gap : float
-        Longest step between their stamps, s.
-    gaps : int
-        Steps longer than is allowed, since listening began.
-    missing, outside : float
-        Share of the messages without a finite value, and with one out of range; NaN without messages.
-    unchanged : int
-        Readings, up to the newest, that repeat the one before.
-    """
+    """Statistics of one sensor since the last look."""
 
     value: float
+    """Newest reading, in the sensor's unit; NaN before the first one."""
     stamp: int
+    """Its stamp, ns; 0 before the first one."""
     rate: float
+    """Readings a second, by their stamps; NaN of fewer than two."""
     gap: float
+    """Longest step between their stamps, s."""
     gaps: int
+    """Steps longer than permitted, since listening began."""
     missing: float
+    """Share of the messages without a finite value; NaN without messages."""
     outside: float
+    """Share of the messages with a value out of range; NaN without messages."""
     unchanged: int
+    """Readings, up to the newest, that repeat the one before."""
 
 
 class Channel:
@@ -57,24 +47,15 @@ class Channel:
         self._value, self._stamp, self._unchanged, self._gaps = nan, 0, 0, 0
 
     def look(self, stamps: NDArray[np.int64], values: Array, refused: int, longest: float) -> ChannelStats:
-        """Return the statistics of what came since the last look.
+        """Return the statistics of `values` (k,) with `stamps` (k,) in ns; NaN where the message had no value.
 
-        Parameters
-        ----------
-        stamps : ndarray of int, shape (k,)
-            ns.
-        values : ndarray, shape (k,)
-            In the sensor's unit; NaN where the message had none.
-        refused : int
-            Messages that held nothing of use for any sensor.
-        longest : float
-            Step between stamps that is allowed, s.
+        `refused` messages more held nothing of use for any sensor; `longest` (s) is the largest permitted step of stamps.
         """
         messages, usable = len(values) + refused, np.isfinite(values)
         stamps, values, steps = stamps[usable], values[usable], np.zeros(0)
         if len(values):
             steps = np.diff(stamps, prepend=self._stamp or stamps[0]) * NANO
-            steps = steps[(steps > 0.0) & (steps <= LONGEST)]
+            steps = steps[(steps > 0.0) & (steps <= LONGEST_PAUSE)]
             changes = np.flatnonzero(np.diff(values, prepend=self._value) != 0.0)  # also the first reading ever
             self._unchanged = len(values) - 1 - int(changes[-1]) if len(changes) else self._unchanged + len(values)
             self._value, self._stamp = float(values[-1]), int(stamps[-1])
@@ -125,8 +106,8 @@ class StreamWatch:
     newest : int or None
         Stamp of the newest message.
     lag : float
-        Least time from a stamp to its arrival since the last look but one, s, by two clocks that need not agree; NaN without
-        messages. Differences of two streams' lags tell how their clocks are apart.
+        Least time from a stamp to its arrival between the last two looks, s; NaN without messages. Its two clocks need not
+        agree, but the difference of two streams' lags shows how far their clocks are apart.
     """
 
     def __init__(self, ranges: Array, monotonic: Callable[[], float] = time.monotonic) -> None:
@@ -137,7 +118,7 @@ class StreamWatch:
     def begin(self) -> None:
         """Start listening; everything but the count is forgotten."""
         self.newest: int | None = None
-        self._heard, self._told, self._least, self.lag = self._monotonic(), self.count, nan, nan
+        self._heard, self._looked_count, self._least, self.lag = self._monotonic(), self.count, nan, nan
         self._counted = nan, 0
         self._channels = [Channel(*bounds) for bounds in self._ranges]
         self._stamps, self._values = array("q"), Rows(len(self._channels))  # of samples
@@ -175,7 +156,7 @@ class StreamWatch:
         """Return the statistics of every channel since the last look; `longest` (s) is the largest permitted step of stamps."""
         stamps, table = np.frombuffer(self._stamps, np.int64), self._values.table()
         self._stamps, self._values = array("q"), Rows(len(self._channels))
-        refused = max(0, self.count - self._told - len(stamps))
-        self._told = self.count
+        refused = max(0, self.count - self._looked_count - len(stamps))
+        self._looked_count = self.count
         self.lag, self._least = self._least, nan
         return [channel.look(stamps, table[:, i], refused, longest) for i, channel in enumerate(self._channels)]

@@ -20,28 +20,20 @@ FOLLOWED = "Followed is the one whose stamps go on, and which of them that is RO
 
 @dataclass(frozen=True, slots=True)
 class Peers:
-    """Publishers of an input, or subscribers of an output.
-
-    Attributes
-    ----------
-    address : str
-        Name of the topic as it is resolved.
-    names, ids : sequence of str
-        Their nodes, and their hexadecimal GIDs in the same order.
-    incompatible : sequence of str
-        Those of them that cannot hear or be heard for their quality of service, and why, in words.
-    rivals : int
-        Publishers of an output beside the node's own.
-    mistyped : sequence of str
-        Others at this topic, which have another type of message and so neither hear nor are heard, with that type, in words.
-    """
+    """Publishers of an input, or subscribers of an output."""
 
     address: str = ""
+    """Name of the topic as it is resolved."""
     names: Sequence[str] = ()
+    """Their nodes."""
     incompatible: Sequence[str] = ()
+    """Those of them whose quality of service prevents a connection, and why, in words."""
     ids: Sequence[str] = ()
+    """Their hexadecimal GIDs, in the order of `names`."""
     rivals: int = 0
+    """Publishers of an output beside the node's own."""
     mistyped: Sequence[str] = ()
+    """Others at this topic whose type of message prevents a connection, with that type, in words."""
 
     def warn(self, judge: ComponentJudge, prefix: str = "") -> None:
         """Warn of those that cannot be connected."""
@@ -63,20 +55,10 @@ def topic_status(
     offset: float,
     wrong_names: tuple[Level, str] | None = None,
 ) -> Status:
-    """Return the status of one input topic.
+    """Return the status of one input topic, after the look of its `stream`.
 
-    Parameters
-    ----------
-    judge : ComponentJudge
-    stream : StreamWatch
-        After its look.
-    is_required : bool
-        Whether the twin needs it.
-    publishers : Peers
-    offset : float
-        By how much the stamps are behind those of the strokes, s; NaN where it is not known.
-    wrong_names : tuple of Level and str, optional
-        What is wrong with the names in its messages, in words.
+    Its stamps are `offset` (s) behind those of the strokes; NaN is not known. `wrong_names` is the fault of the names in its
+    messages, if any.
     """
     at, age = judge.at, stream.age(judge.at.now)
     judge.note({"topic": publishers.address, "messages": stream.count, "rate_Hz": stream.arrival_rate(at.now)})
@@ -131,31 +113,22 @@ def publishers_status(judge: ComponentJudge, publishers: Mapping[Stream, Peers],
 
 @dataclass(frozen=True, slots=True)
 class Reception:
-    """Reception of one topic; counts since the node was activated.
-
-    Attributes
-    ----------
-    received : int
-        Messages that arrived.
-    lost : int
-        That never arrived, by the publisher's numbers, as far as one publisher can be told: see `is_numbered`.
-    dropped : int
-        That arrived and gave way to newer ones before they were read.
-    waiting : int
-        That wait now.
-    wait, latency : float
-        Longest time (s) from arrival to being read, and to being answered, since the last look; NaN without any.
-    is_numbered : bool
-        Whether the numbers since the last look were those of one publisher.
-    """
+    """Reception of one topic; counts since the node was activated."""
 
     received: int = 0
+    """Messages that arrived."""
     lost: int = 0
+    """Messages that never arrived, by the publisher's sequence numbers; valid if `is_numbered`."""
     dropped: int = 0
+    """Messages that gave way to newer ones before they were read."""
     waiting: int = 0
+    """Messages that wait now."""
     wait: float = nan
+    """Longest time (s) from arrival to being read since the last look; NaN without any."""
     latency: float = nan
+    """Longest time (s) from arrival to being answered since the last look; NaN without any."""
     is_numbered: bool = True
+    """True if the sequence numbers since the last look are those of one publisher."""
 
 
 class ReceptionWatch:

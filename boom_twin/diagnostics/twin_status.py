@@ -9,7 +9,7 @@ import numpy as np
 
 from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Thresholds
-from ..types import Health, Report, Residuals, Sample, Stream
+from ..types import Health, Report, Sample, Stream
 from .levels import ComponentJudge, Evaluation, Level, Status
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, stress_status
 from .sensor_status import SensorSpec, sensor_status
@@ -40,12 +40,7 @@ class TwinWatch:
     monotonic : callable
         The time, s, of a clock that only goes forward.
     stress : BendingStressModel, optional
-        Of the boom, if its sections bend.
-
-    Attributes
-    ----------
-    health : HealthWatch or None
-        None until the rig's health was judged.
+        If the boom's sections bend.
     """
 
     def __init__(
@@ -69,11 +64,11 @@ class TwinWatch:
         self._looked = self._monotonic()
         self._judges: dict[str, ComponentJudge] = {}
         self._model, self._load = ModelWatch(self._looked), LoadWatch()
-        self._rows: dict[tuple[str, ...], tuple[Rows, Rows]] = {}  # residuals and their deviations, by channels
+        self._rows: dict[tuple[str, ...], Rows] = {}  # normalised residuals, by channels
         self._residuals: dict[str, ResidualWindow] = {}
         self._newest: Report | None = None  # that has a prediction
         self._silent: set[Stream] = set()
-        self.health: HealthWatch | None = None
+        self.health: HealthWatch | None = None  # until the rig's health was judged
 
     # -- one message --------------------------------------------------------------------------------------------------
 
@@ -87,20 +82,13 @@ class TwinWatch:
         for each in report.all:
             self._model.took(each, duration if each is report else 0.0)
             for residuals in each.residuals:
-                self._keep(residuals)
+                rows = self._rows.setdefault(residuals.names, Rows(len(residuals.names)))
+                rows.append(residuals.normalised)
             if each.prediction is not None:
                 self._newest = each
             if self._load.is_due(each.stamp) and each.estimate is not None:
                 self._load.took(each.estimate)
             self.judged(each.health, 0.0)
-
-    def _keep(self, residuals: Residuals) -> None:
-        """Keep residuals until the next look."""
-        kept = self._rows.get(residuals.names)
-        if kept is None:
-            kept = self._rows[residuals.names] = Rows(len(residuals.names)), Rows(len(residuals.names))
-        kept[0].append(residuals.values)
-        kept[1].append(residuals.sigmas)
 
     def judged(self, health: Health | None, duration: float) -> None:
         """Take the result of a look at the rig's health, which took `duration` seconds; None if there is no news."""
@@ -149,38 +137,24 @@ class TwinWatch:
     ) -> Generator[None, None, list[Status]]:
         """Return the states of model, topics, health, sensors and residuals; of the model alone while the twin does not listen.
 
-        It is worked out in pieces, for a live node to take samples in between: each takes a millisecond or two of those of a
-        second at 1 kHz.
+        It yields between pieces of a millisecond or two, so that a live node takes samples in between.
 
         Parameters
         ----------
-        counts : dict
-            Told with the model.
+        counts, words : dict
+            Counts reported with the model; what they are of, by the last part of their names.
         is_active : bool
-            Whether the twin listens.
-        publishers : dict of Stream to Peers
-            Of every input.
-        subscribers : iterable of Peers
-            Of all outputs.
+            True if the twin listens.
+        publishers, subscribers : dict of Stream to Peers, iterable of Peers
+            Peers of every input, and of all outputs.
         clock : float
             Time that people know, s.
         reception : dict of str to Reception, optional
-            By name of the topic; None where nothing is received live, and so nobody publishes.
+            Reception by name of the topic; None if nothing is received live.
         wrong_names : dict of Stream to tuple of Level and str, optional
-            Of inputs whose messages have names that the scene does not have: that in words.
+            Faults of inputs whose messages have names that the scene does not have.
         left_out : dict of str to int, optional
-            What was left out for lack of time since the node was configured, by what it is.
-        words : dict of str to str, optional
-            What the counts are of, by the last part of their names.
-
-        Yields
-        ------
-        None
-            After every piece but the last.
-
-        Returns
-        -------
-        list of Status
+            Counts of what was left out for lack of time since the node was configured.
         """
         at = Evaluation(self.thresholds, self._monotonic(), clock)
 
@@ -220,8 +194,7 @@ class TwinWatch:
         rows, self._rows = self._rows, {}
         for names, kept in rows.items():
             yield
-            values, sigmas = (each.table() for each in kept)
-            for name, column in zip(names, (values / sigmas).T, strict=True):
+            for name, column in zip(names, kept.table().T, strict=True):
                 window = self._residuals.setdefault(name, ResidualWindow(self._looked))
                 window.take(column, self._monotonic())
         at = Evaluation(self.thresholds, self._monotonic(), clock)

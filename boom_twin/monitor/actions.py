@@ -11,7 +11,7 @@ from typing import Any
 from unicodedata import category
 
 from ..bag.async_writer import PATIENCE
-from ..system.child_process import python_command
+from ..system.child_process import end_process, python_command
 from .data.feed import Feed
 
 RECORDER_TIMEOUT = 2 * PATIENCE
@@ -56,12 +56,8 @@ class RecorderProcess:
 
     def close(self) -> None:
         """Stop the recorder and wait until its files are complete."""
-        if self._process is not None:
-            self.stop()
-            try:
-                self._process.wait(RECORDER_TIMEOUT)
-            except subprocess.TimeoutExpired:
-                self._process.kill()
+        if self.is_running and self._process is not None:
+            end_process(self._process, RECORDER_TIMEOUT, signal.SIGINT)
 
 
 NOTE_LENGTH = 500

@@ -1,4 +1,4 @@
-"""Limit connections to the page's server: how long one may be idle, and how many an address may have.
+"""Limit what a peer can cause: how long a connection may be idle, how many an address may have, lines of the log.
 
 A connection that has sent no whole request has few seconds and few places, in which the newest drives out
 the oldest. A page sends its request at once, so a thousand silent connections do not keep it out. Connections whose request was
@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import sys
+import time
 from functools import partial
 from http import HTTPStatus
 from typing import Any
@@ -136,3 +138,39 @@ class Connection(web.RequestHandler):
         if self._deadline is not None:
             self._deadline.cancel()
             self._deadline = None
+
+
+LOG_PERIOD = 10.0
+"""Seconds."""
+MAX_LOG_LINES = 3
+"""Records of one logger written in a `LOG_PERIOD`."""
+
+
+class LogRateLimit(logging.Filter):
+    """Filter that passes `MAX_LOG_LINES` records of each logger in a `LOG_PERIOD`.
+
+    The first record after the period states how many were left out.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._periods: dict[str, tuple[float, int]] = {}
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Return True if the record is to be written."""
+        now = time.monotonic()
+        begin, count = self._periods.get(record.name, (now, 0))
+        if now - begin >= LOG_PERIOD:
+            if count > MAX_LOG_LINES:
+                left_out = f"({count - MAX_LOG_LINES} lines before this were left out)"
+                record.msg, record.args = f"{record.getMessage()} {left_out}", None
+            begin, count = now, 0
+        self._periods[record.name] = begin, count + 1
+        return count < MAX_LOG_LINES
+
+
+def write_log() -> None:
+    """Write warnings of all loggers of this process to its standard error, at the rate of `LogRateLimit`."""
+    handler = logging.StreamHandler(sys.stderr)
+    handler.addFilter(LogRateLimit())
+    logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])

@@ -17,7 +17,7 @@ offset  type                   meaning
 A spectrum has two columns, for the directions that the message ``lines`` before it names; a spectrogram one for each of
 `boom_twin.monitor.data.spectrum.FREQUENCIES`; a response one for each load that the message ``loads`` before it names. All
 else is JSON in text messages, with a key ``kind``: ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``,
-``load``, ``loads``, ``answer``.
+``loads``, ``answer``.
 """
 
 from __future__ import annotations

@@ -14,10 +14,8 @@ from .access_control import POLICY, AccessControl
 from .actions import ViewerActions
 from .connections import Connection
 from .data.analyst import Analyst
-from .data.feed import Feed
-from .data.session_list import SessionList
-from .data.tip_response import ResponseCompiler
-from .viewer import SessionChoice, Viewer
+from .data.feed import Feed, SessionList
+from .viewer import Viewer
 
 PAGE = Path(__file__).parent / "page"
 MAX_VIEWERS = 16
@@ -38,7 +36,7 @@ class Server:
 
     def __init__(self, feed: Feed, actions: ViewerActions, access: AccessControl, sessions: SessionList | None = None) -> None:
         self._feed, self._actions, self._access = feed, actions, access
-        self._sessions, self._compiler = sessions, ResponseCompiler()
+        self._sessions = sessions
         self._opening: asyncio.Task[None] | None = None
         self._viewers: set[web.WebSocketResponse] = set()
 
@@ -78,19 +76,17 @@ class Server:
             await socket.prepare(request)
             if isinstance(request.protocol, Connection):
                 request.protocol.become_viewer()
-            choice = None if self._sessions is None else SessionChoice(self._sessions, self._choose)
-            await Viewer(socket, self._feed, self._actions, self._analyst, choice).serve()
+            await Viewer(socket, self._feed, self._actions, self._analyst, self._sessions, self._choose).serve()
         finally:
             self._viewers.discard(socket)
         return socket
 
     async def _run(self, application: web.Application) -> AsyncIterator[None]:
         """Poll the feed as long as the server runs."""
-        self._analyst = Analyst(self._feed, self._compiler)
+        self._analyst = Analyst(self._feed)
         tasks = [asyncio.create_task(each()) for each in (self._poll, self._track_peaks)]
         tasks[0].add_done_callback(_stop_on_fault)
         yield
-        self._compiler.close()
         for task in tasks:
             task.cancel()
             with suppress(asyncio.CancelledError):
@@ -127,7 +123,7 @@ class Server:
             return
         sessions.show(index, feed)
         self._feed = feed
-        self._actions, self._analyst = self._actions.of(self._feed), Analyst(self._feed, self._compiler)
+        self._actions, self._analyst = self._actions.of(self._feed), Analyst(self._feed)
         for socket in set(self._viewers):
             await socket.close()
 

@@ -11,16 +11,14 @@ import json
 import time
 from collections.abc import Callable
 from math import inf, isfinite
-from typing import Any, NamedTuple
+from typing import Any
 
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from .actions import ViewerActions
-from .data.analyst import Analyst, response_messages
-from .data.feed import Feed, Playback
-from .data.session_list import SessionList
+from .data.analyst import Analyst, TipResponses, response_messages
+from .data.feed import Feed, Playback, SessionList
 from .data.store import Table
-from .data.tip_response import TipResponses
 from .protocol import ROWS, alarms, dump, layout, pack, state
 
 PERIOD = 1.0 / 30.0
@@ -33,21 +31,17 @@ BEHIND = 5.0
 """Seconds by which a page may be behind before it is skipped to the newest rows."""
 HISTORY = 600.0
 """Seconds that a page is given when it is opened, or goes elsewhere in a session."""
-SINGLE = frozenset({"shape"})
-"""Tables of which the newest row is enough."""
+NEWEST_ROW_ONLY = "shape"
+"""Table of which the newest row is enough."""
 MAX_REQUESTS = 40
 """Requests of a page in a second."""
 
 
-class SessionChoice(NamedTuple):
-    """Sessions of a monitor, and the function that opens one by its index and returns in words what is done."""
-
-    sessions: SessionList
-    choose: Callable[[int], str]
-
-
 class Viewer:
-    """Viewer served over one prepared WebSocket until it is closed; all else is common to all viewers."""
+    """Viewer served over one prepared WebSocket until it is closed; all else is common to all viewers.
+
+    `choose` opens another of the `sessions` by its index and returns in words what is done.
+    """
 
     def __init__(
         self,
@@ -55,9 +49,11 @@ class Viewer:
         feed: Feed,
         actions: ViewerActions,
         analyst: Analyst,
-        choice: SessionChoice | None = None,
+        sessions: SessionList | None,
+        choose: Callable[[int], str],
     ) -> None:
-        self._socket, self._feed, self._actions, self._analyst, self._choice = socket, feed, actions, analyst, choice
+        self._socket, self._feed, self._actions, self._analyst = socket, feed, actions, analyst
+        self._sessions, self._choose = sessions, choose
         self._playback = None if feed.end is None else Playback(feed)
         self._sent: dict[str, int] = {}
         self._generation = -1
@@ -85,8 +81,8 @@ class Viewer:
                 "end": feed.end,
                 "permitted": sorted(self._actions.permitted),
                 "history": HISTORY,
-                "sessions": [] if self._choice is None else self._choice.sessions.names,
-                "session": 0 if self._choice is None else self._choice.sessions.index,
+                "sessions": [] if self._sessions is None else self._sessions.names,
+                "session": 0 if self._sessions is None else self._sessions.index,
             }
         )
         last = time.monotonic()
@@ -156,7 +152,7 @@ class Viewer:
             first = table.until(position - HISTORY)
         elif self._playback is None and (end - first > CHUNK or position - _time_of(table, first) > BEHIND):
             first = table.until(position - BEHIND)
-        if table.name in SINGLE:
+        if table.name == NEWEST_ROW_ONLY:
             first = max(first, end - 1)
         return max(first, table.first), end
 
@@ -168,8 +164,6 @@ class Viewer:
                 lines, block = found
                 await self._send_text(lines)
                 await self._socket.send_bytes(block)
-            if (load := await self._analyst.load_at(position)) is not None:
-                await self._send_text(load)
             await self._send_spectrogram(position)
             await asyncio.sleep(SPECTRUM_PERIOD)
 
@@ -222,16 +216,16 @@ class Viewer:
         if not isinstance(request, dict):
             raise ValueError("not a request")
         if request.get("do") == "session":
-            return self._choose(request["value"])
+            return self._choose_session(request["value"])
         if request.get("do") in ("seek", "speed", "hold"):
             self._control_playback(request["do"], float(request["value"]))
             return None
         return self._actions.act(request)
 
-    def _choose(self, index: Any) -> dict[str, Any]:
-        if self._choice is None or type(index) is not int or not 0 <= index < len(self._choice.sessions.names):
+    def _choose_session(self, index: Any) -> dict[str, Any]:
+        if self._sessions is None or type(index) is not int or not 0 <= index < len(self._sessions.names):
             raise ValueError("no such session")
-        return {"kind": "answer", "do": "session", "done": True, "words": self._choice.choose(index)}
+        return {"kind": "answer", "do": "session", "done": True, "words": self._choose(index)}
 
     def _control_playback(self, what: str, value: float) -> None:
         if (play := self._playback) is None or not isfinite(value):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
@@ -24,13 +25,6 @@ def status(watch: HealthWatch) -> Status:
     return watch.status(ComponentJudge("health").begin(Evaluation(Thresholds(), 0.0, 100.0)))
 
 
-def test_without_alarms() -> None:
-    watch = HealthWatch()
-    watch.took(health(1))
-    assert (status(watch).level, status(watch).message) == (Level.OK, "no alarm")
-    assert not watch.has_news and watch.acknowledge() == "no alarm has ended"
-
-
 def test_a_stream_noisier_than_stated_is_one_warning() -> None:
     watch = HealthWatch()
     watch.took(replace(health(1), noise={"noise_over_stroke_sigma": 1.2, "noise_over_angle_sigma": 2.04}))
@@ -39,7 +33,8 @@ def test_a_stream_noisier_than_stated_is_one_warning() -> None:
     assert found.message.startswith("most sensors are 2.0 times as noisy as angle_sigma states")
     assert "stroke" not in found.message
     watch.took(health(2))
-    assert status(watch).level == Level.OK
+    assert (status(watch).level, status(watch).message) == (Level.OK, "no alarm")
+    assert not watch.has_news and watch.acknowledge() == "no alarm has ended"
 
 
 def test_the_worst_is_told_first() -> None:
@@ -61,18 +56,12 @@ def test_an_alarm_that_ended_stays_until_it_is_acknowledged() -> None:
     watch.took(health(21, OPEN))
     found = status(watch)
     assert found.level == Level.WARN and "ended; not acknowledged" in found.message
-    assert (found.values["alarms"], found.values["not_acknowledged"]) == (1, 1)
+    assert (found.values["alarms"], found.values["not_acknowledged"], found.values["1 to_s"]) == (1, 1, "19.000")
+    assert watch.of("joint_3") is None
     assert watch.acknowledge() == f"joint_3: {BIAS.told}"
     assert status(watch).message == f"joint_1: {OPEN.told}"
     watch.took(health(22, replace(OPEN, told="cylinder_1.k is softer", cause="cylinder_1.k")))
     assert status(watch).message == "joint_1: cylinder_1.k is softer" and status(watch).level == Level.ERROR
-
-
-def test_an_alarm_that_is_told_of_no_more_has_ended() -> None:
-    watch = HealthWatch()
-    watch.took(health(17, BIAS))
-    watch.took(health(18))
-    assert status(watch).values["1 to_s"] == "18.000" and watch.of("joint_3") is None
 
 
 def test_an_alarm_that_comes_and_goes_is_told_once_with_how_often() -> None:
@@ -101,25 +90,25 @@ def test_residuals_are_left_to_an_alarm_that_was_inferred_from_them() -> None:
     inferred = replace(OPEN, ranked=(Ranked("cylinder_1.k", 0.6, ()), Ranked("joint_1.sensor", 0.4, ())))
     watch.took(health(18, BIAS, inferred))
     assert watch.explained == "judged by health: alarm of joint_1"
-    window, judge = ResidualWindow(0.0), ComponentJudge("residual joint_2")
-    told = []
+
+
+LOAD = "a load at the tip moves the boom: pulses of 128 N at 0.430 Hz (+- 0.001)"
+
+
+@pytest.mark.parametrize(
+    ("is_judged", "level", "words"),
+    [
+        (False, Level.ERROR, "6.00 times as large as noise explains, for 10 s"),
+        (True, Level.WARN, "6.00 times as large as noise explains, for 10 s; health finds no fault in that"),
+    ],
+)
+def test_a_residual_that_is_explained_is_none_and_else_a_warning_at_most_where_health_is_judged(
+    is_judged: bool, level: Level, words: str
+) -> None:
+    window, judge, told = ResidualWindow(0.0), ComponentJudge("residual joint_2"), []
     for second in range(1, 30):
         window.take(np.full(100, 6.0), float(second))
         judge.begin(Evaluation(Thresholds(), float(second), 0.0))
-        told.append(window.status(judge, None, watch.explained if second < 15 else ""))
-    assert {(each.level, each.message) for each in told[:14]} == {(Level.OK, "judged by health: alarm of joint_1")}
-    assert told[0].values["rms_normalised"] == 6.0
-    assert told[-1].level == Level.ERROR and "6.00 times as large as noise explains" in told[-1].message
-
-
-def test_a_residual_that_health_finds_no_fault_in_is_a_warning_at_most() -> None:
-    """What is a fault, health says; a model that is a little off, or a load it does not know, is none."""
-    window, judge, told = ResidualWindow(0.0), ComponentJudge("residual cylinder_force_2"), []
-    load = "a load at the tip moves the boom: pulses of 128 N at 0.430 Hz (+- 0.001)"
-    for second in range(1, 30):
-        window.take(np.full(100, 6.0), float(second))
-        judge.begin(Evaluation(Thresholds(), float(second), 0.0))
-        told.append(window.status(judge, None, load if second < 15 else "", is_judged=True))
-    assert {(each.level, each.message) for each in told[:14]} == {(Level.OK, load)}
-    assert told[-1].level == Level.WARN
-    assert told[-1].message == "6.00 times as large as noise explains, for 10 s; health finds no fault in that"
+        told.append(window.status(judge, None, LOAD if second < 15 else "", is_judged))
+    assert {(each.level, each.message) for each in told[:14]} == {(Level.OK, LOAD)}
+    assert told[0].values["rms_normalised"] == 6.0 and (told[-1].level, told[-1].message) == (level, words)

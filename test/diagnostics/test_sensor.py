@@ -1,4 +1,4 @@
-"""Figures of one sensor, and what is made of them."""
+"""Figures of one sensor, what is made of them, and the rule that tells a stuck sensor from a live one."""
 
 from __future__ import annotations
 
@@ -11,41 +11,33 @@ from boom_twin.config.settings import Settings, Thresholds
 from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level
 from boom_twin.diagnostics.sensor_status import SensorSpec, sensor_status, sensors_of
 from boom_twin.diagnostics.stream_stats import Channel, ChannelStats, StreamWatch
+from boom_twin.health.sensor_check import readings_of_frozen
 from boom_twin.scene import load_scene
 from boom_twin.types import Sample, Stream
 
 SECOND = 1_000_000_000
 NOISE = np.random.default_rng(0).normal(0.0, 1.0, 200)
 STAMPS = SECOND + 5_000_000 * np.arange(200)
-ALL = dict.fromkeys(Stream, True)
 
 
 def look(stamps: np.ndarray = STAMPS, values: np.ndarray = NOISE, refused: int = 0) -> ChannelStats:
     return Channel(-4.0, 4.0).look(np.asarray(stamps, dtype=np.int64), np.asarray(values, dtype=float), refused, 0.1)
 
 
-def test_a_healthy_second() -> None:
+def test_figures_of_a_second() -> None:
     channel = Channel(-4.0, 4.0)
     channel.look(STAMPS, NOISE, 0, 0.1)
-    figures = channel.look(STAMPS + SECOND, NOISE, 0, 0.1)
-    assert figures.rate == pytest.approx(200.0) and figures.gap == pytest.approx(0.005)
-    assert (figures.missing, figures.outside, figures.unchanged) == (0.0, 0.0, 0)
-    assert (figures.value, figures.stamp) == (NOISE[-1], STAMPS[-1] + SECOND)
-
-
-def test_missing_and_refused_readings() -> None:
-    values = NOISE.copy()
-    values[50:70] = nan
-    figures = look(values=values, refused=20)
-    assert figures.missing == pytest.approx(40 / 220)
-    assert figures.gap == pytest.approx(21 * 0.005) and figures.gaps == 1
-    assert figures.rate == pytest.approx(179 / (199 * 0.005))
-
-
-def test_readings_out_of_range() -> None:
-    values = NOISE.copy()
-    values[:30] = 4.5
-    assert look(values=values).outside == 30 / 200
+    well = channel.look(STAMPS + SECOND, NOISE, 0, 0.1)
+    assert well.rate == pytest.approx(200.0) and well.gap == pytest.approx(0.005)
+    assert (well.missing, well.outside, well.unchanged, well.value, well.stamp) == (0, 0, 0, NOISE[-1], STAMPS[-1] + SECOND)
+    lacking = look(values=np.where((np.arange(200) >= 50) & (np.arange(200) < 70), nan, NOISE), refused=20)
+    assert lacking.missing == pytest.approx(40 / 220) and lacking.rate == pytest.approx(179 / (199 * 0.005))
+    assert lacking.gap == pytest.approx(21 * 0.005) and lacking.gaps == 1
+    assert look(values=np.where(np.arange(200) < 30, 4.5, NOISE)).outside == 30 / 200
+    none = look(np.zeros(0), np.zeros(0))
+    assert none.stamp == 0 and isnan(none.value) and isnan(none.rate) and isnan(none.missing)
+    set_back = STAMPS - np.where(np.arange(200) >= 100, 3600 * SECOND, 0) + np.where(np.arange(200) >= 150, 7200 * SECOND, 0)
+    assert look(set_back).gap == pytest.approx(0.005) and look(set_back).rate == pytest.approx(200.0)
 
 
 def test_a_reading_that_does_not_change_is_counted_over_looks() -> None:
@@ -56,20 +48,7 @@ def test_a_reading_that_does_not_change_is_counted_over_looks() -> None:
     assert channel.look(STAMPS + 3 * SECOND, NOISE, 0, 0.1).unchanged == 0
 
 
-def test_nothing_came() -> None:
-    figures = look(np.zeros(0), np.zeros(0))
-    assert figures.stamp == 0 and isnan(figures.value) and isnan(figures.rate) and isnan(figures.missing)
-
-
-def test_steps_of_a_clock_that_was_set_are_no_gaps() -> None:
-    stamps = STAMPS.copy()
-    stamps[100:] -= 3600 * SECOND
-    stamps[150:] += 7200 * SECOND
-    figures = look(stamps)
-    assert figures.gap == pytest.approx(0.005) and figures.rate == pytest.approx(200.0)
-
-
-def test_a_stream_gives_each_channel_its_own() -> None:
+def test_a_stream_gives_each_channel_its_own_and_lags_tell_how_clocks_are_apart() -> None:
     watch = StreamWatch(np.array([[-inf, inf], [-inf, 1.0]]))
     for k in range(10):
         watch.seen(SECOND + k * 10_000_000)
@@ -79,62 +58,75 @@ def test_a_stream_gives_each_channel_its_own() -> None:
     assert (watch.count, first.missing, first.outside) == (10, pytest.approx(0.1), 0.0)
     assert (second.missing, second.outside, second.unchanged) == (pytest.approx(0.4), pytest.approx(0.6), 5)
     assert watch.age_of(second, 1e9) - watch.age_of(first, 1e9) == pytest.approx(0.03)
-    assert [figures.missing for figures in watch.look(0.1)] == [pytest.approx(nan, nan_ok=True)] * 2
-
-
-def test_lags_tell_how_clocks_are_apart() -> None:
-    streams = [StreamWatch(np.array([[0.0, 1.0]])) for _ in range(2)]
-    for k in range(5):
-        for stream, behind in zip(streams, (0, 70_000_000), strict=True):
-            stream.seen(SECOND + k * 5_000_000 - behind)
-    for stream in streams:
+    streams = [StreamWatch(np.array([[0.0, 1.0]]), lambda: 100.0) for _ in range(2)]
+    for stream, behind in zip(streams, (0, 70_000_000), strict=True):
+        stream.seen(SECOND - behind)
         stream.look(0.1)
-    assert streams[1].lag - streams[0].lag == pytest.approx(0.07, abs=0.005)
+    assert streams[1].lag - streams[0].lag == pytest.approx(0.07)
 
 
 SENSOR = SensorSpec("joint_1", "rad", -4.0, 4.0, 1.0, 0.1)
 GOOD = ChannelStats(value=0.1, stamp=1, rate=200.0, gap=0.005, gaps=0, missing=0.0, outside=0.0, unchanged=1)
+OPTIONAL = SensorSpec("tip_imu_x", "m_s2", -inf, inf, 0.05, 0.0, False)
+STUCK = "repeats one reading again and again: unchanged for 2.0 s"
+RANGE = "reads out of its range: 80.0% of the readings out of -4 to 4 rad, newest 7"
 
 
-def judged(changes: dict[str, float], age: float = 0.0, sensor: SensorSpec = SENSOR) -> tuple[Level, str]:
-    """Level and message after ten seconds of it."""
+@pytest.mark.parametrize(
+    ("changes", "age", "level", "words", "sensor"),
+    [
+        ({}, 0.0, Level.OK, "measuring", SENSOR),
+        ({}, 2.5, Level.STALE, "no reading for 2.5 s", SENSOR),
+        ({"stamp": 0}, 2.5, Level.STALE, "no reading yet", SENSOR),
+        ({"stamp": 0}, 0.5, Level.OK, "waiting for a reading", SENSOR),
+        ({"stamp": 0}, 99.0, Level.OK, "not there; optional", OPTIONAL),
+        ({"gap": 0.2}, 0.0, Level.WARN, "gap of 0.200 s", SENSOR),
+        ({"missing": 0.05}, 0.0, Level.WARN, "5.0% of the messages without a value", SENSOR),
+        ({"missing": 0.8}, 0.0, Level.ERROR, "80.0% of the messages without a value", SENSOR),
+        ({"outside": 0.8, "value": 7.0}, 0.0, Level.ERROR, RANGE, SENSOR),
+        ({"unchanged": 199}, 0.0, Level.OK, "measuring", SENSOR),
+        ({"unchanged": 400}, 0.0, Level.ERROR, STUCK, SENSOR),
+    ],
+)
+def test_what_a_sensor_is_told_to_be(
+    changes: dict[str, float], age: float, level: Level, words: str, sensor: SensorSpec
+) -> None:
     judge = ComponentJudge("sensor joint_1")
     figures = ChannelStats(**{name: changes.get(name, getattr(GOOD, name)) for name in ChannelStats.__dataclass_fields__})
     for now in range(10):
         status = sensor_status(judge.begin(Evaluation(Thresholds(), float(now), 1e9 + now)), sensor, figures, age)
-    return status.level, status.message
-
-
-@pytest.mark.parametrize(
-    ("changes", "age", "level", "words"),
-    [
-        ({}, 0.0, Level.OK, "measuring"),
-        ({}, 2.5, Level.STALE, "no reading for 2.5 s"),
-        ({"stamp": 0}, 2.5, Level.STALE, "no reading yet"),
-        ({"stamp": 0}, 0.5, Level.OK, "waiting for a reading"),
-        ({"gap": 0.2}, 0.0, Level.WARN, "gap of 0.200 s"),
-        ({"missing": 0.05}, 0.0, Level.WARN, "5.0% of the messages without a value"),
-        ({"missing": 0.8}, 0.0, Level.ERROR, "80.0% of the messages without a value"),
-        ({"outside": 0.8, "value": 7.0}, 0.0, Level.ERROR, "80.0% of the readings out of -4 to 4 rad, newest 7"),
-        ({"unchanged": 199}, 0.0, Level.OK, "measuring"),
-        ({"unchanged": 400}, 0.0, Level.ERROR, "the reading has not changed for 2.0 s: frozen"),
-    ],
-)
-def test_what_a_sensor_is_told_to_be(changes: dict[str, float], age: float, level: Level, words: str) -> None:
-    assert judged(changes, age) == (level, words)
-
-
-def test_an_optional_sensor_may_be_absent() -> None:
-    assert judged({"stamp": 0}, 99.0, SensorSpec("tip_imu_x", "m_s2", -inf, inf, 0.05, 0.0, False)) == (
-        Level.OK,
-        "not there; optional",
-    )
+    assert (status.level, status.message) == (level, words)
 
 
 def test_sensors_of_the_default_scene() -> None:
     scene, settings = load_scene(), Settings()
-    sensors = sensors_of(scene, settings, ALL, [None] * 4)
+    sensors = sensors_of(scene, settings, dict.fromkeys(Stream, True), [None] * 4)
     assert [sensor.name for sensor in sensors[Stream.STROKES]] == [f"cylinder_{i}" for i in (1, 2, 3, 4)]
     assert sensors[Stream.STROKES][0].high == pytest.approx(scene.joints[0].cylinder.max_stroke, abs=2e-4)
     assert np.degrees(sensors[Stream.ANGLES][1].low) == pytest.approx(scene.joints[1].range_deg[0] - 5.0, abs=0.1), "with sag"
     assert [sensor.name for sensor in sensors[Stream.IMU]] == ["tip_imu_x", "tip_imu_z"]
+
+
+@pytest.mark.parametrize(("sigma", "resolution"), [(1.0, 0.25), (1.0, 0.5), (0.5, 1.0), (0.3, 1.0)])
+def test_live_sensors_are_rarely_taken_for_stuck(sigma: float, resolution: float) -> None:
+    """False alarms of 4 million readings of a still sensor, in the middle of a step, where it repeats most."""
+    random, alarm, count = np.random.default_rng(1), 1e-4, 4_000_000
+    needed = int(readings_of_frozen(sigma, resolution, alarm))
+    readings = np.round(random.normal(0.0, sigma, count) / resolution)
+    repeats = (readings[1:] == readings[:-1]).astype(np.int64)
+    total = np.cumsum(repeats)
+    runs = total[needed - 2 :] - np.concatenate([[0], total[: 1 - needed]]) if needed > 2 else repeats
+    rate = np.count_nonzero(runs == needed - 1) / count
+    assert 0.0 <= rate < alarm
+    if sigma < resolution:  # one value is then by far the most frequent, and the bound is nearly reached
+        assert rate > 0.2 * alarm
+
+
+def test_numbers_of_readings_that_are_stated() -> None:
+    settings, alarm = Settings(), Thresholds().frozen_false_alarm
+    assert readings_of_frozen(settings.stroke_sigma, settings.stroke_resolution, alarm) == 10.0
+    assert readings_of_frozen(settings.angle_sigma, settings.angle_resolution, alarm) == 14.0
+    assert readings_of_frozen(settings.imu_sigma, 0.0, alarm) == 2.0
+    assert readings_of_frozen(1.0, 7.0, 1e-9) == pytest.approx(4.4e4, rel=0.1)
+    assert readings_of_frozen(1.0, 10.0, 1e-9) > 3e7
+    assert readings_of_frozen(0.0, 0.1, 1e-9) == readings_of_frozen(1e-3, 1.0, 1e-9) == inf  # it cannot be told

@@ -1,10 +1,17 @@
-"""A session with faults in it, and what a replay says of it."""
+"""A session with faults in it, what a replay says of it, and the live page as a process."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -28,17 +35,11 @@ OFFSET = 0.02  # rad, by which joint 3's encoder is wrong from WRONG_FROM on
 
 @pytest.fixture(scope="session")
 def faulty(made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The bundled session's first 40 s; an encoder jumps at 15 s, everything is silent from 30 to 30.6 s."""
-
-    def jump(time: Any, joints: Any) -> None:
-        joints[time >= WRONG_FROM, 2] += OFFSET
-
-    to = tmp_path_factory.mktemp("faulty") / "faulty_session"
-    return made_once.folder("faulty_session", lambda folder: spoilt(folder, jump), to)
+    """Return the bundled session's first 40 s; an encoder jumps at 15 s, everything is silent from 30 to 30.6 s."""
+    return made_once.folder("faulty_session", _spoilt, tmp_path_factory.mktemp("faulty") / "faulty_session")
 
 
-def spoilt(path: Path, spoil: Callable[[Any, Any], None]) -> Path:
-    """The bundled session's first 40 s with a gap, its joint angles spoilt by a function of times (s) and angles (rad)."""
+def _spoilt(path: Path) -> None:
     topics, decoder = load_topics().inputs, SampleDecoder(4)
     topics = {stream: topics[stream] for stream in (Stream.STROKES, Stream.ANGLES, Stream.IMU)}
     values: dict[Stream, list[Any]] = {stream: [] for stream in topics}
@@ -54,21 +55,20 @@ def spoilt(path: Path, spoil: Callable[[Any, Any], None]) -> Path:
     time = (stamps_ns - stamps_ns[0]) * 1e-9
     kept = (time < SECONDS) & ((time < GAP[0]) | (time > GAP[1]))
     joints = np.array(values[Stream.ANGLES])
-    spoil(time, joints)
+    joints[time >= WRONG_FROM, 2] += OFFSET
     arrays = (np.array(values[Stream.STROKES])[kept], joints[kept], np.array(values[Stream.IMU])[kept])
     write_session(path, stamps_ns[kept], *arrays, {"origin": "synthetic, encoder 3 made wrong"})
     note_drives(path)
-    return path
 
 
 @pytest.fixture(scope="session")
 def feed(faulty: Path, made_once: MadeOnce) -> Feed:
-    """That session through the twin."""
+    """Return that session through the twin."""
     return made_once.value("faulty_feed", lambda: read_all(bag_feed(faulty, load_scene(), Settings())))
 
 
 def read_all(feed: BagFeed) -> BagFeed:
-    """Once it is read."""
+    """Read a session to its end."""
     feed.poll()
     while feed.is_reading:
         feed.poll()
@@ -77,6 +77,39 @@ def read_all(feed: BagFeed) -> BagFeed:
 
 @pytest.fixture(scope="session")
 def replayed(faulty: Path, made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Its replay's folder, with ``summary.json`` and ``bag/``."""
+    """Return the folder of its replay, with ``summary.json`` and ``bag/``."""
     to = tmp_path_factory.mktemp("replayed")
     return made_once.folder("faulty_replayed", lambda folder: replay(faulty, load_scene(), folder), to)
+
+
+class MonitorProcess:
+    """``boom_twin monitor`` as a process; its log goes to a file."""
+
+    def __init__(self, log: Path, *arguments: str) -> None:
+        self._log, command = log, [sys.executable, "-m", "boom_twin.cli.main", "monitor", "--port", "0", *arguments]
+        with log.open("w") as file:
+            self.process = subprocess.Popen(command, stderr=file)
+        end = time.monotonic() + 240.0
+        while (found := re.search(r"open (http\S+)", self.said())) is None:
+            assert self.process.poll() is None and time.monotonic() < end, self.said()
+            time.sleep(0.1)
+        self.url, parts = found[1], urlsplit(found[1])
+        self.host, self.address = parts.netloc, (parts.hostname or "", parts.port or 0)
+
+    def said(self) -> str:
+        return self._log.read_text()
+
+    def stop(self) -> int:
+        self.process.send_signal(signal.SIGTERM)
+        return self.process.wait(60.0)
+
+
+@contextmanager
+def monitoring(log: Path, *arguments: str) -> Iterator[MonitorProcess]:
+    """Provide the page within a context."""
+    process = MonitorProcess(log, *arguments)
+    try:
+        yield process
+    finally:
+        process.process.kill()
+        process.process.wait()

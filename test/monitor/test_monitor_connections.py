@@ -4,75 +4,46 @@ from __future__ import annotations
 
 import asyncio
 import json
-import re
 import resource
-import signal
 import socket
 import struct
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import pytest
 from aiohttp import ClientSession, WSMsgType
+from monitor.conftest import MonitorProcess, monitoring
 
 from boom_twin.monitor import connections
 from boom_twin.monitor.access_control import POLICY
-from boom_twin.system.terminal_text import printable
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 HALF_OPEN = 1000
 PATIENCE = 60.0
 HALVES = (b"", b"G", b"GET / HTTP/1.1\r\nHost: localhost\r\nX", b"GET /socket HTTP/1.1\r\nUpgrade: websocket\r\n")
-
-
-class Server:
-    """``boom_twin monitor`` of the bundled session as a process; what it said, at its end."""
-
-    def __init__(self, log: Path, *arguments: str) -> None:
-        self._log, command = log, [sys.executable, "-m", "boom_twin.cli.main", "monitor", "--port", "0"]
-        with log.open("w") as file:
-            self.process = subprocess.Popen([*command, "--bag", str(BUNDLED), *arguments], stderr=file)
-        end = time.monotonic() + 240.0
-        while (found := re.search(r"open (http\S+)", self.said())) is None:
-            assert self.process.poll() is None and time.monotonic() < end, self.said()
-            time.sleep(0.1)
-        self.url, parts = found[1], urlsplit(found[1])
-        self.address = (parts.hostname or "", parts.port or 0)
-        self.host = parts.netloc
-
-    def said(self) -> str:
-        return self._log.read_text()
-
-    def stop(self) -> int:
-        self.process.send_signal(signal.SIGTERM)
-        return self.process.wait(PATIENCE)
-
-    def ask(self, request: bytes) -> bytes:
-        """The answer to raw bytes, up to its end."""
-        with socket.create_connection(self.address, PATIENCE) as link:
-            link.sendall(request)
-            return b"".join(iter(lambda: link.recv(65536), b""))
-
-
-@contextmanager
-def serving(log: Path, *arguments: str) -> Iterator[Server]:
-    server = Server(log, *arguments)
-    try:
-        yield server
-    finally:
-        server.process.kill()
-        server.process.wait()
+SHAKE = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: " + "A" * 22 + "=="
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    with serving(tmp_path_factory.mktemp("served") / "log", "--host", "127.0.0.2") as made:
-        yield made
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MonitorProcess]:
+    """Provide the page of the bundled session. At the end, nothing that was asked of it may have been a fault of the server."""
+    log = tmp_path_factory.mktemp("served") / "log"
+    with monitoring(log, "--bag", str(BUNDLED), "--host", "127.0.0.2") as process:
+        yield process
+        assert "Traceback" not in process.said() and process.process.poll() is None
+
+
+def ask(server: MonitorProcess, request: str) -> bytes:
+    """Return the answer to raw bytes, up to its end."""
+    with socket.create_connection(server.address, PATIENCE) as link:
+        link.sendall(request.encode("latin-1"))
+        return b"".join(iter(lambda: link.recv(65536), b""))
+
+
+def upgrade(server: MonitorProcess) -> bytes:
+    return f"GET /socket HTTP/1.1\r\nHost: {server.host}\r\nOrigin: http://{server.host}\r\n{SHAKE}\r\n\r\n".encode()
 
 
 @pytest.fixture
@@ -86,7 +57,7 @@ def many_files() -> Iterator[None]:
     resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
-async def visit(server: Server) -> None:
+async def visit(server: MonitorProcess) -> None:
     """As a page does: the document, its files, and the stream with rows."""
     async with asyncio.timeout(PATIENCE), ClientSession() as session:
         for path in ("", "page/main.js", "page/uplot.js", "page/style.css"):
@@ -101,22 +72,18 @@ async def visit(server: Server) -> None:
                 kinds.add(json.loads(message.data)["kind"] if message.type is WSMsgType.TEXT else "rows")
 
 
-def test_pages_that_reset_their_connection_leave_no_trace(server: Server) -> None:
+def test_pages_that_reset_their_connection_leave_no_trace(server: MonitorProcess) -> None:
     """More of them than pages may be open, before they are answered and after."""
-    asked = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13"
-    own = f"{asked}\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA=="
-    request = f"GET /socket HTTP/1.1\r\nHost: {server.host}\r\nOrigin: http://{server.host}\r\n{own}\r\n\r\n".encode()
     for number in range(60):
         with socket.create_connection(server.address, PATIENCE) as link:
             link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # closing it resets it
-            link.sendall(request)
+            link.sendall(upgrade(server))
             if number % 3 == 0:
                 link.recv(15)
     asyncio.run(visit(server))
-    assert "Traceback" not in server.said()
 
 
-def test_a_thousand_half_open_connections_keep_no_page_out(server: Server, many_files: None) -> None:
+def test_a_thousand_half_open_connections_keep_no_page_out(server: MonitorProcess, many_files: None) -> None:
     lines = len(server.said().splitlines())
     links: list[socket.socket] = []
     try:
@@ -140,7 +107,7 @@ def test_a_thousand_half_open_connections_keep_no_page_out(server: Server, many_
     assert 1 <= len(told) <= 20 and all("cut off a connection of 127.0.0" in line for line in told)
 
 
-def test_headers_that_trickle_in_are_not_waited_for(server: Server) -> None:
+def test_headers_that_trickle_in_are_not_waited_for(server: MonitorProcess) -> None:
     links = [socket.create_connection(server.address, PATIENCE) for _ in range(3)]
     for link, path in zip(links, ("/", "/socket", "/"), strict=True):
         link.sendall(f"GET {path} HTTP/1.1\r\nHost: {server.host}\r\n".encode())
@@ -162,6 +129,7 @@ def test_headers_that_trickle_in_are_not_waited_for(server: Server) -> None:
     asyncio.run(visit(server))
 
 
+CLOSE = "Connection: close"
 ODD = {
     "a name of 300": ("GET", "/page/" + "a" * 300, b"404"),
     "a path of 9000": ("GET", "/" + "a" * 9000, b"400"),
@@ -189,36 +157,24 @@ HEADERS = {
     "Content-Length: 99999999999": b"200",
     "Transfer-Encoding: chunked\r\n\r\nzz": b"400",
 }
-
-
-def check(answer: bytes, status: bytes) -> None:
-    """Its status, in words, with all headers of the policy."""
-    head, _, body = answer.partition(b"\r\n\r\n")
-    assert head.split(b" ")[1] == status, head
-    for name, value in POLICY.items():
-        assert f"\r\n{name}: {value}".encode() in head
-    assert b"Traceback" not in body
-
-
-@pytest.mark.parametrize("name", ODD)
-def test_every_answer_has_the_policy_whatever_is_asked_for(server: Server, name: str) -> None:
-    method, path, status = ODD[name]
-    check(server.ask(f"{method} {path} HTTP/1.1\r\nHost: {server.host}\r\nConnection: close\r\n\r\n".encode("latin-1")), status)
-
-
-@pytest.mark.parametrize("header", HEADERS, ids=lambda header: printable(header[:20], keep=""))
-def test_and_whatever_the_headers_are(server: Server, header: str) -> None:
-    usual = f"GET / HTTP/1.1\r\nHost: {server.host}\r\nConnection: close\r\n"
-    check(server.ask(f"{usual}{header}\r\n\r\n".encode("latin-1")), HEADERS[header])
-
-
 HOSTS = {"evil.example": b"403", "localhost": b"200", "127.0.0.2": b"200", "127.0.0.3": b"403", "\xff": b"403", "": b"403"}
 
 
-@pytest.mark.parametrize(("host", "status"), HOSTS.items())
-def test_only_names_of_this_machine_are_answered(server: Server, host: str, status: bytes) -> None:
-    check(server.ask(f"GET / HTTP/1.1\r\nHost: {host}:80\r\nConnection: close\r\n\r\n".encode("latin-1")), status)
-    check(server.ask(b"GET / HTTP/1.0\r\n\r\n"), b"400")
+def test_every_answer_has_the_policy_whatever_is_asked_for(server: MonitorProcess) -> None:
+    requests = [
+        (f"{method} {path} HTTP/1.1\r\nHost: {server.host}\r\n{CLOSE}", status) for method, path, status in ODD.values()
+    ]
+    requests += [
+        (f"GET / HTTP/1.1\r\nHost: {server.host}\r\n{CLOSE}\r\n{header}", status) for header, status in HEADERS.items()
+    ]
+    requests += [(f"GET / HTTP/1.1\r\nHost: {host}:80\r\n{CLOSE}", status) for host, status in HOSTS.items()]
+    requests += [("GET / HTTP/1.0", b"400")]
+    for request, status in requests:
+        head, _, body = ask(server, f"{request}\r\n\r\n").partition(b"\r\n\r\n")
+        assert head.split(b" ")[1] == status, (request[:200], head)
+        for name, value in POLICY.items():
+            assert f"\r\n{name}: {value}".encode() in head, request[:200]
+        assert b"Traceback" not in body
 
 
 FRAMES = {
@@ -228,15 +184,13 @@ FRAMES = {
     "of JSON": (b"\x81\xfe\x0f\xa0", b"[" * 4000),
     "of half a character": (b"\x81\xa5", rb'{"do": "mark", "note": "\ud800 \u0000"}'),
 }
-SHAKE = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: " + "A" * 22 + "=="
 
 
 @pytest.mark.parametrize("name", FRAMES)
-def test_a_frame_that_is_none_closes_its_viewer_only(server: Server, name: str) -> None:
+def test_a_frame_that_is_none_closes_its_viewer_only(server: MonitorProcess, name: str) -> None:
     head, body = FRAMES[name]
     with socket.create_connection(server.address, PATIENCE) as link:
-        origin = f"Host: {server.host}\r\nOrigin: http://{server.host}"
-        link.sendall(f"GET /socket HTTP/1.1\r\n{origin}\r\n{SHAKE}\r\n\r\n".encode())
+        link.sendall(upgrade(server))
         link.sendall(head + bytes(4) + body)
         found = b""
         with suppress(ConnectionError):
@@ -244,7 +198,3 @@ def test_a_frame_that_is_none_closes_its_viewer_only(server: Server, name: str) 
                 found = found or data
         assert found.startswith(b"HTTP/1.1 101")
     asyncio.run(visit(server))
-
-
-def test_nothing_of_all_that_was_a_fault_of_the_server(server: Server) -> None:
-    assert "Traceback" not in server.said() and server.process.poll() is None

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from boom_twin.monitor.data.received_messages import DroppedMessages, MalformedError
-from boom_twin.monitor.data.status import MAX_ALARMS, SILENCE, AlarmList, Severity, StatusTable, overall, worst
+from boom_twin.monitor.data.status import MAX_ALARMS, SILENCE, AlarmList, Severity, StatusTable, overall
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import dump, state
 from boom_twin.types import Alarm, Ranked
@@ -23,18 +23,22 @@ def status(name: str, level: int = OK, message: str = "well", **values: Any) -> 
     return SimpleNamespace(name=name, level=level, message=message, values=pairs)
 
 
+def table(*statuses: Any, now: float = 0.0, clock: float = 0.0, before: StatusTable | None = None) -> StatusTable:
+    return (before or StatusTable()).updated(now, statuses, clock)
+
+
 def test_every_status_lights_the_lamp_of_its_group() -> None:
     names = ["model", "sensor cylinder_1", "residual joint_1", "health", "cylinder_strokes", "outputs"]
-    statuses = StatusTable().updated(1.0, [status(f"boom_twin: {name}") for name in names], 0.0)
-    statuses = statuses.updated(1.0, [status("boom_twin_recorder: recording")], 0.0)
-    groups = {group: [lamp.name for lamp in lamps] for group, lamps in statuses.groups(1.0).items()}
-    assert groups == {
+    statuses = table(*(status(f"boom_twin: {name}") for name in names), status("boom_twin_recorder: recording"))
+    assert {group: [lamp.name for lamp in lamps] for group, lamps in statuses.groups(0.0).items()} == {
         "sensors": ["sensor cylinder_1"],
         "model": ["model"],
         "residuals": ["residual joint_1", "health"],
         "timing": ["cylinder_strokes", "outputs"],
         "recorder": ["recording"],
     }
+    later = table(status("boom_twin: model"), now=1.0, before=statuses)
+    assert not later.groups(1.0)["sensors"], "a status that is told no more goes out"
 
 
 @pytest.mark.parametrize(
@@ -42,20 +46,16 @@ def test_every_status_lights_the_lamp_of_its_group() -> None:
     [([OK, OK], "OK"), ([OK, WARN], "WARN"), ([STALE, WARN], "STALE"), ([STALE, ERROR], "ERROR")],
 )
 def test_the_worst_lamp_is_the_state_of_all(levels: list[int], expected: str) -> None:
-    statuses = [status("n: model"), *(status(f"n: sensor {i}", level, f"reason {i}") for i, level in enumerate(levels))]
-    level, reason = overall(StatusTable().updated(0.0, statuses, 0.0).groups(0.0))
+    sensors = [status(f"n: sensor {i}", level, f"reason {i}") for i, level in enumerate(levels)]
+    level, reason = overall(table(status("n: model"), *sensors).groups(0.0))
     assert level.name == expected
     assert reason == "everything as expected" if expected == "OK" else "reason" in reason
 
 
-def test_without_a_word_from_the_twin_nothing_is_well() -> None:
-    recorder = StatusTable().updated(0.0, [status("boom_twin_recorder: recording")], 0.0)
-    for statuses in (StatusTable(), recorder):
-        assert overall(statuses.groups(0.0)) == (Severity.STALE, "no word from the twin")
-
-
 def test_a_silent_node_is_stale_and_never_green() -> None:
-    statuses = StatusTable().updated(10.0, [status("n: model"), status("n: sensor 1", ERROR)], 0.0)
+    for statuses in (StatusTable(), table(status("boom_twin_recorder: recording"))):
+        assert overall(statuses.groups(0.0)) == (Severity.STALE, "no word from the twin")
+    statuses = table(status("n: model"), status("n: sensor 1", ERROR), now=10.0)
     assert overall(statuses.groups(10.0 + SILENCE))[0] == Severity.ERROR
     level, reason = overall(statuses.groups(10.1 + SILENCE))
     assert level == Severity.STALE and "no word from n" in reason
@@ -64,51 +64,35 @@ def test_a_silent_node_is_stale_and_never_green() -> None:
 def test_a_recorder_that_said_that_it_ended_is_not_missed() -> None:
     """What it ended by stays to be seen; the twin beside it is as it is."""
     for level, reason in ((OK, "ended"), (ERROR, "the disk is full")):
-        statuses = (
-            StatusTable()
-            .updated(0.0, [status("r: recording", level, reason, ended=1)], 0.0)
-            .updated(10.0, [status("n: model")], 0.0)
-        )
+        statuses = table(status("n: model"), now=10.0, before=table(status("r: recording", level, reason, ended=1)))
         (lamp,) = statuses.groups(10.0)["recorder"]
         assert (lamp.level, lamp.reason) == (Severity.ERROR if level == ERROR else Severity.OK, reason)
         assert overall(statuses.groups(10.0))[0] == lamp.level
 
 
-def test_a_status_that_is_told_no_more_goes_out() -> None:
-    statuses = (
-        StatusTable()
-        .updated(0.0, [status("n: model"), status("n: sensor 1", ERROR)], 0.0)
-        .updated(1.0, [status("n: model")], 0.0)
-    )
-    assert not statuses.groups(1.0)["sensors"]
-
-
 def test_the_quantity_nearest_to_its_limit_is_told() -> None:
     values = {"gap_s": 0.02, "gap_s_warn": 0.1, "missing_share": 0.4, "missing_share_warn": 0.01, "missing_share_error": 0.5}
-    (lamp,) = StatusTable().updated(0.0, [status("n: sensor 1", WARN, since_s=30.0, **values)], 42.0).groups(0.0)["sensors"]
-    assert (lamp.quantity, lamp.value, lamp.limit, lamp.age) == ("missing_share", 0.4, 0.01, 12.0)
-    (lamp,) = StatusTable().updated(0.0, [status("n: sensor 1", ERROR, **values)], 42.0).groups(0.0)["sensors"]
-    assert (lamp.quantity, lamp.limit) == ("missing_share", 0.5) and isnan(lamp.age)
-
-
-def test_of_the_disk_a_low_value_is_the_bad_one() -> None:
-    values = {"disk_left_s": 60.0, "disk_left_s_warn": 1800.0, "lag_s": 0.5, "lag_s_warn": 2.0}
-    (lamp,) = StatusTable().updated(0.0, [status("r: recording", WARN, **values)], 0.0).groups(0.0)["recorder"]
-    assert lamp.quantity == "disk_left_s"
+    disk = {"disk_left_s": 60.0, "disk_left_s_warn": 1800.0, "lag_s": 0.5, "lag_s_warn": 2.0}  # little is bad
+    statuses = table(
+        status("n: sensor 1", WARN, since_s=30.0, **values),
+        status("n: sensor 2", ERROR, **values),
+        status("r: recording", WARN, **disk),
+        clock=42.0,
+    )
+    (first, second), (recorder,) = (statuses.groups(0.0)[group] for group in ("sensors", "recorder"))
+    assert (first.quantity, first.value, first.limit, first.age) == ("missing_share", 0.4, 0.01, 12.0)
+    assert (second.quantity, second.limit) == ("missing_share", 0.5) and isnan(second.age)
+    assert recorder.quantity == "disk_left_s"
 
 
 def test_what_is_not_known_is_null_in_json() -> None:
     store = Store(10)
-    store.set_statuses(0.0, StatusTable().updated(0.0, [status("n: model", age_s="nan", age_s_stale=2.0)], 0.0))
+    store.set_statuses(0.0, table(status("n: model", age_s="nan", age_s_stale=2.0)))
     assert "NaN" not in dump(state(store, 0.0, float("inf")))
 
 
-def seconds(stamp: int) -> float:
-    return stamp * 1e-9
-
-
 def judge(alarms: AlarmList, time: float, *told: Alarm) -> None:
-    alarms.judge(time, told, seconds)
+    alarms.judge(time, told, lambda stamp: stamp * 1e-9)
 
 
 def test_a_judged_alarm_is_one_from_the_first_suspicion_to_its_end() -> None:
@@ -135,27 +119,7 @@ def test_a_judged_alarm_is_one_from_the_first_suspicion_to_its_end() -> None:
     assert all(each.is_acknowledged for each in alarms.all)
 
 
-def test_two_alarms_of_one_channel_are_two() -> None:
-    alarms, stuck = AlarmList(), Alarm("joint_3", "stuck", 2 * 10**9, None, "joint_3.sensor", "stuck")
-    for time in (3.0, 4.0, 5.0):
-        judge(alarms, time, stuck, replace(stuck, kind="residual", since=3 * 10**9))
-    assert [(each.begin, each.end) for each in alarms.all] == [(2.0, None), (3.0, None)]
-
-
-def test_alarms_that_last_stand_in_place_of_the_lamp_for_them() -> None:
-    def told(now: float) -> dict[str, str]:
-        lamps = next(group["lamps"] for group in state(store, now, 4.0)["groups"] if group["name"] == "residuals")
-        return {lamp["name"]: lamp["level"] for lamp in lamps}
-
-    store = Store(10)
-    store.set_statuses(0.0, StatusTable().updated(0.0, [status("n: model"), status("n: health", ERROR)], 0.0))
-    assert told(0.0) == {"health": "ERROR"} and not store.alarms.all
-    judge(store.alarms, 3.0, Alarm("joint_3", "stuck", 2 * 10**9, None, "joint_3.sensor", "stuck"))
-    assert told(0.0) == {"joint_3": "ERROR"}
-    assert told(0.1 + SILENCE) == {"health": "STALE"}
-
-
-def test_an_alarm_is_seen_without_a_word_from_the_twin() -> None:
+def test_an_alarm_is_a_fault_without_a_word_from_the_twin() -> None:
     store = Store(10)
     judge(store.alarms, 3.0, Alarm("joint_3", "stuck", 2 * 10**9, None, "joint_3.sensor", "stuck"))
     found = state(store, 3.0, 3.0)
@@ -165,7 +129,7 @@ def test_an_alarm_is_seen_without_a_word_from_the_twin() -> None:
 def test_all_is_not_well_where_messages_were_dropped() -> None:
     """They may have told of a fault: the headline says so, a fault that is known goes before it."""
     store, dropped = Store(10), DroppedMessages()
-    store.set_statuses(0.0, StatusTable().updated(0.0, [status("n: model")], 0.0))
+    store.set_statuses(0.0, table(status("n: model")))
     found = state(store, 0.0, 0.0, dropped)
     assert (found["level"], found["reason"], found["dropped"]) == ("OK", "everything as expected", [])
     for _ in range(2):
@@ -174,33 +138,27 @@ def test_all_is_not_well_where_messages_were_dropped() -> None:
     found = state(store, 0.0, 0.0, dropped)
     assert (found["level"], found["reason"]) == ("WARN", "messages dropped: 2, see below")
     assert found["dropped"] == [{"topic": "/diagnostics", "count": 2, "reason": "no stamp"}]
-    store.set_statuses(0.0, StatusTable().updated(0.0, [status("n: model", ERROR)], 0.0))
+    store.set_statuses(0.0, table(status("n: model", ERROR)))
     assert state(store, 0.0, 0.0, dropped)["reason"].startswith("model: ")
 
 
-def test_an_alarm_lasts_until_its_lamp_is_well_or_out() -> None:
+def test_an_alarm_lasts_until_its_lamp_is_well_or_out_and_asks_again_when_it_gets_worse() -> None:
     alarms, well = AlarmList(), status("n: model")
     for time, level in ((1.0, OK), (2.0, WARN), (3.0, ERROR), (4.0, WARN), (5.0, OK), (6.0, STALE)):
-        alarms.follow(time, StatusTable().updated(0.0, [well, status("n: sensor 1", level, f"level {level}")], 0.0))
-    alarms.follow(7.0, StatusTable().updated(0.0, [well], 0.0))
+        alarms.follow(time, table(well, status("n: sensor 1", level, f"level {level}")))
+        if time == 2.0:
+            assert alarms.acknowledge(alarms.all[0].number) is alarms.all[0] and alarms.all[0].is_acknowledged
+    assert not alarms.all[0].is_acknowledged and alarms.acknowledge(99) is None
+    alarms.follow(7.0, table(well))
     assert [(a.level, a.reason, a.begin, a.end) for a in alarms.all] == [
         (Severity.ERROR, "level 2", 2.0, 5.0),
         (Severity.STALE, "level 3", 6.0, 7.0),
     ]
 
 
-def test_an_acknowledged_alarm_that_gets_worse_asks_again() -> None:
-    alarms = AlarmList()
-    alarms.follow(0.0, StatusTable().updated(0.0, [status("n: model", WARN)], 0.0))
-    assert alarms.acknowledge(alarms.all[0].number) is alarms.all[0] and alarms.all[0].is_acknowledged
-    alarms.follow(1.0, StatusTable().updated(0.0, [status("n: model", ERROR)], 0.0))
-    assert not alarms.all[0].is_acknowledged and alarms.acknowledge(99) is None
-
-
 def test_alarms_that_are_kept_are_bounded_and_the_newest() -> None:
     alarms = AlarmList()
     for time in range(2 * MAX_ALARMS):
-        alarms.follow(time, StatusTable().updated(0.0, [status("n: model", WARN if time % 2 else OK)], 0.0))
+        alarms.follow(time, table(status("n: model", WARN if time % 2 else OK)))
         alarms.add("event", Severity.OK, "", time, time)
     assert len(alarms.all) <= MAX_ALARMS and alarms.all[-1].begin == 2 * MAX_ALARMS - 1
-    assert worst([]) is None

@@ -6,9 +6,11 @@ import asyncio
 import json
 import struct
 from collections.abc import Awaitable, Callable, Iterator
+from functools import partial
 from pathlib import Path
 from threading import Event
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -19,12 +21,11 @@ from monitor.test_monitor_lamps import ERROR, OK, status
 from boom_twin import statics
 from boom_twin.errors import BagError
 from boom_twin.messages.topic_table import load_topics
-from boom_twin.monitor.access_control import AccessControl, is_loopback
+from boom_twin.monitor.access_control import AccessControl
 from boom_twin.monitor.actions import ViewerActions
 from boom_twin.monitor.data.analyst import PREDICTION, SIGNALS
 from boom_twin.monitor.data.bag_feed import BagFeed
-from boom_twin.monitor.data.feed import Feed
-from boom_twin.monitor.data.session_list import SessionList, sessions_in
+from boom_twin.monitor.data.feed import Feed, SessionList, sessions_in
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.server import MAX_VIEWERS, Server
 from boom_twin.scene import load_scene
@@ -59,21 +60,43 @@ class Made(Feed):
         self.published.append(words)
 
 
-def serve(feed: Feed, talk: Talk, permitted: tuple[str, ...] = (), host: str = "127.0.0.1") -> None:
+def serve(feed: Feed, talk: Talk, permitted: tuple[str, ...] = (), access: AccessControl | None = None) -> None:
     """Run `talk` with a session and the address of a server of `feed`."""
+    asyncio.run(_serve(Server(feed, ViewerActions(feed, frozenset(permitted)), access or AccessControl("127.0.0.1")), talk))
 
-    async def run() -> None:
-        access = AccessControl(host)
-        application = Server(feed, ViewerActions(feed, frozenset(permitted)), access).application()
-        async with TestServer(application) as server, ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
-            await asyncio.wait_for(talk(session, str(server.make_url("/"))), 60.0)
 
-    asyncio.run(run())
+Story = Callable[[Made, ClientSession, str], Awaitable[None]]
+
+
+def served(permitted: tuple[str, ...] = (), end: float | None = None) -> Callable[[Story], Callable[[], None]]:
+    """Make a test of a story that is given a feed, a session and the address of the feed's server."""
+
+    def test_of(story: Story) -> Callable[[], None]:
+        def test() -> None:
+            feed = Made(end)
+            serve(feed, partial(story, feed), permitted)
+
+        test.__doc__ = story.__doc__
+        return test
+
+    return test_of
+
+
+async def _serve(server: Server, talk: Talk) -> None:
+    async with TestServer(server.application()) as served, ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
+        await asyncio.wait_for(talk(session, str(served.make_url("/"))), 60.0)
 
 
 def connect(session: ClientSession, url: str, **more: Any) -> Any:
     headers = {"Origin": url.rstrip("/"), **more.pop("headers", {})}
     return session.ws_connect(f"{url}socket", headers=headers, max_msg_size=0, **more)
+
+
+async def closed(socket: ClientWebSocketResponse) -> int | None:
+    """Read until the server closes the socket; return its code."""
+    while (await socket.receive()).type in (WSMsgType.TEXT, WSMsgType.BINARY):
+        pass
+    return socket.close_code
 
 
 async def until(socket: ClientWebSocketResponse, kind: str, accept: Callable[[Any], bool] = lambda _: True) -> Any:
@@ -91,263 +114,191 @@ async def until(socket: ClientWebSocketResponse, kind: str, accept: Callable[[An
             return found
 
 
-def test_a_viewer_gets_layout_state_history_and_what_comes() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            assert (await until(socket, "hello"))["end"] is None
-            layout = await until(socket, "layout")
-            assert layout["tables"] == [{"name": "acceleration", "columns": ["x_m_s2", "z_m_s2"]}]
-            assert (await until(socket, "state"))["level"] == "OK"
-            assert (await until(socket, "rows"))["head"] == (1, 0, 2, 2000)
-            feed.rows(10)
-            rows = await until(socket, "rows")
-            assert rows["head"][3] == 10 and rows["times"][0] == pytest.approx(10.0)
-
-    feed = Made()
-    serve(feed, talk)
-
-
-def test_a_spectrum_with_the_models_frequencies_comes_too() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            lines = await until(socket, "lines")
-            assert lines["natural"] == []  # the strokes are not known
-            assert (await until(socket, "density"))["head"][2] == 2
-
-    serve(Made(), talk)
+@served()
+async def test_a_viewer_gets_layout_state_history_and_what_comes(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as socket:
+        assert (await until(socket, "hello"))["end"] is None
+        layout = await until(socket, "layout")
+        assert layout["tables"] == [{"name": "acceleration", "columns": ["x_m_s2", "z_m_s2"]}]
+        assert (await until(socket, "state"))["level"] == "OK"
+        assert (await until(socket, "rows"))["head"] == (1, 0, 2, 2000)
+        feed.rows(10)
+        rows = await until(socket, "rows")
+        assert rows["head"][3] == 10 and rows["times"][0] == pytest.approx(10.0)
+        feed.store.clear()  # time was set back
+        feed.rows(5)
+        await until(socket, "reset")
+        assert (await until(socket, "rows"))["head"][3] == 5
 
 
-def test_a_response_comes_once_as_long_as_the_posture_is_the_same() -> None:
-    """And before it why there is none, until the strokes are known."""
-
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            assert await until(socket, "loads") == {"kind": "loads", "names": [], "trouble": "the strokes are not known yet"}
-            strokes = strokes_of_posture(load_scene(), "arch")
-            feed.store.append("shape", [f"stroke_{i + 1}" for i in range(4)], 10**18 + 10**10, strokes)
-            loads = await until(socket, "loads")
-            assert loads["trouble"] == "" and loads["names"][1:] == [f"1 mm of cylinder {i}" for i in range(1, 5)]
-            assert (await until(socket, "response"))["head"] == (4, 0, 5, 400)
-            feed.store.append("shape", [f"stroke_{i + 1}" for i in range(4)], 10**18 + 2 * 10**10, strokes + 0.05)
-            assert (await until(socket, "response"))["head"] == (4, 0, 5, 400)
-
-    feed = Made()
-    serve(feed, talk)
+@served()
+async def test_a_response_comes_once_as_long_as_the_posture_is_the_same(feed: Made, session: ClientSession, url: str) -> None:
+    """Before it comes why there is none, until the strokes are known."""
+    async with connect(session, url) as socket:
+        assert await until(socket, "loads") == {"kind": "loads", "names": [], "trouble": "the strokes are not known yet"}
+        strokes = strokes_of_posture(load_scene(), "arch")
+        feed.store.append("shape", [f"stroke_{i + 1}" for i in range(4)], 10**18 + 10**10, strokes)
+        loads = await until(socket, "loads")
+        assert loads["trouble"] == "" and loads["names"][1:] == [f"1 mm of cylinder {i}" for i in range(1, 5)]
+        assert (await until(socket, "response"))["head"] == (4, 0, 5, 400)
+        feed.store.append("shape", [f"stroke_{i + 1}" for i in range(4)], 10**18 + 2 * 10**10, strokes + 0.05)
+        assert (await until(socket, "response"))["head"] == (4, 0, 5, 400)
 
 
-def test_the_spectrogram_since_before_the_page_was_opened_comes_once_and_then_what_is_new() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            past = await until(socket, "past")
-            assert past["times"].tolist() == [10.0] and SIGNALS[past["head"][1]] is PREDICTION  # there is no IMU
-            feed.rows(900)
-            assert (await until(socket, "past"))["times"].tolist() == [12.0, 14.0]
-            feed.store.clear()
-            feed.rows(2500)
-            assert (await until(socket, "past"))["times"].tolist() == [10.0, 12.0]
-
-    feed = Made()
+@served()
+async def test_the_spectrogram_comes_from_before_the_page_was_opened_and_then_once(
+    feed: Made, session: ClientSession, url: str
+) -> None:
     feed.rows(100)
-    serve(feed, talk)
+    async with connect(session, url) as socket:
+        past = await until(socket, "past")
+        assert past["times"].tolist() == [10.0] and SIGNALS[past["head"][1]] is PREDICTION  # there is no IMU
+        feed.rows(900)
+        assert (await until(socket, "past"))["times"].tolist() == [12.0, 14.0]
+        feed.store.clear()
+        feed.rows(2500)
+        assert (await until(socket, "past"))["times"].tolist() == [10.0, 12.0]
 
 
-def test_one_that_does_not_read_loses_rows_but_never_a_lamp() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            await until(socket, "rows")
-            transport = socket._response.connection.transport  # type: ignore[union-attr]
-            transport.pause_reading()
-            for _ in range(50):
-                feed.rows(2000)
-                await asyncio.sleep(0.01)
-            feed.tell(ERROR)
-            feed.rows(15_000)
-            await asyncio.sleep(0.3)
-            transport.resume_reading()
-            assert (await until(socket, "alarms", lambda found: found["alarms"]))["alarms"][0]["level"] == "ERROR"
-            assert (await until(socket, "state", lambda state: state["level"] == "ERROR"))["time"] == feed.store.newest
-            feed.rows(1)
-            rows = await until(socket, "rows", lambda rows: rows["times"][-1] == feed.store.newest)
-            assert rows["head"][3] < 2000
-
-    feed = Made()
-    serve(feed, talk)
+@served()
+async def test_one_that_does_not_read_loses_rows_but_never_a_lamp(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as socket:
+        await until(socket, "rows")
+        transport = socket._response.connection.transport  # type: ignore[union-attr]
+        transport.pause_reading()
+        for _ in range(50):
+            feed.rows(2000)
+            await asyncio.sleep(0.01)
+        feed.tell(ERROR)
+        feed.rows(15_000)
+        await asyncio.sleep(0.3)
+        transport.resume_reading()
+        assert (await until(socket, "alarms", lambda found: found["alarms"]))["alarms"][0]["level"] == "ERROR"
+        assert (await until(socket, "state", lambda state: state["level"] == "ERROR"))["time"] == feed.store.newest
+        feed.rows(1)
+        rows = await until(socket, "rows", lambda rows: rows["times"][-1] == feed.store.newest)
+        assert rows["head"][3] < 2000
 
 
-REQUESTS = ['{"do": "format"}', '{"do": "seek", "value": 1}', '{"do": "acknowledge"}']
+GARBAGE = ("", "{", "[]", "null", "x" * 5000, b"\0", "[" * 4000)
+REQUESTS = ('{"do": "format"}', '{"do": "seek", "value": 1}', '{"do": "acknowledge"}')
 
 
-@pytest.mark.parametrize("garbage", ["", "{", "[]", "null", *REQUESTS, "x" * 5000, b"\0", "[" * 4000])
-def test_garbage_is_shown_out_and_the_others_stay(garbage: str | bytes) -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as good, connect(session, url) as bad:
-            await (bad.send_bytes(garbage) if isinstance(garbage, bytes) else bad.send_str(garbage))
-            while (await bad.receive()).type in (WSMsgType.TEXT, WSMsgType.BINARY):
-                pass
-            assert bad.close_code in (1008, 1009)
+@served(permitted=("acknowledge",))
+async def test_garbage_is_shown_out_and_the_others_stay(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as good:
+        for garbage in (*GARBAGE, *REQUESTS):
+            async with connect(session, url) as bad:
+                await (bad.send_bytes(garbage) if isinstance(garbage, bytes) else bad.send_str(garbage))
+                assert await closed(bad) in (1008, 1009), garbage
             await until(good, "state")
 
-    serve(Made(), talk, permitted=("acknowledge",))
+
+@served(permitted=("mark",))
+async def test_a_flood_of_requests_is_shown_out(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as socket:
+        for _ in range(200):
+            await socket.send_str('{"do": "mark", "note": "x"}')
+        assert await closed(socket) == 1008 and len(feed.published) <= 50
 
 
-def test_a_flood_of_requests_is_shown_out() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            for _ in range(200):
-                await socket.send_str('{"do": "mark", "note": "x"}')
-            while (await socket.receive()).type in (WSMsgType.TEXT, WSMsgType.BINARY):
-                pass
-            assert socket.close_code == 1008 and len(feed.published) <= 50
-
-    feed = Made()
-    serve(feed, talk, permitted=("mark",))
-
-
-def test_a_thousand_connections_leave_room_for_nobody_more_and_harm_nobody() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as good:
-            opened = await asyncio.gather(*(connect(session, url) for _ in range(1000)), return_exceptions=True)
-            sockets = [each for each in opened if isinstance(each, ClientWebSocketResponse)]
-            refused = [each for each in opened if isinstance(each, WSServerHandshakeError)]
-            assert len(sockets) == MAX_VIEWERS - 1 and {each.status for each in refused} == {503}
-            await until(good, "state")
-            await asyncio.gather(*(each.close() for each in sockets))
-            async with connect(session, url) as another:
-                await until(another, "state")
-
-    serve(Made(), talk)
+@served()
+async def test_a_thousand_connections_harm_nobody(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as good:
+        opened = await asyncio.gather(*(connect(session, url) for _ in range(1000)), return_exceptions=True)
+        sockets = [each for each in opened if isinstance(each, ClientWebSocketResponse)]
+        refused = [each for each in opened if isinstance(each, WSServerHandshakeError)]
+        assert len(sockets) == MAX_VIEWERS - 1 and {each.status for each in refused} == {503}
+        await until(good, "state")
+        await asyncio.gather(*(each.close() for each in sockets))
+        async with connect(session, url) as another:
+            await until(another, "state")
 
 
-@pytest.mark.parametrize("origin", ["http://evil.example", "null", "", "http://127.0.0.1"])
-def test_a_page_of_another_origin_may_not_connect(origin: str) -> None:
-    async def talk(session: ClientSession, url: str) -> None:
+@served()
+async def test_only_a_page_of_this_server_connects_and_only_it_is_served(feed: Made, session: ClientSession, url: str) -> None:
+    for origin in ("http://evil.example", "null", "", "http://127.0.0.1"):
         with pytest.raises(WSServerHandshakeError) as caught:
             await connect(session, url, headers={"Origin": origin})
         assert caught.value.status == 403
+    for host, expected in (("evil.example:80", 403), ("localhost:80", 200), ("[::1]:80", 200)):
+        async with session.get(url, headers={"Host": host}) as response:
+            assert response.status == expected, host
+    response = await session.get(url)
+    assert "default-src 'self'" in response.headers["Content-Security-Policy"] and "http" not in await response.text()
+    for path in ("page/../server.py", "page/%2e%2e/server.py", "server.py", "page/"):
+        assert (await session.get(url + path)).status in (403, 404), path
+    assert (await session.post(url)).status == 405
 
-    serve(Made(), talk)
 
+def test_elsewhere_than_on_loopback_a_token_is_needed_that_leads_to_the_page_and_nowhere_else() -> None:
+    assert not AccessControl("127.0.0.1").token and not AccessControl("::1").token and AccessControl("rig.local").token
+    access = AccessControl("0.0.0.0")
+    assert len(access.token) >= 32
 
-def test_another_name_that_resolves_to_this_machine_is_refused() -> None:
     async def talk(session: ClientSession, url: str) -> None:
-        for host, expected in (("evil.example:80", 403), ("localhost:80", 200), ("[::1]:80", 200)):
-            async with session.get(url, headers={"Host": host}) as response:
-                assert response.status == expected, host
-
-    serve(Made(), talk)
-
-
-def test_elsewhere_than_on_loopback_a_token_is_needed() -> None:
-    assert not AccessControl("127.0.0.1").token and not AccessControl("::1").token and len(AccessControl("0.0.0.0").token) >= 32
-    assert not is_loopback("rig.local")
-
-    async def run() -> None:
-        access, feed = AccessControl("0.0.0.0"), Made()
-        async with TestServer(Server(feed, ViewerActions(feed, frozenset()), access).application()) as server:
-            url = str(server.make_url("/"))
-            async with ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
-                for path in ("", "page/main.js", "?token=wrong"):
-                    assert (await session.get(url + path)).status == 403, path
-                with pytest.raises(WSServerHandshakeError):
-                    await connect(session, url)
-                opened = await session.get(f"{url}?token={access.token}")
-                assert opened.status == 200 and "token" not in str(opened.url)
-                async with connect(session, url) as socket:
-                    await until(socket, "hello")
-
-    asyncio.run(run())
-
-
-@pytest.mark.parametrize("path", ["/", "//evil.example/path", "/%5cevil.example/", "/page/x"])
-def test_with_a_token_one_is_led_to_the_page_and_nowhere_else(path: str) -> None:
-    async def run() -> None:
-        access, feed = AccessControl("0.0.0.0"), Made()
-        async with TestServer(Server(feed, ViewerActions(feed, frozenset()), access).application()) as server:
-            head = await ask(server, f"{path}?token={access.token}")
+        for path in ("", "page/main.js", "?token=wrong"):
+            assert (await session.get(url + path)).status == 403, path
+        with pytest.raises(WSServerHandshakeError):
+            await connect(session, url)
+        opened = await session.get(f"{url}?token={access.token}")
+        assert opened.status == 200 and "token" not in str(opened.url)
+        async with connect(session, url) as socket:
+            await until(socket, "hello")
+        for path in ("/", "//evil.example/path", "/%5cevil.example/", "/page/x"):
+            head = await ask(url, f"{path}?token={access.token}")
             assert " 302 " in head and "\r\nLocation: /\r\n" in head and "Content-Security-Policy" in head
-            head = await ask(server, "/", "Cookie: boom_twin_monitor=\xff")
-            assert " 403 " in head and "Content-Security-Policy" in head
+        head = await ask(url, "/", "Cookie: boom_twin_monitor=\xff")
+        assert " 403 " in head and "Content-Security-Policy" in head
 
-    asyncio.run(run())
+    serve(Made(), talk, access=access)
 
 
-async def ask(server: TestServer, path: str, header: str = "X: y") -> str:
-    """The head of the answer to a request as it is, byte by byte."""
-    reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+async def ask(url: str, path: str, header: str = "X: y") -> str:
+    """Return the head of the answer to a request, which is sent byte by byte as it is."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", urlsplit(url).port)
     writer.write(f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n{header}\r\n\r\n".encode("latin-1"))
     answer = await asyncio.wait_for(reader.read(), 60.0)
     writer.close()
     return answer.partition(b"\r\n\r\n")[0].decode("latin-1") + "\r\n"
 
 
-def test_only_the_page_is_served_and_it_asks_for_nothing_from_elsewhere() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        response = await session.get(url)
-        assert "default-src 'self'" in response.headers["Content-Security-Policy"] and "http" not in await response.text()
-        for path in ("page/../server.py", "page/%2e%2e/server.py", "server.py", "page/"):
-            assert (await session.get(url + path)).status in (403, 404), path
-        assert (await session.post(url)).status == 405
-
-    serve(Made(), talk)
-
-
-def test_nothing_is_done_that_was_not_permitted() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            assert (await until(socket, "hello"))["permitted"] == []
-            for request in ({"do": "mark", "note": "x"}, {"do": "record", "on": True}, {"do": "acknowledge", "number": 1}):
-                await socket.send_json(request)
-                assert not (await until(socket, "answer"))["done"]
-        assert feed.published == []
-
-    feed = Made()
-    serve(feed, talk)
+@served()
+async def test_nothing_is_done_that_was_not_permitted(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as socket:
+        assert (await until(socket, "hello"))["permitted"] == []
+        for request in ({"do": "mark", "note": "x"}, {"do": "record", "on": True}, {"do": "acknowledge", "number": 1}):
+            await socket.send_json(request)
+            assert not (await until(socket, "answer"))["done"]
+    assert feed.published == []
 
 
-def test_a_mark_and_an_acknowledgement_are_published() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        feed.tell(ERROR)
-        async with connect(session, url) as socket:
-            number = (await until(socket, "alarms", lambda found: found["alarms"]))["alarms"][0]["number"]
-            await socket.send_json({"do": "mark", "note": "hose moved"})
-            assert (await until(socket, "answer"))["done"]
-            await socket.send_json({"do": "acknowledge", "number": number})
-            assert await until(socket, "alarms", lambda found: found["alarms"][0]["is_acknowledged"])
-        assert feed.published == ["mark: hose moved", "acknowledged: sensor joint_1: frozen"]
-
-    feed = Made()
-    serve(feed, talk, permitted=("mark", "acknowledge"))
+@served(permitted=("mark", "acknowledge"))
+async def test_a_mark_and_an_acknowledgement_are_published(feed: Made, session: ClientSession, url: str) -> None:
+    feed.tell(ERROR)
+    async with connect(session, url) as socket:
+        number = (await until(socket, "alarms", lambda found: found["alarms"]))["alarms"][0]["number"]
+        await socket.send_json({"do": "mark", "note": "hose moved"})
+        assert (await until(socket, "answer"))["done"]
+        await socket.send_json({"do": "acknowledge", "number": number})
+        assert await until(socket, "alarms", lambda found: found["alarms"][0]["is_acknowledged"])
+    assert feed.published == ["mark: hose moved", "acknowledged: sensor joint_1: frozen"]
 
 
-def test_a_recorded_session_is_steered_by_each_viewer_alone() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as one, connect(session, url) as other:
-            await one.send_json({"do": "hold", "value": 1})
-            await one.send_json({"do": "seek", "value": 5.0})
-            state = await until(one, "state", lambda state: state["position"] == 5.0)
-            assert state["is_held"]
-            assert (await until(other, "state", lambda state: state["position"] > 0.4))["position"] < 4.0
-            await one.send_json({"do": "seek", "value": 2.0})
-            await until(one, "reset")
-            rows = await until(one, "rows")
-            assert rows["times"][-1] == pytest.approx(2.0)
-            await other.send_json({"do": "speed", "value": 10.0})
-            assert (await until(other, "state", lambda state: state["position"] == 9.0))["is_held"]
-
-    serve(Made(end=9.0), talk)
-
-
-def test_when_time_is_set_back_the_page_begins_anew() -> None:
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            await until(socket, "rows")
-            feed.store.clear()
-            feed.rows(5)
-            await until(socket, "reset")
-            assert (await until(socket, "rows"))["head"][3] == 5
-
-    feed = Made()
-    serve(feed, talk)
+@served(end=9.0)
+async def test_a_recorded_session_is_steered_by_each_viewer_alone(feed: Made, session: ClientSession, url: str) -> None:
+    async with connect(session, url) as one, connect(session, url) as other:
+        await one.send_json({"do": "hold", "value": 1})
+        await one.send_json({"do": "seek", "value": 5.0})
+        state = await until(one, "state", lambda state: state["position"] == 5.0)
+        assert state["is_held"]
+        assert (await until(other, "state", lambda state: state["position"] > 0.4))["position"] < 4.0
+        await one.send_json({"do": "seek", "value": 2.0})
+        await until(one, "reset")
+        rows = await until(one, "rows")
+        assert rows["times"][-1] == pytest.approx(2.0)
+        await other.send_json({"do": "speed", "value": 10.0})
+        assert (await until(other, "state", lambda state: state["position"] == 9.0))["is_held"]
 
 
 def shaken(feed: Made, frequency: float) -> None:
@@ -365,28 +316,24 @@ def lines_of(feed: Made) -> dict[str, Any]:
     async def talk(session: ClientSession, url: str) -> None:
         async with connect(session, url) as socket:
             found.append(await until(socket, "lines"))
+            assert (await until(socket, "density"))["head"][2] == 2
 
     serve(feed, talk)
     return found[0]
 
 
-def test_the_spectrum_is_of_what_was_measured_where_something_was() -> None:
-    feed = Made()
-    assert lines_of(feed)["source"] == "predicted"
-    shaken(feed, 3.0)
-    lines = lines_of(feed)
-    assert lines["source"] == "measured by the IMU" and lines["axes"] == ["along the last section", "across it"]
-    assert lines["peaks"][0]["frequency"] == pytest.approx(3.0, abs=0.05) and lines["moved"] == 0.0
-
-
-def test_a_spectrum_of_a_boom_that_moved_says_so_and_names_no_mode() -> None:
+def test_the_spectrum_is_of_what_was_measured_and_names_no_mode_of_a_boom_that_moved() -> None:
     feed, rest = Made(), statics(None, "arch")
+    lines = lines_of(feed)
+    assert lines["source"] == "predicted" and lines["natural"] == []  # the strokes are not known
     shaken(feed, float(rest.frequencies[1]))
     columns = [f"stroke_{i + 1}_m" for i in range(4)]
     arch, moved = rest.strokes.tolist(), [*rest.strokes[:3].tolist(), float(rest.strokes[3]) + 0.03]
     for row in range(20):
         feed.store.append("shape", columns, 10**18 + row * 10**9, arch)
     known = lines_of(feed)
+    assert known["source"] == "measured by the IMU" and known["axes"] == ["along the last section", "across it"]
+    assert known["peaks"][0]["frequency"] == pytest.approx(rest.frequencies[1], abs=0.05)
     assert known["moved"] == 0.0 and known["peaks"][0]["mode"] == 2 and abs(known["peaks"][0]["deviation"]) < 0.02
     feed.store.append("shape", columns, 10**18 + 19_500_000_000, moved)
     feed.rows(20)
@@ -413,20 +360,20 @@ def test_a_session_that_is_being_read_gives_way_to_the_one_chosen(tmp_path: Path
         feed.begin(steps())  # type: ignore[arg-type]
         return feed
 
-    async def run() -> None:
-        sessions = SessionList([tmp_path / "a", tmp_path / "b"], opened)
-        server = Server(sessions.feed, ViewerActions(sessions.feed, frozenset()), AccessControl("127.0.0.1"), sessions)
-        async with TestServer(server.application()) as served, ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
-            url = str(served.make_url("/"))
-            async with connect(session, url) as socket:
-                await socket.send_json({"do": "session", "value": 1})
-                while (await socket.receive()).type in (WSMsgType.TEXT, WSMsgType.BINARY):
-                    pass  # until the server lets go
-            async with connect(session, url) as socket:
-                hello = await until(socket, "hello")
-                assert (hello["title"], hello["session"]) == ("b", 1)
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as socket:
+            await socket.send_json({"do": "session", "value": 1})
+            await closed(socket)
+        async with connect(session, url) as socket:
+            hello = await until(socket, "hello")
+            assert (hello["title"], hello["session"]) == ("b", 1)
 
-    asyncio.run(asyncio.wait_for(run(), 60.0))
+    sessions = SessionList([tmp_path / "a", tmp_path / "b"], opened)
+    asyncio.run(_serve(server_of(sessions), talk))
+
+
+def server_of(sessions: SessionList) -> Server:
+    return Server(sessions.feed, ViewerActions(sessions.feed, frozenset()), AccessControl("127.0.0.1"), sessions)
 
 
 def test_a_session_that_cannot_be_read_keeps_no_others_out(tmp_path: Path) -> None:
@@ -465,26 +412,19 @@ def test_one_of_several_sessions_is_chosen_for_all(tmp_path: Path) -> None:
         feed.title = path.name
         return feed
 
-    async def run() -> None:
-        sessions = SessionList(sessions_in(tmp_path), opened)
-        server = Server(sessions.feed, ViewerActions(sessions.feed, frozenset()), AccessControl("127.0.0.1"), sessions)
-        async with TestServer(server.application()) as served, ClientSession(cookie_jar=CookieJar(unsafe=True)) as session:
-            url = str(served.make_url("/"))
-            async with connect(session, url) as socket:
-                hello = await until(socket, "hello")
-                assert (hello["title"], hello["sessions"], hello["session"]) == ("a", ["a", "b", "c", "s.csv"], 0)
-                await socket.send_json({"do": "session", "value": 2})
-                trouble = await until(socket, "state", lambda message: bool(message["trouble"]))
-                assert trouble["trouble"].endswith("c: damaged")
-                await socket.send_json({"do": "session", "value": 1})
-                while (await socket.receive()).type in (WSMsgType.TEXT, WSMsgType.BINARY):
-                    pass  # until the server lets go
-            async with connect(session, url) as socket:
-                hello = await until(socket, "hello")
-                assert (hello["title"], hello["session"]) == ("b", 1)
-                await socket.send_json({"do": "session", "value": 7})
-                while (message := await socket.receive()).type in (WSMsgType.TEXT, WSMsgType.BINARY):
-                    pass
-                assert message.type is WSMsgType.CLOSE and message.data == 1008
+    async def talk(session: ClientSession, url: str) -> None:
+        async with connect(session, url) as socket:
+            hello = await until(socket, "hello")
+            assert (hello["title"], hello["sessions"], hello["session"]) == ("a", ["a", "b", "c", "s.csv"], 0)
+            await socket.send_json({"do": "session", "value": 2})
+            trouble = await until(socket, "state", lambda message: bool(message["trouble"]))
+            assert trouble["trouble"].endswith("c: damaged")
+            await socket.send_json({"do": "session", "value": 1})
+            await closed(socket)
+        async with connect(session, url) as socket:
+            hello = await until(socket, "hello")
+            assert (hello["title"], hello["session"]) == ("b", 1)
+            await socket.send_json({"do": "session", "value": 7})
+            assert await closed(socket) == 1008
 
-    asyncio.run(asyncio.wait_for(run(), 60.0))
+    asyncio.run(_serve(server_of(SessionList(sessions_in(tmp_path), opened)), talk))

@@ -20,7 +20,7 @@ from boom_twin.bag.writer import SessionWriter
 from boom_twin.cli.main import main
 from boom_twin.cli.output import warn_incomplete
 from boom_twin.config.settings import Settings
-from boom_twin.diagnostics.boom_mismatch import FAR, WINDOW, OtherBoom
+from boom_twin.diagnostics.boom_mismatch import JUDGED_TIME, LARGEST_RESIDUAL, OtherBoom
 from boom_twin.errors import BagError
 from boom_twin.messages.sample_decoder import SampleDecoder
 from boom_twin.messages.topic_table import load_topics
@@ -181,13 +181,13 @@ def judged(off, still=(), seconds=6.0):
 
 
 def test_most_encoders_must_be_off():
-    far = 1.1 * FAR
+    far = 1.1 * LARGEST_RESIDUAL
     assert "joint_1 by +11.0 deg, joint_2 by -11.0 deg, joint_3" in judged([far, -far, far, 0.0])
     assert judged([far, far, 0.0, 0.0]) == "" and judged([np.radians(5.0)]) == ""
     assert judged([far, far, far, 0.0], seconds=0.3) == ""  # too few samples
     assert judged([far] * 4, still=(0, 1, 2)) == ""  # most of them may be dead
     assert judged([far] * 4, still=(0,)) and judged([far] * 4, still=(0,), seconds=1.0)  # a short session, at its end
-    assert WINDOW == 5e9
+    assert JUDGED_TIME == 5e9
 
 
 def test_the_given_scene_comes_first_then_the_sessions_then_the_default(four, five, tmp_path):

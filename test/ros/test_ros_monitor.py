@@ -105,12 +105,12 @@ def test_rows_come_from_the_topics(pair: tuple[Any, Rig]) -> None:
     assert feed.store.epoch == EPOCH * 10**9 + 5_000_000
     assert feed.store.tables["displacement"].rows(0, 1)[1].tolist() == [[0.5, -0.25]]
     rig.send(Stream.IMU, 10_000_000, measured)
-    until(feed, lambda: len(feed.topic_rows._forces_felt) == 1)
+    until(feed, lambda: len(feed.topic_rows._forces_felt.waiting) == 1)
     rig.send(Output.RESIDUALS, 10_000_000, residual)
     until(feed, lambda: "force" in feed.store.tables)
     times, values = feed.store.tables["force"].rows(0, 1)
     rig.send(Output.RESIDUALS, 15_000_000, residual)
-    until(feed, lambda: len(feed.topic_rows._forces_felt) == 1)
+    until(feed, lambda: len(feed.topic_rows._forces_felt.waiting) == 1)
     rig.send(Stream.IMU, 15_000_000, measured)
     until(feed, lambda: feed.store.tables["force"].count == 2)
     assert times[0] == pytest.approx(0.005) and values.tolist() == [[1.0, 9.0, 0.75, 9.5, 0.25, 0.25]]

@@ -1,20 +1,22 @@
-"""Analysis beside the server: spectrum, and the model's natural frequencies and response, for what was just shown."""
+"""Analysis beside the server, of what is shown: spectrum, natural frequencies of the model, response of the tip to loads."""
 
 from __future__ import annotations
 
 import asyncio
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from math import floor
 from typing import Any
 
 import numpy as np
 
-from ...analysis.posture_modes import MOVED, ModeList
-from ...deviation.load_spectrum import tip_load
+from ...analysis.frequency_response import UPWARD, linearised_boom
+from ...analysis.posture_modes import MOVED, ModeList, PresentPosture
+from ...errors import BoomTwinError
+from ...scene.schema import Scene
+from ...types import Array
 from ..protocol import RESPONSE, SPECTROGRAM, SPECTRUM, pack
 from .feed import Feed
-from .spectrum import SEGMENT, STEP, WINDOW, Peak, spectrogram, spectrum
-from .tip_response import ResponseCompiler, ResponseList, TipResponses
+from .spectrum import COLUMN_STEP, SEGMENT, SPECTRUM_SPAN, Peak, spectrogram, spectrum
 from .topic_rows import ESTIMATE
 
 
@@ -35,6 +37,40 @@ SIGNALS = (
     PREDICTION,
 )
 """The best first: the prediction knows nothing of what shakes the boom."""
+RESPONSE_FREQUENCIES = np.geomspace(0.25, 30.0, 400)
+"""Frequencies of the responses, Hz."""
+MILLIMETRE = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TipResponses:
+    """Amplitude of the tip's acceleration under harmonic loads."""
+
+    loads: tuple[str, ...] = ()  # in words
+    frequencies: Array = field(default_factory=lambda: np.zeros(0))  # (k,), Hz
+    accelerations: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, loads), both directions together, m/s^2
+    trouble: str = ""  # why there are none
+
+
+class ResponseList(PresentPosture[TipResponses]):
+    """Frequency response of the tip to 1 N at the tip, and to 1 mm of every cylinder's drive."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__()
+        self._scene = scene
+
+    def _work_out(self, strokes: Array) -> TipResponses:
+        try:
+            boom = linearised_boom(self._scene, strokes)
+            drives = range(boom.plan.joints)
+            loads = [boom.load(UPWARD), *(MILLIMETRE * boom.load(drive=i) for i in drives)]
+            columns = [np.linalg.norm(boom.respond(RESPONSE_FREQUENCIES, load).tip_acceleration, axis=1) for load in loads]
+        except BoomTwinError as error:
+            return TipResponses(trouble=str(error))
+        names = ("1 N at the tip, up", *(f"1 mm of cylinder {i + 1}" for i in drives))
+        return TipResponses(names, RESPONSE_FREQUENCIES, np.column_stack(columns))
+
+
 UNKNOWN_SCENE = TipResponses(trouble="the model is not known: give --scene")
 UNKNOWN_POSTURE = TipResponses(trouble="the strokes are not known yet")
 KNOWN_SHARE = 0.9
@@ -44,10 +80,10 @@ MODE_DISTANCE = 0.2
 
 
 class Analyst:
-    """Analysis of one feed, one computation of a kind at a time, because the model's workspace is one."""
+    """Analysis of one feed, one computation of a kind at a time, because the model has one workspace."""
 
-    def __init__(self, feed: Feed, compiler: ResponseCompiler) -> None:
-        self._feed, self._compiler = feed, compiler
+    def __init__(self, feed: Feed) -> None:
+        self._feed = feed
         self._modes: ModeList | None = None
         self._responses: ResponseList | None = None
         self._turn, self._response_turn = asyncio.Lock(), asyncio.Lock()
@@ -66,7 +102,7 @@ class Analyst:
             key = (store.generation, end)
             if self._known is not None and self._known[0] == key:
                 return self._known[1]
-            times, values = table.rows(table.until(time - WINDOW), end)
+            times, values = table.rows(table.until(time - SPECTRUM_SPAN), end)
             found = await asyncio.to_thread(spectrum, times, values[:, signal.columns].astype(float))
             if found is None:
                 return None
@@ -82,7 +118,7 @@ class Analyst:
     async def response_at(self, time: float) -> TipResponses:
         """Return the tip's response to loads in the posture at `time` (s); the same object while the boom has not moved.
 
-        It has a boom of its own, so that no spectrum waits for it: the first on a computer compiles for half a minute.
+        It has a model of its own, so that no spectrum waits for the first one, which compiles for half a minute.
         """
         async with self._response_turn:
             scene, strokes = self._feed.scene(), self._feed.strokes(time)
@@ -90,27 +126,16 @@ class Analyst:
                 return UNKNOWN_SCENE
             if len(strokes) != len(scene.joints):
                 return UNKNOWN_POSTURE
-            if self._responses is None:
-                await self._compiler.finish()
-                self._responses = ResponseList(scene)
+            self._responses = self._responses or ResponseList(scene)
             return await asyncio.to_thread(self._responses.at, strokes)
-
-    async def load_at(self, time: float) -> dict[str, Any] | None:
-        """Return text message ``load`` on the load at the tip before `time` (s), in words; None without a load."""
-        table = self._feed.store.tables.get(ESTIMATE)
-        if table is None:
-            return None
-        times, values = table.rows(table.until(time - WINDOW), table.until(time))
-        found = await asyncio.to_thread(tip_load, times, values[:, -2:].astype(float))
-        return None if found is None else {"kind": "load", "words": f"load at the tip: {found.text}"}
 
     async def spectrogram_between(self, after: float, until: float) -> tuple[float, bytes] | None:
         """Return time (s) of the newest column of the spectrogram between two times, and the block of all its columns."""
-        signal = self._signal(until := STEP * floor(until / STEP))
+        signal = self._signal(until := COLUMN_STEP * floor(until / COLUMN_STEP))
         table = self._feed.store.tables.get(signal.table)
         if table is None:
             return None
-        ends = STEP * np.unique(np.ceil(table.rows(table.until(after), table.until(until))[0] / STEP))
+        ends = COLUMN_STEP * np.unique(np.ceil(table.rows(table.until(after), table.until(until))[0] / COLUMN_STEP))
         ends = ends[(ends > max(after, SEGMENT)) & (ends <= until)]  # none in a pause, which may last for days
         if not len(ends):
             return None
@@ -130,7 +155,7 @@ class Analyst:
 
     def _moved(self, time: float) -> float:
         """Return the largest motion (m) of a cylinder within the window before `time` (s)."""
-        strokes = self._feed.strokes_between(time - WINDOW, time)
+        strokes = self._feed.strokes_between(time - SPECTRUM_SPAN, time)
         return float(np.ptp(strokes, axis=0).max()) if len(strokes) else 0.0
 
     def _placed(self, peak: Peak, natural: list[float], time: float, has_moved: bool) -> dict[str, Any]:

@@ -32,11 +32,11 @@ from ...types import NANO, Stream
 from .feed import Feed
 from .store import Store
 
-LOOK_PERIOD = 1.0
+DIAGNOSIS_PERIOD = 1.0
 """Seconds between two diagnoses of the twin, as of the node."""
-ENOUGH = Output.TIP_ACCELERATION
+PUBLISHED_OUTPUT = Output.TIP_ACCELERATION
 """A session with this output is shown as its node published it."""
-TURN = 0.04
+READING_TIME = 0.04
 """Seconds of reading at a time, after which the pages have their turn."""
 
 
@@ -55,10 +55,10 @@ class BagFeed(Feed):
         return self._steps is not None
 
     def poll(self) -> None:
-        """Read for `TURN` seconds; a fault of the session ends the reading and is kept in `trouble`."""
+        """Read for `READING_TIME` seconds; a fault of the session ends the reading and is kept in `trouble`."""
         if self._steps is None:
             return
-        turn = perf_counter() + TURN
+        turn = perf_counter() + READING_TIME
         try:
             for _ in self._steps:
                 if perf_counter() > turn:
@@ -84,8 +84,8 @@ def bag_feed(
 ) -> BagFeed:
     """Open a recording, or the result bag of a replay.
 
-    The parameters are those of `boom_twin.offline.replay.replay`; `settings` are for the twin, where the session has no
-    outputs, and the twin starts at rest where the `window` begins.
+    The parameters are those of `boom_twin.offline.replay.replay`. A session without outputs is run through a twin with these
+    `settings`, at rest where the `window` begins.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def bag_feed(
     topics = mapped.topics.of_joints(joint.range_deg for joint in scene.joints).reading(strokes_of(path, mapped).reading)
     refuse_other_names(session, topics, len(scene.joints), taken.source)
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
-    is_published = topics.outputs[ENOUGH].absolute in counts
+    is_published = topics.outputs[PUBLISHED_OUTPUT].absolute in counts
     length = (session.end - session.start) * NANO
     store = Store(max(counts.values(), default=1), keeps_statuses=True)
     if not is_published and topics.inputs[Stream.STROKES].absolute not in counts:
@@ -184,7 +184,7 @@ class _Twin:
         for key, encoded in chain.from_iterable(map(self._encoder.fill, report.all)):
             if key in self._names:
                 self._feed.topic_rows.take_encoded(self._names[key], encoded, self._feed.now())
-        if self._time - self._looked >= LOOK_PERIOD or self._watch.is_urgent():
+        if self._time - self._looked >= DIAGNOSIS_PERIOD or self._watch.is_urgent():
             self._look()
 
     def finish(self) -> None:

@@ -16,7 +16,7 @@ from ...types import SENSORS, Stream, stream_of
 LOG = logging.getLogger("boom_twin.monitor.data.dropped_messages")
 LONGEST_REASON, LONGEST_TEXT = 200, 500
 """Characters of a reason, and of another text, that are kept."""
-LARGEST = 1e12
+LARGEST_NUMBER = 1e12
 """Largest magnitude of a number: none of the twin's, in SI units, comes near it."""
 
 
@@ -34,7 +34,7 @@ class TopicLoss:
 
 
 class DroppedMessages:
-    """Counter of dropped messages; each is logged, see `boom_twin.monitor.log_limit` for the rate of these lines."""
+    """Counter of dropped messages; each is logged, at the rate of `boom_twin.monitor.connections.LogRateLimit`."""
 
     def __init__(self) -> None:
         self.by_topic: dict[str, TopicLoss] = {}
@@ -72,11 +72,11 @@ def check_instant(found: int) -> int:
 
 
 def check_numbers(values: Sequence[float], *, may_lack: bool = False) -> list[float]:
-    """Return the values as floats; raise MalformedError above `LARGEST`, or for NaN unless a sensor `may_lack`."""
+    """Return the values as floats; raise MalformedError above `LARGEST_NUMBER`, or for NaN unless a sensor `may_lack`."""
     found = [float(value) for value in values]
     for value in found:
-        if not abs(value) <= LARGEST and not (may_lack and isnan(value)):
-            raise MalformedError(f"a number is {value:g}; at most {LARGEST:g} is possible")
+        if not abs(value) <= LARGEST_NUMBER and not (may_lack and isnan(value)):
+            raise MalformedError(f"a number is {value:g}; at most {LARGEST_NUMBER:g} is possible")
     return found
 
 

@@ -7,18 +7,17 @@ from math import isfinite, nan, pi
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks, hilbert, welch
+from scipy.signal import find_peaks, hilbert, periodogram, welch
 
 from ...analysis.even_times import spacing
 from ...types import Array
 
-WINDOW = 40.0
+SPECTRUM_SPAN = 40.0
 """Time span of the spectrum, up to the shown time, s."""
 SEGMENT = 8.0
 """Segment of Welch's method, s (Hann window, half overlapping, mean removed)."""
-HIGHEST = 30.0
-"""Highest frequency of a peak, Hz."""
-LOWEST = 0.3
+LOWEST_PEAK, HIGHEST_PEAK = 0.3, 30.0
+"""Frequencies of peaks, Hz."""
 MAX_PEAKS = 5
 PROMINENCE = 6.0
 """Lowest prominence of a peak, dB."""
@@ -65,7 +64,7 @@ def _peaks(frequencies: Array, density: Array, values: Array, rate: float) -> li
     """Return the highest prominent peaks. Their frequency is from a parabola through the decibels."""
     level = 10.0 * np.log10(np.maximum(density, 1e-30))
     found, _ = find_peaks(level, prominence=PROMINENCE)
-    found = [i for i in found if LOWEST <= frequencies[i] <= min(HIGHEST, 0.4 * rate)]
+    found = [i for i in found if LOWEST_PEAK <= frequencies[i] <= min(HIGHEST_PEAK, 0.4 * rate)]
     peaks = []
     for i in sorted(found, key=lambda place: -level[place])[:MAX_PEAKS]:
         below, top, above = level[i - 1 : i + 2]
@@ -101,8 +100,8 @@ def damping(values: Array, rate: float, frequency: float) -> float:
     return ratio if isfinite(ratio) and ratio > 0.0 else nan
 
 
-STEP = 2.0
-"""Session time between columns, s. Columns end at its multiples."""
+COLUMN_STEP = 2.0
+"""Session time between columns of the spectrogram, s. Columns end at its multiples."""
 FREQUENCIES = np.arange(0.0, 20.0 + 0.5 / SEGMENT, 1.0 / SEGMENT)
 """Frequencies of every column, Hz."""
 COVERAGE = 0.9
@@ -132,7 +131,5 @@ def _periodogram(times: Array, values: Array) -> Array:
     """Return the density at multiples of 1 / `SEGMENT`, Hz."""
     count = round(SEGMENT / spacing(times))
     even = times[-1] - SEGMENT + SEGMENT / count * np.arange(1, count + 1)
-    window = np.hanning(count + 1)[:-1]
     rows = np.stack([np.interp(even, times, column) for column in values.T])
-    power = np.abs(np.fft.rfft((rows - rows.mean(axis=1, keepdims=True)) * window)) ** 2
-    return np.asarray(2.0 * SEGMENT / count * power.sum(axis=0) / np.sum(window**2))
+    return np.asarray(periodogram(rows, count / SEGMENT, "hann")[1].sum(axis=0))

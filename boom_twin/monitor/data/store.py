@@ -19,10 +19,7 @@ Rows = tuple[NDArray[np.float64], NDArray[np.float32]]
 
 
 class Table:
-    """Ring buffer of rows: named columns (``x_m``) and a time. Beyond `capacity` the oldest rows are dropped.
-
-    Memory grows with the rows.
-    """
+    """Ring buffer of rows: named columns (``x_m``) and a time. It grows up to `capacity`, then the oldest rows are dropped."""
 
     def __init__(self, name: str, columns: Sequence[str], capacity: int) -> None:
         self.name, self.columns, self._capacity = name, tuple(columns), capacity
@@ -43,15 +40,12 @@ class Table:
     def append(self, time: float, values: Sequence[float]) -> None:
         """Add a row: `time` (s), values (columns,)."""
         if self.count == len(self._times) < self._capacity:
-            self._grow(min(2 * self.count, self._capacity))
+            more = min(self.count, self._capacity - self.count)
+            self._times = np.pad(self._times, (0, more))
+            self._values = np.pad(self._values, ((0, more), (0, 0)))
         place = self.count % len(self._times)
         self._times[place], self._values[place] = time, values
         self.count += 1
-
-    def _grow(self, size: int) -> None:
-        more = size - len(self._times)
-        self._times = np.pad(self._times, (0, more))
-        self._values = np.pad(self._values, ((0, more), (0, 0)))
 
     def until(self, time: float) -> int:
         """Return the number of the first row after `time` (s). Rows are sorted."""
@@ -81,6 +75,7 @@ class Store:
         self._capacity, self._keeps_statuses = capacity, keeps_statuses
         self.generation = 0  # incremented when a clock set back deletes all rows
         self.epoch = 0  # first stamp (ns), origin of times
+        self.newest = 0.0  # newest time of all tables, s
         self.tables: dict[str, Table] = {}  # in the order of their first row
         self.alarms = AlarmList()
         self._statuses: list[tuple[float, StatusTable]] = []
@@ -90,7 +85,7 @@ class Store:
     def clear(self) -> None:
         """Delete all rows and the epoch; keep the lamps."""
         self.generation += 1
-        self.epoch = 0
+        self.epoch, self.newest = 0, 0.0
         self.tables, self._last, self._held = {}, {}, {}
 
     def time(self, stamp: int) -> float:
@@ -109,7 +104,8 @@ class Store:
         MalformedError
             The stamp is not after the last one, the columns differ, or the held row was an outlier.
         """
-        self._check(name, columns)
+        if name in self.tables and self.tables[name].columns != tuple(columns):
+            raise MalformedError(_difference(self.tables[name].columns, columns))
         last, held = self._last.get(name, stamp - 1), self._held.get(name)
         is_leap = not -SET_BACK <= stamp - last <= LEAP_AHEAD
         if not is_leap and stamp <= last:
@@ -130,24 +126,13 @@ class Store:
 
     def append(self, name: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
         """Add a row to a table; the first row creates the table."""
-        self._check(name, columns)
         if name not in self.tables:
             self.tables[name] = Table(name, columns, self._capacity)
         table, time = self.tables[name], self.time(stamp)
         if name == EVERY_STROKE and table.count and time - table.newest > GAP:
             self.alarms.add("cylinder_strokes", Severity.WARN, f"gap of {time - table.newest:.2f} s", table.newest, time)
         table.append(time, values)
-
-    def _check(self, name: str, columns: Sequence[str]) -> None:
-        """Raise MalformedError if the table has other columns."""
-        table = self.tables.get(name)
-        if table is not None and table.columns != tuple(columns):
-            raise MalformedError(_difference(table.columns, columns))
-
-    @property
-    def newest(self) -> float:
-        """Newest time of all tables, s; 0 if empty."""
-        return max((table.newest for table in self.tables.values()), default=0.0)
+        self.newest = max(self.newest, time)
 
     def set_statuses(self, time: float, statuses: StatusTable) -> None:
         """Set the lamps from `time` (s, lamps' clock) on and update the alarms."""

@@ -10,7 +10,7 @@ from functools import partial
 from math import sqrt
 from operator import attrgetter
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...messages.report_encoder import decode_health
 from ...messages.sample_decoder import SampleDecoder, stamp_of
@@ -45,33 +45,32 @@ RESIDUALS = {stream: "joints" if stream is Stream.ANGLES else stream.value for s
 """Names of the tables of residuals."""
 NO_MEASUREMENT = "no measurement"
 """Oddity of `SampleDecoder` that is no fault here: an Imu states that it has no measurement."""
-VECTORS: dict[Output, Callable[[Any], Any]] = {
-    Output.TIP_DISPLACEMENT: attrgetter("vector"),
-    Output.TIP_POSITION: attrgetter("point"),
-    Output.TIP_ACCELERATION: attrgetter("accel.linear"),
-    Output.TIP_UNCERTAINTY: attrgetter("vector"),
-    Output.ESTIMATE_POSE: attrgetter("pose.pose.position"),
-    Output.ESTIMATE_ACCELERATION: attrgetter("accel.accel.linear"),
-    Output.ESTIMATE_LOAD: attrgetter("wrench.force"),
-}
-"""Outputs that are a vector in the plane of the boom, and where it is in a message."""
-COVARIANCES = {
-    Output.ESTIMATE_POSE: attrgetter("pose.covariance"),
-    Output.ESTIMATE_ACCELERATION: attrgetter("accel.covariance"),
-}
-PLANE = ("x_m", "z_m")
-TABLES = {
-    Output.TIP_DISPLACEMENT: ("displacement", PLANE),
-    Output.TIP_POSITION: ("position", PLANE),
-    Output.TIP_ACCELERATION: ("acceleration", ("x_m_s2", "z_m_s2")),
-    Output.TIP_UNCERTAINTY: ("uncertainty", PLANE),
-}
-"""Tables of such outputs, with their columns."""
+PLANE, ACCELERATION = ("x_m", "z_m"), ("x_m_s2", "z_m_s2")
 ESTIMATE = "estimate"
 ESTIMATE_COLUMNS = (
-    "x_m", "z_m", "sigma_x_m", "sigma_z_m", "x_m_s2", "z_m_s2", "sigma_x_m_s2", "sigma_z_m_s2", "load_x_N", "load_z_N",
+    *PLANE, "sigma_x_m", "sigma_z_m", *ACCELERATION, "sigma_x_m_s2", "sigma_z_m_s2", "load_x_N", "load_z_N",
 )  # fmt: skip
 """Columns of the table of estimates: displacement and acceleration of the tip with their deviations, load."""
+
+
+class Vector(NamedTuple):
+    """Output that is a vector in the plane of the boom: where it and its covariance are in a message, and its own table."""
+
+    get: Callable[[Any], Any]
+    covariance: Callable[[Any], Any] | None = None
+    table: str = ""
+    columns: tuple[str, ...] = ()
+
+
+VECTORS = {
+    Output.TIP_DISPLACEMENT: Vector(attrgetter("vector"), table="displacement", columns=PLANE),
+    Output.TIP_POSITION: Vector(attrgetter("point"), table="position", columns=PLANE),
+    Output.TIP_ACCELERATION: Vector(attrgetter("accel.linear"), table="acceleration", columns=ACCELERATION),
+    Output.TIP_UNCERTAINTY: Vector(attrgetter("vector"), table="uncertainty", columns=PLANE),
+    Output.ESTIMATE_POSE: Vector(attrgetter("pose.pose.position"), attrgetter("pose.covariance")),
+    Output.ESTIMATE_ACCELERATION: Vector(attrgetter("accel.accel.linear"), attrgetter("accel.covariance")),
+    Output.ESTIMATE_LOAD: Vector(attrgetter("wrench.force")),
+}
 JOINED = (
     Output.TIP_DISPLACEMENT, Output.TIP_POSITION, Output.ESTIMATE_POSE, Output.ESTIMATE_ACCELERATION, Output.ESTIMATE_LOAD,
 )  # fmt: skip
@@ -84,30 +83,22 @@ class PartsOfRows:
 
     def __init__(self, names: Sequence[Hashable]) -> None:
         self._names = names
-        self._waiting: dict[int, dict[Hashable, Sequence[float]]] = {}
+        self.waiting: dict[int, dict[Hashable, Sequence[float]]] = {}  # by stamp, ns
 
     def put(self, name: Hashable, stamp: int, values: Sequence[float]) -> list[Sequence[float]] | None:
         """Return all parts of the row at `stamp` (ns), in their order, if this is the last of them."""
-        if len(self._waiting) > MAX_WAITING:
-            del self._waiting[next(iter(self._waiting))]
-        parts = self._waiting.setdefault(stamp, {})
+        if len(self.waiting) > MAX_WAITING:
+            del self.waiting[next(iter(self.waiting))]
+        parts = self.waiting.setdefault(stamp, {})
         parts[name] = values
         if len(parts) < len(self._names):
             return None
-        del self._waiting[stamp]
+        del self.waiting[stamp]
         return [parts[each] for each in self._names]
-
-    def clear(self) -> None:
-        """Drop all that wait."""
-        self._waiting.clear()
-
-    def __len__(self) -> int:
-        """Return the number of stamps that wait."""
-        return len(self._waiting)
 
 
 class TopicRows:
-    """Converter of messages to rows of a store.
+    """Converter of messages of the topics with the absolute `names` to rows of a store.
 
     =================  ==================================================================================================
     table              columns
@@ -122,8 +113,6 @@ class TopicRows:
     ``estimate``       see `ESTIMATE_COLUMNS`; the displacement is that of the estimated tip; no row before anything is measured
     ``shape``          x, z of the deflected line and of the undeflected one, four of every cylinder's pins, forces, strokes
     =================  ==================================================================================================
-
-    It takes the topics of the absolute `names`.
     """
 
     def __init__(self, store: Store, topics: Topics) -> None:
@@ -132,20 +121,8 @@ class TopicRows:
         self._forces_felt, self._estimates = PartsOfRows((COMPARED, Output.RESIDUALS)), PartsOfRows(JOINED)
         self._forces: list[float] = []
         self._strokes: list[float] = []
-        self._scene, self._now = "", 0.0
-        taken = [(topics.outputs[role], take) for role, take in self._by_role().items()]
-        taken += [(topics.inputs[COMPARED], self._take_measured), (topics.events, self._take_event)]
-        self._takers = {topic.absolute: take for topic, take in taken}
-        self._types = {topic.absolute: topic.type for topic, _ in taken}
-        self.names = frozenset(self._takers)
-
-    @property
-    def scene(self) -> str:
-        """Name of the node's scene: a path, or the name of the package's own; empty until it is known."""
-        return self._scene
-
-    def _by_role(self) -> dict[Output, Callable[[Any], None]]:
-        return {
+        self.scene, self._now = "", 0.0  # name of the node's scene, empty until it is known
+        outputs: dict[Output, Callable[[Any], None]] = {
             **{role: partial(self._take_vector, role) for role in VECTORS},
             Output.JOINT_STATES: self._take_cylinders,
             Output.RESIDUALS: self._take_residuals,
@@ -153,6 +130,11 @@ class TopicRows:
             Output.HEALTH: self._take_health,
             Output.DIAGNOSTICS: self._take_state,
         }
+        taken = [(topics.outputs[role], take) for role, take in outputs.items()]
+        taken += [(topics.inputs[COMPARED], self._take_measured), (topics.events, self._take_event)]
+        self._takers = {topic.absolute: take for topic, take in taken}
+        self._types = {topic.absolute: topic.type for topic, _ in taken}
+        self.names = frozenset(self._takers)
 
     def take(self, topic: str, message: Any, now: float) -> None:
         """Take a message of a topic (absolute name) that came at `now` (s, as lamps count); a malformed one is dropped."""
@@ -176,8 +158,8 @@ class TopicRows:
         generation = self._store.generation
         self._store.receive(table, columns, stamp, values)
         if self._store.generation != generation:  # time was set back
-            self._forces_felt.clear()
-            self._estimates.clear()
+            self._forces_felt.waiting.clear()
+            self._estimates.waiting.clear()
 
     def _take_measured(self, msg: Any) -> None:
         before = self._decoder.oddities.copy()
@@ -189,12 +171,13 @@ class TopicRows:
             raise MalformedError(", ".join(odd))
 
     def _take_vector(self, role: Output, msg: Any) -> None:
-        vector, stamp = VECTORS[role](msg), check_stamp(msg)
-        values = check_numbers((vector.x, vector.z))
-        if role in COVARIANCES:
-            values += _deviations(COVARIANCES[role](msg))
-        if role in TABLES:
-            self._append(*TABLES[role], stamp, values)
+        vector, stamp = VECTORS[role], check_stamp(msg)
+        point = vector.get(msg)
+        values = check_numbers((point.x, point.z))
+        if vector.covariance is not None:
+            values += _deviations(vector.covariance(msg))
+        if vector.table:
+            self._append(vector.table, vector.columns, stamp, values)
         if role in JOINED:
             self._join_estimate(role, stamp, values)
 
@@ -268,7 +251,7 @@ class TopicRows:
         check_count("nodes on one topic", len(statuses.nodes), MAX_NODES)
         for status in msg.status:
             if str(status.name).endswith(": model"):
-                self._scene = next((pair.value for pair in status.values if pair.key == "scene"), self._scene)
+                self.scene = next((pair.value for pair in status.values if pair.key == "scene"), self.scene)
         store.set_statuses(self._now, statuses)
 
 

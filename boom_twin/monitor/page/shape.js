@@ -18,8 +18,8 @@ export class Shape {
     this.canvas = document.getElementById("boom");
     for (const button of document.querySelectorAll("#factors button")) button.onclick = () => this.choose(Number(button.dataset.factor));
     this.choose(10);
-    connection.addEventListener("reset", () => { this.box = null; document.getElementById("load").textContent = ""; });
-    connection.addEventListener("load", event => { document.getElementById("load").textContent = event.detail.words; });
+    connection.addEventListener("reset", () => { this.box = null; });
+    connection.addEventListener("state", event => showLoad(event.detail.groups));
   }
 
   choose(factor) {
@@ -156,4 +156,10 @@ function colourOf(force) {
   if (!Number.isFinite(force)) return themeColour("off");
   const share = Math.min(Math.abs(force) / FULL, 1), end = force > 0 ? [213, 60, 40] : [40, 110, 230];
   return `rgb(${end.map(c => Math.round(150 + share * (c - 150)))})`;
+}
+
+// What /diagnostics says of the load at the tip.
+function showLoad(groups) {
+  const status = groups.flatMap(group => group.lamps).find(({ name, level }) => name === "tip load" && level === "OK");
+  document.getElementById("load").textContent = status ? `load at the tip: ${status.reason}` : "";
 }

@@ -5,7 +5,7 @@ import { lineColour, themeColour } from "./colours.js";
 
 const LOWEST = 0.25, HIGHEST = 50; // Hz
 const COLUMNS = 300; // of the spectrogram
-const WIDTH = 2, HEIGHT = 0.125; // s and Hz of one of its cells: STEP and FREQUENCIES of boom_twin/monitor/data/spectrum.py
+const WIDTH = 2, HEIGHT = 0.125; // s and Hz of one of its cells: COLUMN_STEP and FREQUENCIES of boom_twin/monitor/data/spectrum.py
 const RANGE = 60; // dB from dark to bright
 const SOURCES = ["measured by the IMU", "estimated from all sensors", "predicted"]; // SIGNALS of boom_twin/monitor/data/analyst.py
 
@@ -40,8 +40,9 @@ export class SpectrumTab {
   rebuild() { this.chart?.close(); this.chart = null; this.isNew = true; }
 
   draw(tab) {
-    if (!this.isNew || !this.density) return;
+    if (!this.isNew) return;
     this.isNew = false;
+    if (!this.density) return;
     if (tab === "spectrogram") return this.drawSpectrogram();
     this.chart ??= new Chart(document.getElementById("density"), {
       title: `density, ${this.lines.source}, (m/s²)²/Hz`,
