@@ -21,7 +21,7 @@ from ..scene.schema import Scene
 from ..types import Array
 from .drive import PASSES, TOLERANCE
 from .equilibrium import settle
-from .error_estimate import step_error_warning
+from .doubts import step_error_warning
 from .simulate import RHO
 
 FAMILIES = {
@@ -94,7 +94,7 @@ class MethodRun:
     status : str
         "ok", or why the motion ended.
     doubt : str
-        Warning of a coarse step or of ringing, see `analysis.error_estimate`; empty if none.
+        Warning of a coarse step or of ringing, see `analysis.doubts`; empty if none.
     """
 
     times: Array

@@ -22,7 +22,7 @@ from ..types import Array
 from .cylinder_drives import drives_of
 from .drive import DriveCourse, Run
 from .equilibrium import motion_beyond_validity, rest_at, travel_words
-from .error_estimate import EstimatedError, ringing, row_errors, step_errors, too_fast, warnings_of
+from .doubts import EstimatedError, ringing, row_errors, step_errors, too_fast, warnings_of
 from .initial_state import InitialState, started, state_now
 
 RHO = 0.8
