@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 from ..compiler.compile import compile_scene
 from ..compiler.plan import first_row, taken_apart
 from ..errors import SolverError
-from ..scene.kinematics import posture_angles, skeleton, stroke_curve
+from ..scene.kinematics import posture_angles, skeleton, strokes_of_angles
 from ..scene.schema import Scene
 from ..types import Array
 from .bending_moments import moments_by_unknowns, stations
@@ -145,7 +145,7 @@ class _Boom:
     def at_rest(self, relative: Array, modes: int = MODES) -> Array | None:
         """Return section angles (deg), tip, deflection, forces, moments and frequencies in one row, None at no rest."""
         scene, plan = self._scene, self._plan
-        strokes = np.array([stroke_curve(scene, i, relative[i : i + 1])[0] for i in range(plan.joints)])
+        strokes = strokes_of_angles(scene, relative)
         if not all(0.0 <= s <= joint.cylinder.max_stroke for s, joint in zip(strokes, scene.joints, strict=True)):
             self.skipped["out of a cylinder's travel"] += 1
             return None

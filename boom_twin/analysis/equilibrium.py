@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan, first_row, taken_apart
@@ -24,6 +24,7 @@ from ..scene.schema import Scene
 from ..system.summary_display import SummaryDisplay, numbers
 from ..types import Array
 from .cylinder_drives import spring_free
+from .doubts import beyond_validity
 from .modal import Mode, constraints, natural_modes, negative_pivots
 
 CLAMP = 1e12  # N/m, stiffness of a practically ideal pin
@@ -86,37 +87,6 @@ def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
         heading += angle
         state.z[z + Z_SECTION] = heading
     state.history[X, : len(state.z)] = state.z
-
-
-SHARE = 0.5  # validity limit of the tip deflection, as a fraction of the boom's reach
-INSTANTS = 8  # evenly spaced instants of a motion to check; the tip's farthest point is added
-
-
-def beyond_validity(scene: Scene, away: float) -> tuple[str, ...]:
-    """Return a warning if the tip deflection `away` (m) exceeds the model's validity, else an empty tuple."""
-    if away <= SHARE * scene.reach:
-        return ()
-    return (
-        f"the tip is {away:.3g} m from where rigid sections and cylinders would have it, more than half the reach of "
-        f"{scene.reach:.3g} m: outside the model's validity. Check stiffnesses, masses and load",
-    )
-
-
-def motion_beyond_validity(scene: Scene, strokes: Array, tip: Array, angles: Array | None) -> tuple[str, ...]:
-    """Return the warning of `beyond_validity` for the worst of some instants of a motion.
-
-    `strokes` (m, n) and `tip` (m, 2) are in m. `angles` (n,) is a guess of the first joint angles, rad.
-    """
-    rows: NDArray[np.int64] = np.linspace(0, len(tip) - 1, INSTANTS).astype(np.int64)
-    rows = np.unique(np.append(rows, np.argmax(np.hypot(*(tip - tip[0]).T))))
-    worst, near = 0.0, angles
-    for row in rows:
-        try:
-            near = joint_angles_of_strokes(scene, strokes[row], near=near)
-        except UsageError:  # within the cylinder's travel but outside the joint's range
-            continue
-        worst = max(worst, float(np.hypot(*(tip[row] - skeleton(scene, near).pivots[-1]))))
-    return beyond_validity(scene, worst)
 
 
 TOLERANCE = 1e-9  # rad, increment in the last pass; the remaining error is its square

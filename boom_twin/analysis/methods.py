@@ -19,9 +19,9 @@ from ..kernels.transfer.time_step import run
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Array
+from .doubts import step_error_warning
 from .drive import PASSES, TOLERANCE
 from .equilibrium import settle
-from .doubts import step_error_warning
 from .simulate import RHO
 
 FAMILIES = {

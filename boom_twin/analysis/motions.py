@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..errors import UsageError
-from ..scene.kinematics import posture_angles, stroke_curve, strokes_of_posture
+from ..scene.kinematics import posture_angles, stroke_curve, strokes_of_angles, strokes_of_posture
 from ..scene.load import load_scene
 from ..scene.schema import Scene
 from ..types import Array
@@ -81,7 +81,7 @@ def motion_of(scene: Scene, posture: str | None = None, duration: float = DURATI
     name = posture or (ARCH if ARCH in scene.postures else next(iter(scene.postures), None))
     if name is None:
         angles = np.array([_middle(scene, i) for i in range(len(scene.joints))])
-        first = np.array([stroke_curve(scene, i, angles[i : i + 1])[0] for i in range(len(angles))])
+        first = strokes_of_angles(scene, angles)
     else:
         angles, first = posture_angles(scene, name), strokes_of_posture(scene, name)
     start = f"posture {name}" if name else "the middle of the ranges"

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import UsageError
-from ..scene.kinematics import posture_angles, stroke_curve
+from ..scene.kinematics import posture_angles, strokes_of_angles
 from ..scene.schema import Scene
 from ..types import Array
 from .equilibrium import checked_strokes
@@ -135,8 +135,7 @@ def postures_along(scene: Scene, names: list[str], steps: int) -> dict[str, Arra
 
 
 def _strokes(scene: Scene, name: str, angles: Array) -> Array:
-    strokes = np.array([stroke_curve(scene, i, angles[i : i + 1])[0] for i in range(len(scene.joints))])
     try:
-        return checked_strokes(scene, strokes)
+        return checked_strokes(scene, strokes_of_angles(scene, angles))
     except UsageError as error:
         raise UsageError(f"posture {name}: {error} Leave it out, or go another way.") from None

@@ -20,9 +20,9 @@ from ..scene.schema import Scene
 from ..system.summary_display import SummaryDisplay, data_frame, numbers
 from ..types import Array
 from .cylinder_drives import drives_of
+from .doubts import EstimatedError, motion_beyond_validity, ringing, row_errors, step_errors, too_fast, warnings_of
 from .drive import DriveCourse, Run
-from .equilibrium import motion_beyond_validity, rest_at, travel_words
-from .doubts import EstimatedError, ringing, row_errors, step_errors, too_fast, warnings_of
+from .equilibrium import rest_at, travel_words
 from .initial_state import InitialState, started, state_now
 
 RHO = 0.8

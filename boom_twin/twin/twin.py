@@ -13,7 +13,7 @@ from ..errors import BoomTwinError, SolverError, UsageError
 from ..health.baseline import Baseline
 from ..health.monitor import warm_up
 from ..kernels.tables import SENTENCES
-from ..scene.kinematics import stroke_curve
+from ..scene.kinematics import strokes_of_angles
 from ..scene.load import SceneSource, as_scene
 from ..types import LIMIT, NANO, Array, Change, Health, Mount, Report, Sample, Stream, StrokeReading, channels_of
 from .adjustments import Requests, ResidualBuffer, SensorZeros
@@ -240,7 +240,7 @@ class Twin:
         """Compile every kernel, with a temporary twin of the same boom."""
         other = Twin(self.scene, self.settings, reads=self.reads)
         middle = np.radians([sum(joint.range_deg) / 2 for joint in self.scene.joints])
-        strokes = np.array([stroke_curve(self.scene, i, middle[i : i + 1])[0] for i in range(len(middle))])
+        strokes = strokes_of_angles(self.scene, middle)
         for k in range(20):
             other.update(Sample(Stream.STROKES, k * 5_000_000, strokes))
         other.update(Sample(Stream.ANGLES, 0, middle))
