@@ -2,28 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from boom_twin.analysis.methods import Method, integrate_with
-from boom_twin.analysis.motions import motion_of
 from boom_twin.scene import load_scene
 from boom_twin.validation.study.scene_changes import cylinders
 from boom_twin.validation.study.stability.setups import dead_stop, smooth
 
 SCENE = load_scene()
-
-
-def marched(step, duration=4.0, method=None, scene=SCENE, every=1):
-    move = motion_of(scene)
-    return integrate_with(scene, move, duration, step, every, method, angles=move.angles)
-
-
-def test_the_default_step_raises_no_doubt():
-    assert marched(1e-3).doubt == ""
-    assert marched(1e-4, duration=2.0, every=10).doubt == ""
 
 
 @pytest.mark.parametrize("step", [2e-2, 4e-2])
@@ -44,9 +31,3 @@ def test_ringing_is_doubted():
     found = integrate_with(stop.scene, stop.drive, 1.0, stop.step, 1, Method(parameter=1.0), angles=stop.angles)
     calm = integrate_with(stop.scene, stop.drive, 1.0, stop.step, 1, angles=stop.angles)
     assert "change sign from step to step" in found.doubt and calm.doubt == ""
-
-
-def test_a_boom_at_rest_raises_no_doubt():
-    move = motion_of(SCENE)
-    still = replace(move, travel=0.0 * move.travel)
-    assert integrate_with(SCENE, still, 2.0, 2e-2, angles=move.angles).doubt == ""

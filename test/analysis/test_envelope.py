@@ -114,13 +114,3 @@ def test_the_command_names_worst_postures_and_writes_files(
         values["cylinder_2_force_N_greatest_angles_deg"], rel=1e-8, abs=1e-8
     )
     assert (out / "envelope.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_without_heights_it_says_what_stresses_need(found: Envelope) -> None:
-    from boom_twin.cli.envelope import _report, quantities_of
-
-    words = [quantity.words for quantity in quantities_of(found)]
-    assert "section 1 bending stress" in words and "section 2 bending stress" not in words
-    lines = _report(found, [quantity for quantity in quantities_of(found) if quantity.unit != "MPa"])
-    assert "give sections[i].height" in lines[-1]
-    assert any("found by a search" in line for line in lines)

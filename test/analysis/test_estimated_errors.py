@@ -111,11 +111,6 @@ def test_acceleration_and_force_are_doubted_where_they_are_wrong(scene, added):
     assert "acceleration" in said or "force" in said
 
 
-def test_two_rows_say_nothing_of_what_lies_between():
-    found = simulate(SCENE, np.array([0.0, 0.1]), strokes(np.zeros(2), 0.0), angles=ANGLES)
-    assert found.row_errors == () and found.doubt == ""
-
-
 def test_strokes_faster_than_a_cylinder_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     times = np.arange(0.0, 0.3, 0.01)
     rows = np.column_stack([times, strokes(times, 0.7 * np.clip(times - 0.1, 0.0, 0.1))])

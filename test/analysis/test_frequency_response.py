@@ -91,17 +91,6 @@ def test_poles_are_the_natural_frequencies(scene, posture):
         assert brentq(passing, *around, xtol=1e-12) == pytest.approx(natural, rel=1e-8)
 
 
-def test_natural_frequencies_of_the_scene_are_those_of_the_poles():
-    """The scene's three shapes give the lowest four within 0.01 %."""
-    of_scene, of_poles = (statics(scene, posture="arch").frequencies for scene in (load_scene(), with_all_shapes(load_scene())))
-    assert of_scene[:4] == pytest.approx(of_poles[:4], rel=1e-4)
-
-
-def test_rigid_parts_stay_rigid():
-    sections = with_all_shapes(booms.scene_of(booms.document() | {"modes": 0})).sections
-    assert all(section.modes is None for section in sections)
-
-
 @pytest.mark.parametrize("pins", [RODS, PINS], ids=["rods", "all"])
 def test_worn_pins_in_contact_through_simulate(pins):
     """A drive jerked by less than a micron: journals stay on their bushes, and the motion is the response to its spectrum."""
@@ -247,13 +236,6 @@ def test_a_rigid_boom_follows_its_geometry():
     assert driven.tip == pytest.approx(np.tile(richardson(tip, 1e-2), (3, 1)), rel=1e-7)
 
 
-def test_one_section():
-    scene = booms.random_boom(70)
-    assert len(scene.sections) == 1
-    found = frequency_response(scene, BAND, posture="test")
-    assert np.isfinite(found.tip).all() and found.joints.shape == (40, 1)
-
-
 @pytest.mark.parametrize(
     "given, told",
     [
@@ -268,12 +250,6 @@ def test_one_section():
 def test_refused(given, told):
     with pytest.raises(UsageError, match=told):
         frequency_response(load_scene(), np.array([1.0]), **given)
-
-
-@pytest.mark.parametrize("frequencies", [[-1.0], [np.nan], [[1.0, 2.0], [3.0, 4.0]]])
-def test_frequencies_refused(frequencies):
-    with pytest.raises(UsageError, match="at least 0 Hz"):
-        frequency_response(load_scene(), np.array(frequencies), posture="arch")
 
 
 def test_every_station_has_a_column_of_its_own_and_the_text_is_short() -> None:

@@ -11,7 +11,6 @@ from boom_twin.analysis.equilibrium import settle, statics
 from boom_twin.analysis.modal import damping_ratio, natural_modes
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.errors import SolverError, UsageError
-from boom_twin.kernels.jit import Kernel
 from boom_twin.kernels.transfer.natural_frequency import NOT_COUNTED, negative_eigenvalues
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import stroke_curve
@@ -134,23 +133,6 @@ def test_overloaded_linkage_has_no_equilibrium():
 def test_wrong_questions_get_one_clear_answer(asked, words):
     with pytest.raises(UsageError, match=words):
         statics(load_scene(), **asked)
-
-
-def test_a_mode_takes_few_calls_of_kernels(monkeypatch):
-    """Bisection and inverse iteration are loops of their own; a start from rest waited 14 ms for some hundreds of calls."""
-    calls, original = [], Kernel.__call__
-    monkeypatch.setattr(Kernel, "__call__", lambda self, *arguments: calls.append(self) or original(self, *arguments))
-    boom = settled(load_scene(), "arch")
-    calls.clear()
-    modes = natural_modes(*boom, 4, 1e-3)
-    assert len(modes) == 4 and len(calls) <= 4 + 8 * len(modes)
-
-
-def test_negative_eigenvalues_of_matrices_without_a_diagonal():
-    """Of every block of two rows one is negative; none of zeros is."""
-    blocks = np.zeros((2, 4, 4))
-    blocks[0] = [[0.0, 3.0, 0.0, 1.0], [3.0, 0.0, 2.0, 0.0], [0.0, 2.0, 0.0, 5.0], [1.0, 0.0, 5.0, 0.0]]
-    assert negative_eigenvalues(blocks, np.zeros((5, 4))) == 2 == int(np.sum(np.linalg.eigvalsh(blocks) < 0.0))
 
 
 @pytest.mark.parametrize("size", [2, 6, 8])
