@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from boom_twin import load_scene
 from boom_twin.analysis.methods import Method, integrate_with
-from boom_twin.scene import load_scene
 from boom_twin.validation.study.scene_changes import cylinders
 from boom_twin.validation.study.stability.setups import dead_stop, smooth
 

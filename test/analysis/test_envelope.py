@@ -11,11 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boom_twin import Scene, load_scene, statics
 from boom_twin.analysis.envelope import Envelope, envelope
-from boom_twin.analysis.equilibrium import statics
 from boom_twin.cli.main import main
 from boom_twin.errors import SolverError
-from boom_twin.scene import Scene, load_scene
 
 
 @pytest.fixture(scope="module")

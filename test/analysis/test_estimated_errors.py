@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.analysis.simulate import simulate
+from boom_twin import load_scene, simulate
 from boom_twin.cli.main import main
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.scene.schema import Clearance
 

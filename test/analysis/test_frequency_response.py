@@ -9,8 +9,8 @@ from oracle.clearance.scenes import PINS, RODS, with_pins
 from oracle.response import DenseModel, extrapolated
 from scipy.optimize import brentq
 
-from boom_twin import frequency_response, load_scene, simulate
-from boom_twin.analysis.equilibrium import rest_at, statics
+from boom_twin import frequency_response, load_scene, simulate, statics
+from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.frequency_response import linearised_boom, with_all_shapes
 from boom_twin.analysis.modal import drive_at_rest
 from boom_twin.errors import UsageError

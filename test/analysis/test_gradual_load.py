@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from boom_twin.analysis.equilibrium import rest_at, statics
+from boom_twin import load_scene, statics
+from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.errors import SolverError
 from boom_twin.kernels.integrators import X
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.validation.study import scene_changes as made
 

@@ -7,8 +7,7 @@ import pytest
 from convergence import motions
 from oracle import booms, segments
 
-from boom_twin.analysis.equilibrium import statics
-from boom_twin.analysis.simulate import simulate
+from boom_twin import simulate, statics
 
 DECADES = 10.0 ** np.arange(0, 6)
 

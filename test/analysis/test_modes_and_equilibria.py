@@ -7,12 +7,12 @@ import pytest
 from oracle import booms, segments
 from scipy.linalg import eigh, null_space
 
-from boom_twin.analysis.equilibrium import settle, statics
+from boom_twin import load_scene, statics
+from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.modal import damping_ratio, natural_modes
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.errors import SolverError, UsageError
 from boom_twin.kernels.transfer.natural_frequency import NOT_COUNTED, negative_eigenvalues
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import stroke_curve
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin.analysis.equilibrium import rest_at, statics
+from boom_twin import simulate, statics
+from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.modal import damping_ratio, natural_modes
-from boom_twin.analysis.simulate import simulate
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 from boom_twin.scene.oil_spring import stiffness
 

@@ -7,8 +7,7 @@ import pytest
 from analysis.tip_force_steps import tip_under
 from oracle import booms
 
-from boom_twin import frequency_response, load_scene
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import frequency_response, load_scene, statics
 from boom_twin.analysis.resonance_map import named_postures, resonance_map
 from boom_twin.analysis.steady_state import (
     SAMPLES,

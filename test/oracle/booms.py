@@ -10,8 +10,8 @@ from reference.segments.boom import Segments
 from reference.segments.geometry import link_headings
 from ruamel.yaml import YAML
 
+from boom_twin import Scene
 from boom_twin.scene.load import default_text
-from boom_twin.scene.schema import Scene
 
 LEAST_LEVER = 0.08  # m/rad, of every cylinder at the posture
 BARREL_PINS = ("root", "beam", "head", "given")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from oracle import booms
 
+from boom_twin import Scene
 from boom_twin.scene.kinematics import stroke_curve
-from boom_twin.scene.schema import Scene
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import statics
 
 ROOTS = np.array([1.87510407, 4.69409113, 7.85475744])
 LENGTH, RIGIDITY, DENSITY, GRAVITY = 3.0, 2.06e11 * 2.0e-5, 40.0, 9.81

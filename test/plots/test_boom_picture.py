@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import Scene, load_scene, statics
 from boom_twin.analysis.undeflected import UndeflectedBoom
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.plots.boom import boom_picture
-from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.kinematics import posture_angles, skeleton, strokes_of_posture
 
 

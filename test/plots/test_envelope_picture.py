@@ -11,8 +11,8 @@ import pytest
 from matplotlib.axes import Axes
 
 import boom_twin.plots.envelope as drawing
+from boom_twin import load_scene
 from boom_twin.analysis.envelope import Envelope
-from boom_twin.scene import load_scene
 
 COUNT = 40
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from boom_twin import load_scene
 from boom_twin.cli.main import main
 from boom_twin.errors import SceneError
-from boom_twin.scene import load_scene
 from boom_twin.scene.load import examine
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boom_twin import load_scene
 from boom_twin.cli.main import main
 from boom_twin.plots.joint_ranges import folded_section, joint_ranges_picture
 from boom_twin.plots.style import BLUE, ORANGE
-from boom_twin.scene import load_scene
 from boom_twin.scene.load import examine_text, example_text
 
 
