@@ -1,8 +1,8 @@
 """Energy of a boom, and its balance along a motion: work of the drives = change of energy + what damping and contact take.
 
 What is left over is the time integration's: errors of the trapezoidal rule that the powers are summed by, which fall with the
-square of the step, and the numerical damping of generalised-alpha, which takes energy from fast vibrations (and from slow ones
-little, see `numerical_damping`). Coriolis and centrifugal forces do no work, and neither do pins and links.
+square of the step, and the numerical damping of generalised-alpha, which takes energy from fast vibrations and little from slow
+ones. Coriolis and centrifugal forces do no work, and neither do pins and links.
 """
 
 from __future__ import annotations
@@ -223,18 +223,3 @@ def states_of(course: DriveCourse, dt: float) -> Iterator[tuple[float, State]]:
     """Steps (s) and states, as of `DriveCourse.states`, of a motion whose powers or forces are to be summed."""
     impacts = bool((course.plan.tables.clearances.linear == 0).any())
     return course.states(dt, FINER if impacts else 1)
-
-
-def numerical_damping(frequency: float, step: float, rho: float) -> float:
-    """Damping ratio that generalised-alpha gives an undamped oscillator of `frequency` (Hz) in steps of `step` (s).
-
-    From the spectral radius R of its amplification matrix over (x, v, p): -ln R over the angle turned. About (omega h)^3.
-    """
-    am, af, w = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0), (2.0 * math.pi * frequency * step) ** 2
-    gamma = 0.5 + af - am
-    beta = 0.25 * (gamma + 0.5) ** 2
-    after = np.array([[1.0, 0.0, -beta], [0.0, 1.0, -gamma], [(1.0 - af) * w, 0.0, 1.0 - am]])  # of x', h v', h^2 p'
-    before = np.array([[1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma], [-af * w, 0.0, -am]])
-    own = np.linalg.eigvals(np.linalg.solve(after, before))
-    principal = own[int(np.argmax(np.abs(own.imag)))]
-    return float(-math.log(abs(principal)) / abs(np.angle(principal)))

@@ -40,15 +40,12 @@ class Vibration:
     amplitude: float
 
 
-def free_vibrations(dt: float, values: Array, most_lags: int | None = None) -> list[Vibration]:
-    """Modes by frequency in `values` (k, c), `dt` (s) apart; none of fewer than 3 `ORDER` rows.
-
-    `most_lags`: rows of a Hankel matrix, a third of all samples unless that is more. Fewer take less time, and are less sure.
-    """
+def free_vibrations(dt: float, values: Array) -> list[Vibration]:
+    """Return the modes by frequency in `values` (k, c), `dt` (s) apart; none of fewer than 3 `ORDER` rows."""
     if len(values) < 3 * ORDER or not values.any():
         return []
     x = np.asarray(values - values.mean(axis=0), np.float64)
-    lags = min(len(x) // 3, most_lags or len(x))
+    lags = len(x) // 3  # rows of a Hankel matrix
     hankel = np.hstack([np.lib.stride_tricks.sliding_window_view(column, len(x) - lags) for column in x.T])
     space = np.linalg.eigh(hankel @ hankel.T)[1][:, : -ORDER - 1 : -1]  # its left singular vectors, in a sixth of the time
     turns = np.linalg.eigvals(np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0])

@@ -70,15 +70,6 @@ class InitialState:
     rates: Array
     contacts: Array
 
-    def changed(self, **coordinates: tuple[float, float]) -> InitialState:
-        """Return a copy with other coordinates: name -> (value, rate); UsageError for a name that there is not."""
-        values, rates = self.values.copy(), self.rates.copy()
-        for name, (value, rate) in coordinates.items():
-            if name not in self.names:
-                raise UsageError(f"{name}: no coordinate of this boom. Take one of {', '.join(self.names)}.")
-            values[self.names.index(name)], rates[self.names.index(name)] = value, rate
-        return InitialState(self.names, values, rates, self.contacts)
-
 
 def undeflected(
     scene: SceneSource, strokes: ArrayLike, joint_rates: Array | None = None, angles: Array | None = None

@@ -11,12 +11,11 @@ import pytest
 
 import boom_twin.plots.envelope as envelope_drawing
 import boom_twin.plots.health as health_drawing
-from boom_twin import Scene, load_scene, statics
+from boom_twin import Scene, load_scene
 from boom_twin.analysis.envelope import Envelope
 from boom_twin.analysis.undeflected import UndeflectedBoom
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.plots import AlarmSpan
-from boom_twin.plots.boom import boom_picture
 from boom_twin.plots.history import Orbits
 from boom_twin.plots.posture import orbits_picture
 from boom_twin.scene.kinematics import posture_angles, skeleton, strokes_of_posture
@@ -47,21 +46,6 @@ def test_undeformed_outline_lies_on_the_sections() -> None:
     for point in line:
         shares = np.clip(np.sum((point - bones.pivots[:-1]) * along, axis=1) / np.sum(along**2, axis=1), 0.0, 1.0)
         assert np.hypot(*(point - bones.pivots[:-1] - shares[:, None] * along).T).min() < 1e-9
-
-
-@pytest.mark.parametrize("count", [1, 5])
-def test_boom_is_drawn(tmp_path: Path, count: int) -> None:
-    """The default boom with `count` sections; a fifth one is a copy of the fourth."""
-    from matplotlib.image import imread
-
-    take = [min(i, 3) for i in range(count)]
-    postures = {"arch": tuple(SCENE.postures["arch"][i] for i in take[:4]) + (-100.0,) * (count - 4)}
-    joints, sections = (tuple(items[i] for i in take) for items in (SCENE.joints, SCENE.sections))
-    own = SCENE.model_copy(update={"joints": joints, "sections": sections, "postures": postures})
-    path = boom_picture(own, statics(own, posture="arch"), tmp_path / "boom.png", note="surrogate parameters")
-    image = np.asarray(imread(path)[:, :, :3], dtype=float)
-    assert image.shape == (900, 1600, 3) and image.std() > 0.05
-    assert (np.ptp(image, axis=2) > 0.3).mean() > 0.002, "nothing coloured was drawn"
 
 
 def envelope_of(scene: Scene) -> Envelope:
