@@ -27,20 +27,12 @@ POSTURE_STEP = 0.03  # m of stroke after which the influence of the tip's force 
 
 @dataclass(frozen=True)
 class BendingStresses:
-    """Bending moments and stresses at k stations at one instant.
+    """Bending moments and stresses at k stations at one instant."""
 
-    Attributes
-    ----------
-    moments, moment_sigmas : ndarray, shape (k,)
-        N m, positive where they bend the outer end up; standard deviation by the load at the tip, NaN without an estimate.
-    stresses, stress_sigmas : ndarray, shape (k,)
-        Pa, of the outermost fibre, with the sign of the moment.
-    """
-
-    moments: Array
-    moment_sigmas: Array
-    stresses: Array
-    stress_sigmas: Array
+    moments: Array  # (k,), N m, positive where they bend the outer end up
+    moment_sigmas: Array  # standard deviations by the load at the tip, NaN without an estimate
+    stresses: Array  # (k,), Pa, of the outermost fibre, with the sign of the moment
+    stress_sigmas: Array  # their standard deviations
 
 
 def section_moduli(scene: Scene, heights: Array | None = None) -> Array:

@@ -32,27 +32,13 @@ QUIET = 1e-3  # m/s^2, mean acceleration below which ringing is rounding
 
 @dataclass(frozen=True)
 class EstimatedError:
-    """Estimated largest error of one quantity.
+    """Estimated largest error of one quantity."""
 
-    Attributes
-    ----------
-    what : str
-        The quantity.
-    share : float
-        Its error, as a share of `of`.
-    of : str
-        What it is measured against.
-    bound : float
-        Share above which it is doubted.
-    time : float
-        When it is largest, s.
-    """
-
-    what: str
-    share: float
-    of: str
-    bound: float
-    time: float
+    what: str  # the quantity
+    share: float  # its error, as a share of `of`
+    of: str  # what it is measured against
+    bound: float  # share above which it is doubted
+    time: float  # when it is largest, s
 
     def __str__(self) -> str:
         share = f"about {self.share:.1%}" if self.share < 1.0 else "100 % or more"

@@ -96,26 +96,14 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True)
 class DriveCourse:
-    """Rows of a drive, and the state of the boom at the first row.
-
-    Attributes
-    ----------
-    start : State
-        State at the first row, at rest or in motion. It is not modified.
-    times : ndarray, shape (m,)
-        Times of the rows, s.
-    strokes : ndarray, shape (m, n)
-        Strokes at the rows, m. Between rows they follow a monotone cubic.
-    rho : float
-        Spectral radius of generalised-alpha at infinite frequency.
-    """
+    """Rows of a drive, and the state of the boom at the first row."""
 
     plan: Plan
-    start: State
+    start: State  # at the first row, at rest or in motion; it is not modified
     work: Work
-    times: Array
-    strokes: Array
-    rho: float
+    times: Array  # (m,), s
+    strokes: Array  # (m, n), m; between rows they follow a monotone cubic
+    rho: float  # spectral radius of generalised-alpha at infinite frequency
 
     def stepped(self, rows: NDArray[np.int64], dt: float, finer: int = 1) -> Run:
         """Simulate through `rows` in steps of at most `dt` (s), each divided by `finer`. Steps end on the rows."""

@@ -147,34 +147,16 @@ class Energies:
 
 @dataclass(frozen=True)
 class EnergyBalance:
-    """Energy balance of a motion; energies in J.
+    """Energy balance of a motion; energies in J."""
 
-    Attributes
-    ----------
-    work : float
-        Of the drives.
-    change : float
-        Of kinetic and potential energy, from the first row to the last.
-    damping, contact : float
-        Taken by beams and oil dampers; by contacts.
-    gap : float
-        Largest of work - change - damping - contact at any step, in magnitude.
-    left : float
-        That difference at the end: what time integration took, negative if it gave.
-    moved : float
-        What `gap` is measured against: the largest of the drives' work, kinetic energy, and change of that of weight.
-    step : float
-        Longest step, s.
-    """
-
-    work: float
-    change: float
-    damping: float
-    contact: float
-    gap: float
-    left: float
-    moved: float
-    step: float
+    work: float  # done by the drives
+    change: float  # kinetic and potential energy at the last row less that at the first
+    damping: float  # taken by beams and oil dampers
+    contact: float  # taken by contacts
+    gap: float  # largest of work - change - damping - contact at any step, in magnitude
+    left: float  # that difference at the end: what time integration took, negative if it gave
+    moved: float  # measure of `gap`: the largest of the drives' work, kinetic energy, and change of the weight's energy
+    step: float  # longest step, s
 
     @property
     def share(self) -> float:

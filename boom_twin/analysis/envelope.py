@@ -34,42 +34,18 @@ GAIN = 1e-4  # relative gain by which a step of the search must better the extre
 
 @dataclass(frozen=True)
 class Envelope:
-    """A boom of n sections at rest in m postures.
+    """A boom of n sections at rest in m postures."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of the scene's postures; empty for those of the grid and of the search.
-    angles : ndarray, shape (m, n)
-        Section angles to the base, degrees.
-    tips : ndarray, shape (m, 2)
-        m.
-    deflections : ndarray, shape (m,)
-        Distance of the tip from that of rigid sections and cylinders, m.
-    forces : ndarray, shape (m, n)
-        Of the cylinders, N, positive in tension.
-    frequencies : ndarray, shape (m, k)
-        Hz, ascending, at most `MODES`.
-    moments : ndarray, shape (m, n)
-        The bending moment of largest size in each section, N m; 0 in rigid ones.
-    stresses : ndarray, shape (m, n)
-        Size of that over the section modulus, Pa; NaN where the section has no height.
-    skipped : dict of str to int
-        How many postures of scene and grid are left out, by reason.
-    searched : int
-        How many of the postures, the last ones, were found by the search.
-    """
-
-    names: tuple[str, ...]
-    angles: Array
-    tips: Array
-    deflections: Array
-    forces: Array
-    frequencies: Array
-    moments: Array
-    stresses: Array
-    skipped: dict[str, int]
-    searched: int
+    names: tuple[str, ...]  # posture of the scene; empty for those of the grid and of the search
+    angles: Array  # (m, n), section angles to the base, degrees
+    tips: Array  # (m, 2), m
+    deflections: Array  # (m,), distance of the tip from that of rigid sections and cylinders, m
+    forces: Array  # (m, n), cylinder forces, N, positive in tension
+    frequencies: Array  # (m, k), Hz, ascending, at most `MODES`
+    moments: Array  # (m, n), bending moment of largest size in each section, N m; 0 in rigid ones
+    stresses: Array  # (m, n), that size over the section modulus, Pa; NaN where the section has no height
+    skipped: dict[str, int]  # number of postures of scene and grid that are left out, by reason
+    searched: int  # number of postures, the last ones, that the search found
 
     def posture(self, row: int) -> str:
         """Return a posture as ``--posture`` takes it: its name, or its section angles."""

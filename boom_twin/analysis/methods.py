@@ -37,27 +37,13 @@ Drive = Callable[[Array], tuple[Array, Array]]
 
 @dataclass(frozen=True)
 class Method:
-    """Integration method; UsageError if it is unknown.
+    """Integration method; UsageError if it is unknown."""
 
-    Attributes
-    ----------
-    integrator : str
-        "generalised-alpha", "newmark", "wilson", "houbolt" or "park".
-    parameter : float
-        rho of generalised-alpha, gamma of Newmark, theta of Wilson; Houbolt and Park have none.
-    passes : int
-        Largest number of Newton passes in a step; 1 is the papers' linearised pass.
-    tolerance : float
-        rad, see `kernels.transfer.time_step.advance`.
-    product : str
-        "riccati" or "plain", the papers' product of transfer matrices.
-    """
-
-    integrator: str = "generalised-alpha"
-    parameter: float = RHO
-    passes: int = int(PASSES)
-    tolerance: float = TOLERANCE
-    product: str = "riccati"
+    integrator: str = "generalised-alpha"  # "generalised-alpha", "newmark", "wilson", "houbolt" or "park"
+    parameter: float = RHO  # rho of generalised-alpha, gamma of Newmark, theta of Wilson; Houbolt and Park have none
+    passes: int = int(PASSES)  # largest number of Newton passes in a step; 1 is the papers' linearised pass
+    tolerance: float = TOLERANCE  # rad, see `kernels.transfer.time_step.advance`
+    product: str = "riccati"  # "riccati" or "plain", the papers' product of transfer matrices
 
     def __post_init__(self) -> None:
         if self.integrator not in FAMILIES:
@@ -73,40 +59,19 @@ class Method:
 
 @dataclass(frozen=True)
 class MethodRun:
-    """Motion in rows. Rows after a failure are NaN.
+    """Motion in rows. Rows after a failure are NaN."""
 
-    Attributes
-    ----------
-    times : ndarray, shape (m,)
-        s, from 0.
-    tip, tip_acceleration : ndarray, shape (m, 2)
-        m, m/s^2.
-    joints, cylinder_forces : ndarray, shape (m, n)
-        rad, N.
-    pins : ndarray, shape (m, k, 4)
-        Pins with clearance, see `compiler.plan`.
-    seconds : float
-        CPU time of the stepping alone.
-    steps : int
-    passes : float
-        Mean Newton passes per step.
-    status : str
-        "ok", or why the motion ended.
-    doubt : str
-        Warning of a coarse step or of ringing, see `analysis.doubts`; empty if none.
-    """
-
-    times: Array
-    tip: Array
-    tip_acceleration: Array
-    joints: Array
-    cylinder_forces: Array
-    pins: Array
-    seconds: float
+    times: Array  # (m,), s, from 0
+    tip: Array  # (m, 2), m
+    tip_acceleration: Array  # (m, 2), m/s^2
+    joints: Array  # (m, n), rad
+    cylinder_forces: Array  # (m, n), N
+    pins: Array  # (m, k, 4), pins with clearance, see `compiler.plan`
+    seconds: float  # CPU time of the stepping alone
     steps: int
-    passes: float
-    status: str
-    doubt: str = ""
+    passes: float  # mean Newton passes per step
+    status: str  # "ok", or why the motion ended
+    doubt: str = ""  # warning of a coarse step or of ringing, see `analysis.doubts`; empty if none
 
 
 def integrate_with(

@@ -36,24 +36,12 @@ NUDGE = 1e-6  # rad, step of the derivative of positions by unknowns
 
 @dataclass(frozen=True)
 class Mode:
-    """One undamped mode, scaled to unit modal mass.
+    """One undamped mode, scaled to unit modal mass."""
 
-    Attributes
-    ----------
-    frequency : float
-        Hz.
-    increments : ndarray, shape (unknowns,)
-        Increments of the unknowns, in the order of `Plan.names`, per unit of the modal coordinate (m sqrt(kg)).
-    motion : ndarray, shape (histories,)
-        Displacement of every mass point and angle.
-    drives : ndarray, shape (n,)
-        Lengths of the drives at the equilibrium, m.
-    """
-
-    frequency: float
-    increments: Array
-    motion: Array
-    drives: Array
+    frequency: float  # Hz
+    increments: Array  # (unknowns,), of the unknowns in the order of `Plan.names`, per modal coordinate (m sqrt(kg))
+    motion: Array  # (histories,), displacement of every mass point and angle
+    drives: Array  # (n,), drive lengths at the equilibrium, m
 
 
 def constraints(plan: Plan) -> int:

@@ -86,22 +86,12 @@ class Momenta:
 
 @dataclass(frozen=True)
 class MomentumBalance:
-    """Gap between the momentum of a motion and the impulses of weight and base.
+    """Gap between the momentum of a motion and the impulses of weight and base."""
 
-    Attributes
-    ----------
-    linear_gap : float
-        Largest difference at any step, N s.
-    linear_moved : float
-        What it is measured against: the largest momentum, N s.
-    angular_gap, angular_moved : float
-        The same of the moment of momentum about the base's pivot, N m s.
-    """
-
-    linear_gap: float
-    linear_moved: float
-    angular_gap: float
-    angular_moved: float
+    linear_gap: float  # largest difference at any step, N s
+    linear_moved: float  # measure of it: the largest momentum, N s
+    angular_gap: float  # likewise for the moment of momentum about the base's pivot, N m s
+    angular_moved: float  # N m s
 
     @property
     def linear_share(self) -> float:

@@ -27,27 +27,13 @@ LARGEST = 4e9  # bytes that all motions may take
 
 @dataclass(frozen=True, repr=False)
 class SampledMotions:
-    """Motions of sampled booms. c samples that could be computed, of m rows each.
+    """Motions of sampled booms. c samples that could be computed, of m rows each."""
 
-    Attributes
-    ----------
-    times : ndarray, shape (m,)
-        s.
-    parameters : dict of str to ndarray, shape (c,)
-        What was drawn, SI, by the parameter's name.
-    motions : dict of str to ndarray, shape (c, m)
-        Tip position and acceleration and the cylinders' forces, by their columns in `boom_twin.analysis.simulate.Simulation`.
-    failures : tuple of str
-        Samples that could not be computed: their parameters, and why.
-    doubtful : int
-        Samples whose motion `simulate` doubts.
-    """
-
-    times: Array
-    parameters: dict[str, Array]
-    motions: dict[str, Array]
-    failures: tuple[str, ...]
-    doubtful: int
+    times: Array  # (m,), s
+    parameters: dict[str, Array]  # (c,) each, drawn values, SI, by the parameter's name
+    motions: dict[str, Array]  # (c, m) each, tip position, acceleration and cylinder forces, by the columns of `Simulation`
+    failures: tuple[str, ...]  # parameters of samples that could not be computed, and why
+    doubtful: int  # number of samples whose motion `simulate` doubts
 
     def columns(self) -> dict[str, Array]:
         """Return mean, standard deviation and the quantiles `LOWER` and `UPPER` of every quantity over the samples, by row.

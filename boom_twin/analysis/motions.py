@@ -30,26 +30,14 @@ SAMPLES = 181  # of a joint's range
 
 @dataclass(frozen=True)
 class Motion:
-    """Strokes of a smooth move. n cylinders.
+    """Strokes of a smooth move. n cylinders."""
 
-    Attributes
-    ----------
-    label : str
-        What it is, for a report.
-    angles : ndarray, shape (n,)
-        Joint angles (rad) of the undeformed boom at the start.
-    first, travel : ndarray, shape (n,)
-        Strokes (m) at the start, and how far they go.
-    rise, duration : float
-        s; the strokes arrive after `rise` and hold until `duration`.
-    """
-
-    label: str
-    angles: Array
-    first: Array
-    travel: Array
-    rise: float = RISE
-    duration: float = DURATION
+    label: str  # description for a report
+    angles: Array  # (n,), joint angles (rad) of the undeformed boom at the start
+    first: Array  # (n,), strokes (m) at the start
+    travel: Array  # (n,), change of the strokes (m)
+    rise: float = RISE  # s, after which the strokes have arrived
+    duration: float = DURATION  # s, until which they hold
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""

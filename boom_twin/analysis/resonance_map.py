@@ -26,46 +26,24 @@ LEAST = 1e-5  # m; less is no swing, but rounding or a boom without compliance
 
 @dataclass(frozen=True)
 class RateToAvoid:
-    """A band of rates at which one posture swings too much.
-
-    Attributes
-    ----------
-    posture : str
-    low, high : float
-        Hz, of the rates in the map at which the swing is above `TOO_MUCH` times the posture's median.
-    rate, swing : float
-        Where it is largest, Hz, and how large, m.
-    harmonic : int
-        Of the load, that moves the tip most there.
-    """
+    """A band of rates at which one posture swings too much."""
 
     posture: str
-    low: float
-    high: float
-    rate: float
-    swing: float
-    harmonic: int
+    low: float  # Hz, lowest rate at which the swing is above `TOO_MUCH` times the posture's median
+    high: float  # Hz, highest such rate
+    rate: float  # Hz, of the largest swing
+    swing: float  # m, the largest
+    harmonic: int  # number of the harmonic of the load that moves the tip most there
 
 
 @dataclass(frozen=True)
 class ResonanceMap:
-    """Swing of the tip, peak to peak, over p postures and r rates.
-
-    Attributes
-    ----------
-    postures : tuple of str
-    rates : ndarray, shape (r,)
-        Of the load, Hz.
-    swing : ndarray, shape (p, r)
-        m.
-    harmonics : ndarray of int, shape (p, r)
-        Which harmonic of the load moves the tip most.
-    """
+    """Swing of the tip, peak to peak, over p postures and r rates."""
 
     postures: tuple[str, ...]
-    rates: Array
-    swing: Array
-    harmonics: np.ndarray
+    rates: Array  # (r,), rates of the load, Hz
+    swing: Array  # (p, r), m
+    harmonics: np.ndarray  # (p, r), number of the harmonic of the load that moves the tip most
 
     def to_avoid(self) -> tuple[RateToAvoid, ...]:
         """The bands to avoid, posture by posture, ascending in rate."""

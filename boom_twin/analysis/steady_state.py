@@ -33,18 +33,10 @@ NEGLIGIBLE = 1e-6
 
 @dataclass(frozen=True)
 class PeriodicLoad:
-    """A force at the tip that repeats.
+    """A force at the tip that repeats."""
 
-    Attributes
-    ----------
-    period : float
-        s.
-    forces : ndarray, shape (m, 2)
-        In x and y, N, at m even instants of a period, the first at its start.
-    """
-
-    period: float
-    forces: Array
+    period: float  # s
+    forces: Array  # (m, 2), x and y, N, at m even instants of a period, the first at its start
 
     @property
     def times(self) -> Array:
@@ -164,28 +156,15 @@ def polygon_series(times: Array, values: Array, count: int) -> ComplexArray:
 
 @dataclass(frozen=True)
 class SteadyState:
-    """One period of a boom's motion under a periodic load, about its equilibrium without it; n sections.
-
-    Attributes
-    ----------
-    load : PeriodicLoad
-    times : ndarray, shape (m,)
-        s.
-    tip, tip_acceleration : ndarray, shape (m, 2)
-        Displacement from the place at rest, m; m/s^2.
-    joints, cylinder_forces : ndarray, shape (m, n)
-        Changes, rad, N.
-    harmonics : ndarray, shape (k,)
-        Amplitude of the tip's displacement at 1, 2, .. times the rate of the load, m (0 where it has no such part).
-    """
+    """One period of a boom's motion under a periodic load, about its equilibrium without it; n sections."""
 
     load: PeriodicLoad
-    times: Array
-    tip: Array
-    tip_acceleration: Array
-    joints: Array
-    cylinder_forces: Array
-    harmonics: Array
+    times: Array  # (m,), s
+    tip: Array  # (m, 2), displacement from the place at rest, m
+    tip_acceleration: Array  # (m, 2), m/s^2
+    joints: Array  # (m, n), changes, rad
+    cylinder_forces: Array  # (m, n), changes, N
+    harmonics: Array  # (k,), amplitude of the tip's displacement at 1, 2, .. times the rate of the load, m
 
     @property
     def swing(self) -> float:

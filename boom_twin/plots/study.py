@@ -38,24 +38,14 @@ class Curve:
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves on one pair of axes.
-
-    Attributes
-    ----------
-    front : tuple of (float, float)
-        Seconds and errors of the Pareto front, fastest first.
-    chosen : (float, float), optional
-        The default.
-    floor : float, optional
-        Below it errors are not known: the references differ by so much.
-    """
+    """Curves on one pair of axes."""
 
     title: str
     label: str
     curves: tuple[Curve, ...]
-    front: tuple[tuple[float, float], ...] = ()
-    chosen: tuple[float, float] | None = None
-    floor: float | None = None
+    front: tuple[tuple[float, float], ...] = ()  # seconds and errors of the Pareto front, fastest first
+    chosen: tuple[float, float] | None = None  # the default
+    floor: float | None = None  # below it errors are not known: the references differ by so much
 
 
 def work_precision_picture(path: Path, title: str, note: str, panels: Sequence[Panel], size: tuple[float, float]) -> None:
@@ -126,21 +116,12 @@ ROW = 0.3  # height of a row, hundreds of pixels
 
 @dataclass(frozen=True)
 class Bars:
-    """k variants of a model, ascending in error.
-
-    Attributes
-    ----------
-    names : tuple of str
-    rest, move : ndarray, shape (k,)
-        Largest distance of the tip from the full model's, at rest and in a move, m.
-    saved : ndarray, shape (k,)
-        Share of run time saved.
-    """
+    """k variants of a model, ascending in error."""
 
     names: tuple[str, ...]
-    rest: Array
-    move: Array
-    saved: Array
+    rest: Array  # (k,), largest distance of the tip from the full model's at rest, m
+    move: Array  # (k,), likewise in a move
+    saved: Array  # (k,), share of run time saved
 
 
 def parts_picture(path: Path, bars: Bars, note: str) -> None:

@@ -27,50 +27,25 @@ WIDTH = 1e-7  # relative, of a frequency's bracket
 
 @dataclass(frozen=True)
 class StrokeCourse:
-    """Course on which all models are compared: strokes at rest and a move.
+    """Course on which all models are compared: strokes at rest and a move."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        The postures, m of them, then "start of the move".
-    strokes, angles : ndarray, shape (m + 1, n)
-        Strokes (m), and joint angles (rad) of the undeformed boom there.
-    motion : Motion
-    step : float
-        s; the tip is compared after every `every` of them.
-    """
-
-    names: tuple[str, ...]
-    strokes: Array
-    angles: Array
+    names: tuple[str, ...]  # the postures, m of them, then "start of the move"
+    strokes: Array  # (m + 1, n), strokes, m
+    angles: Array  # (m + 1, n), joint angles of the undeformed boom there, rad
     motion: Motion
-    step: float = STEP
+    step: float = STEP  # s; the tip is compared after every `every` of them
     every: int = EVERY
 
 
 @dataclass(frozen=True)
 class Response:
-    """Response of a model on a course.
+    """Response of a model on a course."""
 
-    Attributes
-    ----------
-    rest : ndarray, shape (m + 1, 2)
-        Tip at rest, m.
-    frequencies : ndarray, shape (up to `FREQUENCIES`,)
-        Hz, about the rest at the start of the move; empty if they were not asked for.
-    tip : ndarray, shape (rows, 2)
-        Tip in the move, m.
-    seconds : float
-        Stepping of the move alone.
-    status : str
-        "ok", or the sentence that says why there are no numbers.
-    """
-
-    rest: Array
-    frequencies: Array
-    tip: Array
-    seconds: float
-    status: str
+    rest: Array  # (m + 1, 2), tip at rest, m
+    frequencies: Array  # (up to `FREQUENCIES`,), Hz, at rest at the start of the move; empty if not asked for
+    tip: Array  # (rows, 2), tip in the move, m
+    seconds: float  # CPU time of stepping the move
+    status: str  # "ok", or the sentence that says why there are no numbers
 
 
 @dataclass(frozen=True)

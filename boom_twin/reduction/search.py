@@ -28,33 +28,15 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Proposal:
-    """Result of a search: the lean scene and its deviation.
+    """Result of a search: the lean scene and its deviation."""
 
-    Attributes
-    ----------
-    scene : Scene
-        The lean one.
-    edits : tuple of Edit
-        From the scene that the search started from to the lean one.
-    deviation : Deviation
-        Of the tip from the full model's, all together.
-    course : StrokeCourse
-        On which it was measured.
-    unknowns : tuple of int
-        Of a step of the full and of the lean model.
-    seconds : tuple of float
-        A step of either takes, s; the least of interleaved runs of the move.
-    next : tuple of str and float, or None
-        What would have to go next, and the error (m) that this would lead to.
-    """
-
-    scene: Scene
-    edits: tuple[Edit, ...]
-    deviation: Deviation
-    course: StrokeCourse
-    unknowns: tuple[int, int]
-    seconds: tuple[float, float]
-    next: tuple[str, float] | None
+    scene: Scene  # the lean one
+    edits: tuple[Edit, ...]  # from the scene that the search started from to the lean one
+    deviation: Deviation  # of the lean model's tip from the full model's
+    course: StrokeCourse  # on which the deviation was measured
+    unknowns: tuple[int, int]  # of a step of the full and of the lean model
+    seconds: tuple[float, float]  # a step of either takes, s; the least of interleaved runs of the move
+    next: tuple[str, float] | None  # what would have to go next, and the error (m) that this would lead to
 
 
 def propose(full: Scene, most: float, start: Scene | None = None, progress: Progress = lambda _: None) -> Proposal:
