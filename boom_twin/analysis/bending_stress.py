@@ -36,12 +36,9 @@ class BendingStresses:
 
 
 def section_moduli(scene: Scene, heights: Array | None = None) -> Array:
-    """Section modulus 2 I / height of every section, shape (n,), m^3; NaN of a rigid one.
+    """Return the section modulus 2 I / height of every section, shape (n,), m^3; NaN of a rigid one.
 
-    Parameters
-    ----------
-    heights : ndarray, shape (n,), optional
-        Outer heights, m; by default those of the scene, and of a section without one that of a thin-walled box.
+    `heights` (n,) are outer heights, m. By default they are those of the scene, or those of thin-walled boxes.
     """
     found = np.full(len(scene.sections), np.nan)
     for i, section in enumerate(scene.sections):
@@ -54,21 +51,9 @@ def section_moduli(scene: Scene, heights: Array | None = None) -> Array:
 
 
 class BendingStressModel:
-    """Moments and stresses of a boom at its stations, sample by sample.
+    """Moments and stresses of a boom at its k `stations`, sample by sample; `moduli` (k,) are the section moduli there, m^3.
 
-    Parameters
-    ----------
-    scene : Scene
-    heights : ndarray, shape (n,), optional
-        See `section_moduli`.
-    reads : StrokeReading
-        Of the strokes of predictions.
-
-    Attributes
-    ----------
-    stations : tuple of Station
-    moduli : ndarray, shape (k,)
-        Section modulus at every station, m^3.
+    For `heights` see `section_moduli`; `reads` says what the strokes of predictions are.
     """
 
     def __init__(self, scene: Scene, heights: Array | None = None, reads: StrokeReading = StrokeReading.LENGTH) -> None:
@@ -82,12 +67,9 @@ class BendingStressModel:
         self._at, self._influence = np.full(len(scene.joints), np.inf), np.zeros((len(self.stations), 2))
 
     def influence(self, strokes: Array, joints: Array) -> Array:
-        """Moment by the x and y of a force at the tip, shape (k, 2), m; NaN where there is no equilibrium.
+        """Return the moment by the x and y of a force at the tip, shape (k, 2), m; NaN where there is no equilibrium.
 
-        Parameters
-        ----------
-        strokes, joints : ndarray, shape (n,)
-            Of the drives, m; joint angles near those of the equilibrium, rad.
+        `strokes` (n,) are of the drives, m; `joints` (n,) are angles near those of the equilibrium, rad.
         """
         if float(np.max(np.abs(strokes - self._at))) > POSTURE_STEP:
             self._at = strokes.copy()

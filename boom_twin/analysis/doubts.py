@@ -46,18 +46,11 @@ class EstimatedError:
 
 
 def step_error_warning(jolt: float, shake: float, travel: float, square: float) -> str:
-    """A sentence with its remedy, or nothing.
+    """Return a warning with its remedy, or nothing.
 
-    One step of a second-order scheme errs by about h^2/12 |a' - a|.
-
-    Parameters
-    ----------
-    jolt, shake : float
-        Sums over all steps of h^2 |a' - a| and of h^2 |a'| (m), as `kernels.transfer.time_step.run` returns them.
-    travel : float
-        How far the tip got from where it started, m.
-    square : float
-        Sum over all steps of h^2, s^2.
+    One step of a second-order scheme errs by about h^2/12 |a' - a|. `jolt` and `shake` are the sums over all steps of
+    h^2 |a' - a| and of h^2 |a'| (m), see `kernels.transfer.time_step.run`. `travel` is how far the tip got from where it
+    started (m), `square` the sum over all steps of h^2 (s^2).
     """
     share = jolt / 12.0 / max(travel, SHORTEST_PATH)
     for sentence in ringing(jolt, shake, square):
@@ -134,12 +127,9 @@ TIP_ACCELERATION = ("the tip's acceleration", "its largest", ACCELERATION)
 
 
 def differences(times: Array, found: Results, other: Results, factor: float) -> tuple[EstimatedError, ...]:
-    """Errors of the tip's place, its acceleration and the worst cylinder's force: `factor` times what `other` differs by.
+    """Return errors of tip, its acceleration and the worst cylinder's force: `factor` times the difference to `other`.
 
-    Parameters
-    ----------
-    times : ndarray, shape (m,)
-        Of the rows, which are the same instants in both.
+    Both have rows at the same `times` (m,), s.
     """
     (tip, acceleration), (place, rate) = ((rows.tip[:, 0, :2], rows.tip[:, 2, :2]) for rows in (found, other))
     path = max(float(_lengths(tip - tip[0]).max()), SHORTEST_PATH)

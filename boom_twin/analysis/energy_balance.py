@@ -39,12 +39,7 @@ FINER = 32
 
 
 class Energies:
-    """Energies and powers of a boom, from its state.
-
-    Parameters
-    ----------
-    plan : Plan
-    """
+    """Energies and powers of a boom, from its state."""
 
     def __init__(self, plan: Plan) -> None:
         t, count = plan.tables, len(plan.names)
@@ -173,18 +168,9 @@ class EnergyBalance:
 
 
 def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
-    """Balance along a motion.
+    """Return the balance along a motion in steps of at most `dt` (s).
 
-    Parameters
-    ----------
-    course : DriveCourse
-        See `boom_twin.analysis.simulate.course_of`.
-    dt : float
-        Longest step, s. Where journals touch and part, each is divided by `FINER`, so that powers in impacts can be summed.
-
-    Returns
-    -------
-    EnergyBalance
+    Where journals touch and part, each step is divided by `FINER`, so that powers in impacts can be summed.
     """
     energies, start = Energies(course.plan), course.start
     first, heavy = energies.total(start), energies.weight(start)

@@ -55,22 +55,9 @@ class Envelope:
 def envelope(scene: Scene, progress: Callable[[int, int], None] = lambda done, total: None) -> Envelope:
     """Return the boom at rest in its named postures, on a grid over the ranges of its joints, and at the extremes.
 
-    Parameters
-    ----------
-    scene : Scene
-    progress : callable, optional
-        Told after every posture how many of how many are done, and then after the search of every extreme.
-
-    Returns
-    -------
-    Envelope
-        Postures out of a cylinder's travel, or without an equilibrium, are left out and counted. There is no ground, and
-        sections may cross each other.
-
-    Raises
-    ------
-    SolverError
-        There is no posture with an equilibrium.
+    `progress` is given how many of how many postures are done, and then how many extremes are searched. Postures out of a
+    cylinder's travel, or without an equilibrium, are left out and counted. There is no ground, and sections may cross each
+    other. SolverError if there is no posture with an equilibrium.
     """
     postures = [(name, posture_angles(scene, name)) for name in scene.postures] + [("", angles) for angles in _grid(scene)]
     boom = _Boom(scene)
@@ -103,13 +90,7 @@ def _grid(scene: Scene) -> list[Array]:
 
 
 class _Boom:
-    """A compiled boom that is brought to rest in one posture after the other.
-
-    Attributes
-    ----------
-    skipped : dict of str to int
-        How many postures had no result, by reason.
-    """
+    """A compiled boom that is brought to rest in one posture after the other; `skipped` counts those without a result."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._plan = scene, compile_scene(scene)

@@ -206,12 +206,7 @@ def statics(
 def strokes_and_angles(scene: Scene, strokes: ArrayLike | str | None, posture: str | None) -> tuple[Array, Array]:
     """Return strokes (m) and joint angles (rad) of the undeformed boom, both (n,), at `strokes` or in a `posture`.
 
-    A string as `strokes` is a posture name.
-
-    Raises
-    ------
-    UsageError
-        Unknown posture, strokes out of range, or not exactly one of strokes and posture.
+    A string as `strokes` is a posture name. UsageError if not exactly one is given, or if it is unknown or out of range.
     """
     if isinstance(strokes, str):
         strokes, posture = None, strokes if posture is None else None
@@ -332,13 +327,7 @@ def is_stable(plan: Plan, state: State, work: Work) -> bool:
 def outline(plan: Plan, frames: Array, position: Array) -> Array:
     """Return points (.., k, 2) of the centre line from base to tip, m.
 
-    Parameters
-    ----------
-    plan : Plan
-    frames : ndarray, shape (.., operations + 1, 5)
-        See `boom_twin.kernels.tables.State`.
-    position : ndarray, shape (.., histories)
-        All history positions.
+    `frames` (.., operations + 1, 5) are those of `boom_twin.kernels.tables.State`, `position` (.., histories) all positions.
     """
     are_frames, are_points = plan.outline[:, 0] == 0, plan.outline[:, 0] == 1
     line = np.empty((*frames.shape[:-2], len(plan.outline), 2))

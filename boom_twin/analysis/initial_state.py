@@ -127,19 +127,9 @@ def state_now(plan: Plan, state: State) -> InitialState:
 
 
 def started(scene: Scene, initial: InitialState, times: Array, strokes: Array) -> tuple[Plan, State, Work]:
-    """Compile a scene and set it in motion.
+    """Compile a scene and set it in motion; the curve through the drives' first rows (s, m) gives length and rate at the start.
 
-    Parameters
-    ----------
-    times, strokes : ndarray, shape (m,) and (m, n)
-        s; m: of the drives, whose curve through them gives length and rate at the start.
-
-    Raises
-    ------
-    UsageError
-        Coordinates of another boom, or loops that they leave open.
-    SolverError
-        There are no accelerations that balance the forces.
+    UsageError for coordinates of another boom, or that leave loops open; SolverError if no accelerations balance the forces.
     """
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()

@@ -84,26 +84,11 @@ def integrate_with(
     basis: BasisName = "end-shapes",
     angles: Array | None = None,
 ) -> MethodRun:
-    """Integrate a drive in equal steps, from static equilibrium at t = 0.
+    """Integrate a drive in equal steps from static equilibrium at t = 0; a failed step sets `status`.
 
-    Parameters
-    ----------
-    duration, step : float
-        s; a row after every `every` steps.
-    angles : ndarray, shape (n,), optional
-        Joint angles (rad) near the equilibrium.
-
-    Returns
-    -------
-    MethodRun
-        Motion, status and CPU time.
-
-    Raises
-    ------
-    UsageError
-        Duration is no multiple of `every` steps, or the scene has clearance and the product is plain.
-    SolverError
-        No equilibrium at t = 0. A failed step sets `status`.
+    `duration` and `step` are in s, with a row after every `every` steps; `angles` (n,) are joint angles (rad) near the
+    equilibrium. UsageError if the duration is no multiple of `every` steps, or for clearance with the plain product;
+    SolverError if there is no equilibrium.
     """
     method, rows = method or Method(), _row_count(duration, step, every)
     plan = compile_scene(scene, basis)

@@ -36,13 +36,7 @@ class SampledMotions:
     doubtful: int  # number of samples whose motion `simulate` doubts
 
     def columns(self) -> dict[str, Array]:
-        """Return mean, standard deviation and the quantiles `LOWER` and `UPPER` of every quantity over the samples, by row.
-
-        Returns
-        -------
-        dict of str to ndarray, shape (m,)
-            By name with unit.
-        """
+        """Return mean, standard deviation and quantiles `LOWER` and `UPPER` of every quantity over the samples, (m,) each."""
         found = {"t_s": self.times}
         for name, values in self.motions.items():
             low, high = np.quantile(values, (LOWER, UPPER), axis=0)
@@ -64,25 +58,11 @@ class SampledMotions:
 
 
 def drawn(scene: Scene, deviations: Mapping[str, float], count: int, seed: int) -> dict[str, Array]:
-    """Random values of parameters about those of `scene`, independent of each other.
+    """Return random values (count,) of parameters about those of `scene`, independent of each other.
 
     Shares give a log-normal distribution, so that stiffness and mass stay positive; loads a normal one, cut off at nothing.
-
-    Parameters
-    ----------
-    deviations : dict of str to float
-        Standard deviations by the parameters' names (`boom_twin.scene.edit`): shares, of loads kg and kg/m.
-    count : int
-    seed : int
-
-    Returns
-    -------
-    dict of str to ndarray, shape (count,)
-
-    Raises
-    ------
-    UsageError
-        A parameter that the scene lacks, or a deviation that is not positive; none at all.
+    `deviations` are standard deviations by the parameters' names (`boom_twin.scene.edit`): shares, of loads kg and kg/m.
+    UsageError for none at all, a parameter that the scene lacks, or a deviation that is not positive.
     """
     names = parameter_names(scene)
     if not deviations:

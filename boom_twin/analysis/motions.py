@@ -47,24 +47,10 @@ class Motion:
 
 
 def motion_of(scene: Scene, posture: str | None = None, duration: float = DURATION) -> Motion:
-    """The motion of a scene; see the head of this file.
+    """Return the motion of a scene for `duration` (s); see the head of this file.
 
-    Parameters
-    ----------
-    posture : str, optional
-        Where it starts: by default `arch`, else the first posture, else next to the middle of the joints' ranges.
-    duration : float
-        s.
-
-    Returns
-    -------
-    Motion
-        Where it starts, and the strokes of all cylinders as functions of time.
-
-    Raises
-    ------
-    UsageError
-        No such posture, or no cylinder with room to move.
+    It starts in `posture`: by default `arch`, else the first posture, else next to the middle of the joints' ranges.
+    UsageError if there is no such posture, or no cylinder with room to move.
     """
     name = posture or (ARCH if ARCH in scene.postures else next(iter(scene.postures), None))
     if name is None:

@@ -65,25 +65,10 @@ class ResonanceMap:
 def resonance_map(
     scene: Scene, postures: Mapping[str, Array], rates: Array, load_at: Callable[[float], PeriodicLoad]
 ) -> ResonanceMap:
-    """Swing of the tip in the steady state of every posture under the load at every rate.
+    """Return the swing of the tip in the steady state of every posture under the load at every rate (Hz).
 
-    Parameters
-    ----------
-    scene : Scene
-        The boom, of n sections.
-    postures : mapping
-        Joint angles (rad), shape (n,), of the undeformed boom, by name; see `named_postures`, `postures_along`.
-    rates : ndarray, shape (r,)
-        Hz.
-    load_at : callable
-        The load at a rate, see `boom_twin.analysis.steady_state.pump_load`.
-
-    Raises
-    ------
-    UsageError
-        A posture is out of the cylinders' travel.
-    SolverError
-        One has no stable equilibrium.
+    `postures` are joint angles (rad), shape (n,), of the undeformed boom, by name; `load_at` gives the load at a rate.
+    UsageError for a posture out of the cylinders' travel, SolverError for one without a stable equilibrium.
     """
     loads = [load_at(float(rate)) for rate in rates]
     swing, harmonics = np.zeros((len(postures), len(rates))), np.zeros((len(postures), len(rates)), np.int64)

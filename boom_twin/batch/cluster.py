@@ -40,14 +40,8 @@ class Workers:
 def connected(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
     """Yield the workers of the scheduler at an address (``tcp://host:8786``), or those of this process, which opens no port.
 
-    `workers` is the number of sessions at once on this machine, by default that of its cores.
-
-    Raises
-    ------
-    UsageError
-        Dask is not installed.
-    BagError
-        No scheduler answers there.
+    `workers` is the number of sessions at once on this machine, by default that of its cores. UsageError if Dask is not
+    installed, BagError if no scheduler answers there.
     """
     if scheduler is None:
         count = workers or os.cpu_count() or 1

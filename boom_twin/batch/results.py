@@ -31,12 +31,8 @@ _OWN = frozenset({MARK, TABLE, PAGE, ROWS, SESSIONS})
 def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
     """Make or reopen the folder of a batch and lock it against other batches.
 
-    None of the sessions to be read may lie in `out`, nor `out` in one of them.
-
-    Raises
-    ------
-    BagError
-        `out` holds anything else, another batch works in it, or it cannot be written.
+    None of the sessions to be read may lie in `out`, nor `out` in one of them. BagError if `out` holds anything else, another
+    batch works in it, or it cannot be written.
     """
     check_lasting(out)
     place = real_path(out)
@@ -82,10 +78,7 @@ class BatchFolder:
     def kept(self, key: str, fingerprint: str) -> Row | None:
         """Return the row of a session if it is finished and its `fingerprint` is equal; None otherwise.
 
-        Raises
-        ------
-        BagError
-            The file was changed since `keep` wrote it.
+        BagError if the file was changed since `keep` wrote it.
         """
         file = self.folder / ROWS / f"{key}.json"
         try:

@@ -77,13 +77,7 @@ def _head(task: SessionTask) -> Row:
 
 
 def row_of(task: SessionTask) -> Row:
-    """Replay a session and return its row.
-
-    Raises
-    ------
-    BoomTwinError
-        The replay fails, see `boom_twin.offline.replay.replay`.
-    """
+    """Replay a session and return its row; errors are those of `boom_twin.offline.replay.replay`."""
     from ..bag.reader import files_sha256
     from ..bag.session_model import scene_of, settings_of
     from ..bag.time_window import TimeWindow

@@ -42,24 +42,9 @@ class Proposal:
 def propose(full: Scene, most: float, start: Scene | None = None, progress: Progress = lambda _: None) -> Proposal:
     """Look for the leanest model whose tip stays within `most` (m) of that of the scene `full`.
 
-    Parameters
-    ----------
-    start : Scene, optional
-        A model of the same boom to start from, by default `full` itself.
-    progress : callable, optional
-        Told in words what is being done.
-
-    Returns
-    -------
-    Proposal
-        The lean scene, what was left out of it, its error at rest and in a move, and what a step costs.
-
-    Raises
-    ------
-    UsageError
-        `most` is not positive; `start` is another boom, or is further off than `most` already.
-    SolverError
-        The full model itself has no equilibrium or fails in the move.
+    The search begins with `start`, a model of the same boom, by default `full` itself; `progress` is told in words what is
+    done. UsageError if `most` is not positive, or `start` is another boom or further off already. SolverError if the full
+    model itself has no equilibrium or fails in the move.
     """
     if not (math.isfinite(most) and most > 0.0):
         raise UsageError(f"need = {most!r} m: must be positive. Give for example 0.001.")
