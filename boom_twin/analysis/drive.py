@@ -70,7 +70,7 @@ def _end(near: Array, far: Array, first: Array, second: Array) -> Array:
     return np.asarray(np.where(turned, 0.0, np.where(steep, 3.0 * first, slope)))
 
 
-TOLERANCE = 1e-6  # rad, increment in the last pass; the remaining error is about 1 to 50 times its square
+STEP_TOLERANCE = 1e-6  # rad, increment in the last pass; the remaining error is about 1 to 50 times its square
 PASSES = np.int64(20)
 
 
@@ -112,8 +112,8 @@ class DriveCourse:
         out[0] = first_row(plan, state)
         steps, counts, drives, rates = self._drive(self.times[rows], self.strokes[rows], dt, finer)
         status, row, passes, jolt, shake = run(
-            plan.tables, state, self.work, steps, counts, drives, rates, GENERALISED_ALPHA, self.rho, TOLERANCE, PASSES, None,
-            out[1:],
+            plan.tables, state, self.work, steps, counts, drives, rates, GENERALISED_ALPHA, self.rho, STEP_TOLERANCE, PASSES,
+            None, out[1:],
         )  # fmt: skip
         at_rows = np.vstack([self.start.drives[1], rates[np.cumsum(counts) - 1]])
         return Run(
@@ -132,8 +132,9 @@ class DriveCourse:
             scheme = prepare(GENERALISED_ALPHA, self.rho, span, work.weights)
             for _ in range(count):
                 status, _, _ = advance(
-                    plan.tables, state, work, scheme, drives[row], rates[row], TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW
-                )
+                    plan.tables, state, work, scheme, drives[row], rates[row], STEP_TOLERANCE, PASSES, LONGEST_INCREMENT, None,
+                    ANEW,
+                )  # fmt: skip
                 if status != OK:
                     raise SolverError(f"step {row + 1} of {len(drives)} failed: {SENTENCES[status]}.")
                 row += 1

@@ -23,12 +23,12 @@ from .bending_moments import moments_by_unknowns, stations
 from .equilibrium import settle
 from .modal import natural_modes
 
-MOST = 700  # postures of the grid
+MOST_POSTURES = 700  # postures of the grid
 FINEST = 11  # angles of a joint
-MODES = 3
-WIDTH = 1e-5  # relative accuracy of frequencies
+FREQUENCY_COUNT = 3
+FREQUENCY_ACCURACY = 1e-5  # relative accuracy of frequencies
 STARTS = 5  # best postures of the grid from which each extreme is searched
-STEP = 1e-3  # of the search's differences, rad
+SEARCH_STEP = 1e-3  # of the search's differences, rad
 GAIN = 1e-4  # relative gain by which a step of the search must better the extreme
 
 
@@ -41,7 +41,7 @@ class Envelope:
     tips: Array  # (m, 2), m
     deflections: Array  # (m,), distance of the tip from that of rigid sections and cylinders, m
     forces: Array  # (m, n), cylinder forces, N, positive in tension
-    frequencies: Array  # (m, k), Hz, ascending, at most `MODES`
+    frequencies: Array  # (m, k), Hz, ascending, at most `FREQUENCY_COUNT`
     moments: Array  # (m, n), bending moment of largest size in each section, N m; 0 in rigid ones
     stresses: Array  # (m, n), that size over the section modulus, Pa; NaN where the section has no height
     skipped: dict[str, int]  # number of postures of scene and grid that are left out, by reason
@@ -83,8 +83,8 @@ def envelope(scene: Scene, progress: Callable[[int, int], None] = lambda done, t
 
 
 def _grid(scene: Scene) -> list[Array]:
-    """Relative joint angles (rad) over all ranges, as many of each as fit into `MOST` postures."""
-    count = max(2, min(FINEST, int(MOST ** (1.0 / len(scene.joints)) + 1e-9)))
+    """Relative joint angles (rad) over all ranges, as many of each as fit into `MOST_POSTURES` postures."""
+    count = max(2, min(FINEST, int(MOST_POSTURES ** (1.0 / len(scene.joints)) + 1e-9)))
     axes = [np.radians(np.linspace(*joint.range_deg, count)) for joint in scene.joints]
     return [np.array(angles) for angles in product(*axes)]
 
@@ -99,7 +99,7 @@ class _Boom:
         self._bounds = np.radians([joint.range_deg for joint in scene.joints])
         self.skipped = dict.fromkeys(("out of a cylinder's travel", "no equilibrium"), 0)
 
-    def at_rest(self, relative: Array, modes: int = MODES) -> Array | None:
+    def at_rest(self, relative: Array, modes: int = FREQUENCY_COUNT) -> Array | None:
         """Return section angles (deg), tip, deflection, forces, moments and frequencies in one row, None at no rest."""
         scene, plan = self._scene, self._plan
         strokes = strokes_of_angles(scene, relative)
@@ -109,7 +109,7 @@ class _Boom:
         state, work = plan.state(), plan.work()
         try:
             settle(plan, state, work, strokes, relative)
-            frequencies = [mode.frequency for mode in natural_modes(plan, state, work, modes, WIDTH)]
+            frequencies = [mode.frequency for mode in natural_modes(plan, state, work, modes, FREQUENCY_ACCURACY)]
         except SolverError:
             self.skipped["no equilibrium"] += 1
             return None
@@ -122,7 +122,7 @@ class _Boom:
     def extreme(self, grid: Array, k: int, sign: float) -> Array | None:
         """Return the row of largest ``sign * row[k]`` that is found from the best of `grid`; None if none is better."""
         n, values = len(self._bounds), -sign * grid[:, k]
-        modes = MODES if k >= 3 + 3 * n else 0
+        modes = FREQUENCY_COUNT if k >= 3 + 3 * n else 0
         best, found = values.min(), None
 
         def lacking(relative: Array) -> float:
@@ -136,7 +136,7 @@ class _Boom:
 
         for start in np.argsort(values)[:STARTS]:
             relative = np.diff(np.radians(grid[start, :n]), prepend=0.0)
-            minimize(lacking, relative, method="L-BFGS-B", bounds=self._bounds, options={"eps": STEP, "ftol": GAIN})
+            minimize(lacking, relative, method="L-BFGS-B", bounds=self._bounds, options={"eps": SEARCH_STEP, "ftol": GAIN})
         return None if found is None else self.at_rest(found)
 
 

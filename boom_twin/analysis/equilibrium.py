@@ -93,7 +93,7 @@ TOLERANCE = 1e-9  # rad, increment in the last pass; the remaining error is its 
 PASSES = 60
 LONGEST_INCREMENT = 0.1  # rad per pass
 FIRST_LOAD, LEAST_LOAD = 0.05, 1e-3  # first and smallest load step, as fractions of gravity, if the full load fails
-LEAST_SHARE = 1e-3  # smallest clearance step, as a fraction of the clearances
+LEAST_CLEARANCE_STEP = 1e-3  # smallest clearance step, as a fraction of the clearances
 
 
 @dataclass(frozen=True, repr=False)
@@ -289,7 +289,7 @@ def _loosen_gradually(plan: Plan, state: State, work: Work, drive: Array) -> flo
     def rests(share: float, aim: float) -> bool:
         return _rests(loosen_pins(plan, state, aim, aim - share), state, work, drive, 1.0)
 
-    return _gradually(state, 1.0, LEAST_SHARE, rests)
+    return _gradually(state, 1.0, LEAST_CLEARANCE_STEP, rests)
 
 
 def _gradually(state: State, step: float, least: float, rests: Callable[[float, float], bool]) -> float:

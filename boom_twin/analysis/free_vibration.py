@@ -18,7 +18,7 @@ from ..types import Array
 
 ORDER = 14
 """Eigenvalues that are looked for: two a mode, and some that take up noise."""
-LOWEST, HIGHEST = 0.2, 15.0
+LOWEST_HZ, HIGHEST_HZ = 0.2, 15.0
 DAMPED = 0.2
 """Largest damping ratio of what is taken for a mode."""
 DECAYS = 4.0
@@ -51,7 +51,7 @@ def free_vibrations(dt: float, values: Array) -> list[Vibration]:
     turns = np.linalg.eigvals(np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0])
     rates = np.log(turns[turns.imag > 0.0]) / dt
     frequencies, dampings = np.abs(rates) / (2.0 * pi), -rates.real / np.abs(rates)
-    kept = (frequencies > LOWEST) & (frequencies < min(HIGHEST, 0.4 / dt)) & (dampings > 0.0) & (dampings < DAMPED)
+    kept = (frequencies > LOWEST_HZ) & (frequencies < min(HIGHEST_HZ, 0.4 / dt)) & (dampings > 0.0) & (dampings < DAMPED)
     rates = rates[kept][np.argsort(frequencies[kept])]
     if not len(rates):
         return []

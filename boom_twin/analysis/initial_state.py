@@ -44,9 +44,9 @@ from .equilibrium import checked_strokes, rest_at, set_undeformed
 SPAN = 1e-3  # rad or m that the fastest coordinate moves in a difference quotient
 SHORT = 2e-5  # s, step that accelerations are found with
 HALF = math.sqrt(2.0) - 0.5  # gamma of Newmark's method with beta = 1/2
-TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
+START_TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
 OPEN = 1e-6  # m, and m/s: by which a loop may be open
-FAR = 1e-3  # m, by which a drive may begin away from where the state was taken
+FARTHEST_START = 1e-3  # m, by which a drive may begin away from where the state was taken
 STENCIL = ((2.0, -1.0), (1.0, 8.0), (-1.0, -8.0), (-2.0, 1.0))  # of the fourth-order difference, over 12
 
 
@@ -145,7 +145,9 @@ def started(scene: Scene, initial: InitialState, times: Array, strokes: Array) -
     for step in (SHORT, 0.5 * SHORT):
         trial = State(*(array.copy() for array in state))
         scheme, (ahead, speed) = prepare(NEWMARK, HALF, step, work.weights), _drive(plan, times, strokes, step)
-        status, _, _ = advance(plan.tables, trial, work, scheme, ahead, speed, TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW)
+        status, _, _ = advance(
+            plan.tables, trial, work, scheme, ahead, speed, START_TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW
+        )
         if status != OK:
             raise SolverError(f"the motion cannot start from the given state: {SENTENCES[status]}.")
         ends.append((trial.history[A], trial.z))
@@ -227,11 +229,11 @@ def _check_drives(plan: Plan, state: State, work: Work, length: Array) -> None:
     cylinders = plan.tables.cylinders
     forces = state.z[cylinders.z]
     began = work.position[cylinders.history] - plan.compliances_and_lags(length)[0] * forces
-    for i in np.flatnonzero(~_incompressible(plan) & (forces != 0.0) & (np.abs(began - length) > FAR)):
+    for i in np.flatnonzero(~_incompressible(plan) & (forces != 0.0) & (np.abs(began - length) > FARTHEST_START)):
         own, given = began[i] - plan.closed_lengths[i], length[i] - plan.closed_lengths[i]
         raise UsageError(
             f"stroke_{i + 1}_m = {given:.5g} m in the first row: the initial state is of a stroke of {own:.5g} m; "
-            f"{1e3 * FAR:g} mm is let pass. Begin the drive where the state was taken."
+            f"{1e3 * FARTHEST_START:g} mm is let pass. Begin the drive where the state was taken."
         )
 
 

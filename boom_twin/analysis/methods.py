@@ -19,7 +19,7 @@ from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Array
 from .doubts import step_error_warning
-from .drive import PASSES, TOLERANCE
+from .drive import PASSES, STEP_TOLERANCE
 from .equilibrium import settle
 from .simulate import RHO
 
@@ -42,7 +42,7 @@ class Method:
     integrator: str = "generalised-alpha"  # "generalised-alpha", "newmark", "wilson", "houbolt" or "park"
     parameter: float = RHO  # rho of generalised-alpha, gamma of Newmark, theta of Wilson; Houbolt and Park have none
     passes: int = int(PASSES)  # largest number of Newton passes in a step; 1 is the papers' linearised pass
-    tolerance: float = TOLERANCE  # rad, see `kernels.transfer.time_step.advance`
+    tolerance: float = STEP_TOLERANCE  # rad, see `kernels.transfer.time_step.advance`
     product: str = "riccati"  # "riccati" or "plain", the papers' product of transfer matrices
 
     def __post_init__(self) -> None:

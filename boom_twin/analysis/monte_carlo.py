@@ -22,7 +22,7 @@ LOADS = ("tip.payload", "line_fill")
 """Parameters that may be nothing: their deviations have units, those of all others are shares."""
 LOWER, UPPER = 0.025, 0.975
 """Quantiles that are told."""
-LARGEST = 4e9  # bytes that all motions may take
+LARGEST_RESULT = 4e9  # bytes that all motions may take
 
 
 @dataclass(frozen=True, repr=False)
@@ -123,8 +123,10 @@ def simulate_samples(
     scene = as_scene(scene)
     if count < 2:
         raise UsageError(f"samples = {count}: a spread needs 2 at least. Give 100.")
-    if (size := 8.0 * count * len(times) * (4 + len(scene.joints))) > LARGEST:
-        raise UsageError(f"samples = {count} of {len(times)} rows: {size:.2g} bytes, {LARGEST:.2g} at most. Give fewer rows.")
+    if (size := 8.0 * count * len(times) * (4 + len(scene.joints))) > LARGEST_RESULT:
+        raise UsageError(
+            f"samples = {count} of {len(times)} rows: {size:.2g} bytes, {LARGEST_RESULT:.2g} at most. Give fewer rows."
+        )
     values = drawn(scene, deviations, count, seed)
     simulate(scene, times[:1], strokes[:1], dt, angles, estimate_errors=False)  # what is wrong for all is told once
 

@@ -25,7 +25,7 @@ TURN = math.radians(8.0)
 HALVINGS = 4
 RISE = 1.5  # s
 DURATION = 4.0  # s
-SAMPLES = 181  # of a joint's range
+RANGE_SAMPLES = 181  # of a joint's range
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def _is_default(scene: Scene, first: Array) -> bool:
 def _middle(scene: Scene, index: int) -> float:
     """Angle (rad) of joint `index` nearest to the middle of its range that its cylinder reaches."""
     low, high = np.radians(scene.joints[index].range_deg)
-    grid = np.linspace(low, high, SAMPLES)
+    grid = np.linspace(low, high, RANGE_SAMPLES)
     strokes = stroke_curve(scene, index, grid)
     with np.errstate(invalid="ignore"):
         reached = grid[(strokes >= 0.0) & (strokes <= scene.joints[index].cylinder.max_stroke)]

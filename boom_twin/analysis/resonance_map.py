@@ -21,7 +21,7 @@ from .frequency_response import LinearisedBoom
 from .steady_state import PeriodicLoad, steady_state_of
 
 TOO_MUCH = 1.5  # times the median swing of a posture: such rates are to be avoided
-LEAST = 1e-5  # m; less is no swing, but rounding or a boom without compliance
+LEAST_SWING = 1e-5  # m; less is no swing, but rounding or a boom without compliance
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class ResonanceMap:
         """The bands to avoid, posture by posture, ascending in rate."""
         found = []
         for name, swing, harmonics in zip(self.postures, self.swing, self.harmonics, strict=True):
-            above = np.concatenate([[False], swing > max(TOO_MUCH * float(np.median(swing)), LEAST), [False]])
+            above = np.concatenate([[False], swing > max(TOO_MUCH * float(np.median(swing)), LEAST_SWING), [False]])
             starts, stops = np.flatnonzero(above[1:] & ~above[:-1]), np.flatnonzero(above[:-1] & ~above[1:])
             for start, stop in zip(starts, stops, strict=True):
                 peak = start + int(np.argmax(swing[start:stop]))

@@ -1,6 +1,6 @@
 """Steady state under a periodic load at the tip: its Fourier series through the frequency response.
 
-The load stands for `SAMPLES` even instants of a period, of a long period as many as its harmonics up to `HIGHEST_HARMONIC`
+The load stands for `INSTANTS` even instants of a period, of a long period as many as its harmonics up to `HIGHEST_HARMONIC`
 need; every harmonic whose amplitude is above `NEGLIGIBLE` of the largest is answered by the boom linearised at rest, its mean
 by the static limit, and the answers are added up in time. Where a load goes straight from row to row its harmonics are exact
 (`polygon_series`): instants of it alone would take what is faster than half their rate for something slower.
@@ -19,7 +19,7 @@ from ..scene.schema import Scene
 from ..types import Array, ComplexArray
 from .frequency_response import LinearisedBoom, linearised_boom
 
-SAMPLES = 2048
+INSTANTS = 2048
 HIGHEST_HARMONIC = 200.0  # Hz; far above what moves a boom
 PERIODS = (0.01, 2000.0)  # s, shortest and longest: the model ends at some 100 Hz, and harmonics cost time
 LARGEST_FORCE = 1e7  # N; far above what any boom bears
@@ -92,7 +92,7 @@ def _instants(period: float) -> Array:
     low, high = PERIODS
     if not low <= period <= high:
         raise UsageError(f"load: its period of {period:g} s must be {low:g} to {high:g} s. Give another rate.")
-    count = 2 * max(SAMPLES // 2, math.ceil(HIGHEST_HARMONIC * period))
+    count = 2 * max(INSTANTS // 2, math.ceil(HIGHEST_HARMONIC * period))
     return period * np.arange(count) / count
 
 

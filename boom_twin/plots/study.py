@@ -110,7 +110,7 @@ def _marks(axes: Axes, panel: Panel) -> None:
         axes.set_ylim(bottom=low)
 
 
-LEAST = 1e-4  # mm; errors below are drawn as this
+LEAST_ERROR = 1e-4  # mm; errors below are drawn as this
 ROW = 0.3  # height of a row, hundreds of pixels
 
 
@@ -141,9 +141,11 @@ def parts_picture(path: Path, bars: Bars, note: str) -> None:
 
 def _errors(axes: Axes, bars: Bars, rows: Array) -> None:
     for values, shift, colour, label in ((bars.rest, -0.19, BLUE, "at rest"), (bars.move, 0.19, ORANGE, "in the move")):
-        axes.barh(rows + shift, np.maximum(1e3 * values, LEAST) - LEAST, 0.36, left=LEAST, color=colour, label=label)
+        axes.barh(
+            rows + shift, np.maximum(1e3 * values, LEAST_ERROR) - LEAST_ERROR, 0.36, left=LEAST_ERROR, color=colour, label=label
+        )
     axes.set_xscale("log")
-    axes.set_xlim(LEAST, 2e3 * max(float(np.max([bars.rest, bars.move])), LEAST))
+    axes.set_xlim(LEAST_ERROR, 2e3 * max(float(np.max([bars.rest, bars.move])), LEAST_ERROR))
     axes.axvline(1.0, color=GREY, linewidth=1.0, linestyle="--")
     axes.set_xlabel("largest error of the tip, mm (dashed: 1 mm)")
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)

@@ -21,7 +21,7 @@ from .deviation import Deviation, Response, StrokeCourse, answer, course_of, dev
 from .variants import FEWER_MODES, KINDS, Variant, VariantKind, without
 
 GROUPS = 8  # sections are left out one by one up to so many; on a longer boom so many runs of neighbours
-ROUNDS = 30
+TIMED_RUNS = 30
 
 Progress = Callable[[str], None]
 
@@ -54,7 +54,7 @@ def propose(full: Scene, most: float, start: Scene | None = None, progress: Prog
     lean = search.model()
     found = search.measured(search.edits)
     progress("measuring run times")
-    times = step_times((full, lean), search.course, ROUNDS)
+    times = step_times((full, lean), search.course, TIMED_RUNS)
     counts = (unknowns(full), unknowns(lean))
     return Proposal(lean, search.edits, found, search.course, counts, (float(times[0]), float(times[1])), search.next)
 

@@ -10,7 +10,7 @@ from oracle import booms
 from boom_twin import frequency_response, load_scene, statics
 from boom_twin.analysis.resonance_map import named_postures, resonance_map
 from boom_twin.analysis.steady_state import (
-    SAMPLES,
+    INSTANTS,
     PeriodicLoad,
     load_of_rows,
     polygon_series,
@@ -49,7 +49,7 @@ def test_pump_pulses_against_the_last_periods_of_a_long_motion(rate):
 
 
 def test_a_sine_is_the_frequency_response():
-    times = np.arange(SAMPLES) / (SAMPLES * 0.9)
+    times = np.arange(INSTANTS) / (INSTANTS * 0.9)
     load = PeriodicLoad(1.0 / 0.9, np.outer(np.sin(2.0 * np.pi * 0.9 * times), [3.0, 4.0]))
     found = steady_state(SCENE, load, posture="low")
     response = frequency_response(SCENE, np.array([0.9]), posture="low", tip_force=(3.0, 4.0))
