@@ -20,8 +20,7 @@ from .bending_moments import Station, increments_by_tip_force, moments_by_unknow
 from .cylinder_drives import drives_as_read
 from .equilibrium import settle
 
-BOX = 2.4
-"""Height over radius of gyration of a thin-walled box, for sections whose height is not given."""
+BOX = 2.4  # height over radius of gyration of a thin-walled box, for sections whose height is not given
 POSTURE_STEP = 0.03  # m of stroke after which the influence of the tip's force is made anew
 
 

@@ -34,8 +34,7 @@ from ..kernels.transfer.clearance_pins import axis_of
 from ..types import Array
 from .drive import DriveCourse
 
-FINER = 32
-"""Sub-steps of a step where journals touch and part: as many as a step is divided into at most."""
+FINER = 32  # sub-steps of a step where journals touch and part: as many as a step is divided into at most
 
 
 class Energies:

@@ -16,13 +16,10 @@ import numpy as np
 
 from ..types import Array
 
-ORDER = 14
-"""Eigenvalues that are looked for: two a mode, and some that take up noise."""
+ORDER = 14  # eigenvalues that are looked for: two a mode, and some that take up noise
 LOWEST_HZ, HIGHEST_HZ = 0.2, 15.0
-DAMPED = 0.2
-"""Largest damping ratio of what is taken for a mode."""
-DECAYS = 4.0
-"""Deviations by which a vibration has to be damped: the line of a pump is not."""
+DAMPED = 0.2  # largest damping ratio of what is taken for a mode
+DECAYS = 4.0  # deviations by which a vibration has to be damped: the line of a pump is not
 NEIGHBOURHOOD = 3.0
 """Times the resolution, one over the length of the record: what is left so near to a frequency counts for how sure that is."""
 LONGEST_STEP = 5.0

@@ -30,8 +30,7 @@ from .bending_moments import Station, moments_by_unknowns, stations
 from .equilibrium import rest_at, strokes_and_angles
 from .modal import drive_at_rest
 
-SHAPES = 5
-"""Least number of shapes in which a flexible part bends, see `with_all_shapes`."""
+SHAPES = 5  # least number of shapes in which a flexible part bends, see `with_all_shapes`
 LARGE = 1e4  # times a load of 1 N or 1 m: static forces and lengths are rounded to 1e-16 of themselves
 SMALL = np.array([1.0, 1e-6])  # N, m of a drive: loads that leave the tangents as they are, see `harmonic_response`
 UPWARD = (0.0, 1.0)  # N

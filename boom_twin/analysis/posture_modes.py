@@ -16,11 +16,9 @@ from ..types import Array
 from .equilibrium import settle
 from .modal import natural_modes
 
-MOVED = 0.005
-"""m of any stroke after which all is computed anew."""
+MOVED = 0.005  # m of any stroke after which all is computed anew
 COUNT = 6
-FREQUENCY_ACCURACY = 1e-4
-"""Relative accuracy of the frequencies."""
+FREQUENCY_ACCURACY = 1e-4  # relative accuracy of the frequencies
 
 Found = TypeVar("Found")
 

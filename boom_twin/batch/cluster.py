@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 
 REMEDY = 'Run `pip install "boom_twin[batch]"`.'
 KILLED = "the workers that had it were ended from outside. Look for what ends them, as the system's memory."
-COUNT_PERIOD = 5
-"""Seconds between two counts of a cluster's workers."""
-CONNECT_TIMEOUT = 20.0
-"""Seconds for a scheduler to answer."""
+COUNT_PERIOD = 5  # seconds between two counts of a cluster's workers
+CONNECT_TIMEOUT = 20.0  # seconds for a scheduler to answer
 
 
 @dataclass(frozen=True, slots=True)

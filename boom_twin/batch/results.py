@@ -22,8 +22,7 @@ from .session_task import ALARM, OK, Row
 MARK, TABLE, PAGE = "batch.json", "sessions.parquet", "batch.html"
 ROWS, SESSIONS = "rows", "sessions"
 """Folders of the rows, and of the replays."""
-DIGEST = "row_sha256"
-"""Key of a row's digest in its file, by which a change is detected."""
+DIGEST = "row_sha256"  # key of a row's digest in its file, by which a change is detected
 _OWN = frozenset({MARK, TABLE, PAGE, ROWS, SESSIONS})
 
 

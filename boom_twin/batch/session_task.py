@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 OK, FAILED = "ok", "failed"
 """Status of a row."""
-ALARM = ("channel", "kind", "from_s", "to_s", "cause", "told")
-"""Keys of an alarm in a row."""
+ALARM = ("channel", "kind", "from_s", "to_s", "cause", "told")  # keys of an alarm in a row
 Row = dict[str, Any]
 
 

@@ -13,8 +13,7 @@ from ..bag.session_sheet import sheet_path
 from ..bag.storages import is_session
 from ..errors import UsageError
 
-LIST = ".txt"
-"""Suffix of a file that lists sessions."""
+LIST = ".txt"  # suffix of a file that lists sessions
 
 
 def sessions_of(sources: Iterable[str]) -> list[Path]:

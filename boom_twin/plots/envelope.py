@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.text import Annotation
 
-COLOURS = {"kN": ORANGE, "Hz": GREEN, "kN m": PURPLE, "MPa": SKY}
-"""Colours of bars, by unit."""
+COLOURS = {"kN": ORANGE, "Hz": GREEN, "kN m": PURPLE, "MPa": SKY}  # colours of bars, by unit
 GAP = 16.0  # pixels between a bar, its words and the edge
 LEAST_BAR_WIDTH = 0.1  # of the width, that is left for bars however long the words are
 

@@ -47,8 +47,7 @@ def replay_pictures(
     return written
 
 
-SHOWN = 30.0
-"""Standard deviations at which a bar is cut off, with its number beside it."""
+SHOWN = 30.0  # standard deviations at which a bar is cut off, with its number beside it
 
 
 def compare_picture(path: Path, title: str, names: list[str], apart: list[float], sure: float) -> None:

@@ -25,10 +25,8 @@ from ..types import Array, Stream, sensor_kind, stream_of
 from .vibration import RestPeriod
 
 FILE_NAME = "quantities.json"
-BATCHES = 10
-"""Number of batches for the standard deviation of a mean (method of batch means)."""
-LEG = 1e-3
-"""Reversal (m) of a stroke that begins a new leg."""
+BATCHES = 10  # number of batches for the standard deviation of a mean (method of batch means)
+LEG = 1e-3  # reversal (m) of a stroke that begins a new leg
 MODEL_ERROR: dict[Stream | None, float] = {Stream.ANGLES: 5e-5, Stream.IMU: 0.02}
 """Standard deviation of the model error of a reading in one posture, by stream; rad, m/s^2."""
 FREQUENCY_ERROR = 0.01  # relative standard deviation of the model's natural frequencies in one posture
