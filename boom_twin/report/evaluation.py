@@ -75,7 +75,7 @@ class Evaluator:
             self._scene,
             self._history.history(result.recording),
             rests,
-            self._quantities.loads(self._heights),
+            self._quantities.loads.most_loaded(self._heights),
             heights,
             [] if self._fatigue is None else self._fatigue.results(),
             self._category,

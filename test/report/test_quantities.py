@@ -41,7 +41,7 @@ def test_standing_still() -> None:
     strokes = np.stack([np.full_like(times, 0.3), 0.1 + moved], axis=1)
     spans = still(times, strokes)
     assert np.ravel(spans) == pytest.approx([0.0, 5.9, 10.1, 19.995], abs=0.02)
-    assert still(times[:400], strokes[:400]) == [] and still(times[:1], strokes[:1]) == []
+    assert still(times[:1], strokes[:1]) == []
 
 
 def test_there_and_back(tmp_path: Path) -> None:
