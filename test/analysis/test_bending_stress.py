@@ -6,29 +6,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from analysis.resting import at_rest
 from drive_twin import drive_twin
 
 from boom_twin import Sample, Stream, Twin, load_scene, statics
 from boom_twin.analysis.bending_moments import increments_by_tip_force, moments_by_unknowns, stations
 from boom_twin.analysis.bending_stress import BOX, BendingStressModel, section_moduli
-from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import course_of
 from boom_twin.deviation.estimate_row import WIDTH
 from boom_twin.errors import UsageError
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import estimate_of
 from boom_twin.types import StrokeReading
-from boom_twin.validation.rig.exudyn.solve import at_rest, move
+from boom_twin.validation.rig.exudyn import solve
 from boom_twin.validation.rig.exudyn.system import Boom, section_frames
 
 SCENE = load_scene()
 ELEMENTS = 24
 LOADED = 3e6  # Pa; less is not looked at by its share
-
-
-def rest(posture, scene=SCENE):
-    return rest_at(scene, strokes_of_posture(scene, posture), posture_angles(scene, posture))
 
 
 def peer_moments(boom: Boom):
@@ -60,11 +56,11 @@ def at_stations(boom, strokes):
 
 @pytest.mark.parametrize("posture", ["horizontal", "arch"])
 def test_stresses_at_rest_are_those_of_exact_beams(posture):
-    plan, state, _ = rest(posture)
+    plan, state, _ = at_rest(SCENE, posture)
     model = BendingStressModel(SCENE)
     own = moments_by_unknowns(plan) @ state.z / model.moduli
     strokes = strokes_of_posture(SCENE, posture)
-    peer = at_stations(at_rest(SCENE, strokes, ELEMENTS).boom, strokes) / model.moduli
+    peer = at_stations(solve.at_rest(SCENE, strokes, ELEMENTS).boom, strokes) / model.moduli
     loaded = np.abs(peer) > LOADED
     assert loaded.sum() >= 6
     assert own[loaded] == pytest.approx(peer[loaded], rel=0.01)
@@ -73,13 +69,13 @@ def test_stresses_at_rest_are_those_of_exact_beams(posture):
 def test_stresses_in_a_move_are_those_of_exact_beams():
     """When a fast move has stopped halfway through its swing."""
     course, span = motion_of(SCENE, "arch"), 0.6
-    resting = at_rest(SCENE, course.first, 24)
-    move(resting, course, span, 1e-3, 0.1)
+    resting = solve.at_rest(SCENE, course.first, ELEMENTS)
+    solve.move(resting, course, span, 1e-3, 0.1)
     model = BendingStressModel(SCENE)
     peer = at_stations(resting.boom, course.first) / model.moduli
     times = np.linspace(0.0, span, 301)
     *_, (_, last) = course_of(SCENE, times, course(times)[0], angles=course.angles).states(1e-3)
-    twin = moments_by_unknowns(rest("arch")[0]) @ last.z / model.moduli
+    twin = moments_by_unknowns(at_rest(SCENE, "arch")[0]) @ last.z / model.moduli
     loaded = np.abs(peer) > LOADED
     assert loaded.sum() >= 3
     assert twin[loaded] == pytest.approx(peer[loaded], rel=0.01)
@@ -87,7 +83,7 @@ def test_stresses_in_a_move_are_those_of_exact_beams():
 
 def test_the_last_section_carries_its_own_weight():
     """M(s) = -g (head (c - s) + rho (l - s)^2 / 2), less by the cosine of its slope, when the boom is level."""
-    plan, state, _ = rest("horizontal")
+    plan, state, _ = at_rest(SCENE, "horizontal")
     slope = np.arctan2(*np.diff(state.frames[[-3, -1], :2], axis=0)[0, ::-1])
     section, moments = SCENE.sections[-1], moments_by_unknowns(plan) @ state.z
     for station, moment in zip(stations(SCENE), moments, strict=True):
@@ -99,10 +95,10 @@ def test_the_last_section_carries_its_own_weight():
 
 def test_a_force_at_the_tip_bends_as_a_payload_does():
     """The weight of half a kilogram is a force down."""
-    plan, state, work = rest("arch")
+    plan, state, work = at_rest(SCENE, "arch")
     influence = moments_by_unknowns(plan) @ increments_by_tip_force(plan, state, work)
     heavy = type(SCENE).model_validate(SCENE.model_dump(exclude_none=True) | {"tip": {"payload": 0.5}})
-    loaded, moved, _ = rest("arch", heavy)
+    loaded, moved, _ = at_rest(heavy, "arch")
     more = moments_by_unknowns(loaded) @ moved.z - moments_by_unknowns(plan) @ state.z
     assert influence @ [0.0, -0.5 * 9.81] == pytest.approx(more, rel=2e-3, abs=0.02)
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from analysis.resting import at_rest
 from oracle import booms
 from oracle.clearance.scenes import PINS, RODS, with_pins
 from oracle.response import DenseModel, extrapolated
 from scipy.optimize import brentq
 
 from boom_twin import frequency_response, load_scene, simulate, statics
-from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.frequency_response import linearised_boom, with_all_shapes
 from boom_twin.analysis.modal import drive_at_rest
 from boom_twin.errors import UsageError
@@ -44,7 +44,7 @@ DENSE = [
 def test_sweeps_solve_the_dense_equations(scene, posture):
     """Every unknown under every load, between and at natural frequencies; what is left is of the dense model's differences."""
     scene = with_all_shapes(scene)
-    plan, state, work = rest_at(scene, strokes_of_posture(scene, posture), posture_angles(scene, posture))
+    plan, state, work = at_rest(scene, posture)
     dense = DenseModel(plan, state.z.copy(), drive_at_rest(plan, state, work))
     boom = linearised_boom(scene, posture=posture)
     frequencies = np.sort(np.concatenate([BAND, statics(scene, posture=posture).frequencies[:3]]))
@@ -245,11 +245,14 @@ def test_a_rigid_boom_follows_its_geometry():
         ({"posture": "arch", "drive": 0}, "cylinders 1 to 4"),
         ({"posture": "arch", "drive": 1, "tip_force": (0.0, 1.0)}, "give one of them"),
         ({"posture": "arch", "tip_force": (1.0,)}, "two numbers"),
+        ({"posture": "arch", "frequencies": [-1.0]}, "at least 0 Hz"),
+        ({"posture": "arch", "frequencies": [np.nan]}, "at least 0 Hz"),
+        ({"posture": "arch", "frequencies": [[1.0, 2.0]]}, "in one row"),
     ],
 )
 def test_refused(given, told):
     with pytest.raises(UsageError, match=told):
-        frequency_response(load_scene(), np.array([1.0]), **given)
+        frequency_response(load_scene(), **{"frequencies": [1.0]} | given)
 
 
 def test_every_station_has_a_column_of_its_own_and_the_text_is_short() -> None:

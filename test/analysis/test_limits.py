@@ -8,6 +8,10 @@ from convergence import motions
 from oracle import booms, segments
 
 from boom_twin import simulate, statics
+from boom_twin.analysis.equilibrium import settle
+from boom_twin.analysis.modal import natural_modes
+from boom_twin.compiler.compile import compile_scene
+from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 DECADES = 10.0 ** np.arange(0, 6)
 
@@ -136,11 +140,6 @@ def test_more_modes_converge_from_above():
 
 
 def test_both_bases_have_the_same_limit():
-    from boom_twin.analysis.equilibrium import settle
-    from boom_twin.analysis.modal import natural_modes
-    from boom_twin.compiler.compile import compile_scene
-    from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-
     found = []
     for basis, modes in (("end-shapes", 3), ("cantilever", 3), ("cantilever", 10)):
         scene = booms.scene_of(booms.document() | {"modes": modes})

@@ -4,26 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from analysis.resting import at_rest
 from oracle import booms, segments
 from scipy.linalg import eigh, null_space
 
 from boom_twin import load_scene, statics
-from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.modal import damping_ratio, natural_modes
-from boom_twin.compiler.compile import compile_scene
 from boom_twin.errors import SolverError, UsageError
 from boom_twin.kernels.transfer.natural_frequency import NOT_COUNTED, negative_eigenvalues
 from boom_twin.scene.kinematics import stroke_curve
-
-
-def settled(scene, posture):
-    plan = compile_scene(scene)
-    state, work = plan.state(), plan.work()
-    angles = np.diff(np.radians(scene.postures[posture]), prepend=0.0)
-    closed = np.array([joint.cylinder.closed_length for joint in scene.joints])
-    settle(plan, state, work, segments.Segments(scene, 0).lengths(angles) - closed, angles)
-    return plan, state, work
-
 
 CASES = [pytest.param(load_scene(), "arch", id="default"), pytest.param(booms.random_boom(28), "test", id="boom 28")]
 
@@ -31,7 +20,7 @@ CASES = [pytest.param(load_scene(), "arch", id="default"), pytest.param(booms.ra
 @pytest.mark.parametrize("scene, posture", CASES)
 def test_modes_are_orthonormal_and_complete(scene, posture):
     """All modes below 500 Hz: unit modal mass, no mode missing between them (counted), state left as it was."""
-    plan, state, work = settled(scene, posture)
+    plan, state, work = at_rest(scene, posture)
     before = state.z.copy()
     modes = natural_modes(plan, state, work, 100, highest=2 * np.pi * 500.0)
     motions = np.array([mode.motion for mode in modes])
@@ -44,7 +33,7 @@ def test_modes_are_orthonormal_and_complete(scene, posture):
 @pytest.mark.parametrize("scene, posture", CASES)
 def test_stiffness_of_a_mode_is_almost_all_elastic(scene, posture):
     """omega^2 of a unit mode is twice its elastic energy, save what weight and pin forces add: some g/L."""
-    plan, state, work = settled(scene, posture)
+    plan, state, work = at_rest(scene, posture)
     t = plan.tables
     for mode in natural_modes(plan, state, work, 100, highest=2 * np.pi * 300.0):
         omega2, elastic = (2 * np.pi * mode.frequency) ** 2, 0.0
@@ -59,7 +48,7 @@ def test_stiffness_of_a_mode_is_almost_all_elastic(scene, posture):
 @pytest.mark.parametrize("scene, posture", CASES)
 def test_damping_ratios_are_those_of_the_oracle(scene, posture):
     """Dissipation of the oracle's modes at their own frequency, extrapolated from two subdivisions."""
-    plan, state, work = settled(scene, posture)
+    plan, state, work = at_rest(scene, posture)
     found = [damping_ratio(plan, mode) for mode in natural_modes(plan, state, work, 4)]
     coarse, fine = (_ratios(segments.Segments(scene, fineness), posture) for fineness in (2, 4))
     assert found == pytest.approx(fine + (fine - coarse) / 3.0, rel=2e-3)
@@ -99,13 +88,6 @@ def test_equilibrium_wherever_the_joints_reach(ends):
         assert found.tip_rigid == pytest.approx([lengths @ np.cos(heading), lengths @ np.sin(heading)], abs=1e-8)
         assert np.abs(found.joints - angles).max() < 0.08
         assert found.frequencies[0] > 0.3
-
-
-@pytest.mark.parametrize("seed", range(40, 60))
-def test_equilibrium_of_random_booms(seed):
-    scene = booms.random_boom(seed)
-    found = statics(scene, posture="test", modes=1)
-    assert np.all(np.isfinite(found.joints)) and np.all(found.frequencies > 0.0)
 
 
 def test_overloaded_linkage_has_no_equilibrium():
