@@ -141,8 +141,5 @@ class _Boom:
 
 
 def _largest(values: Array, owners: Array, count: int) -> Array:
-    """The value of largest size of every owner, 0 where there is none."""
-    found = np.zeros(count)
-    for value, owner in zip(values, owners, strict=True):
-        found[owner] = value if abs(value) > abs(found[owner]) else found[owner]
-    return found
+    """Return the value of largest size of every owner, 0 where there is none."""
+    return np.array([max(values[owners == owner], key=abs, default=0.0) for owner in range(count)])

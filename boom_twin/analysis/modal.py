@@ -17,13 +17,7 @@ from ..compiler.plan import Plan
 from ..errors import SolverError
 from ..kernels.tables import OK, SENTENCES, State, Work
 from ..kernels.transfer.forward_kinematics import place
-from ..kernels.transfer.natural_frequency import (
-    NOT_COUNTED,
-    bisect_frequency,
-    count_below,
-    inertia_response,
-    position_change,
-)
+from ..kernels.transfer.natural_frequency import NOT_COUNTED, bisect_frequency, count_below, inertia_response, position_change
 from ..types import Array
 
 HIGHEST_RATE = 1e7  # rad/s, upper limit of the search

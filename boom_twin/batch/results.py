@@ -50,18 +50,13 @@ def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
     except OSError as error:
         raise BagError(f"{out}: cannot be written ({error.strerror}). Choose a folder that can.") from None
     try:
-        _lock(lock, out)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise BagError(f"{out}: another `boom_twin batch` is at work there. Wait for its end, or choose another.") from None
         yield BatchFolder(place, lock)
     finally:
         os.close(lock)
-
-
-def _lock(lock: int, out: Path) -> None:
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        busy = "another `boom_twin batch` is at work there. Wait for its end, or choose another folder."
-        raise BagError(f"{out}: {busy}") from None
 
 
 class BatchFolder:

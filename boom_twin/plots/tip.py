@@ -9,22 +9,7 @@ import numpy as np
 
 from ..types import Array
 from .history import History, Truth
-from .style import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PALE,
-    PURPLE,
-    TIME,
-    broken,
-    extent,
-    legend_above,
-    limits,
-    picture,
-    shade_gaps,
-)  # fmt: skip
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, TIME, broken, extent, legend_above, limits, picture, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -91,6 +91,7 @@ def test_a_blow_between_two_instants_keeps_its_impulse():
     assert series == pytest.approx(even[:, 0], abs=1e-6), "rows uneven and even"
 
 
+@pytest.mark.slow  # a constant load says nearly as much in no time
 def test_a_long_pump_cycle_swings_by_its_static_share():
     static = frequency_response(SCENE, np.zeros(1), posture="arch", tip_force=(0.0, 130.0)).tip.real
     found = steady_state(SCENE, pump_load(SCENE, 0.001, 130.0), posture="arch")
