@@ -25,20 +25,10 @@ from ..types import Array
 
 
 def pchip(x: Array, y: Array, at: Array) -> tuple[Array, Array]:
-    """Return the interpolating curve and its derivative at `at`.
+    """Return the interpolating curves and their derivatives at `at` (k,), both (k, n).
 
-    Parameters
-    ----------
-    x : ndarray, shape (m,)
-        Increasing abscissae, m >= 2.
-    y : ndarray, shape (m, n)
-        Values at `x`, one curve per column.
-    at : ndarray, shape (k,)
-        Abscissae between x[0] and x[-1].
-
-    Returns
-    -------
-    values, derivatives : ndarray, shape (k, n)
+    `x` (m,) are increasing abscissae, m >= 2, and `y` (m, n) the values there, one curve a column; `at` lies between x[0] and
+    x[-1].
     """
     h = np.diff(x)[:, None]
     secant = np.diff(y, axis=0) / h

@@ -92,33 +92,12 @@ def simulate_samples(
     angles: Array | None = None,
     tell: Callable[[int], object] = lambda done: None,
 ) -> SampledMotions:
-    """Follow the strokes with `count` booms that differ in parameters drawn at random, on all cores.
+    """Follow the strokes with `count` booms (2 at least) that differ in parameters drawn at random, on all cores.
 
-    Parameters
-    ----------
-    scene : Scene, path or mapping
-        The boom, of n sections; as for `boom_twin.statics`.
-    times, strokes, dt, angles
-        As for `boom_twin.simulate`; every boom begins at rest.
-    deviations : dict of str to float
-        See `drawn`.
-    count : int
-        Samples, at least 2.
-    seed : int
-        The same seed gives the same samples, whatever the number of cores.
-    tell : callable, optional
-        Called with 1 whenever a sample is done.
-
-    Returns
-    -------
-    SampledMotions
-
-    Raises
-    ------
-    UsageError
-        As `drawn` and `boom_twin.simulate`; motions that take too much memory.
-    SolverError
-        Not one of the samples could be computed.
+    `scene`, `times`, `strokes`, `dt` and `angles` are as for `boom_twin.simulate`, and every boom begins at rest; for
+    `deviations` see `drawn`. The same `seed` gives the same samples, whatever the number of cores. `tell` is called with 1
+    whenever a sample is done. UsageError as `drawn` and `boom_twin.simulate` raise it, and for motions that take too much
+    memory. SolverError if fewer than two samples could be computed.
     """
     scene = as_scene(scene)
     if count < 2:

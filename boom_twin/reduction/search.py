@@ -63,7 +63,9 @@ class _Search:
     """The present model, as edits of the one that the search started from, and all errors measured so far."""
 
     def __init__(self, full: Scene, start: Scene, most: float, progress: Progress) -> None:
-        _check_same_boom(full, start)
+        one, other = ([section.length for section in scene.sections] for scene in (full, start))
+        if one != other:
+            raise UsageError(f"lengths of sections = {other}: the full scene has {one}. Give two scenes of the same boom.")
         self.start, self.most, self.progress = start, most, progress
         self.course = course_of(full)
         self.edits: tuple[Edit, ...] = ()
@@ -141,10 +143,3 @@ class _Search:
             return None
         added = self.measured(trial[1]).worst - self.measured(self.edits).worst
         return added / (self.size(self.edits) - self.size(trial[1])), number, kind, where
-
-
-def _check_same_boom(full: Scene, start: Scene) -> None:
-    """Raise unless both have the sections of the same lengths."""
-    one, other = ([section.length for section in scene.sections] for scene in (full, start))
-    if one != other:
-        raise UsageError(f"lengths of sections = {other}: the full scene has {one}. Give two scenes of the same boom.")

@@ -25,6 +25,13 @@ def apart(found, expected):
     return np.max(np.linalg.norm(found - expected, axis=1) / np.linalg.norm(expected, axis=1))
 
 
+def in_time(amplitudes, spectrum, within, count, rows):
+    """What moves by `amplitudes` (k, c) per unit of a signal with this `spectrum`, of which `within` is looked at; (rows, c)."""
+    whole = np.zeros((len(spectrum), amplitudes.shape[1]), complex)
+    whole[within] = amplitudes * spectrum[within, None]
+    return np.fft.irfft(whole, count, axis=0)[:rows]
+
+
 def undamped(spec):
     """Plain dicts of a scene without any damping."""
     for section in spec["sections"]:
@@ -107,9 +114,7 @@ def test_worn_pins_in_contact_through_simulate(pins):
     seen = moved.tip[:, :2] - moved.tip[0, :2]
 
     def apart_from(own):
-        whole = np.zeros((len(spectrum), 2), complex)
-        whole[within] = own * spectrum[within, None]
-        expected = np.fft.irfft(whole, count, axis=0)[: len(times)]
+        expected = in_time(own, spectrum, within, count, len(times))
         return np.sqrt(np.mean((seen - expected) ** 2) / np.mean(expected**2))
 
     assert apart_from(response.tip) < 3e-3 < apart_from(ideal.tip)
@@ -204,9 +209,7 @@ def test_sine_sweep_through_simulate():
         (response.joints, moved.joints - moved.joints[0]),
         (response.cylinder_forces, moved.cylinder_forces - moved.cylinder_forces[0]),
     ):
-        whole = np.zeros((len(spectrum), own.shape[1]), complex)
-        whole[within] = own * spectrum[within, None]
-        expected = np.fft.irfft(whole, count, axis=0)[: len(times)]
+        expected = in_time(own, spectrum, within, count, len(times))
         assert np.sqrt(np.mean((seen - expected) ** 2)) < 0.01 * np.sqrt(np.mean(expected**2))
 
 
