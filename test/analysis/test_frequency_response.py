@@ -26,7 +26,7 @@ def apart(found, expected):
 
 
 def in_time(amplitudes, spectrum, within, count, rows):
-    """What moves by `amplitudes` (k, c) per unit of a signal with this `spectrum`, of which `within` is looked at; (rows, c)."""
+    """Motion (rows, c) whose `amplitudes` (k, c) are per unit of a signal, of whose `spectrum` the part `within` counts."""
     whole = np.zeros((len(spectrum), amplitudes.shape[1]), complex)
     whole[within] = amplitudes * spectrum[within, None]
     return np.fft.irfft(whole, count, axis=0)[:rows]
