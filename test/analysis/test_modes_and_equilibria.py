@@ -1,4 +1,4 @@
-"""Natural modes by their orthogonality, and equilibria wherever the joints reach."""
+"""Natural modes by their orthogonality, and equilibria wherever the joints reach and however soft the boom is."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from scipy.linalg import eigh, null_space
 from boom_twin import load_scene, statics
 from boom_twin.analysis.modal import damping_ratio, natural_modes
 from boom_twin.errors import SolverError, UsageError
+from boom_twin.kernels.integrators import X
 from boom_twin.kernels.transfer.natural_frequency import NOT_COUNTED, negative_eigenvalues
-from boom_twin.scene.kinematics import stroke_curve
+from boom_twin.scene.kinematics import strokes_of_angles
+from boom_twin.validation.study import scene_changes as made
 
 CASES = [pytest.param(load_scene(), "arch", id="default"), pytest.param(booms.random_boom(28), "test", id="boom 28")]
 
@@ -81,7 +83,7 @@ def test_equilibrium_wherever_the_joints_reach(ends):
     scene, rng = load_scene(), np.random.default_rng(11)
     for _ in range(60):
         angles = anywhere(scene, rng, ends)
-        strokes = np.array([stroke_curve(scene, i, angles[i : i + 1])[0] for i in range(4)])
+        strokes = strokes_of_angles(scene, angles)
         found = statics(scene, strokes=strokes, modes=1)
         heading = np.cumsum(angles)
         lengths = np.array([section.length for section in scene.sections])
@@ -128,3 +130,40 @@ def test_negative_eigenvalues_of_badly_scaled_matrices(size):
     assert negative_eigenvalues(blocks * scale[:, :, None] * scale[:, None, :], scratch) == expected
     blocks[7, 1, 0] = blocks[7, 0, 1] = np.nan
     assert negative_eigenvalues(blocks, scratch) == NOT_COUNTED
+
+
+@pytest.mark.parametrize(
+    "scene, posture",
+    [
+        (made.cylinders(load_scene(), 1e5), "arch"),
+        (made.bending(load_scene(), 1e-3), "arch"),
+        (made.loaded(load_scene(), 10.0), "high"),
+    ],
+    ids=["soft cylinders", "soft sections", "ten times its own weight"],
+)
+def test_a_soft_boom_hangs_and_is_stable(scene, posture):
+    found = statics(scene, posture=posture)
+    assert found.tip[1] < found.tip_rigid[1] - 1.0
+    assert found.frequencies[0] > 0.05
+
+
+def test_barrels_and_rods_at_rest_are_turned_by_less_than_half_a_turn():
+    """Whatever full turns the trials on the way made: a multiple of 2 pi in their histories would cost digits."""
+    soft = made.bending(load_scene(), 1e-3)
+    plan, state, _ = at_rest(soft, "arch")
+    assert np.abs(state.history[X, plan.tables.parts.history + 2]).max() <= np.pi
+
+
+def test_the_path_of_growing_load_is_one_curve():
+    """The equilibrium at full load is next to that at nearly full load: nothing has jumped."""
+    soft = made.cylinders(load_scene(), 1e5)
+    tips = [statics(made.lighter_gravity(soft, share), posture="arch").tip for share in (0.98, 0.99, 1.0)]
+    steps = np.diff(tips, axis=0)
+    assert np.linalg.norm(steps, axis=1).max() < 0.1
+    assert np.linalg.norm(steps[1] - steps[0]) < 0.1 * np.linalg.norm(steps[0])
+
+
+def test_what_no_boom_carries_is_refused_with_the_share_that_it_does():
+    beyond = made.freed(load_scene(), 1, -178.0, 0.6, -172.0)
+    with pytest.raises(SolverError, match=r"carries 0\.\d+ of its weight"):
+        statics(beyond, posture="case")
