@@ -10,12 +10,12 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from boom_figure import boom_picture
 from dimensions import angle, dimension, frame, leader, mass_centre, name, span
 
 from boom_twin.analysis.equilibrium import statics
 from boom_twin.cli.main import main as command
 from boom_twin.plots.boom import (
-    boom_picture,
     draw_base,
     draw_cylinder,
     draw_link,

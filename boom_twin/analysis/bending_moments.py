@@ -22,8 +22,7 @@ from ..scene.schema import Scene
 from ..scene.segmentation import flexible_parts
 from ..types import Array
 
-PLACES = (0.0, 0.5, 1.0)
-"""Places of the stations of a part, over its length."""
+PLACES = (0.0, 0.5, 1.0)  # places of the stations of a part, over its length
 
 
 @dataclass(frozen=True, slots=True)

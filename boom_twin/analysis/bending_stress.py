@@ -21,36 +21,24 @@ from .bending_moments import Station, increments_by_tip_force, moments_by_unknow
 from .cylinder_drives import drives_as_read
 from .equilibrium import settle
 
-BOX = 2.4
-"""Height over radius of gyration of a thin-walled box, for sections whose height is not given."""
+BOX = 2.4  # height over radius of gyration of a thin-walled box, for sections whose height is not given
 POSTURE_STEP = 0.03  # m of stroke after which the influence of the tip's force is made anew
 
 
 @dataclass(frozen=True)
 class BendingStresses:
-    """Bending moments and stresses at k stations at one instant.
+    """Bending moments and stresses at k stations at one instant."""
 
-    Attributes
-    ----------
-    moments, moment_sigmas : ndarray, shape (k,)
-        N m, positive where they bend the outer end up; standard deviation by the load at the tip, NaN without an estimate.
-    stresses, stress_sigmas : ndarray, shape (k,)
-        Pa, of the outermost fibre, with the sign of the moment.
-    """
-
-    moments: Array
-    moment_sigmas: Array
-    stresses: Array
-    stress_sigmas: Array
+    moments: Array  # (k,), N m, positive where they bend the outer end up
+    moment_sigmas: Array  # standard deviations by the load at the tip, NaN without an estimate
+    stresses: Array  # (k,), Pa, of the outermost fibre, with the sign of the moment
+    stress_sigmas: Array  # their standard deviations
 
 
 def section_moduli(scene: Scene, heights: Array | None = None) -> Array:
-    """Section modulus 2 I / height of every section, shape (n,), m^3; NaN of a rigid one.
+    """Return the section modulus 2 I / height of every section, shape (n,), m^3; NaN of a rigid one.
 
-    Parameters
-    ----------
-    heights : ndarray, shape (n,), optional
-        Outer heights, m; by default those of the scene, and of a section without one that of a thin-walled box.
+    `heights` (n,) are outer heights, m. By default they are those of the scene, or those of thin-walled boxes.
     """
     found = np.full(len(scene.sections), np.nan)
     for i, section in enumerate(scene.sections):
@@ -63,21 +51,9 @@ def section_moduli(scene: Scene, heights: Array | None = None) -> Array:
 
 
 class BendingStressModel:
-    """Moments and stresses of a boom at its stations, sample by sample.
+    """Moments and stresses of a boom at its k `stations`, sample by sample; `moduli` (k,) are the section moduli there, m^3.
 
-    Parameters
-    ----------
-    scene : Scene
-    heights : ndarray, shape (n,), optional
-        See `section_moduli`.
-    reads : StrokeReading
-        Of the strokes of predictions.
-
-    Attributes
-    ----------
-    stations : tuple of Station
-    moduli : ndarray, shape (k,)
-        Section modulus at every station, m^3.
+    For `heights` see `section_moduli`; `reads` says what the strokes of predictions are.
     """
 
     def __init__(self, scene: Scene, heights: Array | None = None, reads: StrokeReading = StrokeReading.LENGTH) -> None:
@@ -91,12 +67,9 @@ class BendingStressModel:
         self._at, self._influence = np.full(len(scene.joints), np.inf), np.zeros((len(self.stations), 2))
 
     def influence(self, strokes: Array, joints: Array) -> Array:
-        """Moment by the x and y of a force at the tip, shape (k, 2), m; NaN where there is no equilibrium.
+        """Return the moment by the x and y of a force at the tip, shape (k, 2), m; NaN where there is no equilibrium.
 
-        Parameters
-        ----------
-        strokes, joints : ndarray, shape (n,)
-            Of the drives, m; joint angles near those of the equilibrium, rad.
+        `strokes` (n,) are of the drives, m; `joints` (n,) are angles near those of the equilibrium, rad.
         """
         if float(np.max(np.abs(strokes - self._at))) > POSTURE_STEP:
             self._at = strokes.copy()

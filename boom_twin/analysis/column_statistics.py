@@ -9,18 +9,9 @@ from ..types import Array
 
 
 class ColumnStatistics:
-    """Mean, standard deviation and root mean square of all finite values of each column so far.
+    """Mean, standard deviation and root mean square of all finite values of each column so far; `count` is their number.
 
     Parts are combined as by Chan et al. 1983, doi 10.1080/00031305.1983.10483115.
-
-    Parameters
-    ----------
-    columns : int
-
-    Attributes
-    ----------
-    count : ndarray of int, shape (columns,)
-        Finite values.
     """
 
     def __init__(self, columns: int) -> None:

@@ -25,20 +25,10 @@ from ..types import Array
 
 
 def pchip(x: Array, y: Array, at: Array) -> tuple[Array, Array]:
-    """Return the interpolating curve and its derivative at `at`.
+    """Return the interpolating curves and their derivatives at `at` (k,), both (k, n).
 
-    Parameters
-    ----------
-    x : ndarray, shape (m,)
-        Increasing abscissae, m >= 2.
-    y : ndarray, shape (m, n)
-        Values at `x`, one curve per column.
-    at : ndarray, shape (k,)
-        Abscissae between x[0] and x[-1].
-
-    Returns
-    -------
-    values, derivatives : ndarray, shape (k, n)
+    `x` (m,) are increasing abscissae, m >= 2, and `y` (m, n) the values there, one curve a column; `at` lies between x[0] and
+    x[-1].
     """
     h = np.diff(x)[:, None]
     secant = np.diff(y, axis=0) / h
@@ -70,7 +60,7 @@ def _end(near: Array, far: Array, first: Array, second: Array) -> Array:
     return np.asarray(np.where(turned, 0.0, np.where(steep, 3.0 * first, slope)))
 
 
-TOLERANCE = 1e-6  # rad, increment in the last pass; the remaining error is about 1 to 50 times its square
+STEP_TOLERANCE = 1e-6  # rad, increment in the last pass; the remaining error is about 1 to 50 times its square
 PASSES = np.int64(20)
 
 
@@ -96,26 +86,14 @@ class Run(NamedTuple):
 
 @dataclass(frozen=True)
 class DriveCourse:
-    """Rows of a drive, and the state of the boom at the first row.
-
-    Attributes
-    ----------
-    start : State
-        State at the first row, at rest or in motion. It is not modified.
-    times : ndarray, shape (m,)
-        Times of the rows, s.
-    strokes : ndarray, shape (m, n)
-        Strokes at the rows, m. Between rows they follow a monotone cubic.
-    rho : float
-        Spectral radius of generalised-alpha at infinite frequency.
-    """
+    """Rows of a drive, and the state of the boom at the first row."""
 
     plan: Plan
-    start: State
+    start: State  # at the first row, at rest or in motion; it is not modified
     work: Work
-    times: Array
-    strokes: Array
-    rho: float
+    times: Array  # (m,), s
+    strokes: Array  # (m, n), m; between rows they follow a monotone cubic
+    rho: float  # spectral radius of generalised-alpha at infinite frequency
 
     def stepped(self, rows: NDArray[np.int64], dt: float, finer: int = 1) -> Run:
         """Simulate through `rows` in steps of at most `dt` (s), each divided by `finer`. Steps end on the rows."""
@@ -124,8 +102,8 @@ class DriveCourse:
         out[0] = first_row(plan, state)
         steps, counts, drives, rates = self._drive(self.times[rows], self.strokes[rows], dt, finer)
         status, row, passes, jolt, shake = run(
-            plan.tables, state, self.work, steps, counts, drives, rates, GENERALISED_ALPHA, self.rho, TOLERANCE, PASSES, None,
-            out[1:],
+            plan.tables, state, self.work, steps, counts, drives, rates, GENERALISED_ALPHA, self.rho, STEP_TOLERANCE, PASSES,
+            None, out[1:],
         )  # fmt: skip
         at_rows = np.vstack([self.start.drives[1], rates[np.cumsum(counts) - 1]])
         return Run(
@@ -144,8 +122,9 @@ class DriveCourse:
             scheme = prepare(GENERALISED_ALPHA, self.rho, span, work.weights)
             for _ in range(count):
                 status, _, _ = advance(
-                    plan.tables, state, work, scheme, drives[row], rates[row], TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW
-                )
+                    plan.tables, state, work, scheme, drives[row], rates[row], STEP_TOLERANCE, PASSES, LONGEST_INCREMENT, None,
+                    ANEW,
+                )  # fmt: skip
                 if status != OK:
                     raise SolverError(f"step {row + 1} of {len(drives)} failed: {SENTENCES[status]}.")
                 row += 1

@@ -1,8 +1,8 @@
 """Energy of a boom, and its balance along a motion: work of the drives = change of energy + what damping and contact take.
 
 What is left over is the time integration's: errors of the trapezoidal rule that the powers are summed by, which fall with the
-square of the step, and the numerical damping of generalised-alpha, which takes energy from fast vibrations (and from slow ones
-little, see `numerical_damping`). Coriolis and centrifugal forces do no work, and neither do pins and links.
+square of the step, and the numerical damping of generalised-alpha, which takes energy from fast vibrations and little from slow
+ones. Coriolis and centrifugal forces do no work, and neither do pins and links.
 """
 
 from __future__ import annotations
@@ -34,17 +34,11 @@ from ..kernels.transfer.clearance_pins import axis_of
 from ..types import Array
 from .drive import DriveCourse
 
-FINER = 32
-"""Sub-steps of a step where journals touch and part: as many as a step is divided into at most."""
+FINER = 32  # sub-steps of a step where journals touch and part: as many as a step is divided into at most
 
 
 class Energies:
-    """Energies and powers of a boom, from its state.
-
-    Parameters
-    ----------
-    plan : Plan
-    """
+    """Energies and powers of a boom, from its state."""
 
     def __init__(self, plan: Plan) -> None:
         t, count = plan.tables, len(plan.names)
@@ -147,34 +141,16 @@ class Energies:
 
 @dataclass(frozen=True)
 class EnergyBalance:
-    """Energy balance of a motion; energies in J.
+    """Energy balance of a motion; energies in J."""
 
-    Attributes
-    ----------
-    work : float
-        Of the drives.
-    change : float
-        Of kinetic and potential energy, from the first row to the last.
-    damping, contact : float
-        Taken by beams and oil dampers; by contacts.
-    gap : float
-        Largest of work - change - damping - contact at any step, in magnitude.
-    left : float
-        That difference at the end: what time integration took, negative if it gave.
-    moved : float
-        What `gap` is measured against: the largest of the drives' work, kinetic energy, and change of that of weight.
-    step : float
-        Longest step, s.
-    """
-
-    work: float
-    change: float
-    damping: float
-    contact: float
-    gap: float
-    left: float
-    moved: float
-    step: float
+    work: float  # done by the drives
+    change: float  # kinetic and potential energy at the last row less that at the first
+    damping: float  # taken by beams and oil dampers
+    contact: float  # taken by contacts
+    gap: float  # largest of work - change - damping - contact at any step, in magnitude
+    left: float  # that difference at the end: what time integration took, negative if it gave
+    moved: float  # measure of `gap`: the largest of the drives' work, kinetic energy, and change of the weight's energy
+    step: float  # longest step, s
 
     @property
     def share(self) -> float:
@@ -191,18 +167,9 @@ class EnergyBalance:
 
 
 def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
-    """Balance along a motion.
+    """Return the balance along a motion in steps of at most `dt` (s).
 
-    Parameters
-    ----------
-    course : DriveCourse
-        See `boom_twin.analysis.simulate.course_of`.
-    dt : float
-        Longest step, s. Where journals touch and part, each is divided by `FINER`, so that powers in impacts can be summed.
-
-    Returns
-    -------
-    EnergyBalance
+    Where journals touch and part, each step is divided by `FINER`, so that powers in impacts can be summed.
     """
     energies, start = Energies(course.plan), course.start
     first, heavy = energies.total(start), energies.weight(start)
@@ -223,18 +190,3 @@ def states_of(course: DriveCourse, dt: float) -> Iterator[tuple[float, State]]:
     """Steps (s) and states, as of `DriveCourse.states`, of a motion whose powers or forces are to be summed."""
     impacts = bool((course.plan.tables.clearances.linear == 0).any())
     return course.states(dt, FINER if impacts else 1)
-
-
-def numerical_damping(frequency: float, step: float, rho: float) -> float:
-    """Damping ratio that generalised-alpha gives an undamped oscillator of `frequency` (Hz) in steps of `step` (s).
-
-    From the spectral radius R of its amplification matrix over (x, v, p): -ln R over the angle turned. About (omega h)^3.
-    """
-    am, af, w = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0), (2.0 * math.pi * frequency * step) ** 2
-    gamma = 0.5 + af - am
-    beta = 0.25 * (gamma + 0.5) ** 2
-    after = np.array([[1.0, 0.0, -beta], [0.0, 1.0, -gamma], [(1.0 - af) * w, 0.0, 1.0 - am]])  # of x', h v', h^2 p'
-    before = np.array([[1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma], [-af * w, 0.0, -am]])
-    own = np.linalg.eigvals(np.linalg.solve(after, before))
-    principal = own[int(np.argmax(np.abs(own.imag)))]
-    return float(-math.log(abs(principal)) / abs(np.angle(principal)))

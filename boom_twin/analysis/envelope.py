@@ -16,60 +16,36 @@ from scipy.optimize import minimize
 from ..compiler.compile import compile_scene
 from ..compiler.plan import first_row, taken_apart
 from ..errors import SolverError
-from ..scene.kinematics import posture_angles, skeleton, stroke_curve
+from ..scene.kinematics import posture_angles, skeleton, strokes_of_angles
 from ..scene.schema import Scene
 from ..types import Array
 from .bending_moments import moments_by_unknowns, stations
 from .equilibrium import settle
 from .modal import natural_modes
 
-MOST = 700  # postures of the grid
+MOST_POSTURES = 700  # postures of the grid
 FINEST = 11  # angles of a joint
-MODES = 3
-WIDTH = 1e-5  # relative accuracy of frequencies
+FREQUENCY_COUNT = 3
+FREQUENCY_ACCURACY = 1e-5  # relative accuracy of frequencies
 STARTS = 5  # best postures of the grid from which each extreme is searched
-STEP = 1e-3  # of the search's differences, rad
+SEARCH_STEP = 1e-3  # of the search's differences, rad
 GAIN = 1e-4  # relative gain by which a step of the search must better the extreme
 
 
 @dataclass(frozen=True)
 class Envelope:
-    """A boom of n sections at rest in m postures.
+    """A boom of n sections at rest in m postures."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of the scene's postures; empty for those of the grid and of the search.
-    angles : ndarray, shape (m, n)
-        Section angles to the base, degrees.
-    tips : ndarray, shape (m, 2)
-        m.
-    deflections : ndarray, shape (m,)
-        Distance of the tip from that of rigid sections and cylinders, m.
-    forces : ndarray, shape (m, n)
-        Of the cylinders, N, positive in tension.
-    frequencies : ndarray, shape (m, k)
-        Hz, ascending, at most `MODES`.
-    moments : ndarray, shape (m, n)
-        The bending moment of largest size in each section, N m; 0 in rigid ones.
-    stresses : ndarray, shape (m, n)
-        Size of that over the section modulus, Pa; NaN where the section has no height.
-    skipped : dict of str to int
-        How many postures of scene and grid are left out, by reason.
-    searched : int
-        How many of the postures, the last ones, were found by the search.
-    """
-
-    names: tuple[str, ...]
-    angles: Array
-    tips: Array
-    deflections: Array
-    forces: Array
-    frequencies: Array
-    moments: Array
-    stresses: Array
-    skipped: dict[str, int]
-    searched: int
+    names: tuple[str, ...]  # posture of the scene; empty for those of the grid and of the search
+    angles: Array  # (m, n), section angles to the base, degrees
+    tips: Array  # (m, 2), m
+    deflections: Array  # (m,), distance of the tip from that of rigid sections and cylinders, m
+    forces: Array  # (m, n), cylinder forces, N, positive in tension
+    frequencies: Array  # (m, k), Hz, ascending, at most `FREQUENCY_COUNT`
+    moments: Array  # (m, n), bending moment of largest size in each section, N m; 0 in rigid ones
+    stresses: Array  # (m, n), that size over the section modulus, Pa; NaN where the section has no height
+    skipped: dict[str, int]  # number of postures of scene and grid that are left out, by reason
+    searched: int  # number of postures, the last ones, that the search found
 
     def posture(self, row: int) -> str:
         """Return a posture as ``--posture`` takes it: its name, or its section angles."""
@@ -79,22 +55,9 @@ class Envelope:
 def envelope(scene: Scene, progress: Callable[[int, int], None] = lambda done, total: None) -> Envelope:
     """Return the boom at rest in its named postures, on a grid over the ranges of its joints, and at the extremes.
 
-    Parameters
-    ----------
-    scene : Scene
-    progress : callable, optional
-        Told after every posture how many of how many are done, and then after the search of every extreme.
-
-    Returns
-    -------
-    Envelope
-        Postures out of a cylinder's travel, or without an equilibrium, are left out and counted. There is no ground, and
-        sections may cross each other.
-
-    Raises
-    ------
-    SolverError
-        There is no posture with an equilibrium.
+    `progress` is given how many of how many postures are done, and then how many extremes are searched. Postures out of a
+    cylinder's travel, or without an equilibrium, are left out and counted. There is no ground, and sections may cross each
+    other. SolverError if there is no posture with an equilibrium.
     """
     postures = [(name, posture_angles(scene, name)) for name in scene.postures] + [("", angles) for angles in _grid(scene)]
     boom = _Boom(scene)
@@ -120,20 +83,14 @@ def envelope(scene: Scene, progress: Callable[[int, int], None] = lambda done, t
 
 
 def _grid(scene: Scene) -> list[Array]:
-    """Relative joint angles (rad) over all ranges, as many of each as fit into `MOST` postures."""
-    count = max(2, min(FINEST, int(MOST ** (1.0 / len(scene.joints)) + 1e-9)))
+    """Relative joint angles (rad) over all ranges, as many of each as fit into `MOST_POSTURES` postures."""
+    count = max(2, min(FINEST, int(MOST_POSTURES ** (1.0 / len(scene.joints)) + 1e-9)))
     axes = [np.radians(np.linspace(*joint.range_deg, count)) for joint in scene.joints]
     return [np.array(angles) for angles in product(*axes)]
 
 
 class _Boom:
-    """A compiled boom that is brought to rest in one posture after the other.
-
-    Attributes
-    ----------
-    skipped : dict of str to int
-        How many postures had no result, by reason.
-    """
+    """A compiled boom that is brought to rest in one posture after the other; `skipped` counts those without a result."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._plan = scene, compile_scene(scene)
@@ -142,17 +99,17 @@ class _Boom:
         self._bounds = np.radians([joint.range_deg for joint in scene.joints])
         self.skipped = dict.fromkeys(("out of a cylinder's travel", "no equilibrium"), 0)
 
-    def at_rest(self, relative: Array, modes: int = MODES) -> Array | None:
+    def at_rest(self, relative: Array, modes: int = FREQUENCY_COUNT) -> Array | None:
         """Return section angles (deg), tip, deflection, forces, moments and frequencies in one row, None at no rest."""
         scene, plan = self._scene, self._plan
-        strokes = np.array([stroke_curve(scene, i, relative[i : i + 1])[0] for i in range(plan.joints)])
+        strokes = strokes_of_angles(scene, relative)
         if not all(0.0 <= s <= joint.cylinder.max_stroke for s, joint in zip(strokes, scene.joints, strict=True)):
             self.skipped["out of a cylinder's travel"] += 1
             return None
         state, work = plan.state(), plan.work()
         try:
             settle(plan, state, work, strokes, relative)
-            frequencies = [mode.frequency for mode in natural_modes(plan, state, work, modes, WIDTH)]
+            frequencies = [mode.frequency for mode in natural_modes(plan, state, work, modes, FREQUENCY_ACCURACY)]
         except SolverError:
             self.skipped["no equilibrium"] += 1
             return None
@@ -165,7 +122,7 @@ class _Boom:
     def extreme(self, grid: Array, k: int, sign: float) -> Array | None:
         """Return the row of largest ``sign * row[k]`` that is found from the best of `grid`; None if none is better."""
         n, values = len(self._bounds), -sign * grid[:, k]
-        modes = MODES if k >= 3 + 3 * n else 0
+        modes = FREQUENCY_COUNT if k >= 3 + 3 * n else 0
         best, found = values.min(), None
 
         def lacking(relative: Array) -> float:
@@ -179,13 +136,10 @@ class _Boom:
 
         for start in np.argsort(values)[:STARTS]:
             relative = np.diff(np.radians(grid[start, :n]), prepend=0.0)
-            minimize(lacking, relative, method="L-BFGS-B", bounds=self._bounds, options={"eps": STEP, "ftol": GAIN})
+            minimize(lacking, relative, method="L-BFGS-B", bounds=self._bounds, options={"eps": SEARCH_STEP, "ftol": GAIN})
         return None if found is None else self.at_rest(found)
 
 
 def _largest(values: Array, owners: Array, count: int) -> Array:
-    """The value of largest size of every owner, 0 where there is none."""
-    found = np.zeros(count)
-    for value, owner in zip(values, owners, strict=True):
-        found[owner] = value if abs(value) > abs(found[owner]) else found[owner]
-    return found
+    """Return the value of largest size of every owner, 0 where there is none."""
+    return np.array([max(values[owners == owner], key=abs, default=0.0) for owner in range(count)])

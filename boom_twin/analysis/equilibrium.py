@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan, first_row, taken_apart
@@ -24,6 +24,7 @@ from ..scene.schema import Scene
 from ..system.summary_display import SummaryDisplay, numbers
 from ..types import Array
 from .cylinder_drives import spring_free
+from .doubts import beyond_validity
 from .modal import Mode, constraints, natural_modes, negative_pivots
 
 CLAMP = 1e12  # N/m, stiffness of a practically ideal pin
@@ -88,42 +89,11 @@ def set_undeformed(plan: Plan, state: State, angles: Array) -> None:
     state.history[X, : len(state.z)] = state.z
 
 
-SHARE = 0.5  # validity limit of the tip deflection, as a fraction of the boom's reach
-INSTANTS = 8  # evenly spaced instants of a motion to check; the tip's farthest point is added
-
-
-def beyond_validity(scene: Scene, away: float) -> tuple[str, ...]:
-    """Return a warning if the tip deflection `away` (m) exceeds the model's validity, else an empty tuple."""
-    if away <= SHARE * scene.reach:
-        return ()
-    return (
-        f"the tip is {away:.3g} m from where rigid sections and cylinders would have it, more than half the reach of "
-        f"{scene.reach:.3g} m: outside the model's validity. Check stiffnesses, masses and load",
-    )
-
-
-def motion_beyond_validity(scene: Scene, strokes: Array, tip: Array, angles: Array | None) -> tuple[str, ...]:
-    """Return the warning of `beyond_validity` for the worst of some instants of a motion.
-
-    `strokes` (m, n) and `tip` (m, 2) are in m. `angles` (n,) is a guess of the first joint angles, rad.
-    """
-    rows: NDArray[np.int64] = np.linspace(0, len(tip) - 1, INSTANTS).astype(np.int64)
-    rows = np.unique(np.append(rows, np.argmax(np.hypot(*(tip - tip[0]).T))))
-    worst, near = 0.0, angles
-    for row in rows:
-        try:
-            near = joint_angles_of_strokes(scene, strokes[row], near=near)
-        except UsageError:  # within the cylinder's travel but outside the joint's range
-            continue
-        worst = max(worst, float(np.hypot(*(tip[row] - skeleton(scene, near).pivots[-1]))))
-    return beyond_validity(scene, worst)
-
-
 TOLERANCE = 1e-9  # rad, increment in the last pass; the remaining error is its square
 PASSES = 60
 LONGEST_INCREMENT = 0.1  # rad per pass
 FIRST_LOAD, LEAST_LOAD = 0.05, 1e-3  # first and smallest load step, as fractions of gravity, if the full load fails
-LEAST_SHARE = 1e-3  # smallest clearance step, as a fraction of the clearances
+LEAST_CLEARANCE_STEP = 1e-3  # smallest clearance step, as a fraction of the clearances
 
 
 @dataclass(frozen=True, repr=False)
@@ -236,12 +206,7 @@ def statics(
 def strokes_and_angles(scene: Scene, strokes: ArrayLike | str | None, posture: str | None) -> tuple[Array, Array]:
     """Return strokes (m) and joint angles (rad) of the undeformed boom, both (n,), at `strokes` or in a `posture`.
 
-    A string as `strokes` is a posture name.
-
-    Raises
-    ------
-    UsageError
-        Unknown posture, strokes out of range, or not exactly one of strokes and posture.
+    A string as `strokes` is a posture name. UsageError if not exactly one is given, or if it is unknown or out of range.
     """
     if isinstance(strokes, str):
         strokes, posture = None, strokes if posture is None else None
@@ -324,7 +289,7 @@ def _loosen_gradually(plan: Plan, state: State, work: Work, drive: Array) -> flo
     def rests(share: float, aim: float) -> bool:
         return _rests(loosen_pins(plan, state, aim, aim - share), state, work, drive, 1.0)
 
-    return _gradually(state, 1.0, LEAST_SHARE, rests)
+    return _gradually(state, 1.0, LEAST_CLEARANCE_STEP, rests)
 
 
 def _gradually(state: State, step: float, least: float, rests: Callable[[float, float], bool]) -> float:
@@ -362,13 +327,7 @@ def is_stable(plan: Plan, state: State, work: Work) -> bool:
 def outline(plan: Plan, frames: Array, position: Array) -> Array:
     """Return points (.., k, 2) of the centre line from base to tip, m.
 
-    Parameters
-    ----------
-    plan : Plan
-    frames : ndarray, shape (.., operations + 1, 5)
-        See `boom_twin.kernels.tables.State`.
-    position : ndarray, shape (.., histories)
-        All history positions.
+    `frames` (.., operations + 1, 5) are those of `boom_twin.kernels.tables.State`, `position` (.., histories) all positions.
     """
     are_frames, are_points = plan.outline[:, 0] == 0, plan.outline[:, 0] == 1
     line = np.empty((*frames.shape[:-2], len(plan.outline), 2))

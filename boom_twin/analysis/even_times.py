@@ -6,8 +6,7 @@ import numpy as np
 
 from ..types import Array
 
-BREAK = 1.0
-"""Step of time, s, that is not bridged; neither is a step back."""
+BREAK = 1.0  # step of time, s, that is not bridged; neither is a step back
 
 
 def unbroken(times: Array) -> list[slice]:

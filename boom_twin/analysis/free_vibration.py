@@ -16,13 +16,10 @@ import numpy as np
 
 from ..types import Array
 
-ORDER = 14
-"""Eigenvalues that are looked for: two a mode, and some that take up noise."""
-LOWEST, HIGHEST = 0.2, 15.0
-DAMPED = 0.2
-"""Largest damping ratio of what is taken for a mode."""
-DECAYS = 4.0
-"""Deviations by which a vibration has to be damped: the line of a pump is not."""
+ORDER = 14  # eigenvalues that are looked for: two a mode, and some that take up noise
+LOWEST_HZ, HIGHEST_HZ = 0.2, 15.0
+DAMPED = 0.2  # largest damping ratio of what is taken for a mode
+DECAYS = 4.0  # deviations by which a vibration has to be damped: the line of a pump is not
 NEIGHBOURHOOD = 3.0
 """Times the resolution, one over the length of the record: what is left so near to a frequency counts for how sure that is."""
 LONGEST_STEP = 5.0
@@ -40,21 +37,18 @@ class Vibration:
     amplitude: float
 
 
-def free_vibrations(dt: float, values: Array, most_lags: int | None = None) -> list[Vibration]:
-    """Modes by frequency in `values` (k, c), `dt` (s) apart; none of fewer than 3 `ORDER` rows.
-
-    `most_lags`: rows of a Hankel matrix, a third of all samples unless that is more. Fewer take less time, and are less sure.
-    """
+def free_vibrations(dt: float, values: Array) -> list[Vibration]:
+    """Return the modes by frequency in `values` (k, c), `dt` (s) apart; none of fewer than 3 `ORDER` rows."""
     if len(values) < 3 * ORDER or not values.any():
         return []
     x = np.asarray(values - values.mean(axis=0), np.float64)
-    lags = min(len(x) // 3, most_lags or len(x))
+    lags = len(x) // 3  # rows of a Hankel matrix
     hankel = np.hstack([np.lib.stride_tricks.sliding_window_view(column, len(x) - lags) for column in x.T])
     space = np.linalg.eigh(hankel @ hankel.T)[1][:, : -ORDER - 1 : -1]  # its left singular vectors, in a sixth of the time
     turns = np.linalg.eigvals(np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0])
     rates = np.log(turns[turns.imag > 0.0]) / dt
     frequencies, dampings = np.abs(rates) / (2.0 * pi), -rates.real / np.abs(rates)
-    kept = (frequencies > LOWEST) & (frequencies < min(HIGHEST, 0.4 / dt)) & (dampings > 0.0) & (dampings < DAMPED)
+    kept = (frequencies > LOWEST_HZ) & (frequencies < min(HIGHEST_HZ, 0.4 / dt)) & (dampings > 0.0) & (dampings < DAMPED)
     rates = rates[kept][np.argsort(frequencies[kept])]
     if not len(rates):
         return []

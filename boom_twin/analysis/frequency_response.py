@@ -30,8 +30,7 @@ from .bending_moments import Station, moments_by_unknowns, stations
 from .equilibrium import rest_at, strokes_and_angles
 from .modal import drive_at_rest
 
-SHAPES = 5
-"""Least number of shapes in which a flexible part bends, see `with_all_shapes`."""
+SHAPES = 5  # least number of shapes in which a flexible part bends, see `with_all_shapes`
 LARGE = 1e4  # times a load of 1 N or 1 m: static forces and lengths are rounded to 1e-16 of themselves
 SMALL = np.array([1.0, 1e-6])  # N, m of a drive: loads that leave the tangents as they are, see `harmonic_response`
 UPWARD = (0.0, 1.0)  # N
@@ -91,23 +90,11 @@ class FrequencyResponse(SummaryDisplay):
 
 
 def with_oil_at_rest(plan: Plan, drives: Array, stretches: Array) -> tuple[Tables, Array, Array]:
-    """Tables whose cylinders keep the oil's compliance at rest, and how much more a drive does than it would with that.
+    """Return tables whose cylinders keep the oil's compliance at rest, and gains and lags (s) of the drives, both (n,).
 
     A drive on its way changes the stiffness k(s) of its oil, too. The force k(s) (l - s) + d (l' - s') therefore changes by
-    -(k - k' (l - s)) ds - d ds'; with k kept it would by -k ds - d ds'.
-
-    Parameters
-    ----------
-    drives, stretches : ndarray, shape (n,)
-        Lengths of the drives, and of the springs l - s, at rest, m.
-
-    Returns
-    -------
-    tables : Tables
-    gains : ndarray, shape (n,)
-        1 - k' (l - s) / k; 1 of a cylinder without `oil`.
-    lags : ndarray, shape (n,)
-        d / k, s.
+    -(k - k' (l - s)) ds - d ds'; with k kept it would by -k ds - d ds'. The gain is their ratio 1 - k' (l - s) / k, which is 1
+    without `oil`, and the lag is d / k. `drives` and `stretches` l - s (m), both (n,), are those at rest.
     """
     rows, step = plan.tables.cylinders.copy(), 1e-6
     rows.compliance, rows.lag = plan.compliances_and_lags(drives)
@@ -134,15 +121,10 @@ def with_all_shapes(scene: Scene) -> Scene:
 
 
 def pins_at_rest(plan: Plan, state: State, work: Work) -> Array:
-    """Return the pin forces at rest and their tangents, and the derivative of these by the rate s of motion.
+    """Return forces and tangents of pins with clearance at rest, and the tangents' derivative by the rate s of motion, stacked.
 
-    Both are of shape (pins, columns), see `Work.hold`, and are stacked. The pins are those with clearance. `work` has the
-    state's positions.
-
-    Raises
-    ------
-    UsageError
-        A pin does not answer in proportion: it has friction, or hangs free in its bush. Or it is a spring whose place turns.
+    Both are of shape (pins, columns), see `Work.hold`. `work` has the state's positions. UsageError if a pin does not answer in
+    proportion: it has friction, hangs free in its bush, or is a spring whose place turns.
     """
     for name, row, memory in zip(plan.pins, plan.tables.clearances, state.contacts, strict=True):
         if row.linear:
@@ -170,18 +152,8 @@ def pins_at_rest(plan: Plan, state: State, work: Work) -> Array:
 class LinearisedBoom:
     """A boom at rest, for harmonic loads small enough that it answers in proportion.
 
-    Parameters
-    ----------
-    scene : Scene
-    strokes, angles : ndarray, shape (n,)
-        Absolute strokes (m), and the joint angles (rad) of the undeformed boom next to which the equilibrium is looked for.
-
-    Raises
-    ------
-    UsageError
-        A pin with clearance does not answer in proportion, see `pins_at_rest`.
-    SolverError
-        No equilibrium there.
+    It rests at absolute `strokes` (m) next to the joint `angles` (rad) of the undeformed boom, both (n,). SolverError if
+    there is no equilibrium, UsageError for a pin with clearance that does not answer in proportion, see `pins_at_rest`.
     """
 
     def __init__(self, scene: Scene, strokes: Array, angles: Array) -> None:
@@ -196,19 +168,10 @@ class LinearisedBoom:
         self._joints, self._moments = joint_angles_by_unknowns(self.plan), moments_by_unknowns(self.plan)
 
     def respond(self, frequencies: Array, loads: ComplexArray) -> FrequencyResponse:
-        """The answer at `frequencies` (k,), in Hz, to a load at each of them.
+        """Return the answer at `frequencies` (k,), Hz, to a load at each of them; 0 Hz is the static limit.
 
-        Parameters
-        ----------
-        frequencies : ndarray, shape (k,)
-            Hz; 0 is the static limit.
-        loads : ndarray of complex, shape (k, 2 + n) or (2 + n,)
-            Force at the tip in x and y (N), then the drive of every cylinder (m).
-
-        Raises
-        ------
-        SolverError
-            The equations are singular at a frequency.
+        `loads` (k, 2 + n) or (2 + n,) are the force at the tip in x and y (N), then the drive of every cylinder (m), complex.
+        SolverError if the equations are singular at a frequency.
         """
         every = np.array(np.broadcast_to(np.asarray(loads, complex), (len(frequencies), self.load().size)))
         rates = 2j * math.pi * np.asarray(frequencies, float)

@@ -44,9 +44,9 @@ from .equilibrium import checked_strokes, rest_at, set_undeformed
 SPAN = 1e-3  # rad or m that the fastest coordinate moves in a difference quotient
 SHORT = 2e-5  # s, step that accelerations are found with
 HALF = math.sqrt(2.0) - 0.5  # gamma of Newmark's method with beta = 1/2
-TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
+START_TOLERANCE = 1e-9  # rad in the last pass; what is left is its square
 OPEN = 1e-6  # m, and m/s: by which a loop may be open
-FAR = 1e-3  # m, by which a drive may begin away from where the state was taken
+FARTHEST_START = 1e-3  # m, by which a drive may begin away from where the state was taken
 STENCIL = ((2.0, -1.0), (1.0, 8.0), (-1.0, -8.0), (-2.0, 1.0))  # of the fourth-order difference, over 12
 
 
@@ -69,15 +69,6 @@ class InitialState:
     values: Array
     rates: Array
     contacts: Array
-
-    def changed(self, **coordinates: tuple[float, float]) -> InitialState:
-        """Return a copy with other coordinates: name -> (value, rate); UsageError for a name that there is not."""
-        values, rates = self.values.copy(), self.rates.copy()
-        for name, (value, rate) in coordinates.items():
-            if name not in self.names:
-                raise UsageError(f"{name}: no coordinate of this boom. Take one of {', '.join(self.names)}.")
-            values[self.names.index(name)], rates[self.names.index(name)] = value, rate
-        return InitialState(self.names, values, rates, self.contacts)
 
 
 def undeflected(
@@ -136,19 +127,9 @@ def state_now(plan: Plan, state: State) -> InitialState:
 
 
 def started(scene: Scene, initial: InitialState, times: Array, strokes: Array) -> tuple[Plan, State, Work]:
-    """Compile a scene and set it in motion.
+    """Compile a scene and set it in motion; the curve through the drives' first rows (s, m) gives length and rate at the start.
 
-    Parameters
-    ----------
-    times, strokes : ndarray, shape (m,) and (m, n)
-        s; m: of the drives, whose curve through them gives length and rate at the start.
-
-    Raises
-    ------
-    UsageError
-        Coordinates of another boom, or loops that they leave open.
-    SolverError
-        There are no accelerations that balance the forces.
+    UsageError for coordinates of another boom, or that leave loops open; SolverError if no accelerations balance the forces.
     """
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
@@ -164,7 +145,9 @@ def started(scene: Scene, initial: InitialState, times: Array, strokes: Array) -
     for step in (SHORT, 0.5 * SHORT):
         trial = State(*(array.copy() for array in state))
         scheme, (ahead, speed) = prepare(NEWMARK, HALF, step, work.weights), _drive(plan, times, strokes, step)
-        status, _, _ = advance(plan.tables, trial, work, scheme, ahead, speed, TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW)
+        status, _, _ = advance(
+            plan.tables, trial, work, scheme, ahead, speed, START_TOLERANCE, PASSES, LONGEST_INCREMENT, None, ANEW
+        )
         if status != OK:
             raise SolverError(f"the motion cannot start from the given state: {SENTENCES[status]}.")
         ends.append((trial.history[A], trial.z))
@@ -246,11 +229,11 @@ def _check_drives(plan: Plan, state: State, work: Work, length: Array) -> None:
     cylinders = plan.tables.cylinders
     forces = state.z[cylinders.z]
     began = work.position[cylinders.history] - plan.compliances_and_lags(length)[0] * forces
-    for i in np.flatnonzero(~_incompressible(plan) & (forces != 0.0) & (np.abs(began - length) > FAR)):
+    for i in np.flatnonzero(~_incompressible(plan) & (forces != 0.0) & (np.abs(began - length) > FARTHEST_START)):
         own, given = began[i] - plan.closed_lengths[i], length[i] - plan.closed_lengths[i]
         raise UsageError(
             f"stroke_{i + 1}_m = {given:.5g} m in the first row: the initial state is of a stroke of {own:.5g} m; "
-            f"{1e3 * FAR:g} mm is let pass. Begin the drive where the state was taken."
+            f"{1e3 * FARTHEST_START:g} mm is let pass. Begin the drive where the state was taken."
         )
 
 

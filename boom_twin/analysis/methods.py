@@ -5,23 +5,22 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from ..compiler.compile import BasisName, compile_scene
-from ..compiler.plan import Plan, first_row, taken_apart, width_of
+from ..compiler.plan import first_row, taken_apart, width_of
 from ..errors import UsageError
 from ..kernels import integrators
-from ..kernels.tables import OK, SENTENCES, State, Work
+from ..kernels.tables import OK, SENTENCES
 from ..kernels.transfer.matrix_product import new_product
 from ..kernels.transfer.time_step import run
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..types import Array
-from .drive import PASSES, TOLERANCE
+from .doubts import step_error_warning
+from .drive import PASSES, STEP_TOLERANCE
 from .equilibrium import settle
-from .error_estimate import step_error_warning
 from .simulate import RHO
 
 FAMILIES = {
@@ -38,27 +37,13 @@ Drive = Callable[[Array], tuple[Array, Array]]
 
 @dataclass(frozen=True)
 class Method:
-    """Integration method; UsageError if it is unknown.
+    """Integration method; UsageError if it is unknown."""
 
-    Attributes
-    ----------
-    integrator : str
-        "generalised-alpha", "newmark", "wilson", "houbolt" or "park".
-    parameter : float
-        rho of generalised-alpha, gamma of Newmark, theta of Wilson; Houbolt and Park have none.
-    passes : int
-        Largest number of Newton passes in a step; 1 is the papers' linearised pass.
-    tolerance : float
-        rad, see `kernels.transfer.time_step.advance`.
-    product : str
-        "riccati" or "plain", the papers' product of transfer matrices.
-    """
-
-    integrator: str = "generalised-alpha"
-    parameter: float = RHO
-    passes: int = int(PASSES)
-    tolerance: float = TOLERANCE
-    product: str = "riccati"
+    integrator: str = "generalised-alpha"  # "generalised-alpha", "newmark", "wilson", "houbolt" or "park"
+    parameter: float = RHO  # rho of generalised-alpha, gamma of Newmark, theta of Wilson; Houbolt and Park have none
+    passes: int = int(PASSES)  # largest number of Newton passes in a step; 1 is the papers' linearised pass
+    tolerance: float = STEP_TOLERANCE  # rad, see `kernels.transfer.time_step.advance`
+    product: str = "riccati"  # "riccati" or "plain", the papers' product of transfer matrices
 
     def __post_init__(self) -> None:
         if self.integrator not in FAMILIES:
@@ -74,40 +59,19 @@ class Method:
 
 @dataclass(frozen=True)
 class MethodRun:
-    """Motion in rows. Rows after a failure are NaN.
+    """Motion in rows. Rows after a failure are NaN."""
 
-    Attributes
-    ----------
-    times : ndarray, shape (m,)
-        s, from 0.
-    tip, tip_acceleration : ndarray, shape (m, 2)
-        m, m/s^2.
-    joints, cylinder_forces : ndarray, shape (m, n)
-        rad, N.
-    pins : ndarray, shape (m, k, 4)
-        Pins with clearance, see `compiler.plan`.
-    seconds : float
-        CPU time of the stepping alone, fastest of the repeats.
-    steps : int
-    passes : float
-        Mean Newton passes per step.
-    status : str
-        "ok", or why the motion ended.
-    doubt : str
-        Warning of a coarse step or of ringing, see `analysis.error_estimate`; empty if none.
-    """
-
-    times: Array
-    tip: Array
-    tip_acceleration: Array
-    joints: Array
-    cylinder_forces: Array
-    pins: Array
-    seconds: float
+    times: Array  # (m,), s, from 0
+    tip: Array  # (m, 2), m
+    tip_acceleration: Array  # (m, 2), m/s^2
+    joints: Array  # (m, n), rad
+    cylinder_forces: Array  # (m, n), N
+    pins: Array  # (m, k, 4), pins with clearance, see `compiler.plan`
+    seconds: float  # CPU time of the stepping alone
     steps: int
-    passes: float
-    status: str
-    doubt: str = ""
+    passes: float  # mean Newton passes per step
+    status: str  # "ok", or why the motion ended
+    doubt: str = ""  # warning of a coarse step or of ringing, see `analysis.doubts`; empty if none
 
 
 def integrate_with(
@@ -119,41 +83,31 @@ def integrate_with(
     method: Method | None = None,
     basis: BasisName = "end-shapes",
     angles: Array | None = None,
-    repeats: int = 1,
 ) -> MethodRun:
-    """Integrate a drive in equal steps, from static equilibrium at t = 0.
+    """Integrate a drive in equal steps from static equilibrium at t = 0; a failed step sets `status`.
 
-    Parameters
-    ----------
-    duration, step : float
-        s; a row after every `every` steps.
-    angles : ndarray, shape (n,), optional
-        Joint angles (rad) near the equilibrium.
-    repeats : int
-        Number of runs; the fastest gives the time.
-
-    Returns
-    -------
-    MethodRun
-        Motion, status and CPU time.
-
-    Raises
-    ------
-    UsageError
-        Duration is no multiple of `every` steps, or the scene has clearance and the product is plain.
-    SolverError
-        No equilibrium at t = 0. A failed step sets `status`.
+    `duration` and `step` are in s, with a row after every `every` steps; `angles` (n,) are joint angles (rad) near the
+    equilibrium. UsageError if the duration is no multiple of `every` steps, or for clearance with the plain product;
+    SolverError if there is no equilibrium.
     """
     method, rows = method or Method(), _row_count(duration, step, every)
     plan = compile_scene(scene, basis)
     if plan.pins and method.product == "plain":
         raise UsageError("product = 'plain': knows ideal pins only. Take riccati, or a scene without the block `clearance`.")
     depth, first = integrators.depth_of(FAMILIES[method.integrator]), drive(np.zeros(1))[0][0]
-    start, work = plan.state(depth), plan.work(depth)
-    settle(plan, start, work, first, joint_angles_of_strokes(scene, first, near=angles))
+    state, work = plan.state(depth), plan.work(depth)
+    settle(plan, state, work, first, joint_angles_of_strokes(scene, first, near=angles))
+    out = np.full((rows + 1, width_of(plan)), np.nan)
+    out[0] = first_row(plan, state)
+    product = new_product(plan.tables) if method.product == "plain" else None
     strokes, rates = drive(np.asarray(step * (np.arange(rows * every) + method.reach), float))
-    runs = [_stepped(plan, start, work, method, step, every, strokes, rates) for _ in range(repeats)]
-    last, found = runs[-1], taken_apart(plan, runs[-1].out)
+    steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
+    begun = time.process_time()
+    status, row, passes, jolt, shake = run(
+        plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, FAMILIES[method.integrator],
+        method.parameter, method.tolerance, np.int64(method.passes), product, out[1:],
+    )  # fmt: skip
+    seconds, found, is_done = time.process_time() - begun, taken_apart(plan, out), int(status) == OK
     tip = found.tip
     travel = float(np.linalg.norm(tip[:, 0, :2] - tip[0, 0, :2], axis=1).max())
     return MethodRun(
@@ -163,11 +117,11 @@ def integrate_with(
         joints=found.joints,
         cylinder_forces=found.cylinder_forces,
         pins=found.pins,
-        seconds=min(each.seconds for each in runs),
+        seconds=seconds,
         steps=rows * every,
-        passes=last.passes / (max(last.row, 1) * every),
-        status="ok" if last.status == OK else SENTENCES[last.status],
-        doubt=step_error_warning(last.jolt, last.shake, travel, step * rows * every * step) if last.status == OK else "",
+        passes=int(passes) / (max(int(row), 1) * every),
+        status="ok" if is_done else SENTENCES[int(status)],
+        doubt=step_error_warning(jolt, shake, travel, step * rows * every * step) if is_done else "",
     )
 
 
@@ -177,32 +131,3 @@ def _row_count(duration: float, step: float, every: int) -> int:
     if rows < 1 or abs(rows * step * every - duration) > 1e-6 * step:
         raise UsageError(f"duration = {duration:g} s: not a multiple of {every} steps of {step:g} s. Choose one that is.")
     return rows
-
-
-class _Run(NamedTuple):
-    """Rows, results of `kernels.transfer.time_step.run`, and CPU time (s)."""
-
-    out: Array
-    status: int
-    row: int
-    passes: int
-    jolt: float
-    shake: float
-    seconds: float
-
-
-def _stepped(
-    plan: Plan, start: State, work: Work, method: Method, step: float, every: int, strokes: Array, rates: Array
-) -> _Run:
-    """Integrate a copy of `start` along strokes (m) and rates (m/s), shape (steps, n)."""
-    rows, state = len(strokes) // every, State(*(array.copy() for array in start))
-    out = np.full((rows + 1, width_of(plan)), np.nan)
-    out[0] = first_row(plan, state)
-    product = new_product(plan.tables) if method.product == "plain" else None
-    steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
-    begun = time.process_time()
-    status, row, passes, jolt, shake = run(
-        plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, FAMILIES[method.integrator],
-        method.parameter, method.tolerance, np.int64(method.passes), product, out[1:],
-    )  # fmt: skip
-    return _Run(out, int(status), int(row), int(passes), jolt, shake, time.process_time() - begun)

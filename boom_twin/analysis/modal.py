@@ -8,25 +8,19 @@ Bisection on that integer misses no mode and needs no starting guess. A mode fol
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiler.plan import Plan, first_row, taken_apart
+from ..compiler.plan import Plan
 from ..errors import SolverError
 from ..kernels.tables import OK, SENTENCES, State, Work
 from ..kernels.transfer.forward_kinematics import place
-from ..kernels.transfer.natural_frequency import (
-    NOT_COUNTED,
-    bisect_frequency,
-    count_below,
-    inertia_response,
-    position_change,
-)
+from ..kernels.transfer.natural_frequency import NOT_COUNTED, bisect_frequency, count_below, inertia_response, position_change
 from ..types import Array
 
-HIGHEST = 1e7  # rad/s, upper limit of the search
+HIGHEST_RATE = 1e7  # rad/s, upper limit of the search
 RELATIVE_WIDTH = 1e-11  # relative width of the last bracket
 SHIFT = 1e-6  # relative shift from the frequency, for inverse iteration
 LOAD = 1e-9  # m, displacement whose inertia forces are the load there
@@ -36,24 +30,12 @@ NUDGE = 1e-6  # rad, step of the derivative of positions by unknowns
 
 @dataclass(frozen=True)
 class Mode:
-    """One undamped mode, scaled to unit modal mass.
+    """One undamped mode, scaled to unit modal mass."""
 
-    Attributes
-    ----------
-    frequency : float
-        Hz.
-    increments : ndarray, shape (unknowns,)
-        Increments of the unknowns, in the order of `Plan.names`, per unit of the modal coordinate (m sqrt(kg)).
-    motion : ndarray, shape (histories,)
-        Displacement of every mass point and angle.
-    drives : ndarray, shape (n,)
-        Lengths of the drives at the equilibrium, m.
-    """
-
-    frequency: float
-    increments: Array
-    motion: Array
-    drives: Array
+    frequency: float  # Hz
+    increments: Array  # (unknowns,), of the unknowns in the order of `Plan.names`, per modal coordinate (m sqrt(kg))
+    motion: Array  # (histories,), displacement of every mass point and angle
+    drives: Array  # (n,), drive lengths at the equilibrium, m
 
 
 def constraints(plan: Plan) -> int:
@@ -118,7 +100,7 @@ def drive_at_rest(plan: Plan, state: State, work: Work) -> Array:
 
 
 def natural_modes(
-    plan: Plan, state: State, work: Work, count: int, width: float = RELATIVE_WIDTH, highest: float = HIGHEST
+    plan: Plan, state: State, work: Work, count: int, width: float = RELATIVE_WIDTH, highest: float = HIGHEST_RATE
 ) -> tuple[Mode, ...]:
     """Return the lowest `count` modes below `highest` (rad/s) about the equilibrium in `state`, or all if fewer.
 
@@ -146,24 +128,6 @@ def _mode(plan: Plan, state: State, work: Work, boom: _AtRest, omega: float, low
             raise SolverError(f"the mode at {omega / (2.0 * math.pi):.6g} Hz cannot be computed. {ABSURD}")
         motion, increments = motion / size, increments / size
     return Mode(omega / (2.0 * math.pi), increments, motion, state.drives[0].copy())
-
-
-def joint_increments(plan: Plan, state: State, work: Work, increments: Array) -> Array:
-    """Return the change of the joint angles, shape (n,), rad, by `increments` of the unknowns."""
-    return along(plan, state, work, increments, lambda: taken_apart(plan, first_row(plan, state)).joints)
-
-
-def along(plan: Plan, state: State, work: Work, increments: Array, read: Callable[[], Array]) -> Array:
-    """Return the derivative of `read()` along `increments` of the unknowns, by central differences."""
-    z = state.z.copy()
-    size, sides = _nudge(plan, increments), []
-    for sign in (1.0, -1.0):
-        state.z[:] = z + sign * size * increments
-        place(plan.tables, state, work)
-        sides.append(read())
-    state.z[:] = z
-    place(plan.tables, state, work)
-    return np.asarray((sides[0] - sides[1]) / (2.0 * size))
 
 
 def _nudge(plan: Plan, increments: Array) -> float:

@@ -29,14 +29,7 @@ BEHIND_PIVOT = np.int64(1)  # the operation outboard of joint A, up to which for
 
 
 class Momenta:
-    """Momentum of a boom and the forces from outside, from its state; each as x, y and the moment about the base's pivot.
-
-    Parameters
-    ----------
-    plan : Plan
-    work : Work
-        Scratch, written by `forces`.
-    """
+    """Momentum of a boom and the forces from outside; each as x, y and the moment about the base's pivot."""
 
     def __init__(self, plan: Plan, work: Work) -> None:
         t = plan.tables
@@ -86,22 +79,12 @@ class Momenta:
 
 @dataclass(frozen=True)
 class MomentumBalance:
-    """Gap between the momentum of a motion and the impulses of weight and base.
+    """Gap between the momentum of a motion and the impulses of weight and base."""
 
-    Attributes
-    ----------
-    linear_gap : float
-        Largest difference at any step, N s.
-    linear_moved : float
-        What it is measured against: the largest momentum, N s.
-    angular_gap, angular_moved : float
-        The same of the moment of momentum about the base's pivot, N m s.
-    """
-
-    linear_gap: float
-    linear_moved: float
-    angular_gap: float
-    angular_moved: float
+    linear_gap: float  # largest difference at any step, N s
+    linear_moved: float  # measure of it: the largest momentum, N s
+    angular_gap: float  # likewise for the moment of momentum about the base's pivot, N m s
+    angular_moved: float  # N m s
 
     @property
     def linear_share(self) -> float:
@@ -122,15 +105,7 @@ class MomentumBalance:
 
 
 def momentum_balance(course: DriveCourse, dt: float) -> MomentumBalance:
-    """Balance along a motion, in the steps of `boom_twin.analysis.energy_balance.energy_balance`.
-
-    Parameters
-    ----------
-    course : DriveCourse
-        See `boom_twin.analysis.simulate.course_of`.
-    dt : float
-        Longest step, s.
-    """
+    """Return the balance along a motion, in the steps of `boom_twin.analysis.energy_balance.energy_balance`."""
     momenta = Momenta(course.plan, course.plan.work())
     first, before, impulse = momenta.momentum(course.start), momenta.forces(course.start), np.zeros(3)
     rows, gaps = [first], [np.zeros(3)]

@@ -22,41 +22,21 @@ LOADS = ("tip.payload", "line_fill")
 """Parameters that may be nothing: their deviations have units, those of all others are shares."""
 LOWER, UPPER = 0.025, 0.975
 """Quantiles that are told."""
-LARGEST = 4e9  # bytes that all motions may take
+LARGEST_RESULT = 4e9  # bytes that all motions may take
 
 
 @dataclass(frozen=True, repr=False)
 class SampledMotions:
-    """Motions of sampled booms. c samples that could be computed, of m rows each.
+    """Motions of sampled booms. c samples that could be computed, of m rows each."""
 
-    Attributes
-    ----------
-    times : ndarray, shape (m,)
-        s.
-    parameters : dict of str to ndarray, shape (c,)
-        What was drawn, SI, by the parameter's name.
-    motions : dict of str to ndarray, shape (c, m)
-        Tip position and acceleration and the cylinders' forces, by their columns in `boom_twin.analysis.simulate.Simulation`.
-    failures : tuple of str
-        Samples that could not be computed: their parameters, and why.
-    doubtful : int
-        Samples whose motion `simulate` doubts.
-    """
-
-    times: Array
-    parameters: dict[str, Array]
-    motions: dict[str, Array]
-    failures: tuple[str, ...]
-    doubtful: int
+    times: Array  # (m,), s
+    parameters: dict[str, Array]  # (c,) each, drawn values, SI, by the parameter's name
+    motions: dict[str, Array]  # (c, m) each, tip position, acceleration and cylinder forces, by the columns of `Simulation`
+    failures: tuple[str, ...]  # parameters of samples that could not be computed, and why
+    doubtful: int  # number of samples whose motion `simulate` doubts
 
     def columns(self) -> dict[str, Array]:
-        """Return mean, standard deviation and the quantiles `LOWER` and `UPPER` of every quantity over the samples, by row.
-
-        Returns
-        -------
-        dict of str to ndarray, shape (m,)
-            By name with unit.
-        """
+        """Return mean, standard deviation and quantiles `LOWER` and `UPPER` of every quantity over the samples, (m,) each."""
         found = {"t_s": self.times}
         for name, values in self.motions.items():
             low, high = np.quantile(values, (LOWER, UPPER), axis=0)
@@ -78,25 +58,11 @@ class SampledMotions:
 
 
 def drawn(scene: Scene, deviations: Mapping[str, float], count: int, seed: int) -> dict[str, Array]:
-    """Random values of parameters about those of `scene`, independent of each other.
+    """Return random values (count,) of parameters about those of `scene`, independent of each other.
 
     Shares give a log-normal distribution, so that stiffness and mass stay positive; loads a normal one, cut off at nothing.
-
-    Parameters
-    ----------
-    deviations : dict of str to float
-        Standard deviations by the parameters' names (`boom_twin.scene.edit`): shares, of loads kg and kg/m.
-    count : int
-    seed : int
-
-    Returns
-    -------
-    dict of str to ndarray, shape (count,)
-
-    Raises
-    ------
-    UsageError
-        A parameter that the scene lacks, or a deviation that is not positive; none at all.
+    `deviations` are standard deviations by the parameters' names (`boom_twin.scene.edit`): shares, of loads kg and kg/m.
+    UsageError for none at all, a parameter that the scene lacks, or a deviation that is not positive.
     """
     names = parameter_names(scene)
     if not deviations:
@@ -126,39 +92,20 @@ def simulate_samples(
     angles: Array | None = None,
     tell: Callable[[int], object] = lambda done: None,
 ) -> SampledMotions:
-    """Follow the strokes with `count` booms that differ in parameters drawn at random, on all cores.
+    """Follow the strokes with `count` booms (2 at least) that differ in parameters drawn at random, on all cores.
 
-    Parameters
-    ----------
-    scene : Scene, path or mapping
-        The boom, of n sections; as for `boom_twin.statics`.
-    times, strokes, dt, angles
-        As for `boom_twin.simulate`; every boom begins at rest.
-    deviations : dict of str to float
-        See `drawn`.
-    count : int
-        Samples, at least 2.
-    seed : int
-        The same seed gives the same samples, whatever the number of cores.
-    tell : callable, optional
-        Called with 1 whenever a sample is done.
-
-    Returns
-    -------
-    SampledMotions
-
-    Raises
-    ------
-    UsageError
-        As `drawn` and `boom_twin.simulate`; motions that take too much memory.
-    SolverError
-        Not one of the samples could be computed.
+    `scene`, `times`, `strokes`, `dt` and `angles` are as for `boom_twin.simulate`, and every boom begins at rest; for
+    `deviations` see `drawn`. The same `seed` gives the same samples, whatever the number of cores. `tell` is called with 1
+    whenever a sample is done. UsageError as `drawn` and `boom_twin.simulate` raise it, and for motions that take too much
+    memory. SolverError if fewer than two samples could be computed.
     """
     scene = as_scene(scene)
     if count < 2:
         raise UsageError(f"samples = {count}: a spread needs 2 at least. Give 100.")
-    if (size := 8.0 * count * len(times) * (4 + len(scene.joints))) > LARGEST:
-        raise UsageError(f"samples = {count} of {len(times)} rows: {size:.2g} bytes, {LARGEST:.2g} at most. Give fewer rows.")
+    if (size := 8.0 * count * len(times) * (4 + len(scene.joints))) > LARGEST_RESULT:
+        raise UsageError(
+            f"samples = {count} of {len(times)} rows: {size:.2g} bytes, {LARGEST_RESULT:.2g} at most. Give fewer rows."
+        )
     values = drawn(scene, deviations, count, seed)
     simulate(scene, times[:1], strokes[:1], dt, angles, estimate_errors=False)  # what is wrong for all is told once
 

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..errors import UsageError
-from ..scene.kinematics import posture_angles, stroke_curve, strokes_of_posture
+from ..scene.kinematics import posture_angles, stroke_curve, strokes_of_angles, strokes_of_posture
 from ..scene.load import load_scene
 from ..scene.schema import Scene
 from ..types import Array
@@ -25,31 +25,19 @@ TURN = math.radians(8.0)
 HALVINGS = 4
 RISE = 1.5  # s
 DURATION = 4.0  # s
-SAMPLES = 181  # of a joint's range
+RANGE_SAMPLES = 181  # of a joint's range
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Strokes of a smooth move. n cylinders.
+    """Strokes of a smooth move. n cylinders."""
 
-    Attributes
-    ----------
-    label : str
-        What it is, for a report.
-    angles : ndarray, shape (n,)
-        Joint angles (rad) of the undeformed boom at the start.
-    first, travel : ndarray, shape (n,)
-        Strokes (m) at the start, and how far they go.
-    rise, duration : float
-        s; the strokes arrive after `rise` and hold until `duration`.
-    """
-
-    label: str
-    angles: Array
-    first: Array
-    travel: Array
-    rise: float = RISE
-    duration: float = DURATION
+    label: str  # description for a report
+    angles: Array  # (n,), joint angles (rad) of the undeformed boom at the start
+    first: Array  # (n,), strokes (m) at the start
+    travel: Array  # (n,), change of the strokes (m)
+    rise: float = RISE  # s, after which the strokes have arrived
+    duration: float = DURATION  # s, until which they hold
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
@@ -59,29 +47,15 @@ class Motion:
 
 
 def motion_of(scene: Scene, posture: str | None = None, duration: float = DURATION) -> Motion:
-    """The motion of a scene; see the head of this file.
+    """Return the motion of a scene for `duration` (s); see the head of this file.
 
-    Parameters
-    ----------
-    posture : str, optional
-        Where it starts: by default `arch`, else the first posture, else next to the middle of the joints' ranges.
-    duration : float
-        s.
-
-    Returns
-    -------
-    Motion
-        Where it starts, and the strokes of all cylinders as functions of time.
-
-    Raises
-    ------
-    UsageError
-        No such posture, or no cylinder with room to move.
+    It starts in `posture`: by default `arch`, else the first posture, else next to the middle of the joints' ranges.
+    UsageError if there is no such posture, or no cylinder with room to move.
     """
     name = posture or (ARCH if ARCH in scene.postures else next(iter(scene.postures), None))
     if name is None:
         angles = np.array([_middle(scene, i) for i in range(len(scene.joints))])
-        first = np.array([stroke_curve(scene, i, angles[i : i + 1])[0] for i in range(len(angles))])
+        first = strokes_of_angles(scene, angles)
     else:
         angles, first = posture_angles(scene, name), strokes_of_posture(scene, name)
     start = f"posture {name}" if name else "the middle of the ranges"
@@ -108,7 +82,7 @@ def _is_default(scene: Scene, first: Array) -> bool:
 def _middle(scene: Scene, index: int) -> float:
     """Angle (rad) of joint `index` nearest to the middle of its range that its cylinder reaches."""
     low, high = np.radians(scene.joints[index].range_deg)
-    grid = np.linspace(low, high, SAMPLES)
+    grid = np.linspace(low, high, RANGE_SAMPLES)
     strokes = stroke_curve(scene, index, grid)
     with np.errstate(invalid="ignore"):
         reached = grid[(strokes >= 0.0) & (strokes <= scene.joints[index].cylinder.max_stroke)]

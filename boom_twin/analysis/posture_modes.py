@@ -16,11 +16,9 @@ from ..types import Array
 from .equilibrium import settle
 from .modal import natural_modes
 
-MOVED = 0.005
-"""m of any stroke after which all is computed anew."""
+MOVED = 0.005  # m of any stroke after which all is computed anew
 COUNT = 6
-WIDTH = 1e-4
-"""Relative accuracy of the frequencies."""
+FREQUENCY_ACCURACY = 1e-4  # relative accuracy of the frequencies
 
 Found = TypeVar("Found")
 
@@ -58,4 +56,4 @@ class ModeList(PresentPosture[list[float]]):
             settle(self._plan, state, work, strokes, joint_angles_of_strokes(self._scene, strokes))
         except BoomTwinError:
             return []
-        return [mode.frequency for mode in natural_modes(self._plan, state, work, COUNT, WIDTH)]
+        return [mode.frequency for mode in natural_modes(self._plan, state, work, COUNT, FREQUENCY_ACCURACY)]

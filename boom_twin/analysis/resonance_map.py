@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import UsageError
-from ..scene.kinematics import posture_angles, stroke_curve
+from ..scene.kinematics import posture_angles, strokes_of_angles
 from ..scene.schema import Scene
 from ..types import Array
 from .equilibrium import checked_strokes
@@ -21,57 +21,35 @@ from .frequency_response import LinearisedBoom
 from .steady_state import PeriodicLoad, steady_state_of
 
 TOO_MUCH = 1.5  # times the median swing of a posture: such rates are to be avoided
-LEAST = 1e-5  # m; less is no swing, but rounding or a boom without compliance
+LEAST_SWING = 1e-5  # m; less is no swing, but rounding or a boom without compliance
 
 
 @dataclass(frozen=True)
 class RateToAvoid:
-    """A band of rates at which one posture swings too much.
-
-    Attributes
-    ----------
-    posture : str
-    low, high : float
-        Hz, of the rates in the map at which the swing is above `TOO_MUCH` times the posture's median.
-    rate, swing : float
-        Where it is largest, Hz, and how large, m.
-    harmonic : int
-        Of the load, that moves the tip most there.
-    """
+    """A band of rates at which one posture swings too much."""
 
     posture: str
-    low: float
-    high: float
-    rate: float
-    swing: float
-    harmonic: int
+    low: float  # Hz, lowest rate at which the swing is above `TOO_MUCH` times the posture's median
+    high: float  # Hz, highest such rate
+    rate: float  # Hz, of the largest swing
+    swing: float  # m, the largest
+    harmonic: int  # number of the harmonic of the load that moves the tip most there
 
 
 @dataclass(frozen=True)
 class ResonanceMap:
-    """Swing of the tip, peak to peak, over p postures and r rates.
-
-    Attributes
-    ----------
-    postures : tuple of str
-    rates : ndarray, shape (r,)
-        Of the load, Hz.
-    swing : ndarray, shape (p, r)
-        m.
-    harmonics : ndarray of int, shape (p, r)
-        Which harmonic of the load moves the tip most.
-    """
+    """Swing of the tip, peak to peak, over p postures and r rates."""
 
     postures: tuple[str, ...]
-    rates: Array
-    swing: Array
-    harmonics: np.ndarray
+    rates: Array  # (r,), rates of the load, Hz
+    swing: Array  # (p, r), m
+    harmonics: np.ndarray  # (p, r), number of the harmonic of the load that moves the tip most
 
     def to_avoid(self) -> tuple[RateToAvoid, ...]:
         """The bands to avoid, posture by posture, ascending in rate."""
         found = []
         for name, swing, harmonics in zip(self.postures, self.swing, self.harmonics, strict=True):
-            above = np.concatenate([[False], swing > max(TOO_MUCH * float(np.median(swing)), LEAST), [False]])
+            above = np.concatenate([[False], swing > max(TOO_MUCH * float(np.median(swing)), LEAST_SWING), [False]])
             starts, stops = np.flatnonzero(above[1:] & ~above[:-1]), np.flatnonzero(above[:-1] & ~above[1:])
             for start, stop in zip(starts, stops, strict=True):
                 peak = start + int(np.argmax(swing[start:stop]))
@@ -87,25 +65,10 @@ class ResonanceMap:
 def resonance_map(
     scene: Scene, postures: Mapping[str, Array], rates: Array, load_at: Callable[[float], PeriodicLoad]
 ) -> ResonanceMap:
-    """Swing of the tip in the steady state of every posture under the load at every rate.
+    """Return the swing of the tip in the steady state of every posture under the load at every rate (Hz).
 
-    Parameters
-    ----------
-    scene : Scene
-        The boom, of n sections.
-    postures : mapping
-        Joint angles (rad), shape (n,), of the undeformed boom, by name; see `named_postures`, `postures_along`.
-    rates : ndarray, shape (r,)
-        Hz.
-    load_at : callable
-        The load at a rate, see `boom_twin.analysis.steady_state.pump_load`.
-
-    Raises
-    ------
-    UsageError
-        A posture is out of the cylinders' travel.
-    SolverError
-        One has no stable equilibrium.
+    `postures` are joint angles (rad), shape (n,), of the undeformed boom, by name; `load_at` gives the load at a rate.
+    UsageError for a posture out of the cylinders' travel, SolverError for one without a stable equilibrium.
     """
     loads = [load_at(float(rate)) for rate in rates]
     swing, harmonics = np.zeros((len(postures), len(rates))), np.zeros((len(postures), len(rates)), np.int64)
@@ -135,8 +98,7 @@ def postures_along(scene: Scene, names: list[str], steps: int) -> dict[str, Arra
 
 
 def _strokes(scene: Scene, name: str, angles: Array) -> Array:
-    strokes = np.array([stroke_curve(scene, i, angles[i : i + 1])[0] for i in range(len(scene.joints))])
     try:
-        return checked_strokes(scene, strokes)
+        return checked_strokes(scene, strokes_of_angles(scene, angles))
     except UsageError as error:
         raise UsageError(f"posture {name}: {error} Leave it out, or go another way.") from None

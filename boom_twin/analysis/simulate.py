@@ -20,9 +20,9 @@ from ..scene.schema import Scene
 from ..system.summary_display import SummaryDisplay, data_frame, numbers
 from ..types import Array
 from .cylinder_drives import drives_of
+from .doubts import EstimatedError, motion_beyond_validity, ringing, row_errors, step_errors, too_fast, warnings_of
 from .drive import DriveCourse, Run
-from .equilibrium import motion_beyond_validity, rest_at, travel_words
-from .error_estimate import EstimatedError, ringing, row_errors, step_errors, too_fast, warnings_of
+from .equilibrium import rest_at, travel_words
 from .initial_state import InitialState, started, state_now
 
 RHO = 0.8
@@ -245,15 +245,12 @@ def _checked(scene: Scene, times: Array, strokes: Array, dt: float, name: str) -
         row, column = np.argwhere(~np.isfinite(np.column_stack([times, strokes])))[0].tolist()
         where = f"{name}_{column}_m" if column else "t_s"
         raise UsageError(f"row {row + 1} of the drive, {where}: not finite. Give a number in every column.")
-    if np.any(np.diff(times) <= 0.0):
-        row = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
-        raise UsageError(f"t_s = {times[row + 1]:g} s in row {row + 2} of the drive: not after row {row + 1}. Sort the rows.")
-    if np.any(np.diff(times) < CLOSEST):
-        row = int(np.flatnonzero(np.diff(times) < CLOSEST)[0])
-        raise UsageError(
-            f"t_s = {times[row + 1]:.9g} s in row {row + 2} of the drive: {times[row + 1] - times[row]:.2g} s after row "
-            f"{row + 1}, {CLOSEST:g} s at least. Leave one of the two out."
-        )
+    if np.any((spans := np.diff(times)) < CLOSEST):
+        row = int(np.argmax(spans < CLOSEST))
+        where = f"t_s = {times[row + 1]:.9g} s in row {row + 2} of the drive"
+        if spans[row] <= 0.0:
+            raise UsageError(f"{where}: not after row {row + 1}. Sort the rows.")
+        raise UsageError(f"{where}: {spans[row]:.2g} s after row {row + 1}, {CLOSEST:g} s at least. Leave one of the two out.")
     if (steps := (times[-1] - times[0]) / dt) > MOST_STEPS:
         raise UsageError(
             f"t_s = {times[-1]:g} s in row {len(times)} of the drive: {steps:.2g} steps of {dt:g} s, {MOST_STEPS:.2g} at most. "

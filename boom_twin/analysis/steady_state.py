@@ -1,8 +1,8 @@
 """Steady state under a periodic load at the tip: its Fourier series through the frequency response.
 
-The load stands for `SAMPLES` even instants of a period, of a long period as many as its harmonics up to `HIGHEST` need; every
-harmonic whose amplitude is above `NEGLIGIBLE` of the largest is answered by the boom linearised at rest, its mean by the static
-limit, and the answers are added up in time. Where a load goes straight from row to row its harmonics are exact
+The load stands for `INSTANTS` even instants of a period, of a long period as many as its harmonics up to `HIGHEST_HARMONIC`
+need; every harmonic whose amplitude is above `NEGLIGIBLE` of the largest is answered by the boom linearised at rest, its mean
+by the static limit, and the answers are added up in time. Where a load goes straight from row to row its harmonics are exact
 (`polygon_series`): instants of it alone would take what is faster than half their rate for something slower.
 """
 
@@ -19,32 +19,20 @@ from ..scene.schema import Scene
 from ..types import Array, ComplexArray
 from .frequency_response import LinearisedBoom, linearised_boom
 
-SAMPLES = 2048
-HIGHEST = 200.0
-"""Hz; far above what moves a boom."""
-PERIODS = (0.01, 2000.0)
-"""s, shortest and longest: the model ends at some 100 Hz, and harmonics cost time."""
-LARGEST = 1e7
-"""N; far above what any boom bears."""
-MOST_TERMS = 2e9
-"""Rows times harmonics that are summed one by one, where rows are not even in time."""
+INSTANTS = 2048
+HIGHEST_HARMONIC = 200.0  # Hz; far above what moves a boom
+PERIODS = (0.01, 2000.0)  # s, shortest and longest: the model ends at some 100 Hz, and harmonics cost time
+LARGEST_FORCE = 1e7  # N; far above what any boom bears
+MOST_TERMS = 2e9  # rows times harmonics that are summed one by one, where rows are not even in time
 NEGLIGIBLE = 1e-6
 
 
 @dataclass(frozen=True)
 class PeriodicLoad:
-    """A force at the tip that repeats.
+    """A force at the tip that repeats."""
 
-    Attributes
-    ----------
-    period : float
-        s.
-    forces : ndarray, shape (m, 2)
-        In x and y, N, at m even instants of a period, the first at its start.
-    """
-
-    period: float
-    forces: Array
+    period: float  # s
+    forces: Array  # (m, 2), x and y, N, at m even instants of a period, the first at its start
 
     @property
     def times(self) -> Array:
@@ -53,12 +41,9 @@ class PeriodicLoad:
 
 
 def pump_load(scene: Scene, frequency: float, height: float, change_over: float = CHANGE_OVER) -> PeriodicLoad:
-    """Vertical pump pulses of `frequency` (Hz) and `height` (N): on for half of a period, flanks of `change_over` (s).
+    """Return vertical pump pulses of `frequency` (Hz) and `height` (N): on for half of a period, flanks of `change_over` (s).
 
-    Raises
-    ------
-    UsageError
-        A number is not positive, or flanks take longer than half a period.
+    UsageError for a number that is not positive, or flanks that take longer than half a period.
     """
     for name, value, unit in (("rate", frequency, "Hz"), ("height", height, "N"), ("change-over", change_over, "s")):
         if not 0.0 < value < math.inf:
@@ -74,28 +59,19 @@ def pump_load(scene: Scene, frequency: float, height: float, change_over: float 
 
 
 def load_of_rows(times: Array, forces: Array) -> PeriodicLoad:
-    """A load that goes straight from row to row, with harmonics up to `HIGHEST`; its last row is the first of the next period.
+    """Return a load that goes straight from row to row, with harmonics up to `HIGHEST_HARMONIC`.
 
-    Parameters
-    ----------
-    times : ndarray, shape (m,)
-        s, increasing; the period is from the first to the last.
-    forces : ndarray, shape (m, 2)
-        In x and y, N.
-
-    Raises
-    ------
-    UsageError
-        Fewer than three rows, a value that is not finite, times that do not increase, ends that differ.
+    `times` (m,), s, increase; `forces` (m, 2) are in x and y, N. The last row ends the period with the force of the first.
+    UsageError for fewer than three rows, values that are not finite, times that do not increase, or ends that differ.
     """
     if len(times) < 3:
         raise UsageError("load: give at least three rows of finite numbers t_s,fx_N,fy_N, one period of the force.")
-    usable = np.isfinite(times) & (np.abs(forces) <= LARGEST).all(axis=1)
+    usable = np.isfinite(times) & (np.abs(forces) <= LARGEST_FORCE).all(axis=1)
     if not usable.all():
         row = int(np.flatnonzero(~usable)[0])
         raise UsageError(
             f"row {row + 1} of the load: t_s = {times[row]:g} s, fx_N = {forces[row, 0]:g}, fy_N = {forces[row, 1]:g}: times "
-            f"must be finite, forces at most {LARGEST:g} N. Put it right."
+            f"must be finite, forces at most {LARGEST_FORCE:g} N. Put it right."
         )
     if np.any(np.diff(times) <= 0.0):
         row = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
@@ -116,32 +92,16 @@ def _instants(period: float) -> Array:
     low, high = PERIODS
     if not low <= period <= high:
         raise UsageError(f"load: its period of {period:g} s must be {low:g} to {high:g} s. Give another rate.")
-    count = 2 * max(SAMPLES // 2, math.ceil(HIGHEST * period))
+    count = 2 * max(INSTANTS // 2, math.ceil(HIGHEST_HARMONIC * period))
     return period * np.arange(count) / count
 
 
 def polygon_series(times: Array, values: Array, count: int) -> ComplexArray:
-    """Fourier coefficients 0 to `count` - 1 of what goes straight from row to row and repeats, exactly.
+    """Return the Fourier coefficients 0 to `count` - 1 of what goes straight from row to row and repeats, exactly.
 
     Its second derivative is a sum of impulses, as large as its slope changes at the rows, which gives
-    c_k = sum_j ds_j e^(-i w_k t_j) / (T (i w_k)^2), w_k = 2 pi k / T.
-
-    Parameters
-    ----------
-    times : ndarray, shape (m,)
-        s, increasing; the last ends the period.
-    values : ndarray, shape (m, columns)
-        The last as the first.
-    count : int
-
-    Returns
-    -------
-    ndarray of complex, shape (count, columns)
-
-    Raises
-    ------
-    UsageError
-        Rows uneven in time, and too many of them for so many coefficients.
+    c_k = sum_j ds_j e^(-i w_k t_j) / (T (i w_k)^2), w_k = 2 pi k / T. `times` (m,), s, increase, and the last ends the period;
+    `values` (m, columns) end as they begin. UsageError for rows uneven in time that are too many for so many coefficients.
     """
     period, rows = times[-1] - times[0], len(times) - 1
     slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
@@ -164,28 +124,15 @@ def polygon_series(times: Array, values: Array, count: int) -> ComplexArray:
 
 @dataclass(frozen=True)
 class SteadyState:
-    """One period of a boom's motion under a periodic load, about its equilibrium without it; n sections.
-
-    Attributes
-    ----------
-    load : PeriodicLoad
-    times : ndarray, shape (m,)
-        s.
-    tip, tip_acceleration : ndarray, shape (m, 2)
-        Displacement from the place at rest, m; m/s^2.
-    joints, cylinder_forces : ndarray, shape (m, n)
-        Changes, rad, N.
-    harmonics : ndarray, shape (k,)
-        Amplitude of the tip's displacement at 1, 2, .. times the rate of the load, m (0 where it has no such part).
-    """
+    """One period of a boom's motion under a periodic load, about its equilibrium without it; n sections."""
 
     load: PeriodicLoad
-    times: Array
-    tip: Array
-    tip_acceleration: Array
-    joints: Array
-    cylinder_forces: Array
-    harmonics: Array
+    times: Array  # (m,), s
+    tip: Array  # (m, 2), displacement from the place at rest, m
+    tip_acceleration: Array  # (m, 2), m/s^2
+    joints: Array  # (m, n), changes, rad
+    cylinder_forces: Array  # (m, n), changes, N
+    harmonics: Array  # (k,), amplitude of the tip's displacement at 1, 2, .. times the rate of the load, m
 
     @property
     def swing(self) -> float:
@@ -209,29 +156,9 @@ def swing_of(path: Array) -> float:
 
 
 def steady_state(scene: Scene, load: PeriodicLoad, strokes: Array | None = None, posture: str | None = None) -> SteadyState:
-    """Motion under a periodic load at the tip, when all that began with it has died away.
+    """Return the motion under a periodic load at the tip, when all that began with it has died away.
 
-    Parameters
-    ----------
-    scene : Scene
-        The boom, of n sections.
-    load : PeriodicLoad
-        See `pump_load`, `load_of_rows`.
-    strokes : ndarray, shape (n,), optional
-        Absolute strokes, m.
-    posture : str, optional
-        A posture of the scene; just one of strokes and posture is given.
-
-    Returns
-    -------
-    SteadyState
-
-    Raises
-    ------
-    UsageError
-        As `statics` does.
-    SolverError
-        No stable equilibrium was found.
+    The boom rests at absolute `strokes` (m) or in a `posture`, as for `statics`, whose errors this raises too.
     """
     return steady_state_of(linearised_boom(scene, strokes, posture), load)
 

@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 
 REMEDY = 'Run `pip install "boom_twin[batch]"`.'
 KILLED = "the workers that had it were ended from outside. Look for what ends them, as the system's memory."
-COUNT_PERIOD = 5
-"""Seconds between two counts of a cluster's workers."""
-CONNECT_TIMEOUT = 20.0
-"""Seconds for a scheduler to answer."""
+COUNT_PERIOD = 5  # seconds between two counts of a cluster's workers
+CONNECT_TIMEOUT = 20.0  # seconds for a scheduler to answer
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +38,8 @@ class Workers:
 def connected(scheduler: str | None, workers: int | None) -> Iterator[Workers]:
     """Yield the workers of the scheduler at an address (``tcp://host:8786``), or those of this process, which opens no port.
 
-    `workers` is the number of sessions at once on this machine, by default that of its cores.
-
-    Raises
-    ------
-    UsageError
-        Dask is not installed.
-    BagError
-        No scheduler answers there.
+    `workers` is the number of sessions at once on this machine, by default that of its cores. UsageError if Dask is not
+    installed, BagError if no scheduler answers there.
     """
     if scheduler is None:
         count = workers or os.cpu_count() or 1

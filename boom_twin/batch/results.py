@@ -22,8 +22,7 @@ from .session_task import ALARM, OK, Row
 MARK, TABLE, PAGE = "batch.json", "sessions.parquet", "batch.html"
 ROWS, SESSIONS = "rows", "sessions"
 """Folders of the rows, and of the replays."""
-DIGEST = "row_sha256"
-"""Key of a row's digest in its file, by which a change is detected."""
+DIGEST = "row_sha256"  # key of a row's digest in its file, by which a change is detected
 _OWN = frozenset({MARK, TABLE, PAGE, ROWS, SESSIONS})
 
 
@@ -31,12 +30,8 @@ _OWN = frozenset({MARK, TABLE, PAGE, ROWS, SESSIONS})
 def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
     """Make or reopen the folder of a batch and lock it against other batches.
 
-    None of the sessions to be read may lie in `out`, nor `out` in one of them.
-
-    Raises
-    ------
-    BagError
-        `out` holds anything else, another batch works in it, or it cannot be written.
+    None of the sessions to be read may lie in `out`, nor `out` in one of them. BagError if `out` holds anything else, another
+    batch works in it, or it cannot be written.
     """
     check_lasting(out)
     place = real_path(out)
@@ -55,18 +50,13 @@ def batch_folder(out: Path, sessions: Sequence[Path]) -> Iterator[BatchFolder]:
     except OSError as error:
         raise BagError(f"{out}: cannot be written ({error.strerror}). Choose a folder that can.") from None
     try:
-        _lock(lock, out)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise BagError(f"{out}: another `boom_twin batch` is at work there. Wait for its end, or choose another.") from None
         yield BatchFolder(place, lock)
     finally:
         os.close(lock)
-
-
-def _lock(lock: int, out: Path) -> None:
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        busy = "another `boom_twin batch` is at work there. Wait for its end, or choose another folder."
-        raise BagError(f"{out}: {busy}") from None
 
 
 class BatchFolder:
@@ -82,10 +72,7 @@ class BatchFolder:
     def kept(self, key: str, fingerprint: str) -> Row | None:
         """Return the row of a session if it is finished and its `fingerprint` is equal; None otherwise.
 
-        Raises
-        ------
-        BagError
-            The file was changed since `keep` wrote it.
+        BagError if the file was changed since `keep` wrote it.
         """
         file = self.folder / ROWS / f"{key}.json"
         try:

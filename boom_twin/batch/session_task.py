@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
 OK, FAILED = "ok", "failed"
 """Status of a row."""
-ALARM = ("channel", "kind", "from_s", "to_s", "cause", "told")
-"""Keys of an alarm in a row."""
+ALARM = ("channel", "kind", "from_s", "to_s", "cause", "told")  # keys of an alarm in a row
 Row = dict[str, Any]
 
 
@@ -77,13 +76,7 @@ def _head(task: SessionTask) -> Row:
 
 
 def row_of(task: SessionTask) -> Row:
-    """Replay a session and return its row.
-
-    Raises
-    ------
-    BoomTwinError
-        The replay fails, see `boom_twin.offline.replay.replay`.
-    """
+    """Replay a session and return its row; errors are those of `boom_twin.offline.replay.replay`."""
     from ..bag.reader import files_sha256
     from ..bag.session_model import scene_of, settings_of
     from ..bag.time_window import TimeWindow

@@ -13,23 +13,15 @@ from ..bag.session_sheet import sheet_path
 from ..bag.storages import is_session
 from ..errors import UsageError
 
-LIST = ".txt"
-"""Suffix of a file that lists sessions."""
+LIST = ".txt"  # suffix of a file that lists sessions
 
 
 def sessions_of(sources: Iterable[str]) -> list[Path]:
     """Return all sessions of the sources, each once, in the order of the sources.
 
-    Parameters
-    ----------
-    sources : iterable of str
-        Paths of sessions, globs, or files ``*.txt`` with one of these a line, where ``#`` begins a comment; relative paths in
-        a file are those from its folder. A path without wildcards is taken as it is, whether it is there or not.
-
-    Raises
-    ------
-    UsageError
-        A glob fits no session, or a list cannot be read or is empty.
+    Sources are paths of sessions, globs, or files ``*.txt`` with one of these a line, where ``#`` begins a comment. Relative
+    paths in a file start at its folder. A path without wildcards is taken as it is, whether it is there or not. UsageError if
+    a glob fits no session, or a list cannot be read or is empty.
     """
     found: dict[str, Path] = {}
     for source in sources:

@@ -13,10 +13,8 @@ from dataclasses import dataclass
 from tempfile import TemporaryFile
 from threading import Thread
 
-LOOK_PERIOD = 0.1
-"""Seconds between two measurements of the memory."""
-STDERR_BYTES = 2000
-"""Number of last bytes of a process's stderr that are reported."""
+LOOK_PERIOD = 0.1  # seconds between two measurements of the memory
+STDERR_BYTES = 2000  # number of last bytes of a process's stderr that are reported
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from ..plots.extreme_rows import ExtremeRows
 from ..plots.health import SLOW
 from ..plots.residuals import running_mean
 from ..plots.session_distributions import SessionDistributionsBuilder
-from ..plots.tip import WINDOW
+from ..plots.tip import ENLARGED_SPAN
 from ..scene.kinematics import gravity_in_base
 from ..scene.schema import Scene
 from ..types import NANO, Array, Stream, channels_of
@@ -100,7 +100,7 @@ class HistoryBuilder:
         stamps = next(iter(table.columns.values()))
         if table is not self._predicted and table is not self._imu:
             return np.zeros(len(stamps), bool)
-        return np.asarray((np.abs(stamps - self._peak_at) <= WINDOW) | (stamps >= stamps[-1] - WINDOW))
+        return np.asarray((np.abs(stamps - self._peak_at) <= ENLARGED_SPAN) | (stamps >= stamps[-1] - ENLARGED_SPAN))
 
     def history(self, recording: Recording) -> History:
         """Return the history of all stretches so far; at least one."""

@@ -18,10 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.text import Annotation
 
-COLOURS = {"kN": ORANGE, "Hz": GREEN, "kN m": PURPLE, "MPa": SKY}
-"""Colours of bars, by unit."""
+COLOURS = {"kN": ORANGE, "Hz": GREEN, "kN m": PURPLE, "MPa": SKY}  # colours of bars, by unit
 GAP = 16.0  # pixels between a bar, its words and the edge
-LEAST_SHARE = 0.1  # of the width, that is left for bars however long the words are
+LEAST_BAR_WIDTH = 0.1  # of the width, that is left for bars however long the words are
 
 
 def envelope_picture(path: Path, scene: Scene, found: Envelope, ranges: list[tuple[str, Array]]) -> None:
@@ -90,7 +89,7 @@ def _make_room(axes: Axes, labels: list[Annotation]) -> None:
     room = np.array([label.get_window_extent().width + GAP for label in labels])
     sides = np.array([-1.0 if label.get_horizontalalignment() == "right" else 1.0 for label in labels])
     span = float(np.ptp(ends)) or 1.0
-    for share in np.linspace(1.0, LEAST_SHARE, 50):  # of the width, for what the bars span
+    for share in np.linspace(1.0, LEAST_BAR_WIDTH, 50):  # of the width, for what the bars span
         reach = ends + sides * room * span / (share * width)
         if np.ptp(reach) <= span / share:
             break

@@ -11,23 +11,11 @@ from ..types import Array
 
 
 class ExtremeRows:
-    """Table of arrays side by side that keeps all rows while they are few, and of more rows the extremes in bins.
+    """Table of arrays side by side, `columns`, that keeps all rows while they are few, and of more rows the extremes in bins.
 
     A row stays if it has the least or the largest value of a key in its bin of consecutive rows. So a curve through the rows
     that are left spans in every bin what all rows spanned. Bins get twice as wide whenever `most` rows are not enough: the
-    extremes of a wide bin are among those of its halves.
-
-    Parameters
-    ----------
-    most : int
-        Rows from which on they are thinned out.
-    keys : sequence of str
-        Columns whose extremes are to be seen.
-
-    Attributes
-    ----------
-    columns : dict of str to ndarray, shapes (k, ..)
-        The rows that are left; none before the first `add`.
+    extremes of a wide bin are among those of its halves. `keys` are the columns whose extremes are to be seen.
     """
 
     def __init__(self, most: int, keys: Sequence[str]) -> None:

@@ -59,8 +59,7 @@ def frequency_picture(
         legend_above(axes, 2)
 
 
-SLOW = 4.0
-"""s of the running mean that stands for the static part."""
+SLOW = 4.0  # s of the running mean that stands for the static part
 
 
 def moment_picture(path: Path, session: str, history: History, rows: list[tuple[str, int]], note: str) -> None:

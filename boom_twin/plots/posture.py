@@ -43,7 +43,7 @@ def spread(count: int, most: int) -> list[int]:
 
 
 COLUMNS = 4
-WIDTH = 4.2  # width of a panel, hundreds of pixels
+PANEL_WIDTH = 4.2  # width of a panel, hundreds of pixels
 MICRO = 1e6
 ROOM = 1.25  # least half width of a panel, in clearances
 
@@ -52,7 +52,7 @@ def orbits_picture(path: Path, title: str, orbits: Orbits, note: str = "") -> No
     """Write the picture of journal paths, one panel per pin."""
     columns = max(2, min(COLUMNS, len(orbits.names)))
     rows = -(-len(orbits.names) // columns)
-    with picture(path, title, note, (WIDTH * columns + 1.0, WIDTH * rows + 1.1)) as figure:
+    with picture(path, title, note, (PANEL_WIDTH * columns + 1.0, PANEL_WIDTH * rows + 1.1)) as figure:
         panels = figure.subplots(rows, columns, squeeze=False)
         colours = colours_of_times(figure, panels, orbits.times, "time, s (orange: in flight)")
         for number, axes in enumerate(panels.flat):

@@ -80,7 +80,7 @@ def _distribution(axes: Axes, found: ResidualDistribution) -> None:
         axes.text(0.98, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=11, color=INK)
 
 
-SHORTEST = 4.0  # s; no spectrum of less
+SHORTEST_SPECTRUM = 4.0  # s; no spectrum of less
 
 
 def spectrum_picture(path: Path, session: str, history: History, note: str) -> None:
@@ -104,7 +104,7 @@ def spectrum_picture(path: Path, session: str, history: History, note: str) -> N
 
 def has_spectrum(history: History) -> bool:
     """Return True if the session is long enough for a spectrum."""
-    return bool(len(history.stamps_s) > 16 and history.stamps_s[-1] - history.stamps_s[0] >= SHORTEST)
+    return bool(len(history.stamps_s) > 16 and history.stamps_s[-1] - history.stamps_s[0] >= SHORTEST_SPECTRUM)
 
 
 def _curve(found: Density) -> tuple[Array, Array]:

@@ -20,15 +20,11 @@ from .tip import tip_picture
 def replay_pictures(
     directory: Path, history: History, truth: Truth | None = None, *, session: str = "session", note: str = ""
 ) -> list[Path]:
-    """Draw what was replayed into a directory, which is made if it is not there.
+    """Draw what was replayed into a directory, which is made if it is not there; return the written files.
 
-    `session` is its name for the titles, and `note` small print such as "synthetic session of a virtual rig".
-
-    Returns
-    -------
-    list of Path
-        ``tip.png``, ``residuals.png`` (if there are channels), ``posture.png`` (if there are shapes), ``spectrum.png``
-        (from 4 s on); none at all if nothing was predicted. The same arrays give the same bytes.
+    These are ``tip.png``, ``residuals.png`` (if there are channels), ``posture.png`` (if there are shapes), ``spectrum.png``
+    (from 4 s on); none at all if nothing was predicted. The same arrays give the same bytes. `session` is its name for the
+    titles, and `note` small print such as "synthetic session of a virtual rig".
     """
     if len(history.stamps_s) == 0:
         return []
@@ -47,8 +43,7 @@ def replay_pictures(
     return written
 
 
-SHOWN = 30.0
-"""Standard deviations at which a bar is cut off, with its number beside it."""
+SHOWN = 30.0  # standard deviations at which a bar is cut off, with its number beside it
 
 
 def compare_picture(path: Path, title: str, names: list[str], apart: list[float], sure: float) -> None:

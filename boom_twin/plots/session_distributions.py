@@ -14,8 +14,7 @@ from .history import Density, History, ResidualDistribution, SessionDistribution
 
 EDGES = np.linspace(-5.0, 5.0, 51)
 """Edges of the bins of normalised residuals. Residuals outside count in the outermost bins."""
-SEGMENT = 8.0
-"""s; lines of a spectrum are 1/SEGMENT apart."""
+SEGMENT = 8.0  # s; lines of a spectrum are 1/SEGMENT apart
 
 
 class SessionDistributionsBuilder:

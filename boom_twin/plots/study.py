@@ -38,24 +38,14 @@ class Curve:
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves on one pair of axes.
-
-    Attributes
-    ----------
-    front : tuple of (float, float)
-        Seconds and errors of the Pareto front, fastest first.
-    chosen : (float, float), optional
-        The default.
-    floor : float, optional
-        Below it errors are not known: the references differ by so much.
-    """
+    """Curves on one pair of axes."""
 
     title: str
     label: str
     curves: tuple[Curve, ...]
-    front: tuple[tuple[float, float], ...] = ()
-    chosen: tuple[float, float] | None = None
-    floor: float | None = None
+    front: tuple[tuple[float, float], ...] = ()  # seconds and errors of the Pareto front, fastest first
+    chosen: tuple[float, float] | None = None  # the default
+    floor: float | None = None  # below it errors are not known: the references differ by so much
 
 
 def work_precision_picture(path: Path, title: str, note: str, panels: Sequence[Panel], size: tuple[float, float]) -> None:
@@ -120,27 +110,18 @@ def _marks(axes: Axes, panel: Panel) -> None:
         axes.set_ylim(bottom=low)
 
 
-LEAST = 1e-4  # mm; errors below are drawn as this
+LEAST_ERROR = 1e-4  # mm; errors below are drawn as this
 ROW = 0.3  # height of a row, hundreds of pixels
 
 
 @dataclass(frozen=True)
 class Bars:
-    """k variants of a model, ascending in error.
-
-    Attributes
-    ----------
-    names : tuple of str
-    rest, move : ndarray, shape (k,)
-        Largest distance of the tip from the full model's, at rest and in a move, m.
-    saved : ndarray, shape (k,)
-        Share of run time saved.
-    """
+    """k variants of a model, ascending in error."""
 
     names: tuple[str, ...]
-    rest: Array
-    move: Array
-    saved: Array
+    rest: Array  # (k,), largest distance of the tip from the full model's at rest, m
+    move: Array  # (k,), likewise in a move
+    saved: Array  # (k,), share of run time saved
 
 
 def parts_picture(path: Path, bars: Bars, note: str) -> None:
@@ -160,9 +141,11 @@ def parts_picture(path: Path, bars: Bars, note: str) -> None:
 
 def _errors(axes: Axes, bars: Bars, rows: Array) -> None:
     for values, shift, colour, label in ((bars.rest, -0.19, BLUE, "at rest"), (bars.move, 0.19, ORANGE, "in the move")):
-        axes.barh(rows + shift, np.maximum(1e3 * values, LEAST) - LEAST, 0.36, left=LEAST, color=colour, label=label)
+        axes.barh(
+            rows + shift, np.maximum(1e3 * values, LEAST_ERROR) - LEAST_ERROR, 0.36, left=LEAST_ERROR, color=colour, label=label
+        )
     axes.set_xscale("log")
-    axes.set_xlim(LEAST, 2e3 * max(float(np.max([bars.rest, bars.move])), LEAST))
+    axes.set_xlim(LEAST_ERROR, 2e3 * max(float(np.max([bars.rest, bars.move])), LEAST_ERROR))
     axes.axvline(1.0, color=GREY, linewidth=1.0, linestyle="--")
     axes.set_xlabel("largest error of the tip, mm (dashed: 1 mm)")
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)

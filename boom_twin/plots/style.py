@@ -30,8 +30,7 @@ TONES = ((BLUE, "o"), (ORANGE, "s"), (GREEN, "D"), (PURPLE, "^"), (SKY, "v"), (I
 """Colour and marker of each curve in a group."""
 DPI = 100
 MARGIN = 0.08  # fraction of the data range, left free above and below
-TIME = "time since first sample, s"
-"""Label of time axes."""
+TIME = "time since first sample, s"  # label of time axes
 NOTE = 70  # longest note beside a title, characters
 
 LOOK = {

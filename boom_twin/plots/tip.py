@@ -9,27 +9,12 @@ import numpy as np
 
 from ..types import Array
 from .history import History, Truth
-from .style import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PALE,
-    PURPLE,
-    TIME,
-    broken,
-    extent,
-    legend_above,
-    limits,
-    picture,
-    shade_gaps,
-)  # fmt: skip
+from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, TIME, broken, extent, legend_above, limits, picture, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-WINDOW = 6.0  # s shown enlarged
+ENLARGED_SPAN = 6.0  # s shown enlarged
 TRUTH: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (3, 4))}
 PREDICTED, ESTIMATED = (BLUE, ORANGE), (GREEN, PURPLE)
 """Colours of x and y."""
@@ -65,14 +50,14 @@ def tip_picture(path: Path, session: str, history: History, truth: Truth | None,
 
 
 def most_active_window(stamps: Array, acceleration: Array) -> tuple[float, float]:
-    """Return the window of `WINDOW` s about the largest acceleration (m, 2), inside the session; all of a shorter session."""
+    """Return the span of `ENLARGED_SPAN` s about the largest acceleration (m, 2) in a session; all of a shorter session."""
     size = np.hypot(acceleration[:, 0], acceleration[:, 1])
     if not np.isfinite(size).any():
-        return 0.0, WINDOW
+        return 0.0, ENLARGED_SPAN
     first, last = float(stamps[0]), float(stamps[-1])
-    start = float(stamps[np.nanargmax(size)]) - 0.35 * WINDOW
-    start = max(first, min(start, last - WINDOW))
-    return start, min(start + WINDOW, max(last, first + 1e-3))
+    start = float(stamps[np.nanargmax(size)]) - 0.35 * ENLARGED_SPAN
+    start = max(first, min(start, last - ENLARGED_SPAN))
+    return start, min(start + ENLARGED_SPAN, max(last, first + 1e-3))
 
 
 def _panels(history: History, truth: Truth | None) -> list[Panel]:

@@ -19,58 +19,33 @@ from ..scene.kinematics import posture_angles, strokes_of_posture
 from ..scene.schema import Scene
 from ..types import Array
 
-STEP = 1e-3  # s
-EVERY = 4
+COMPARED_STEP = 1e-3  # s
+COMPARED_EVERY = 4
 FREQUENCIES = 3
-WIDTH = 1e-7  # relative, of a frequency's bracket
+FREQUENCY_ACCURACY = 1e-7  # relative, of a frequency's bracket
 
 
 @dataclass(frozen=True)
 class StrokeCourse:
-    """Course on which all models are compared: strokes at rest and a move.
+    """Course on which all models are compared: strokes at rest and a move."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        The postures, m of them, then "start of the move".
-    strokes, angles : ndarray, shape (m + 1, n)
-        Strokes (m), and joint angles (rad) of the undeformed boom there.
-    motion : Motion
-    step : float
-        s; the tip is compared after every `every` of them.
-    """
-
-    names: tuple[str, ...]
-    strokes: Array
-    angles: Array
+    names: tuple[str, ...]  # the postures, m of them, then "start of the move"
+    strokes: Array  # (m + 1, n), strokes, m
+    angles: Array  # (m + 1, n), joint angles of the undeformed boom there, rad
     motion: Motion
-    step: float = STEP
-    every: int = EVERY
+    step: float = COMPARED_STEP  # s; the tip is compared after every `every` of them
+    every: int = COMPARED_EVERY
 
 
 @dataclass(frozen=True)
 class Response:
-    """Response of a model on a course.
+    """Response of a model on a course."""
 
-    Attributes
-    ----------
-    rest : ndarray, shape (m + 1, 2)
-        Tip at rest, m.
-    frequencies : ndarray, shape (up to `FREQUENCIES`,)
-        Hz, about the rest at the start of the move; empty if they were not asked for.
-    tip : ndarray, shape (rows, 2)
-        Tip in the move, m.
-    seconds : float
-        Stepping of the move alone.
-    status : str
-        "ok", or the sentence that says why there are no numbers.
-    """
-
-    rest: Array
-    frequencies: Array
-    tip: Array
-    seconds: float
-    status: str
+    rest: Array  # (m + 1, 2), tip at rest, m
+    frequencies: Array  # (up to `FREQUENCIES`,), Hz, at rest at the start of the move; empty if not asked for
+    tip: Array  # (rows, 2), tip in the move, m
+    seconds: float  # CPU time of stepping the move
+    status: str  # "ok", or the sentence that says why there are no numbers
 
 
 @dataclass(frozen=True)
@@ -119,7 +94,7 @@ def _at_rest(plan: Plan, course: StrokeCourse, frequencies: int) -> tuple[Array,
     for k, (strokes, angles) in enumerate(zip(course.strokes, course.angles, strict=True)):
         settle(plan, state, work, strokes, angles)
         tips[k] = state.frames[-1, :2]
-    modes = natural_modes(plan, state, work, frequencies, WIDTH)
+    modes = natural_modes(plan, state, work, frequencies, FREQUENCY_ACCURACY)
     return tips, np.array([mode.frequency for mode in modes])
 
 
@@ -136,7 +111,7 @@ def deviation(model: Response, full: Response, course: StrokeCourse) -> Deviatio
 # In unknowns, measured on the default boom (`test/bench/parts.py` shows how well they count):
 AXIAL = 0.35  # an axial coordinate; other unknowns count as one
 OTHER = 0.6  # more for a flexible part that has not the usual shapes, for which the kernels have code of their own
-SHARE = 0.05  # a coordinate of a mass, or a point that turns finitely
+COORDINATE_COST = 0.05  # a coordinate of a mass, or a point that turns finitely
 
 STEPS = 400  # that are timed
 
@@ -152,7 +127,7 @@ def size(scene: Scene) -> float:
     unknowns, beams = len(plan.names), plan.tables.beams
     other = np.sum((beams.bending != USUAL.bending) | (beams.axial != USUAL.axial))
     shares = len(plan.masses) - unknowns + beams.finite.sum()
-    return float(unknowns - (1.0 - AXIAL) * beams.axial.sum() + OTHER * other + SHARE * shares)
+    return float(unknowns - (1.0 - AXIAL) * beams.axial.sum() + OTHER * other + COORDINATE_COST * shares)
 
 
 def step_times(scenes: Sequence[Scene], course: StrokeCourse, rounds: int) -> Array:

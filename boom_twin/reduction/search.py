@@ -21,63 +21,30 @@ from .deviation import Deviation, Response, StrokeCourse, answer, course_of, dev
 from .variants import FEWER_MODES, KINDS, Variant, VariantKind, without
 
 GROUPS = 8  # sections are left out one by one up to so many; on a longer boom so many runs of neighbours
-ROUNDS = 30
+TIMED_RUNS = 30
 
 Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """Result of a search: the lean scene and its deviation.
+    """Result of a search: the lean scene and its deviation."""
 
-    Attributes
-    ----------
-    scene : Scene
-        The lean one.
-    edits : tuple of Edit
-        From the scene that the search started from to the lean one.
-    deviation : Deviation
-        Of the tip from the full model's, all together.
-    course : StrokeCourse
-        On which it was measured.
-    unknowns : tuple of int
-        Of a step of the full and of the lean model.
-    seconds : tuple of float
-        A step of either takes, s; the least of interleaved runs of the move.
-    next : tuple of str and float, or None
-        What would have to go next, and the error (m) that this would lead to.
-    """
-
-    scene: Scene
-    edits: tuple[Edit, ...]
-    deviation: Deviation
-    course: StrokeCourse
-    unknowns: tuple[int, int]
-    seconds: tuple[float, float]
-    next: tuple[str, float] | None
+    scene: Scene  # the lean one
+    edits: tuple[Edit, ...]  # from the scene that the search started from to the lean one
+    deviation: Deviation  # of the lean model's tip from the full model's
+    course: StrokeCourse  # on which the deviation was measured
+    unknowns: tuple[int, int]  # of a step of the full and of the lean model
+    seconds: tuple[float, float]  # a step of either takes, s; the least of interleaved runs of the move
+    next: tuple[str, float] | None  # what would have to go next, and the error (m) that this would lead to
 
 
 def propose(full: Scene, most: float, start: Scene | None = None, progress: Progress = lambda _: None) -> Proposal:
     """Look for the leanest model whose tip stays within `most` (m) of that of the scene `full`.
 
-    Parameters
-    ----------
-    start : Scene, optional
-        A model of the same boom to start from, by default `full` itself.
-    progress : callable, optional
-        Told in words what is being done.
-
-    Returns
-    -------
-    Proposal
-        The lean scene, what was left out of it, its error at rest and in a move, and what a step costs.
-
-    Raises
-    ------
-    UsageError
-        `most` is not positive; `start` is another boom, or is further off than `most` already.
-    SolverError
-        The full model itself has no equilibrium or fails in the move.
+    The search begins with `start`, a model of the same boom, by default `full` itself; `progress` is told in words what is
+    done. UsageError if `most` is not positive, or `start` is another boom or further off already. SolverError if the full
+    model itself has no equilibrium or fails in the move.
     """
     if not (math.isfinite(most) and most > 0.0):
         raise UsageError(f"need = {most!r} m: must be positive. Give for example 0.001.")
@@ -87,7 +54,7 @@ def propose(full: Scene, most: float, start: Scene | None = None, progress: Prog
     lean = search.model()
     found = search.measured(search.edits)
     progress("measuring run times")
-    times = step_times((full, lean), search.course, ROUNDS)
+    times = step_times((full, lean), search.course, TIMED_RUNS)
     counts = (unknowns(full), unknowns(lean))
     return Proposal(lean, search.edits, found, search.course, counts, (float(times[0]), float(times[1])), search.next)
 
@@ -96,7 +63,9 @@ class _Search:
     """The present model, as edits of the one that the search started from, and all errors measured so far."""
 
     def __init__(self, full: Scene, start: Scene, most: float, progress: Progress) -> None:
-        _check_same_boom(full, start)
+        one, other = ([section.length for section in scene.sections] for scene in (full, start))
+        if one != other:
+            raise UsageError(f"lengths of sections = {other}: the full scene has {one}. Give two scenes of the same boom.")
         self.start, self.most, self.progress = start, most, progress
         self.course = course_of(full)
         self.edits: tuple[Edit, ...] = ()
@@ -174,10 +143,3 @@ class _Search:
             return None
         added = self.measured(trial[1]).worst - self.measured(self.edits).worst
         return added / (self.size(self.edits) - self.size(trial[1])), number, kind, where
-
-
-def _check_same_boom(full: Scene, start: Scene) -> None:
-    """Raise unless both have the sections of the same lengths."""
-    one, other = ([section.length for section in scene.sections] for scene in (full, start))
-    if one != other:
-        raise UsageError(f"lengths of sections = {other}: the full scene has {one}. Give two scenes of the same boom.")

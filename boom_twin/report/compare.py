@@ -32,12 +32,8 @@ class ComparedSession:
 def side_of(path: Path, replayed: Callable[[Path], Path], window: TimeWindow = WHOLE) -> ComparedSession:
     """Return one side from a replay folder, or from a session that `replayed` makes one of, for the `window`.
 
-    Raises
-    ------
-    BagError
-        The session cannot be replayed, or the folder is incomplete, lacks figures or has none that can be read.
-    UsageError
-        A window of a replay folder, which has its own.
+    BagError if the session cannot be replayed, or the folder is incomplete or without figures that can be read. UsageError
+    for a window of a replay folder, which has its own.
     """
     is_replay = holds_file(path / "summary.json")
     if is_replay and (told := incompleteness(path)):

@@ -49,15 +49,8 @@ class Evaluation:
 class Evaluator:
     """Evaluation of a replay block by block. Its `add` is the function to give to `boom_twin.offline.replay.replay_into`.
 
-    Parameters
-    ----------
-    scene : Scene
-    settings : Settings
-        Of the replay.
-    heights : ndarray, shape (n,), optional
-        Of the sections, m, for the stresses; by default those of the scene, or of thin-walled boxes.
-    category : float, optional
-        Detail category (MPa) for the fatigue of all stations; without it fatigue is not computed.
+    `heights` (n,) of the sections, m, are for the stresses, see `boom_twin.analysis.bending_stress.section_moduli`. Fatigue is
+    computed for a detail `category` (MPa), without one not at all.
     """
 
     def __init__(self, scene: Scene, settings: Settings, heights: Array | None = None, category: float | None = None) -> None:
@@ -83,7 +76,7 @@ class Evaluator:
             self._scene,
             self._history.history(result.recording),
             rests,
-            self._quantities.loads(self._heights),
+            self._quantities.loads.most_loaded(self._heights),
             heights,
             [] if self._fatigue is None else self._fatigue.results(),
             self._category,
@@ -101,18 +94,9 @@ def evaluated_replay(
     category: float | None = None,
     also: Callable[[Stretch], None] | None = None,
 ) -> Evaluation:
-    """Replay a session as `replay_into` does, with its figures; return its evaluation.
+    """Replay a session into the folder `building` as `replay_into` does, with its figures; return its evaluation.
 
-    Parameters
-    ----------
-    building : UnfinishedResult
-        Folder of the replay.
-    bag, scene, settings, options
-        See `boom_twin.offline.replay.replay_into`.
-    heights, category
-        See `Evaluator`.
-    also : callable, optional
-        Is given each stretch too.
+    `heights` and `category` are those of `Evaluator`; `also` is given each stretch too.
     """
     evaluator = Evaluator(scene.scene, settings, heights, category)
 

@@ -25,8 +25,7 @@ from ..plots import History
 from ..scene.schema import Scene
 from ..types import Array
 
-CATEGORY = 71.0
-"""MPa, of a welded box where nothing better is known."""
+CATEGORY = 71.0  # MPa, of a welded box where nothing better is known
 CUT_OFF_CYCLES = 1e8
 KNEE_CYCLES = 5e6
 CATEGORY_CYCLES = 2e6

@@ -25,10 +25,8 @@ from ..types import Array, Stream, sensor_kind, stream_of
 from .vibration import RestPeriod
 
 FILE_NAME = "quantities.json"
-BATCHES = 10
-"""Number of batches for the standard deviation of a mean (method of batch means)."""
-LEG = 1e-3
-"""Reversal (m) of a stroke that begins a new leg."""
+BATCHES = 10  # number of batches for the standard deviation of a mean (method of batch means)
+LEG = 1e-3  # reversal (m) of a stroke that begins a new leg
 MODEL_ERROR: dict[Stream | None, float] = {Stream.ANGLES: 5e-5, Stream.IMU: 0.02}
 """Standard deviation of the model error of a reading in one posture, by stream; rad, m/s^2."""
 FREQUENCY_ERROR = 0.01  # relative standard deviation of the model's natural frequencies in one posture
@@ -52,7 +50,7 @@ class QuantityBuilder:
         self._channels: dict[str, tuple[BatchMeans, BatchMeans]] = {}  # means of values and of squares
         self._displacement = self._acceleration = 0.0
         self._travels = [PathLength() for _ in scene.joints]
-        self._loads = SectionLoads(scene)
+        self.loads = SectionLoads(scene)
 
     def add(self, history: History, load: Array, variance: Array) -> None:
         """Add the next block of rows; `load` and `variance` as for `SectionLoads.add`."""
@@ -65,11 +63,7 @@ class QuantityBuilder:
         self._acceleration = max(self._acceleration, float(np.hypot(*history.tip_acceleration.T).max()))
         for travel, stroke in zip(self._travels, history.strokes.T, strict=True):
             travel.add(stroke)
-        self._loads.add(history, load, variance)
-
-    def loads(self, heights: Array | None) -> list[Load]:
-        """Return the result of `SectionLoads.loads`."""
-        return self._loads.loads(heights)
+        self.loads.add(history, load, variance)
 
     def quantities(self, tip_sigma: float | None, rests: list[RestPeriod], settings: Settings) -> list[Quantity]:
         """Return all quantities; `tip_sigma` is the largest standard deviation of the predicted tip, m, or None."""
@@ -79,8 +73,8 @@ class QuantityBuilder:
             Quantity("tip_displacement_max", self._displacement, tip_sigma, "m"),
             Quantity("tip_acceleration_max", self._acceleration, None, "m/s^2"),
             *(
-                Quantity(f"bending_moment_max_section_{load.station.section + 1}", abs(load.moment), None, "N m")
-                for load in self.loads(None)
+                Quantity(f"bending_moment_max_section_{section + 1}", moment, None, "N m")
+                for section, moment in self.loads.moments.items()
             ),
             *self._stroke_travels(settings),
         ]
@@ -243,7 +237,12 @@ class SectionLoads:
                 about = (each[row].copy() for each in (history.strokes, history.joints, load, variance))
                 self._largest[section] = _Largest(column, moment, when, static, *about)
 
-    def loads(self, heights: Array | None) -> list[Load]:
+    @property
+    def moments(self) -> dict[int, float]:
+        """Size (N m) of the largest moment so far by section, counted from 0."""
+        return {section: abs(own.moment) for section, own in self._largest.items()}
+
+    def most_loaded(self, heights: Array | None) -> list[Load]:
         """Return the load of every flexible section.
 
         `heights` (n,) are the section heights, m. None: those of the scene, else those of thin-walled boxes.

@@ -110,7 +110,7 @@ class RestFinder:
         if not len(times):
             return 0.0
         needed = float(times[-1]) - SPEED_SPAN
-        for start, stop in [span for part in unbroken(times) for span in still(times[part], strokes[part], 0.0)]:
+        for start, stop in [span for part in unbroken(times) for span in still(times[part], strokes[part])]:
             is_open = not is_last and stop > times[-1] - SPEED_SPAN
             if start <= self._evaluated_to:
                 self._evaluated_to = stop
@@ -142,8 +142,8 @@ def course(history: History, scene: Scene) -> tuple[Array, Array]:
     return history.stamps_s[places], table
 
 
-def still(times: Array, strokes: Array, least: float = SHORTEST_REST) -> list[tuple[float, float]]:
-    """Return begin and end (s) of intervals of `least` seconds in which no stroke (k, n) was faster than `STILL_SPEED`."""
+def still(times: Array, strokes: Array) -> list[tuple[float, float]]:
+    """Return begin and end (s) of the intervals in which no stroke (k, n) was faster than `STILL_SPEED`."""
     if len(times) < 2:
         return []
     half = SPEED_SPAN / 2
@@ -151,8 +151,7 @@ def still(times: Array, strokes: Array, least: float = SHORTEST_REST) -> list[tu
     span = np.maximum(times[after] - times[before], 1e-9)
     calm = np.abs(strokes[after] - strokes[before]).max(axis=1) < STILL_SPEED * span
     edges = np.flatnonzero(np.diff(np.concatenate([[0], calm.astype(int), [0]])))
-    spans = [(float(times[a]), float(times[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    return [(start, stop) for start, stop in spans if stop - start >= least]
+    return [(float(times[a]), float(times[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def measured_motion(history: History) -> Series:

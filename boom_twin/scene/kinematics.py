@@ -115,7 +115,11 @@ def posture_angles(scene: Scene, posture: str) -> Array:
 
 def strokes_of_posture(scene: Scene, posture: str) -> Array:
     """Return the strokes (m), shape (n,), that bring the undeformed boom to a posture, see `section_angles`."""
-    relative = posture_angles(scene, posture)
+    return strokes_of_angles(scene, posture_angles(scene, posture))
+
+
+def strokes_of_angles(scene: Scene, relative: Array) -> Array:
+    """Return the strokes (m), shape (n,), of the undeformed boom at `relative` joint angles (rad); NaN if links are open."""
     return np.array([stroke_curve(scene, i, relative[i : i + 1])[0] for i in range(len(scene.joints))])
 
 

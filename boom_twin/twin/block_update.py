@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.equilibrium import SHARE
+from ..analysis.doubts import VALID_DEFLECTION
 from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor, Drawn
 from ..health.blocks import MeasuredRows, PredictionRows
@@ -43,7 +43,7 @@ def limits_of(scene: Scene, boom: BoomPredictor, settings: Settings, absent: Col
         rate=settings.stroke_rate,
         shortest=np.full(boom.plan.joints, -far),
         longest=np.array([joint.cylinder.max_stroke for joint in scene.joints]) + far,
-        valid=SHARE * scene.reach,
+        valid=VALID_DEFLECTION * scene.reach,
         gravity=np.array(boom.plan.tables.gravity),
         inclination=scene.base.inclination,
         absolute=boom.posture.absolute,

@@ -7,7 +7,7 @@ import numpy as np
 from ..config.settings import Settings
 from ..errors import UsageError
 from ..health.monitor import warm_up
-from ..scene.kinematics import stroke_curve
+from ..scene.kinematics import strokes_of_angles
 from ..types import Health, Report, Sample, Stream
 from .block_update import CAPACITY
 from .blocks import CODES, STREAMS, ReportBlock, SampleBlock
@@ -131,7 +131,7 @@ class Twin(SampleTaker):
         """Compile every kernel, with a temporary twin of the same boom."""
         other = Twin(self.scene, self.settings, reads=self.reads)
         middle = np.radians([sum(joint.range_deg) / 2 for joint in self.scene.joints])
-        strokes = np.array([stroke_curve(self.scene, i, middle[i : i + 1])[0] for i in range(len(middle))])
+        strokes = strokes_of_angles(self.scene, middle)
         for k in range(20):
             other.update(Sample(Stream.STROKES, k * 5_000_000, strokes))
         other.update(Sample(Stream.ANGLES, 0, middle))

@@ -1,4 +1,4 @@
-"""A boom at rest on pins with clearance."""
+"""A boom at rest in a posture, on ideal pins or with clearance."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from boom_twin.analysis.equilibrium import settle
-from boom_twin.compiler.compile import compile_scene
+from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.compiler.plan import first_row, taken_apart
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
@@ -23,11 +22,14 @@ class Resting:
     forces: np.ndarray
 
 
+def at_rest(scene, posture, longer=0.0):
+    """Plan, state and scratch of a scene at a posture's strokes, all cylinders' drives `longer` (m, scalar or (n,))."""
+    return rest_at(scene, strokes_of_posture(scene, posture) + longer, posture_angles(scene, posture))
+
+
 def resting(scene, posture, longer=0.0):
-    """`Resting` of a scene at a posture's strokes, all cylinders' drives `longer` (m, scalar or (n,))."""
-    plan = compile_scene(scene)
-    state, work = plan.state(), plan.work()
-    settle(plan, state, work, strokes_of_posture(scene, posture) + longer, posture_angles(scene, posture))
+    """`Resting` of a scene, arguments as of `at_rest`."""
+    plan, state, _ = at_rest(scene, posture, longer)
     found = taken_apart(plan, first_row(plan, state))
     offsets = found.pins[:, 0] + 1j * found.pins[:, 1]
     sizes = found.pins[:, 2]

@@ -10,14 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.analysis.equilibrium import statics
-from boom_twin.analysis.simulate import simulate
+from boom_twin import Scene, load_scene, simulate, statics
 from boom_twin.cli.main import main
 from boom_twin.errors import SolverError, UsageError
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.load import default_text
-from boom_twin.scene.schema import Scene
 
 ABSURD = {
     "barrel": ("barrel: {mass: 12.0, inertia: 0.6", "barrel: {mass: 12.0, inertia: 1e+300"),

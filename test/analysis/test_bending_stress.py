@@ -6,61 +6,48 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from analysis.resting import at_rest
 from drive_twin import drive_twin
 
 from boom_twin import Sample, Stream, Twin, load_scene, statics
 from boom_twin.analysis.bending_moments import increments_by_tip_force, moments_by_unknowns, stations
 from boom_twin.analysis.bending_stress import BOX, BendingStressModel, section_moduli
-from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.motions import motion_of
+from boom_twin.analysis.simulate import course_of
 from boom_twin.deviation.estimate_row import WIDTH
 from boom_twin.errors import UsageError
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import estimate_of
 from boom_twin.types import StrokeReading
-from boom_twin.validation.rig.exudyn.solve import at_rest, move
-from boom_twin.validation.rig.exudyn.system import Boom
+from boom_twin.validation.rig.exudyn import solve
+from boom_twin.validation.rig.exudyn.system import Boom, section_frames
 
 SCENE = load_scene()
 ELEMENTS = 24
 LOADED = 3e6  # Pa; less is not looked at by its share
 
 
-def rest(posture, scene=SCENE):
-    return rest_at(scene, strokes_of_posture(scene, posture), posture_angles(scene, posture))
-
-
 def peer_moments(boom: Boom):
-    """Moments (N m) of the peer's elements in the middle of each, and its place: by section, ascending."""
+    """Moment (N m) in the middle of every beam element of the peer, and where it begins."""
     import exudyn
 
-    found = {}
-    system = boom.system
+    torque, position = exudyn.OutputVariableType.TorqueLocal, exudyn.OutputVariableType.Position
+    now, undeformed, system = exudyn.ConfigurationType.Current, exudyn.ConfigurationType.Reference, boom.system
     for number in range(system.systemData.NumberOfObjects()):
-        beam = system.GetObject(number)
-        if beam["objectType"] != "ObjectBeamGeometricallyExact2D" and beam["objectType"] != "BeamGeometricallyExact2D":
-            continue
-        kinds = exudyn.OutputVariableType
-        torque = system.GetObjectOutputBody(number, kinds.TorqueLocal, [0.0, 0.0, 0.0], exudyn.ConfigurationType.Current)
-        start = system.GetObjectOutputBody(number, kinds.Position, [0.0, 0.0, 0.0], exudyn.ConfigurationType.Reference)
-        found[number] = float(np.ravel(torque)[-1]), np.array(start[:2])
-    return found
+        if system.GetObject(number)["objectType"].removeprefix("Object") == "BeamGeometricallyExact2D":
+            moment = system.GetObjectOutputBody(number, torque, [0.0, 0.0, 0.0], now)
+            start = system.GetObjectOutputBody(number, position, [0.0, 0.0, 0.0], undeformed)
+            yield float(np.ravel(moment)[-1]), np.array(start[:2])
 
 
 def at_stations(boom, strokes):
     """Moments of the peer at this model's stations: inside the parts between the middles of elements, at ends beyond them."""
-    from boom_twin.validation.rig.exudyn.system import section_frames
-
-    frames, wanted = section_frames(SCENE, strokes), stations(SCENE)
-    elements = list(peer_moments(boom).values())
+    frames, wanted, elements = section_frames(SCENE, strokes), stations(SCENE), list(peer_moments(boom))
     found = np.full(len(wanted), np.nan)
     for k, station in enumerate(wanted):
-        frame = frames[station.section]
-        places = np.array([frame.local(place) for _, place in elements])
-        part = range(3 * (k // 3), 3 * (k // 3) + 3)
-        low, high = wanted[part[0]].place, wanted[part[-1]].place
+        places = np.array([frames[station.section].local(place) for _, place in elements])
+        low, high = (wanted[i].place for i in (3 * (k // 3), 3 * (k // 3) + 2))
         own = np.flatnonzero((np.abs(places[:, 1]) < 1e-6) & (places[:, 0] > low) & (places[:, 0] < high))
-        own = own[np.argsort(places[own, 0])]
         x, m = places[own, 0], np.array([elements[i][0] for i in own])
         near = np.argsort(np.abs(x - station.place))[:4]
         found[k] = np.polyval(np.polyfit(x[near] - station.place, m[near], 2), 0.0)
@@ -69,11 +56,11 @@ def at_stations(boom, strokes):
 
 @pytest.mark.parametrize("posture", ["horizontal", "arch"])
 def test_stresses_at_rest_are_those_of_exact_beams(posture):
-    plan, state, _ = rest(posture)
+    plan, state, _ = at_rest(SCENE, posture)
     model = BendingStressModel(SCENE)
     own = moments_by_unknowns(plan) @ state.z / model.moduli
     strokes = strokes_of_posture(SCENE, posture)
-    peer = at_stations(at_rest(SCENE, strokes, ELEMENTS).boom, strokes) / model.moduli
+    peer = at_stations(solve.at_rest(SCENE, strokes, ELEMENTS).boom, strokes) / model.moduli
     loaded = np.abs(peer) > LOADED
     assert loaded.sum() >= 6
     assert own[loaded] == pytest.approx(peer[loaded], rel=0.01)
@@ -82,32 +69,36 @@ def test_stresses_at_rest_are_those_of_exact_beams(posture):
 def test_stresses_in_a_move_are_those_of_exact_beams():
     """When a fast move has stopped halfway through its swing."""
     course, span = motion_of(SCENE, "arch"), 0.6
-    resting = at_rest(SCENE, course.first, 24)
-    move(resting, course, span, 1e-3, 0.1)
+    resting = solve.at_rest(SCENE, course.first, ELEMENTS)
+    solve.move(resting, course, span, 1e-3, 0.1)
     model = BendingStressModel(SCENE)
     peer = at_stations(resting.boom, course.first) / model.moduli
-    twin = moving_moments(course, span) / model.moduli
+    times = np.linspace(0.0, span, 301)
+    *_, (_, last) = course_of(SCENE, times, course(times)[0], angles=course.angles).states(1e-3)
+    twin = moments_by_unknowns(at_rest(SCENE, "arch")[0]) @ last.z / model.moduli
     loaded = np.abs(peer) > LOADED
     assert loaded.sum() >= 3
     assert twin[loaded] == pytest.approx(peer[loaded], rel=0.01)
 
 
-def moving_moments(course, span):
-    from boom_twin.analysis.simulate import course_of
-
-    times = np.linspace(0.0, span, 301)
-    steps = course_of(SCENE, times, course(times)[0], angles=course.angles).states(1e-3)
-    for _, state in steps:
-        last = state
-    return moments_by_unknowns(rest("arch")[0]) @ last.z
+def test_the_last_section_carries_its_own_weight():
+    """M(s) = -g (head (c - s) + rho (l - s)^2 / 2), less by the cosine of its slope, when the boom is level."""
+    plan, state, _ = at_rest(SCENE, "horizontal")
+    slope = np.arctan2(*np.diff(state.frames[[-3, -1], :2], axis=0)[0, ::-1])
+    section, moments = SCENE.sections[-1], moments_by_unknowns(plan) @ state.z
+    for station, moment in zip(stations(SCENE), moments, strict=True):
+        if station.section == 3:
+            arm = section.beam[1] - station.place
+            weight = section.head.mass * (section.head.com[0] - station.place) + 0.5 * section.rho_A * arm**2
+            assert moment == pytest.approx(-9.81 * weight * np.cos(slope), rel=5e-3, abs=0.5)
 
 
 def test_a_force_at_the_tip_bends_as_a_payload_does():
     """The weight of half a kilogram is a force down."""
-    plan, state, work = rest("arch")
+    plan, state, work = at_rest(SCENE, "arch")
     influence = moments_by_unknowns(plan) @ increments_by_tip_force(plan, state, work)
     heavy = type(SCENE).model_validate(SCENE.model_dump(exclude_none=True) | {"tip": {"payload": 0.5}})
-    loaded, moved, _ = rest("arch", heavy)
+    loaded, moved, _ = at_rest(heavy, "arch")
     more = moments_by_unknowns(loaded) @ moved.z - moments_by_unknowns(plan) @ state.z
     assert influence @ [0.0, -0.5 * 9.81] == pytest.approx(more, rel=2e-3, abs=0.02)
 
@@ -118,6 +109,8 @@ def test_what_sensors_know_beyond_the_prediction_is_added_with_its_deviation():
     load, variance = np.array([0.0, -100.0]), np.array([0.0, 400.0])
     estimate = replace(estimate_of(10**9, np.zeros(WIDTH)), load=load, load_variance=variance)
     found, bare = model.at(prediction, estimate), model.at(prediction, None)
+    assert prediction.moments.shape == (len(model.stations),) and model.stations[0].name == "section 1 at 0.60 m"
+    assert prediction.moments[0] == pytest.approx(-33038.1, rel=1e-3)
     assert np.isnan(bare.moment_sigmas).all()
     arm = 13.46 - 0.6  # the first station of section 1, inboard of the first pin C
     assert found.moments[0] - bare.moments[0] == pytest.approx(-100.0 * arm, rel=2e-2)

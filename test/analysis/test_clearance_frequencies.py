@@ -10,7 +10,7 @@ from oracle.clearance.scenes import PINS, RADII, RODS, with_pins
 from reference.worn_pin import geometry
 from reference.worn_pin.motion import freed
 
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import statics
 from boom_twin.analysis.methods import integrate_with
 from boom_twin.kernels.elements.pin_contact import SMOOTH
 from boom_twin.scene.kinematics import strokes_of_posture

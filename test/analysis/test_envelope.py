@@ -11,11 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boom_twin import Scene, load_scene, statics
 from boom_twin.analysis.envelope import Envelope, envelope
-from boom_twin.analysis.equilibrium import statics
 from boom_twin.cli.main import main
 from boom_twin.errors import SolverError
-from boom_twin.scene import Scene, load_scene
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +77,7 @@ def test_moment_and_stress_at_the_root_are_those_by_hand(boom: Scene, found: Env
 
 def test_postures_out_of_travel_are_counted(boom: Scene) -> None:
     short = boom.joints[1].model_copy(update={"cylinder": boom.joints[1].cylinder.model_copy(update={"max_stroke": 0.2})})
-    found = envelope(boom.model_copy(update={"joints": (boom.joints[0], short)}))
+    found = envelope(boom.model_copy(update={"joints": (boom.joints[0], short), "modes": 0}))
     assert found.skipped["out of a cylinder's travel"] > 20
     with pytest.raises(SolverError, match="none of"):
         none = short.model_copy(update={"cylinder": short.cylinder.model_copy(update={"max_stroke": 1e-4})})
@@ -114,13 +113,3 @@ def test_the_command_names_worst_postures_and_writes_files(
         values["cylinder_2_force_N_greatest_angles_deg"], rel=1e-8, abs=1e-8
     )
     assert (out / "envelope.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_without_heights_it_says_what_stresses_need(found: Envelope) -> None:
-    from boom_twin.cli.envelope import _report, quantities_of
-
-    words = [quantity.words for quantity in quantities_of(found)]
-    assert "section 1 bending stress" in words and "section 2 bending stress" not in words
-    lines = _report(found, [quantity for quantity in quantities_of(found) if quantity.unit != "MPa"])
-    assert "give sections[i].height" in lines[-1]
-    assert any("found by a search" in line for line in lines)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from analysis.resting import at_rest
 from oracle import booms
 from oracle.clearance.scenes import PINS, RODS, with_pins
 from oracle.response import DenseModel, extrapolated
 from scipy.optimize import brentq
 
-from boom_twin import frequency_response, load_scene, simulate
-from boom_twin.analysis.equilibrium import rest_at, statics
+from boom_twin import frequency_response, load_scene, simulate, statics
 from boom_twin.analysis.frequency_response import linearised_boom, with_all_shapes
 from boom_twin.analysis.modal import drive_at_rest
 from boom_twin.errors import UsageError
@@ -23,6 +23,13 @@ FORCES = ([1.0, 0.0], [0.0, 1.0])
 def apart(found, expected):
     """Largest distance of rows, over the rows' size."""
     return np.max(np.linalg.norm(found - expected, axis=1) / np.linalg.norm(expected, axis=1))
+
+
+def in_time(amplitudes, spectrum, within, count, rows):
+    """Motion (rows, c) whose `amplitudes` (k, c) are per unit of a signal, of whose `spectrum` the part `within` counts."""
+    whole = np.zeros((len(spectrum), amplitudes.shape[1]), complex)
+    whole[within] = amplitudes * spectrum[within, None]
+    return np.fft.irfft(whole, count, axis=0)[:rows]
 
 
 def undamped(spec):
@@ -44,7 +51,7 @@ DENSE = [
 def test_sweeps_solve_the_dense_equations(scene, posture):
     """Every unknown under every load, between and at natural frequencies; what is left is of the dense model's differences."""
     scene = with_all_shapes(scene)
-    plan, state, work = rest_at(scene, strokes_of_posture(scene, posture), posture_angles(scene, posture))
+    plan, state, work = at_rest(scene, posture)
     dense = DenseModel(plan, state.z.copy(), drive_at_rest(plan, state, work))
     boom = linearised_boom(scene, posture=posture)
     frequencies = np.sort(np.concatenate([BAND, statics(scene, posture=posture).frequencies[:3]]))
@@ -91,17 +98,6 @@ def test_poles_are_the_natural_frequencies(scene, posture):
         assert brentq(passing, *around, xtol=1e-12) == pytest.approx(natural, rel=1e-8)
 
 
-def test_natural_frequencies_of_the_scene_are_those_of_the_poles():
-    """The scene's three shapes give the lowest four within 0.01 %."""
-    of_scene, of_poles = (statics(scene, posture="arch").frequencies for scene in (load_scene(), with_all_shapes(load_scene())))
-    assert of_scene[:4] == pytest.approx(of_poles[:4], rel=1e-4)
-
-
-def test_rigid_parts_stay_rigid():
-    sections = with_all_shapes(booms.scene_of(booms.document() | {"modes": 0})).sections
-    assert all(section.modes is None for section in sections)
-
-
 @pytest.mark.parametrize("pins", [RODS, PINS], ids=["rods", "all"])
 def test_worn_pins_in_contact_through_simulate(pins):
     """A drive jerked by less than a micron: journals stay on their bushes, and the motion is the response to its spectrum."""
@@ -118,9 +114,7 @@ def test_worn_pins_in_contact_through_simulate(pins):
     seen = moved.tip[:, :2] - moved.tip[0, :2]
 
     def apart_from(own):
-        whole = np.zeros((len(spectrum), 2), complex)
-        whole[within] = own * spectrum[within, None]
-        expected = np.fft.irfft(whole, count, axis=0)[: len(times)]
+        expected = in_time(own, spectrum, within, count, len(times))
         return np.sqrt(np.mean((seen - expected) ** 2) / np.mean(expected**2))
 
     assert apart_from(response.tip) < 3e-3 < apart_from(ideal.tip)
@@ -215,9 +209,7 @@ def test_sine_sweep_through_simulate():
         (response.joints, moved.joints - moved.joints[0]),
         (response.cylinder_forces, moved.cylinder_forces - moved.cylinder_forces[0]),
     ):
-        whole = np.zeros((len(spectrum), own.shape[1]), complex)
-        whole[within] = own * spectrum[within, None]
-        expected = np.fft.irfft(whole, count, axis=0)[: len(times)]
+        expected = in_time(own, spectrum, within, count, len(times))
         assert np.sqrt(np.mean((seen - expected) ** 2)) < 0.01 * np.sqrt(np.mean(expected**2))
 
 
@@ -247,13 +239,6 @@ def test_a_rigid_boom_follows_its_geometry():
     assert driven.tip == pytest.approx(np.tile(richardson(tip, 1e-2), (3, 1)), rel=1e-7)
 
 
-def test_one_section():
-    scene = booms.random_boom(70)
-    assert len(scene.sections) == 1
-    found = frequency_response(scene, BAND, posture="test")
-    assert np.isfinite(found.tip).all() and found.joints.shape == (40, 1)
-
-
 @pytest.mark.parametrize(
     "given, told",
     [
@@ -263,17 +248,14 @@ def test_one_section():
         ({"posture": "arch", "drive": 0}, "cylinders 1 to 4"),
         ({"posture": "arch", "drive": 1, "tip_force": (0.0, 1.0)}, "give one of them"),
         ({"posture": "arch", "tip_force": (1.0,)}, "two numbers"),
+        ({"posture": "arch", "frequencies": [-1.0]}, "at least 0 Hz"),
+        ({"posture": "arch", "frequencies": [np.nan]}, "at least 0 Hz"),
+        ({"posture": "arch", "frequencies": [[1.0, 2.0]]}, "in one row"),
     ],
 )
 def test_refused(given, told):
     with pytest.raises(UsageError, match=told):
-        frequency_response(load_scene(), np.array([1.0]), **given)
-
-
-@pytest.mark.parametrize("frequencies", [[-1.0], [np.nan], [[1.0, 2.0], [3.0, 4.0]]])
-def test_frequencies_refused(frequencies):
-    with pytest.raises(UsageError, match="at least 0 Hz"):
-        frequency_response(load_scene(), np.array(frequencies), posture="arch")
+        frequency_response(load_scene(), **{"frequencies": [1.0]} | given)
 
 
 def test_every_station_has_a_column_of_its_own_and_the_text_is_short() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from published import scenes
@@ -85,11 +87,9 @@ def test_coordinates_that_leave_a_loop_open_are_refused():
     times, strokes, angles = held(SCENE, "arch", 0.1, 3)
     start = undeflected(SCENE, strokes[0], None, angles)
     place = start.names.index("alpha_L_3")
-    off = start.changed(alpha_L_3=(float(start.values[place]) + 1e-3, 0.0))
+    off = replace(start, values=start.values + 1e-3 * (np.arange(len(start.names)) == place))
     with pytest.raises(UsageError, match=r"joint_3\.Q, . *: .* m apart at the start"):
         simulate(SCENE, times, strokes, 1e-3, angles, start=off, **QUIET)
-    with pytest.raises(UsageError, match="no coordinate of this boom"):
-        start.changed(theta_9=(0.0, 0.0))
 
 
 def test_a_stiff_cylinder_must_go_as_fast_as_its_drive():

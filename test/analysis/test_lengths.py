@@ -46,13 +46,6 @@ def test_a_boom_at_rest_is_held_by_lengths_as_by_struts(name):
         assert length == pytest.approx(drive + force / stiffness(joint.cylinder, drive), abs=1e-12)
 
 
-def test_the_rigid_tip_is_where_straight_sections_have_it_at_these_lengths():
-    found = statics(lengths=statics(None, "arch").lengths)
-    rigid = statics(with_rigid_cylinders(load_scene()), found.lengths).tip_rigid
-    assert found.tip_rigid == pytest.approx(rigid, abs=1e-12)
-    assert np.hypot(*(found.tip - found.tip_rigid)) < 0.8 * np.hypot(*(found.tip - statics(None, found.strokes).tip_rigid))
-
-
 def test_an_incompressible_cylinder_is_as_long_as_its_drive():
     scene = with_rigid_cylinders(load_scene())
     strokes = strokes_of_posture(scene, "high")

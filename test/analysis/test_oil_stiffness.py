@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin.analysis.equilibrium import rest_at, statics
+from boom_twin import simulate, statics
+from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.modal import damping_ratio, natural_modes
-from boom_twin.analysis.simulate import simulate
-from boom_twin.config.settings import load_settings
-from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 from boom_twin.scene.oil_spring import stiffness
 
@@ -48,13 +46,6 @@ def with_numbers(strokes):
         cylinder = joint["cylinder"]
         cylinder["k"] = formula(cylinder.pop("oil"), cylinder["max_stroke"], stroke)
     return booms.scene_of(spec)
-
-
-@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 1.0])
-def test_stiffness_is_that_of_both_columns(share):
-    cylinder = with_oil().joints[0].cylinder
-    stroke = share * cylinder.max_stroke
-    assert stiffness(cylinder, stroke) == pytest.approx(formula(OIL, cylinder.max_stroke, stroke), rel=1e-12)
 
 
 def test_stiffness_of_the_guide():
@@ -94,14 +85,3 @@ def test_a_held_boom_swings_as_with_the_number_and_a_moved_one_does_not():
     tips = [[simulate(one, times, strokes, dt=2e-3).tip[:, :2] for one in (scene, numbers)] for strokes in (still, moved)]
     apart = [np.linalg.norm(one - other, axis=1).max() for one, other in tips]
     assert apart[0] < 1e-6 and apart[1] > 1e-3
-
-
-def test_the_filter_follows_the_stroke():
-    """Compliance in the filter of the twin is that of the posture."""
-    scene = with_oil()
-    strokes = strokes_of_posture(scene, "high")
-    boom = BoomPredictor(scene, load_settings())
-    boom.start(statics(scene, strokes).lengths)
-    expected = [formula(j["cylinder"]["oil"], j["cylinder"]["max_stroke"], s)
-                for j, s in zip(spec_with_oil()["joints"], strokes, strict=True)]  # fmt: skip
-    assert 1.0 / boom.posture.compliance == pytest.approx(expected, rel=1e-9)

@@ -8,9 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.analysis.equilibrium import statics
-from boom_twin.analysis.simulate import simulate
-from boom_twin.scene import load_scene
+from boom_twin import load_scene, simulate, statics
 
 REFERENCE = Path(__file__).parents[1] / "data" / "reference"
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from analysis.resting import at_rest
 
-from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.modal import drive_at_rest
 from boom_twin.kernels.tables import OK, Motion
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 RHO = 0.9
 PASSES = 2
@@ -17,7 +16,7 @@ PASSES = 2
 
 def tip_under(scene, posture, step, forces):
     """Displacement of the tip (m, 2) from rest, after every step (s); the forces (m, 2), in N, are those at the steps' ends."""
-    plan, state, work = rest_at(scene, strokes_of_posture(scene, posture), posture_angles(scene, posture))
+    plan, state, work = at_rest(scene, posture)
     t, still, end = plan.tables, np.zeros(plan.joints), np.int64(len(plan.tables.operations))
     drive = drive_at_rest(plan, state, work)
     am, af = (2.0 * RHO - 1.0) / (RHO + 1.0), RHO / (RHO + 1.0)

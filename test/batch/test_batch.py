@@ -13,12 +13,12 @@ import time
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import suppress
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 from drive_twin import ARCH_DRIVES
 from health.recorded import written
+from page_outline import outline
 
 psutil, parquet = pytest.importorskip("psutil"), pytest.importorskip("pyarrow.parquet")
 pytest.importorskip("distributed")
@@ -35,6 +35,7 @@ from boom_twin.system.child_process import python_command  # noqa: E402
 
 COUNT = 5
 PATIENCE = 300.0
+Done = tuple[Path, dict[str, int], list[psutil.Process]]
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +85,7 @@ def listening(process: subprocess.Popen[str]) -> list[object]:
 
 
 @pytest.fixture(scope="module")
-def done(sessions: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, int], list[psutil.Process]]:
+def done(sessions: Path, tmp_path_factory: pytest.TempPathFactory) -> Done:
     """Folder of a batch that lost a process, was stopped, and went on; times of the rows when it was stopped; its processes."""
     out = tmp_path_factory.mktemp("batch") / "out"
     process = started(sessions, out)
@@ -109,7 +110,7 @@ def done(sessions: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path
     return out, kept, family
 
 
-def test_going_on_repeats_nothing(done: tuple[Path, dict[str, int], list[psutil.Process]]) -> None:
+def test_going_on_repeats_nothing(done: Done) -> None:
     out, kept, family = done
     assert 2 <= len(kept) < COUNT + 1
     assert {name: time for path in rows_in(out) if (name := path.name) in kept for time in [path.stat().st_mtime_ns]} == kept
@@ -118,9 +119,7 @@ def test_going_on_repeats_nothing(done: tuple[Path, dict[str, int], list[psutil.
     assert not [each for each in alive if each.status() != psutil.STATUS_ZOMBIE]
 
 
-def test_rows_are_those_of_single_replays(
-    sessions: Path, done: tuple[Path, dict[str, int], list[psutil.Process]], tmp_path: Path
-) -> None:
+def test_rows_are_those_of_single_replays(sessions: Path, done: Done, tmp_path: Path) -> None:
     table = parquet.read_table(done[0] / "sessions.parquet").to_pylist()
     right = [row for row in table if row["status"] == "ok"]
     assert len(table) == COUNT + 1 and {row["session"] for row in right} == {f"s{number}" for number in range(COUNT)}
@@ -131,39 +130,23 @@ def test_rows_are_those_of_single_replays(
         assert row["alarms"] == [] and row["version"] and row["residual_rms_joint_1"] > 0.0 and len(row["file_sha256"]) == 64
 
 
-def test_a_broken_session_costs_its_own_row(done: tuple[Path, dict[str, int], list[psutil.Process]]) -> None:
+def test_a_broken_session_costs_its_own_row(done: Done) -> None:
     (row,) = [row for row in parquet.read_table(done[0] / "sessions.parquet").to_pylist() if row["status"] != "ok"]
     assert row["session"] == "torn" and row["status"] == "failed" and row["attempts"] == 2
     assert "incomplete: the end is missing" in row["reason"]
 
 
-class Links(HTMLParser):
-    """Tags, and what they refer to."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.tags: list[str] = []
-        self.links: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list) -> None:
-        self.tags.append(tag)
-        self.links += [value for name, value in attrs if name in ("src", "href", "srcset")]
-
-
-def test_the_page_needs_nothing_from_elsewhere(done: tuple[Path, dict[str, int], list[psutil.Process]]) -> None:
+def test_the_page_needs_nothing_from_elsewhere(done: Done) -> None:
     text = (done[0] / "batch.html").read_text(encoding="utf-8")
-    found = Links()
-    found.feed(text)
-    assert found.links and all(link.startswith("data:image/png;base64,") for link in found.links)
+    found = outline(done[0] / "batch.html")
+    assert found.sources and all(link.startswith("data:image/png;base64,") for link in found.sources)
     written = re.sub('base64,[^"]*', "", text)
     assert "http" not in written and not re.search(r"url\(|@import|fetch\(", written)
     assert found.tags.count("tr") == COUNT + 2 and "residual_rms_joint_1, rad" in written
     assert '<div class="sorted"><table' in text, "the table scrolls by itself where the screen is narrower"
 
 
-def test_a_finished_batch_starts_no_session(
-    sessions: Path, done: tuple[Path, dict[str, int], list[psutil.Process]], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_finished_batch_starts_no_session(sessions: Path, done: Done, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["batch", str(sessions / "s*"), str(sessions / "torn"), "--out", str(done[0])]) == 1
     told = capsys.readouterr()
     assert "sessions are done" not in told.err and f"{COUNT} sessions right, 1 failed" in told.out
@@ -212,18 +195,15 @@ def test_no_scheduler_answers(
     assert "no Dask scheduler answers" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("option", [("--workers", "0"), ("--retries", "-1"), ("--timeout", "0"), ("--memory", "nan")])
-def test_numbers_out_of_bounds_are_refused(option: tuple[str, str], tmp_path: Path) -> None:
-    with pytest.raises(SystemExit, match="2"):
-        main(["batch", "x", "--out", str(tmp_path / "o"), *option])
-
-
-def task_of(session: Path, out: Path) -> SessionTask:
-    return SessionTask("key", str(session), str(out), "", None, None, None, None, False, False, 600.0, 10**9, 0, calibrate=True)
+def task(key: str = "key", session: object = "s", out: object = "o", **changes: object) -> SessionTask:
+    given = {"fingerprint": "", "report": False, "keep_bag": False, "time": 600.0, "memory": 10**9, "retries": 0} | changes
+    for name in ("scene", "params", "mapping", "baseline"):
+        given.setdefault(name, None)
+    return SessionTask(key, str(session), str(out), **given)  # type: ignore[arg-type]
 
 
 def test_a_session_that_tells_no_parameters_costs_these_only(sessions: Path, tmp_path: Path) -> None:
-    row = row_of(task_of(sessions / "s0", tmp_path / "out"))
+    row = row_of(task("key", sessions / "s0", tmp_path / "out", calibrate=True))
     assert row["status"] == "ok" and row["output_sha256"] and row["calibration_reason"]
     assert not [name for name in row if name.startswith("calibrated_")]
 
@@ -231,7 +211,7 @@ def test_a_session_that_tells_no_parameters_costs_these_only(sessions: Path, tmp
 @pytest.mark.slow
 def test_parameters_of_a_session_are_those_of_a_calibration(tmp_path: Path) -> None:
     bag = ARCH_DRIVES
-    row, found = row_of(task_of(bag, tmp_path / "out")), calibrate([bag], load_scene())
+    row, found = row_of(task("key", bag, tmp_path / "out", calibrate=True)), calibrate([bag], load_scene())
     told = {each.unknown.name: each for each in found.estimates if each.told}
     names = {name.removeprefix("calibrated_") for name in row if name.startswith("calibrated_") and not name.endswith("_sigma")}
     assert names == told.keys() >= {f"cylinder_{i}.k" for i in (1, 2, 3, 4)}
@@ -242,7 +222,7 @@ def test_parameters_of_a_session_are_those_of_a_calibration(tmp_path: Path) -> N
 
 
 def test_no_task_waits_at_a_worker_whose_end_would_count_against_it() -> None:
-    tasks = [SessionTask(str(k), "s", "o", "f", None, None, None, None, False, False, 1.0, 1, 0) for k in range(9)]
+    tasks = [task(str(k)) for k in range(9)]
     with Client(LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None)) as client:
         most = 0
         for row in cluster.rows_of(cluster.on_dask(client, slept), tasks):
@@ -251,9 +231,9 @@ def test_no_task_waits_at_a_worker_whose_end_would_count_against_it() -> None:
     assert 0 < most <= 2
 
 
-def slept(task: SessionTask) -> dict[str, object]:
+def slept(own: SessionTask) -> dict[str, object]:
     time.sleep(0.1)
-    return {"key": task.key, "status": "ok"}
+    return {"key": own.key, "status": "ok"}
 
 
 class LosingClient:
@@ -278,35 +258,31 @@ class LosingClient:
 def test_a_row_that_is_lost_with_its_worker_costs_an_attempt_and_not_the_batch() -> None:
     from distributed import KilledWorker
 
-    task = SessionTask("key", "s", "o", "f", None, None, None, None, False, False, 1.0, 1, 2)
     for error, reason in (
         (KilledWorker("s0", None, 6), "the workers that had it were ended from outside"),
         (CancelledError(), "Dask gave it up (finished)"),
         (OSError("gone"), "OSError: gone"),
     ):
-        (row,) = cluster.rows_of(cluster.on_dask(LosingClient(error), slept), [task])  # type: ignore[arg-type]
+        (row,) = cluster.rows_of(cluster.on_dask(LosingClient(error), slept), [task(retries=2)])  # type: ignore[arg-type]
         assert row["status"] == "failed" and row["attempts"] == 3 and row["reason"].startswith(reason)
 
 
 def test_what_fails_here_costs_its_own_row() -> None:
-    tasks = [SessionTask(key, "s", "o", "f", None, None, None, None, False, False, 1.0, 1, 0) for key in ("good", "bad")]
+    tasks = [task("good"), task("bad")]
 
-    def work(task: SessionTask) -> dict[str, object]:
-        return {"key": task.key} if task.key == "good" else {}[task.key]
+    def work(own: SessionTask) -> dict[str, object]:
+        return {"key": own.key} if own.key == "good" else {}[own.key]
 
     rows = {row["key"]: row.get("reason") for row in cluster.rows_of(cluster.Workers(work, lambda: 2), tasks)}
     assert rows == {"good": None, "bad": "KeyError: 'bad'"}
 
 
-def test_without_the_extra_one_line_tells_what_to_install(sessions: Path, tmp_path: Path) -> None:
-    code = (
-        "import sys; sys.modules['pyarrow'] = None; from boom_twin.cli.main import main; "
-        "sys.exit(main(['batch', sys.argv[1], '--out', sys.argv[2]]))"
-    )
-    command = [sys.executable, "-c", code, str(sessions / "s0"), str(tmp_path / "out")]
-    found = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert found.returncode == 1 and len(found.stderr.splitlines()) == 1
-    assert 'pip install "boom_twin[batch]"' in found.stderr
+def test_without_the_extra_one_line_tells_what_to_install(
+    sessions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert main(["batch", str(sessions / "s0"), "--out", str(tmp_path / "out")]) == 1
+    assert 'pip install "boom_twin[batch]"' in capsys.readouterr().err
 
 
 def test_a_path_that_is_not_utf_8_is_in_the_table_with_its_bytes_as_escapes(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from oracle import booms
 from oracle.clearance import rigid
 from oracle.clearance.scenes import RODS, with_pins
 
-from boom_twin.analysis.drive import PASSES, TOLERANCE
+from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
 from boom_twin.analysis.energy_balance import Energies
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.simulate import RHO
@@ -85,7 +85,7 @@ class Closed:
         out, count = np.zeros((1, width_of(self.plan))), np.array([len(drives)])
         status, *_ = run(
             self.plan.tables, self.state, self.work, np.array([self.step]), count, drives, rates, GENERALISED_ALPHA, RHO,
-            TOLERANCE, PASSES, None, out,
+            STEP_TOLERANCE, PASSES, None, out,
         )  # fmt: skip
         assert status == 0, status
 

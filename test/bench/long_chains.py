@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 
-from boom_twin.analysis.drive import PASSES, TOLERANCE
+from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.simulate import RHO
 from boom_twin.compiler.compile import compile_scene
@@ -57,7 +57,7 @@ class Runner:
         begun = time.perf_counter()
         status, _, passes, *_ = run(
             self.plan.tables, state, self.work, np.array([STEP]), np.array([STEPS]), self.drives, self.rates,
-            GENERALISED_ALPHA, RHO, TOLERANCE, PASSES, None, self.out,
+            GENERALISED_ALPHA, RHO, STEP_TOLERANCE, PASSES, None, self.out,
         )  # fmt: skip
         ended = time.perf_counter()
         assert status == 0, f"{self.plan.joints} sections: status {status}"

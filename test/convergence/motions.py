@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from boom_twin.analysis.drive import PASSES, TOLERANCE
+from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.simulate import RHO
 from boom_twin.compiler.compile import compile_scene
@@ -41,7 +41,7 @@ def follow(scene, drive, angles, step, count, every=1, rho=RHO):
     lengths, rates, _ = drive(times)
     steps, counts = np.full(count // every, step), np.full(count // every, every, dtype=np.int64)
     status, _, _, _, _ = run(
-        plan.tables, state, work, steps, counts, lengths, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
+        plan.tables, state, work, steps, counts, lengths, rates, GENERALISED_ALPHA, rho, STEP_TOLERANCE, PASSES, None, rows[1:]
     )
     assert status == 0
     return rows

@@ -7,7 +7,7 @@ import pytest
 from convergence import motions
 from oracle import booms, segments
 
-from boom_twin.analysis.drive import PASSES, TOLERANCE
+from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
 from boom_twin.analysis.energy_balance import Energies
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.compiler.compile import compile_scene
@@ -30,7 +30,7 @@ def balance(scene, posture, travel, step, rho=0.8, duration=0.8):
     for k in range(1, round(duration / step) + 1):
         length, rate, _ = drive(k * step)
         status, _, _ = advance(
-            plan.tables, state, work, scheme, length, rate, TOLERANCE, PASSES, LONGEST_INCREMENT, None, False
+            plan.tables, state, work, scheme, length, rate, STEP_TOLERANCE, PASSES, LONGEST_INCREMENT, None, False
         )
         assert status == 0
         powers.append((energies.drive_power(state), energies.damping_power(state)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin.analysis.drive import PASSES, TOLERANCE
+from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
 from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.methods import Method, integrate_with
 from boom_twin.compiler.plan import width_of
@@ -150,7 +150,7 @@ def test_the_tangent_is_kept_over_many_steps():
         own = slice(20 * k, 20 * k + 20)
         status, *_ = run(
             plan.tables, state, work, np.array([1e-3]), np.array([20]), lengths[own], rates[own], GENERALISED_ALPHA, 0.8,
-            TOLERANCE, PASSES, None, out,
+            STEP_TOLERANCE, PASSES, None, out,
         )  # fmt: skip
         assert status == OK
         found.append(np.abs(work.kept_z - state.z)[plan.tables.moving > 0].max())

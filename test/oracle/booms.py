@@ -10,8 +10,8 @@ from reference.segments.boom import Segments
 from reference.segments.geometry import link_headings
 from ruamel.yaml import YAML
 
+from boom_twin import Scene
 from boom_twin.scene.load import default_text
-from boom_twin.scene.schema import Scene
 
 LEAST_LEVER = 0.08  # m/rad, of every cylinder at the posture
 BARREL_PINS = ("root", "beam", "head", "given")
@@ -45,12 +45,12 @@ def random_boom(seed):
     rng = np.random.default_rng(seed)
     spec = document()
     count = 1 + seed % 5
-    sections = [_section(spec["sections"][i], rng) for i in rng.integers(0, 4, count)]
+    sections = [varied_section(spec["sections"][i], rng) for i in rng.integers(0, 4, count)]
     for section in sections:
         section.pop("rod_pin", None)
     sections[0]["rod_pin"] = [[0.5, -0.12], [1.1, -0.2], [0.6, -0.12]][rng.integers(3)]
-    joints = [_joint(spec["joints"][0], rng)]
-    joints += [_joint(spec["joints"][i], rng) for i in rng.integers(1, 4, count - 1)]
+    joints = [varied_joint(spec["joints"][0], rng)]
+    joints += [varied_joint(spec["joints"][i], rng) for i in rng.integers(1, 4, count - 1)]
     for joint, before in zip(joints[1:], sections, strict=False):
         _place_barrel_pin(joint, before, rng)
     vary_cylinders(joints, seed)
@@ -64,28 +64,33 @@ def random_boom(seed):
     return _with_posture(spec, rng)
 
 
-def _section(section, rng):
+RIGID = {"mass": 140.0, "com": [1.5, 0.05], "inertia": 110.0}
+
+
+def varied_section(section, rng, spread=(0.5, 2.0), missing=0.25, rigid=RIGID, in_place_of_a_root=False):
+    """A copy with other stiffness and mass, perhaps rigid, perhaps without some part."""
     section = dict(section)
-    section["I"] *= float(rng.uniform(0.5, 2.0))
-    section["rho_A"] *= float(rng.uniform(0.5, 2.0))
+    section["I"] *= float(rng.uniform(*spread))
+    section["rho_A"] *= float(rng.uniform(*spread))
     for part in ("root", "head", "rho_I", "beta"):
-        if rng.random() < 0.25:
+        if rng.random() < missing:
             del section[part]
     kind = rng.random()
     if kind < 0.15:
         section["modes"] = 0
-    elif kind < 0.3:
+    elif kind < 0.3 and ("root" in section or not in_place_of_a_root):
         for part in ("beam", "head", "A", "I", "rho_A", "rho_I", "beta"):
             section.pop(part, None)
-        section["root"] = {"mass": 140.0, "com": [1.5, 0.05], "inertia": 110.0}
+        section["root"] = dict(rigid)
     return section
 
 
-def _joint(joint, rng):
+def varied_joint(joint, rng, spread=(0.5, 2.0), missing=0.25):
+    """A copy with another oil spring, perhaps incompressible, perhaps with massless parts."""
     joint = dict(joint, cylinder=dict(joint["cylinder"]))
-    joint["cylinder"]["k"] *= float(rng.uniform(0.5, 2.0))
+    joint["cylinder"]["k"] *= float(rng.uniform(*spread))
     for part in ("barrel", "rod", "d"):
-        if rng.random() < 0.25:
+        if rng.random() < missing:
             del joint["cylinder"][part]
     if rng.random() < 0.2:
         joint["cylinder"].pop("k")

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("exudyn")
 
 import boom_twin
-from boom_twin.scene import load_scene
+from boom_twin import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.validation.rig import Move, Programme, simulate, statics
 

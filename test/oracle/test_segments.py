@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from oracle import booms, segments
 
-from boom_twin.analysis.equilibrium import statics
-from boom_twin.scene import load_scene
+from boom_twin import load_scene, statics
 
 REFERENCE = Path(__file__).parents[1] / "data" / "reference" / "statics.json"
 

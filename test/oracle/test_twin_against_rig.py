@@ -7,8 +7,7 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin.analysis.equilibrium import statics
-from boom_twin.analysis.simulate import simulate
+from boom_twin import simulate, statics
 from boom_twin.scene.kinematics import stroke_range
 from boom_twin.validation import rig
 from boom_twin.validation.rig.motion import SAMPLES

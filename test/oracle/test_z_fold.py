@@ -9,8 +9,7 @@ from oracle.oscillation import mean_frequency
 
 pytest.importorskip("exudyn")
 
-from boom_twin.analysis.equilibrium import statics
-from boom_twin.analysis.simulate import simulate
+from boom_twin import simulate, statics
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.scene.load import examine_text, example_text
 from boom_twin.validation import rig

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from boom_twin import load_scene
 from boom_twin.cli.main import main
 from boom_twin.errors import SceneError
-from boom_twin.scene import load_scene
 from boom_twin.scene.load import examine
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -60,22 +60,25 @@ def test_check_prints_what_is_quoted(boom: Path, capsys: pytest.CaptureFixture[s
     assert printed.startswith(quoted("boom_twin check my_boom.yaml").removesuffix("..")) and "Warnings: none" in printed
 
 
-def test_statics_prints_what_is_quoted(boom: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["statics", "my_boom.yaml", "--posture", "reach"]) == 0
-    printed, told = capsys.readouterr().out.strip(), quoted("boom_twin statics my_boom.yaml --posture reach")
+def assert_quoted(printed: str, told: str, rel: float, tolerance: float = 0.0) -> None:
+    """The same words, and numbers that differ by less than `rel` or `tolerance`."""
     assert NUMBER.sub("#", printed).split() == NUMBER.sub("#", told).split()
     numbers = [[float(number) for number in NUMBER.findall(text)] for text in (printed, told)]
-    assert numbers[0] == pytest.approx(numbers[1], rel=1e-3, abs=2e-3)
+    assert numbers[0] == pytest.approx(numbers[1], rel=rel, abs=tolerance)
+
+
+def test_statics_prints_what_is_quoted(boom: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["statics", "my_boom.yaml", "--posture", "reach"]) == 0
+    told = quoted("boom_twin statics my_boom.yaml --posture reach")
+    assert_quoted(capsys.readouterr().out.strip(), told, 1e-3, 2e-3)
 
 
 def test_the_leanest_model_is_the_one_quoted(boom: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = "boom_twin check my_boom.yaml --need tip=1mm --out my_lean.yaml"
     assert main(command.split()[1:]) == 0
-    printed, told = capsys.readouterr().out, quoted(command).removesuffix("..")
+    printed = capsys.readouterr().out
     printed = printed[printed.index("Leanest") : printed.index("\nIts tip")]
-    assert NUMBER.sub("#", printed).split() == NUMBER.sub("#", told).split()
-    numbers = [[float(number) for number in NUMBER.findall(text)] for text in (printed, told)]
-    assert numbers[0] == pytest.approx(numbers[1], rel=5e-3)
+    assert_quoted(printed, quoted(command).removesuffix(".."), 5e-3)
     load_scene("my_lean.yaml")
 
 
@@ -83,17 +86,12 @@ def test_the_leanest_model_is_the_one_quoted(boom: Path, capsys: pytest.CaptureF
 def test_mistakes_give_their_messages(boom: Path, right: str, wrong: str, message: str) -> None:
     assert WHOLE.count(right) >= 1
     boom.write_text(WHOLE.replace(right, wrong, 1), encoding="utf-8")
+    assert len(TOLD_MISTAKES) >= 4
     try:
         _, said = examine(boom)
     except SceneError as error:
         said = [*error.faults, *error.oddities]
     assert any(str(fault).startswith(message) for fault in said), said
-
-
-def test_there_are_mistakes_and_pictures() -> None:
-    assert len(TOLD_MISTAKES) >= 4
-    for name in re.findall(r"!\[.*?\]\((.*?)\)", GUIDE):
-        assert (DOCS / name).is_file(), name
 
 
 def without(*keys: str) -> str:

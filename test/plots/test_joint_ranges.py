@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boom_twin import load_scene
 from boom_twin.cli.main import main
-from boom_twin.plots.joint_ranges import folded_section, joint_ranges_picture
+from boom_twin.plots.joint_ranges import joint_ranges_picture
 from boom_twin.plots.style import BLUE, ORANGE
-from boom_twin.scene import load_scene
 from boom_twin.scene.load import examine_text, example_text
 
 
@@ -41,22 +41,6 @@ def test_a_swapped_pin_changes_only_the_panels_of_its_joint(tmp_path: Path) -> N
     below = changed[changed.shape[0] // 2 :, : changed.shape[1] // 3]
     assert below.mean() > 0.01
     assert changed[: changed.shape[0] // 2 - 40, changed.shape[1] // 3 :].mean() < 0.001
-
-
-@pytest.mark.parametrize(("degrees", "side"), [(-180.0, -1.0), (180.0, 1.0), (-165.0, -1.0)])
-def test_a_section_folded_back_is_drawn_beside_the_one_it_lies_on(degrees: float, side: float) -> None:
-    heading = np.radians(30.0)
-    line = folded_section(np.array([3.0, 4.0]), float(heading), float(np.radians(degrees)), 5.0, 0.6) - [3.0, 4.0]
-    along, across = line @ [np.cos(heading), np.sin(heading)], line @ [-np.sin(heading), np.cos(heading)]
-    assert (line[0] == 0.0).all() and np.hypot(*(line[2] - line[1])) == pytest.approx(5.0)
-    assert across[1] == pytest.approx(-0.6 * side * np.cos(np.radians(degrees))) and along[2] < -4.8
-    assert (side * across[1:] > 0.5).all(), "where it can be seen, on the side from which it came"
-
-
-def test_a_section_that_is_not_folded_stays_where_it_is() -> None:
-    for degrees in (-90.0, 0.0, 85.0):
-        line = folded_section(np.zeros(2), 0.0, float(np.radians(degrees)), 5.0, 0.6)
-        assert np.allclose(line[1:], [[0.0, 0.0], [5.0 * np.cos(np.radians(degrees)), 5.0 * np.sin(np.radians(degrees))]])
 
 
 def test_the_overview_shows_where_folded_sections_get(tmp_path: Path) -> None:

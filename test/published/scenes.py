@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from boom_twin.scene.schema import Scene
+from boom_twin import Scene
 
 YOUNG = 2.0e11  # Pa
 FREE = {"k": 1e-9, "closed_length": 1.0, "max_stroke": 100.0}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from published import scenes
 
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import statics
 
 ROOTS = np.array([1.87510407, 4.69409113, 7.85475744, 10.99554073])
 LENGTH, BENDING, MASS = 3.0, 4.12e6, 40.0

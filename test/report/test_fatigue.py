@@ -77,3 +77,5 @@ def test_the_report_has_the_fatigue_of_all_stations(replays, tmp_path, capsys):
     assert text.partition("<h3>Fatigue")[2].count("section 1 at") == 6
     assert main(["replay", "bags/pump_session", "--out", str(tmp_path / "b"), "--fatigue"]) == 1
     assert "Give --report too" in capsys.readouterr().err
+    with pytest.raises(SystemExit, match="2"):
+        main(["replay", "bags/pump_session", "--out", str(tmp_path / "b"), "--report", "--no-pictures"])

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from reference.ideal_pins import refuse_clearance
 
-from boom_twin.analysis.drive import TOLERANCE
+from boom_twin.analysis.drive import STEP_TOLERANCE
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.motions import Motion as StrokeMotion
 from boom_twin.analysis.simulate import RHO
@@ -93,7 +93,7 @@ def _solve(
         sweep_out(t, state, work, work.condensed, ROOT, last, FREE)
         state.z[:] += work.dz
         place(t, state, work)
-        if np.max(t.scale * np.abs(work.dz)) < TOLERANCE:
+        if np.max(t.scale * np.abs(work.dz)) < STEP_TOLERANCE:
             return
     raise SolverError(f"a step fails: {SENTENCES[1]}.")
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from boom_twin.analysis.drive import PASSES, TOLERANCE
+from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.motions import motion_of
 from boom_twin.compiler.compile import BasisName, compile_scene
@@ -37,7 +37,7 @@ def step_of_move(scene: Scene, span: float, length: float, basis: BasisName = "e
         strokes, rates = (values[0] for values in move(np.array([k * length])))
         drive = plan.closed_lengths + strokes
         status, _, _ = advance(
-            plan.tables, state, work, scheme, drive, rates, TOLERANCE * 1e-3, PASSES, LONGEST_INCREMENT, None, ANEW
+            plan.tables, state, work, scheme, drive, rates, STEP_TOLERANCE * 1e-3, PASSES, LONGEST_INCREMENT, None, ANEW
         )
         if status != OK:
             raise SolverError(f"the reference move fails at {k * length:g} s.")

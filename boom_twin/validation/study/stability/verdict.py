@@ -32,7 +32,7 @@ class Facts:
     solvable : bool
         True if a solution exists.
     doubt : str
-        Warning that the simulation gave, see `analysis.error_estimate`.
+        Warning that the simulation gave, see `analysis.doubts`.
     error : float
         Largest tip error, relative to the tip's path.
     acceleration, force : float

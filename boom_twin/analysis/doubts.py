@@ -1,12 +1,9 @@
-"""Estimate the error of a simulated motion by Richardson extrapolation, and say where the result cannot be trusted.
+"""Reasons to doubt a result: estimated errors of a simulated motion, ringing, deflections beyond the model's validity.
 
-Two estimates of errors: while stepping, the changes of the tip's acceleration give that of its place for nothing
-(`step_error_warning`);
-the same motion run again, otherwise resolved, gives those of acceleration and forces too.
-
-A finer step tells what stepping adds; every second row of the drive what the curve between the rows adds. (Hairer, Norsett
-and Wanner, Solving Ordinary Differential Equations I, 1993, section II.4.) The step is halved, but with clearance divided by
-eight: a journal swings in its bush at some hundred Hz to some kHz, which half a step of 1 ms knows as little of as a whole one.
+While stepping, the changes of the tip's acceleration give the error of its place (`step_error_warning`). The same motion run
+again gives errors of acceleration and forces too: a finer step shows what stepping adds, every second row of the drive shows
+what the curve between the rows adds (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 1993, section
+II.4). The step is halved. With clearance it is divided by eight, because a journal swings at some hundred Hz to some kHz.
 """
 
 from __future__ import annotations
@@ -16,42 +13,32 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..config.settings import STROKE_RATE
+from ..errors import UsageError
 from ..kernels.result_row import Results
 from ..kernels.tables import OK
+from ..scene.kinematics import joint_angles_of_strokes, skeleton
+from ..scene.schema import Scene
 from ..types import Array
 from .drive import DriveCourse, Run
 
 COARSE = 0.01  # estimated error as a share of the tip's travel
-SHORTEST = 1e-3  # m of travel that an error is measured against at least
+SHORTEST_PATH = 1e-3  # m of travel that an error is measured against at least
 RINGING = 1.0  # sum of the changes of acceleration over that of the accelerations: 2 if it changes sign from step to step
 QUIET = 1e-3  # m/s^2, mean acceleration below which ringing is rounding
 
 
 @dataclass(frozen=True)
 class EstimatedError:
-    """Estimated largest error of one quantity.
+    """Estimated largest error of one quantity."""
 
-    Attributes
-    ----------
-    what : str
-        The quantity.
-    share : float
-        Its error, as a share of `of`.
-    of : str
-        What it is measured against.
-    bound : float
-        Share above which it is doubted.
-    time : float
-        When it is largest, s.
-    """
-
-    what: str
-    share: float
-    of: str
-    bound: float
-    time: float
+    what: str  # the quantity
+    share: float  # its error, as a share of `of`
+    of: str  # what it is measured against
+    bound: float  # share above which it is doubted
+    time: float  # when it is largest, s
 
     def __str__(self) -> str:
         share = f"about {self.share:.1%}" if self.share < 1.0 else "100 % or more"
@@ -59,20 +46,13 @@ class EstimatedError:
 
 
 def step_error_warning(jolt: float, shake: float, travel: float, square: float) -> str:
-    """A sentence with its remedy, or nothing.
+    """Return a warning with its remedy, or nothing.
 
-    One step of a second-order scheme errs by about h^2/12 |a' - a|.
-
-    Parameters
-    ----------
-    jolt, shake : float
-        Sums over all steps of h^2 |a' - a| and of h^2 |a'| (m), as `kernels.transfer.time_step.run` returns them.
-    travel : float
-        How far the tip got from where it started, m.
-    square : float
-        Sum over all steps of h^2, s^2.
+    One step of a second-order scheme errs by about h^2/12 |a' - a|. `jolt` and `shake` are the sums over all steps of
+    h^2 |a' - a| and of h^2 |a'| (m), see `kernels.transfer.time_step.run`. `travel` is how far the tip got from where it
+    started (m), `square` the sum over all steps of h^2 (s^2).
     """
-    share = jolt / 12.0 / max(travel, SHORTEST)
+    share = jolt / 12.0 / max(travel, SHORTEST_PATH)
     for sentence in ringing(jolt, shake, square):
         return sentence
     if share > COARSE:
@@ -147,15 +127,12 @@ TIP_ACCELERATION = ("the tip's acceleration", "its largest", ACCELERATION)
 
 
 def differences(times: Array, found: Results, other: Results, factor: float) -> tuple[EstimatedError, ...]:
-    """Errors of the tip's place, its acceleration and the worst cylinder's force: `factor` times what `other` differs by.
+    """Return errors of tip, its acceleration and the worst cylinder's force: `factor` times the difference to `other`.
 
-    Parameters
-    ----------
-    times : ndarray, shape (m,)
-        Of the rows, which are the same instants in both.
+    Both have rows at the same `times` (m,), s.
     """
     (tip, acceleration), (place, rate) = ((rows.tip[:, 0, :2], rows.tip[:, 2, :2]) for rows in (found, other))
-    path = max(float(_lengths(tip - tip[0]).max()), SHORTEST)
+    path = max(float(_lengths(tip - tip[0]).max()), SHORTEST_PATH)
     largest = max(float(_lengths(acceleration).max()), LEAST_ACCELERATION)
     sizes = np.abs(found.cylinder_forces).max(axis=0)
     sizes = np.maximum(sizes, max(LEAST_FORCE * sizes.max(), 1.0))
@@ -174,3 +151,34 @@ def differences(times: Array, found: Results, other: Results, factor: float) -> 
 
 def _lengths(vectors: Array) -> Array:
     return np.asarray(np.hypot(vectors[:, 0], vectors[:, 1]))
+
+
+VALID_DEFLECTION = 0.5  # validity limit of the tip deflection, as a fraction of the boom's reach
+CHECKED_INSTANTS = 8  # evenly spaced instants of a motion to check; the tip's farthest point is added
+
+
+def beyond_validity(scene: Scene, away: float) -> tuple[str, ...]:
+    """Return a warning if the tip deflection `away` (m) exceeds the model's validity, else an empty tuple."""
+    if away <= VALID_DEFLECTION * scene.reach:
+        return ()
+    return (
+        f"the tip is {away:.3g} m from where rigid sections and cylinders would have it, more than half the reach of "
+        f"{scene.reach:.3g} m: outside the model's validity. Check stiffnesses, masses and load",
+    )
+
+
+def motion_beyond_validity(scene: Scene, strokes: Array, tip: Array, angles: Array | None) -> tuple[str, ...]:
+    """Return the warning of `beyond_validity` for the worst of some instants of a motion.
+
+    `strokes` (m, n) and `tip` (m, 2) are in m. `angles` (n,) is a guess of the first joint angles, rad.
+    """
+    rows: NDArray[np.int64] = np.linspace(0, len(tip) - 1, CHECKED_INSTANTS).astype(np.int64)
+    rows = np.unique(np.append(rows, np.argmax(np.hypot(*(tip - tip[0]).T))))
+    worst, near = 0.0, angles
+    for row in rows:
+        try:
+            near = joint_angles_of_strokes(scene, strokes[row], near=near)
+        except UsageError:  # within the cylinder's travel but outside the joint's range
+            continue
+        worst = max(worst, float(np.hypot(*(tip[row] - skeleton(scene, near).pivots[-1]))))
+    return beyond_validity(scene, worst)
