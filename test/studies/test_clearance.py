@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
-from studies.clearance import report as clearance
-from studies.clearance.convergence import Convergence, MotionRows, convergence, errors, one_pin
+from studies.clearance.convergence import convergence, one_pin
 from studies.clearance.rest_stop_cost import shifts, swings
 from studies.clearance.scenes import ideal, pins_of, rods_and_joints, treated, with_play
 from studies.stops import halt
@@ -53,38 +49,11 @@ def test_swings_of_a_stop(two_sections: Scene) -> None:
     assert all(own.peak > own.rms > 0.0 and own.effective > 0.0 for own in found.values())
 
 
-def test_errors_are_shares_of_what_is_right() -> None:
-    right = MotionRows(np.ones((5, 2)), np.full((5, 2), 2.0), np.full((5, 1), 4.0))
-    wrong = MotionRows(np.ones((5, 2)) + 1e-3, np.full((5, 2), 2.2), np.full((5, 1), 5.0))
-    assert errors([wrong], right)[0] == pytest.approx([1.0, 10.0, 25.0])
-
-
-@pytest.fixture(scope="module")
-def converged(two_sections: Scene) -> Convergence:
-    return convergence(with_play(two_sections), "arch", True)
-
-
-def test_the_independent_model_agrees(two_sections: Scene, converged: Convergence) -> None:
-    found = converged
+def test_the_independent_model_agrees(two_sections: Scene) -> None:
+    found = convergence(with_play(two_sections), True)
     assert [(line.program, line.against) for line in found.lines] == [
         ("boom_twin", "own"), ("boom_twin", "own"), ("boom_twin", "independent"), ("SciPy", "independent"),
     ]  # fmt: skip
     against = found.lines[2]
     assert against.errors[-1, 0] < 0.01 and against.errors[-1, 2] < 1.0
     assert not one_pin(with_play(two_sections), 0).is_flexible(0)
-
-
-def test_the_files(two_sections: Scene, converged: Convergence, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def convergence_before(*given: object) -> Convergence:
-        assert given == (with_play(two_sections), "arch", True)
-        return converged
-
-    monkeypatch.setattr(clearance, "convergence", convergence_before)
-    written = clearance.write(two_sections, tmp_path / "out", True, "arch")
-    assert sorted(written) == sorted((tmp_path / "out").iterdir())
-    values = json.loads(written[0].read_text())
-    assert len(values["stops"]) == 6 and len(values["rests"]) == 4 and values["costs"][0]["pins"] == 0
-    text = written[1].read_text()
-    assert all(title in text for title in ("## After a stop", "## At rest", "## Convergence", "## What a pin costs"))
-    assert "nan" not in text and "surrogate" in text
-    assert all(path.read_bytes()[:4] == b"\x89PNG" for path in written[2:])

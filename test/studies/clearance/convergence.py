@@ -45,30 +45,14 @@ class MotionRows:
 
 @dataclass(frozen=True)
 class ErrorCurve:
-    """One program on one boom, coarse to fine.
+    """One program on one boom, coarse to fine."""
 
-    Attributes
-    ----------
-    case : str
-        "one pin, rigid boom" or "all rods' pins, elastic boom".
-    program : str
-        "boom_twin" or "SciPy".
-    against : str
-        The reference: "own" or "independent".
-    marks : tuple of float
-        Steps (s), or tolerances of SciPy.
-    errors : ndarray, shape (k, 3)
-        See `MEASURES`; rms over the rows, shares of the quantity's own rms.
-    seconds : tuple of float
-        Run time, for `span` seconds.
-    """
-
-    case: str
-    program: str
-    against: str
-    marks: tuple[float, ...]
-    errors: Array
-    seconds: tuple[float, ...]
+    case: str  # "one pin, rigid boom" or "all rods' pins, elastic boom"
+    program: str  # "boom_twin" or "SciPy"
+    against: str  # the reference: "own" or "independent"
+    marks: tuple[float, ...]  # steps (s), or tolerances of SciPy
+    errors: Array  # (k, 3), see `MEASURES`: rms over the rows, shares of the quantity's own rms
+    seconds: tuple[float, ...]  # run time, for `span` seconds
 
 
 @dataclass(frozen=True)
@@ -80,17 +64,17 @@ class Convergence:
     span: float
 
 
-def convergence(scene: Scene, posture: str | None, quick: bool = False) -> Convergence:
+def convergence(scene: Scene, quick: bool = False) -> Convergence:
     """Both booms; without the independent model if no cylinder has k, barrel and rod."""
     span, steps = STOP + SPAN, QUICK_STEPS if quick else STEPS
     finest = QUICK_FINEST if quick else FINEST
     full = treated(scene, "contact")
-    lines = [_own("all rods' pins, elastic boom", full, _stopped(full, posture, None), span, steps, finest)[0]]
+    lines = [_own("all rods' pins, elastic boom", full, _stopped(full, None), span, steps, finest)[0]]
     index = _free(scene)
     if index is None:
         return Convergence(tuple(lines), np.full(3, np.nan), span)
     one = one_pin(full, index)
-    drive = _stopped(one, posture, index)
+    drive = _stopped(one, index)
     line, own, tracks = _own("one pin, rigid boom", one, drive, span, steps, finest)
     tolerances = QUICK_TOLERANCES if quick else TOLERANCES
     independent = peer(one, index, drive, span, QUICK_TIGHTEST if quick else TIGHTEST)[0]
@@ -99,19 +83,15 @@ def convergence(scene: Scene, posture: str | None, quick: bool = False) -> Conve
         line,
         ErrorCurve(line.case, "boom_twin", "independent", steps, errors(tracks, independent), line.seconds),
         ErrorCurve(
-            line.case,
-            "SciPy",
-            "independent",
-            tolerances,
-            errors([track for track, _ in runs], independent),
+            line.case, "SciPy", "independent", tolerances, errors([track for track, _ in runs], independent),
             tuple(seconds for _, seconds in runs),
         ),
-    ]
+    ]  # fmt: skip
     return Convergence(tuple(lines), errors([own], independent)[0], span)
 
 
-def _stopped(scene: Scene, posture: str | None, only: int | None) -> StopMotion:
-    drive = halt(scene, posture, BRAKE, only)
+def _stopped(scene: Scene, only: int | None) -> StopMotion:
+    drive = halt(scene, None, BRAKE, only)
     return StopMotion(drive.angles, drive.first, drive.speed, BRAKE, RAMP, STOP)
 
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from boom_twin.errors import UsageError
 from boom_twin.scene.schema import IDEAL_BELOW, Scene
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.validation.study.report import machine, provenance, table, write_json
@@ -121,25 +120,17 @@ class Study:
     costs: list[Cost]
 
 
-def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
+def write(scene: Scene, out: Path, quick: bool = False) -> list[Path]:
     """Measure, and write ``clearance.json``, ``clearance.md`` and pictures into `out`; returns their paths.
 
-    The pins are those of the scene, or else the package's. Stops and rests are in all postures of the scene, convergence and
-    cost from `posture`.
-
-    Raises
-    ------
-    UsageError
-        The scene has no posture.
+    The pins are those of the scene, or else the package's. Stops and rests are in all postures of the scene.
     """
-    if not scene.postures:
-        raise UsageError("postures: the scene has none, and the study starts from them. Add one.")
     scene, postures = with_play(scene), tuple(scene.postures)
     found = Study(
         swings(scene, postures, QUICK_HOLD if quick else HOLD),
         shifts(scene, postures, QUICK_COUNT if quick else COUNT),
-        convergence(scene, posture, quick),
-        costs(scene, posture, quick),
+        convergence(scene, quick),
+        costs(scene, quick),
     )
     out.mkdir(parents=True, exist_ok=True)
     paths = [out / f"clearance{part}" for part in (".json", ".md", ".png", "_static.png", "_convergence.png")]

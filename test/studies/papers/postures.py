@@ -21,55 +21,29 @@ NEAR = 4e-6  # m, of the gap, from which on a journal flies
 
 @dataclass(frozen=True)
 class PostureRun:
-    """A stop in one posture by one program. m rows, n cylinders, k pins with clearance.
-
-    Attributes
-    ----------
-    pins : str
-        ``ideal`` or ``worn``.
-    times : ndarray, shape (m,)
-        s.
-    tip, acceleration : ndarray, shape (m, 2)
-        m, m/s^2.
-    forces : ndarray, shape (m, n)
-        Of the cylinders, N.
-    penetration : ndarray, shape (m, k)
-        Of the journals, m; negative in flight.
-    """
+    """A stop in one posture by one program. m rows, n cylinders, k pins with clearance."""
 
     posture: str
-    pins: str
-    times: Array
-    tip: Array
-    acceleration: Array
-    forces: Array
-    penetration: Array
+    pins: str  # "ideal" or "worn"
+    times: Array  # (m,), s
+    tip: Array  # (m, 2), m
+    acceleration: Array  # (m, 2), m/s^2
+    forces: Array  # (m, n), N, of the cylinders
+    penetration: Array  # (m, k), m, of the journals; negative in flight
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Both programs, and how far they are apart.
-
-    Attributes
-    ----------
-    flight : float
-        When a journal first left its bush, s; the end where none did. Errors are taken up to there.
-    tip, tip_throughout : float
-        rms distance, m; the second to the end, whatever flies.
-    forces, acceleration : float
-        rms difference as a share of the rms.
-    penetration : float
-        Largest difference as a share of the largest penetration; NaN for ideal pins.
-    """
+    """Both programs, and how far they are apart. Differences are rms, up to the first flight of a journal."""
 
     own: PostureRun
     peer: PostureRun
-    flight: float
-    tip: float
-    tip_throughout: float
-    forces: float
-    acceleration: float
-    penetration: float
+    flight: float  # s, when a journal first left its bush; the end where none did
+    tip: float  # m
+    tip_throughout: float  # m, to the end, whatever flies
+    forces: float  # share of their rms
+    acceleration: float  # share of its rms
+    penetration: float  # largest difference as a share of the largest penetration; NaN for ideal pins
 
 
 def stop_in(scene: Scene, posture: str) -> StopMotion:

@@ -15,7 +15,6 @@ from boom_twin.analysis.modal import natural_modes
 from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import simulate
 from boom_twin.compiler.compile import BasisName, compile_scene
-from boom_twin.errors import UsageError
 from boom_twin.scene.kinematics import posture_angles, skeleton, strokes_of_posture
 from boom_twin.scene.schema import Scene
 from boom_twin.system.atomic_files import write_atomic
@@ -126,20 +125,12 @@ def _let_go(scene: Scene, posture: str) -> tuple[LetGoTrace, ...]:
     return tuple(found)
 
 
-def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
+def write(scene: Scene, out: Path, quick: bool = False) -> list[Path]:
     """Measure, and write ``papers.json``, ``papers.md`` and two pictures into the folder `out`; returns their paths.
 
-    `posture`: only this one; `quick`: only the first, and few speeds.
-
-    Raises
-    ------
-    UsageError
-        The scene names no posture.
+    `quick`: only the first posture, and few speeds.
     """
-    postures = [posture] if posture else list(scene.postures)[: 1 if quick else None]
-    if not postures:
-        raise UsageError("postures: none in this scene. Name at least one: the study starts there.")
-    found = measure(scene, postures, quick)
+    found = measure(scene, list(scene.postures)[: 1 if quick else None], quick)
     out.mkdir(parents=True, exist_ok=True)
     paths = [out / name for name in ("papers.json", "papers.md", "papers_postures.png", "papers_low_speed.png")]
     write_json(paths[0], {"machine": machine(), **_numbers(found)})

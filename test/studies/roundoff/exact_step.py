@@ -32,25 +32,14 @@ ROUNDS = 12  # of equilibration, and most of refinement
 
 @dataclass(frozen=True)
 class StepRoundoff:
-    """Round-off in one step of a boom.
-
-    Attributes
-    ----------
-    unknowns : int
-    condition : float
-        Of the whole equilibrated system, in the 1-norm.
-    riccati, plain, dense : float
-        Relative error of the tip's increment: of the sweep, of the plain product (NaN if it gave none), of LU of the whole.
-    exact : float
-        What the last refinement of the exact solution changed, relative.
-    """
+    """Round-off in one step of a boom: relative errors of the tip's increment by each way of solving."""
 
     unknowns: int
-    condition: float
-    riccati: float
-    plain: float
-    dense: float
-    exact: float
+    condition: float  # of the whole equilibrated system, in the 1-norm
+    riccati: float  # error of the sweep
+    plain: float  # error of the plain product, NaN if it gave no increment
+    dense: float  # error of LU of the whole
+    exact: float  # what the last refinement of the exact solution changed
 
 
 def digits(error: float) -> float:
