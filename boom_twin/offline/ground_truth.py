@@ -9,7 +9,6 @@ from math import sqrt
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import BagError
 from ..system.received_files import holds_file, open_received
@@ -50,21 +49,6 @@ class TipTruth:
         found = TipErrors(self)
         found.add(predictions, rows)
         return found.rms
-
-    def position_error(self, stamps: NDArray[np.int64], first: int, position: Array) -> float:
-        """Return the root mean square distance to `position` (k, 2), m, told at `stamps` (ns).
-
-        The truth begins at `first` (ns).
-        """
-        return self._rms_off(stamps, first, position, self.position)
-
-    def acceleration_error(self, stamps: NDArray[np.int64], first: int, acceleration: Array) -> float:
-        """Return the root mean square error of `acceleration` (k, 2), m/s^2; see `position_error`."""
-        return self._rms_off(stamps, first, acceleration, self.acceleration)
-
-    def _rms_off(self, stamps: NDArray[np.int64], first: int, told: Array, true: Array) -> float:
-        times = (stamps - first) * NANO + self.times[0]
-        return float(np.sqrt(np.mean(np.sum((told - self.at(times, true)) ** 2, axis=1))))
 
     def since(self, offset: float) -> TipTruth:
         """Return the truth from `offset` (s) after its beginning on."""
