@@ -70,7 +70,7 @@ def _worn(scene: Scene, at: str, more: float) -> Scene:
     return scene.model_copy(update={"clearance": clearance.model_copy(update={"pins": tuple(pins.values())})})
 
 
-MOST = 0.3  # share; twice as much is drawn at most, and every parameter stays positive
+MOST_WRONG = 0.3  # share; twice as much is drawn at most, and every parameter stays positive
 KEYS = ("k", "d", "EI", "mass")
 
 
@@ -85,8 +85,8 @@ def wrong_by(scene: Scene, share: float, seed: int) -> Scene:
     UsageError
         `share` is not from 0 to 0.3.
     """
-    if not 0.0 <= share <= MOST:
-        raise UsageError(f"wrong by {share:g}: must be from 0 to {MOST:g}, as a share of every parameter. 0.02 is 2 %.")
+    if not 0.0 <= share <= MOST_WRONG:
+        raise UsageError(f"wrong by {share:g}: must be from 0 to {MOST_WRONG:g}, as a share of every parameter. 0.02 is 2 %.")
     rng = np.random.default_rng([seed, 2])
     names = [name for name in parameter_names(scene) if name.split(".")[-1] in KEYS]
     scene = with_parameters(scene, {name: parameter(scene, name) * _factor(share, rng) for name in names})

@@ -102,7 +102,7 @@ BUNDLED_MOVES = (
 """Cylinder (0-based), start (s), duration (s), target (m): for the default scene from its posture arch."""
 
 TIP_SPEED = 1.2  # m/s, bound of random programmes, by rigid kinematics
-SAMPLES = 91  # of a joint's range
+RANGE_SAMPLES = 91  # of a joint's range
 MARGIN = 0.08  # of the range of a stroke, kept free at both ends
 HOLD, DURATION = (3.0, 8.0), (1.5, 6.0)  # s
 FIRST_HOLD = 3.0  # s
@@ -132,10 +132,10 @@ def bundled(scene: Scene) -> Programme:
 def _scaled(scene: Scene, first: Array, usual: Scene) -> Programme:
     """The bundled moves as shares of the ranges of other cylinders, from `first` (m); further ones move as those four."""
     at = strokes_of_posture(usual, "arch")
-    wide = [high - low for low, high in (stroke_range(usual, i, SAMPLES) for i in range(len(at)))]
+    wide = [high - low for low, high in (stroke_range(usual, i, RANGE_SAMPLES) for i in range(len(at)))]
     moves = []
     for i, start in enumerate(first.tolist()):
-        low, high = stroke_range(scene, i, SAMPLES)
+        low, high = stroke_range(scene, i, RANGE_SAMPLES)
         free, model = MARGIN * (high - low), i % len(at)
         for move in (move for move in BUNDLED_MOVES if move.cylinder == model):
             target = start + (high - low) * (move.target - float(at[model])) / wide[model]
@@ -190,7 +190,7 @@ def _reachable(scene: Scene, now: Array, cylinders: list[int], span: float, rng:
     """Random targets of some cylinders, drawn nearer until the tip is slow enough."""
     aim = now.copy()
     for i in cylinders:
-        low, high = stroke_range(scene, i, SAMPLES)
+        low, high = stroke_range(scene, i, RANGE_SAMPLES)
         if low >= high:
             raise UsageError(f"cylinder_{i + 1}: no stroke is within both max_stroke and range_deg. Widen one.")
         free = MARGIN * (high - low)

@@ -11,7 +11,7 @@ from boom_twin.errors import UsageError
 from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, stroke_range
 from boom_twin.validation.rig import BUNDLED_DURATION, Move, Programme, bundled, random_programme
-from boom_twin.validation.rig.motion import BUNDLED_MOVES, SAMPLES, TIP_SPEED, tip_speed
+from boom_twin.validation.rig.motion import BUNDLED_MOVES, RANGE_SAMPLES, TIP_SPEED, tip_speed
 
 SCENE = load_scene()
 
@@ -49,7 +49,7 @@ def test_overlapping_moves_are_refused():
 def test_programmes_stay_in_range_and_slow_enough(programme):
     strokes = programme(np.linspace(0.0, 60.0, 121))[0]
     for cylinder in range(4):
-        low, high = stroke_range(SCENE, cylinder, SAMPLES)
+        low, high = stroke_range(SCENE, cylinder, RANGE_SAMPLES)
         assert low < strokes[:, cylinder].min() and strokes[:, cylinder].max() < high
     assert np.isfinite([joint_angles_of_strokes(SCENE, row) for row in strokes[::10]]).all()  # raises if out of reach
     fastest = tip_speed(SCENE, programme, np.linspace(0.0, 60.0, 601)).max()
@@ -65,7 +65,7 @@ def test_another_boom_makes_moves_within_its_own_ranges(sections):
     times, drive = np.linspace(0.0, BUNDLED_DURATION, 401), bundled(scene)
     strokes, _ = drive(times)
     for i in range(sections):
-        low, high = stroke_range(scene, i, SAMPLES)
+        low, high = stroke_range(scene, i, RANGE_SAMPLES)
         assert low <= strokes[:, i].min() < strokes[:, i].max() <= high
         assert np.ptp(strokes[:, i]) > 0.04 * (high - low)
     assert tip_speed(scene, drive, times).max() <= TIP_SPEED

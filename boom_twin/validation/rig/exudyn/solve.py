@@ -25,8 +25,8 @@ from .stepping import Course, Effort, Scheme, step_through
 from .system import Boom, section_frames
 
 PASSES = 40
-SETTLED = 1e-6  # m and rad, last increment; what is left is near its square
-LONGEST = 0.2  # m and rad, in one pass
+LAST_INCREMENT = 1e-6  # m and rad, last increment; what is left is near its square
+LONGEST_INCREMENT = 0.2  # m and rad, in one pass
 NUDGE = 1e-5  # m and rad, of the difference quotient
 
 
@@ -46,8 +46,8 @@ def find_equilibrium(system: Any, aim: str) -> None:
         longest = float(np.abs(increment[:moving]).max())
         if not np.isfinite(longest):
             break
-        state += increment * min(1.0, LONGEST / max(longest, 1e-300))
-        if longest < SETTLED:
+        state += increment * min(1.0, LONGEST_INCREMENT / max(longest, 1e-300))
+        if longest < LAST_INCREMENT:
             residual(state)
             data.SetODE2Coordinates(state[:moving], exudyn.ConfigurationType.Initial)
             return

@@ -14,10 +14,9 @@ from ....scene.schema import Scene
 from ....system.atomic_files import write_atomic
 from ..report import machine, provenance, table, write_json
 from .cases import PAPERS, Case, Own, Peer, own_cases, peer_cases
-from .pareto import EQUAL, acceleration, fastest, front, of, order, same_step, tip
 from .pictures import methods_picture, programs_picture
 from .problem import Problem, build, pose
-from .runner import ROUNDS, Row, Runner
+from .runner import EQUAL, ROUNDS, Row, Runner, acceleration, fastest, front, of, order, same_step, tip
 
 QUICK_DURATION = 0.6  # s
 TURNS, QUICK_TURNS = 5, 2  # runs of each program at the same step

@@ -35,7 +35,7 @@ REFERENCE = Method(tolerance=1e-10)
 NOTHING = "there is no solution"
 FINER, FINEST = 8, 5e-6  # divisor of the step for the reference; its smallest step (s), below which round-off prevails
 HALVINGS = 20  # bisections of the load limit
-WIDTH = 1e-6  # relative tolerance of a frequency
+FREQUENCY_TOLERANCE = 1e-6  # relative tolerance of a frequency
 
 
 @dataclass(frozen=True)
@@ -165,4 +165,4 @@ def _slowest(setup: Setup, share: float) -> float:
         plan, state, work = rest_at(lighter_gravity(setup.scene, share), *_strokes(setup, 0.0))
     except SolverError:
         return float("nan")
-    return natural_modes(plan, state, work, 1, WIDTH)[0].frequency
+    return natural_modes(plan, state, work, 1, FREQUENCY_TOLERANCE)[0].frequency
