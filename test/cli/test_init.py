@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from boom_twin import load_scene
 from boom_twin.cli.main import main
-from boom_twin.scene import load_scene
 from boom_twin.scene.load import default_text
 
 ANSWERS = """Small boom

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from boom_twin import Stream
 from boom_twin.bag.reader import Session, read, scan
 from boom_twin.bag.session_model import scene_of, settings_of
 from boom_twin.errors import BagError, BoomTwinError
@@ -31,7 +32,7 @@ from boom_twin.ros.startup import require_rclpy
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.system.received_files import holds_file, open_received
 from boom_twin.system.result_folder import REPLAY, result_folder
-from boom_twin.types import NANO, Array, Stream, sensor_kind
+from boom_twin.types import NANO, sensor_kind
 
 from .isolation import add_domain
 from .processes import DemoProcesses, demo_processes
@@ -55,7 +56,7 @@ class DemoResult:
 
     positions: dict[int, tuple[float, float]]
     residual_sets: int
-    latency_ms: Array
+    latency_ms: np.ndarray
     residual_rms: dict[str, float]
 
     def as_text(self, session: str, sent: int, equal: int, summary: dict[str, Any]) -> list[str]:

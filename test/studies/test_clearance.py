@@ -9,7 +9,7 @@ from studies.clearance.rest_stop_cost import shifts, swings
 from studies.clearance.scenes import ideal, pins_of, rods_and_joints, treated, with_play
 from studies.stops import halt
 
-from boom_twin.scene import Scene, load_scene
+from boom_twin import Scene, load_scene
 from boom_twin.scene.schema import IDEAL_BELOW
 
 

@@ -12,12 +12,10 @@ from studies.papers.boundary_zeros import bisect, equilibrium, frequencies
 from studies.papers.postures import compare, run_own, run_peer
 from studies.papers.sweep_matrices import boundary_solution, chain_of, difference
 
-from boom_twin import load_scene
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import Scene, load_scene, statics
 from boom_twin.analysis.methods import integrate_with
 from boom_twin.analysis.motions import motion_of
 from boom_twin.errors import UsageError
-from boom_twin.scene.schema import Scene
 
 SCENE = load_scene()
 LOADED = Scene.model_validate(

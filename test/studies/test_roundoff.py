@@ -8,10 +8,10 @@ from studies.roundoff.dense_solver import Kinematics
 from studies.roundoff.exact_step import digits, one_step
 from studies.roundoff.report import TARGET, TURN_UP_STEPS, turn_up
 
+from boom_twin import load_scene
 from boom_twin.analysis.equilibrium import set_undeformed
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.transfer.forward_kinematics import place
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles
 from boom_twin.validation.study.long_booms import long_boom
 

@@ -15,9 +15,9 @@ from reference.worn_pin.geometry import cylinder_length
 from reference.worn_pin.motion import PinMotion, PinnedBoom, freed
 from studies.stops import StopMotion, halt
 
+from boom_twin import Scene
 from boom_twin.analysis.methods import MethodRun, integrate_with
-from boom_twin.scene.schema import Cylinder, Joint, Scene
-from boom_twin.types import Array
+from boom_twin.scene.schema import Cylinder, Joint
 from boom_twin.validation.contact_law import HYSTERESIS, Contact, stiffness
 
 from .scenes import pin_like, pins_of, treated, with_pins, without_friction
@@ -38,9 +38,9 @@ MEASURES = ("tip, mm", "acceleration of the tip, %", "force of the pin, %")
 class MotionRows:
     """m rows: tip (m), its acceleration (m/s^2), contact forces (N)."""
 
-    tip: Array
-    acceleration: Array
-    force: Array
+    tip: np.ndarray
+    acceleration: np.ndarray
+    force: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class ErrorCurve:
     program: str  # "boom_twin" or "SciPy"
     against: str  # the reference: "own" or "independent"
     marks: tuple[float, ...]  # steps (s), or tolerances of SciPy
-    errors: Array  # (k, 3), see `MEASURES`: rms over the rows, shares of the quantity's own rms
+    errors: np.ndarray  # (k, 3), see `MEASURES`: rms over the rows, shares of the quantity's own rms
     seconds: tuple[float, ...]  # run time, for `span` seconds
 
 
@@ -60,7 +60,7 @@ class Convergence:
     """All lines, how far both references of the one pin are apart (`MEASURES`), and how long the motions last (s)."""
 
     lines: tuple[ErrorCurve, ...]
-    apart: Array
+    apart: np.ndarray
     span: float
 
 
@@ -111,7 +111,7 @@ def _track(run: MethodRun) -> MotionRows:
     return MotionRows(run.tip, run.tip_acceleration, run.pins[:, :, 2])
 
 
-def errors(tracks: Sequence[MotionRows], right: MotionRows) -> Array:
+def errors(tracks: Sequence[MotionRows], right: MotionRows) -> np.ndarray:
     """`MEASURES` of every track, shape (k, 3)."""
 
     def off(track: MotionRows) -> list[float]:
@@ -124,7 +124,7 @@ def errors(tracks: Sequence[MotionRows], right: MotionRows) -> Array:
     return np.array([off(track) for track in tracks])
 
 
-def _rms(values: Array) -> float:
+def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from boom_twin.scene.schema import IDEAL_BELOW, Scene
+from boom_twin import Scene
+from boom_twin.scene.schema import IDEAL_BELOW
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.validation.study.report import machine, provenance, table, write_json
 

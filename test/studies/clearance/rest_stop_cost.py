@@ -9,13 +9,13 @@ import numpy as np
 from reference.worn_pin import geometry
 from studies.stops import StopMotion, halt
 
-from boom_twin.analysis.equilibrium import rest_at, statics
+from boom_twin import Scene, statics
+from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.methods import MethodRun, integrate_with
 from boom_twin.analysis.motions import motion_of
 from boom_twin.compiler.plan import first_row, taken_apart
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.scene.schema import IDEAL_BELOW, Scene
-from boom_twin.types import Array
+from boom_twin.scene.schema import IDEAL_BELOW
 
 from .scenes import Treatment, ideal, pin_like, rods_and_joints, treated, with_pins
 
@@ -30,9 +30,9 @@ class Shift:
 
     posture: str
     pin: str
-    clearances: Array  # (k,), m
-    shifts: Array  # (k,), m, distance of the tips
-    penetrations: Array  # (k,), m, how far the journal presses into the bush
+    clearances: np.ndarray  # (k,), m
+    shifts: np.ndarray  # (k,), m, distance of the tips
+    penetrations: np.ndarray  # (k,), m, how far the journal presses into the bush
     force: float  # N, of the pin at the last clearance
     lever: float  # the tip's way for the cylinder's, of the rigid boom's geometry
     loaded: float  # the same of the loaded elastic boom with ideal pins
@@ -43,7 +43,7 @@ class Shift:
         return float(self.shifts[-1])
 
     @property
-    def ratios(self) -> Array:
+    def ratios(self) -> np.ndarray:
         """Shifts over loaded lever x (clearance + penetration), shape (k,)."""
         return np.asarray(self.shifts / (self.loaded * (self.clearances + self.penetrations)))
 
@@ -60,7 +60,7 @@ def shifts(scene: Scene, postures: tuple[str, ...], count: int = COUNT) -> list[
     return found
 
 
-def _shift(scene: Scene, posture: str, index: int, levers: tuple[float, float], tip: Array, count: int) -> Shift:
+def _shift(scene: Scene, posture: str, index: int, levers: tuple[float, float], tip: np.ndarray, count: int) -> Shift:
     clearances = np.geomspace(WIDEST, IDEAL_BELOW, count)
     clearances[-1] = IDEAL_BELOW
     name = f"cylinder_{index + 1}.rod"
@@ -78,7 +78,7 @@ def _loaded(scene: Scene, posture: str, index: int) -> float:
     return float(np.hypot(*(ways[1] - ways[0])) / (2.0 * NUDGE))
 
 
-def _rest(scene: Scene, posture: str, more: float | Array = 0.0) -> tuple[Array, Array, Array]:
+def _rest(scene: Scene, posture: str, more: float | np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Tip (2,) in m, joint angles (n,) in rad, pins (k, 4) as in `compiler.plan`."""
     plan, state, _ = rest_at(scene, strokes_of_posture(scene, posture) + more, posture_angles(scene, posture))
     found = taken_apart(plan, first_row(plan, state))
@@ -97,9 +97,9 @@ class Swing:
 
     posture: str
     model: str
-    times: Array  # (m,), s from the stop: the drives hold from 0
-    height: Array  # (m,), m
-    acceleration: Array  # (m,), m/s^2, vertical
+    times: np.ndarray  # (m,), s from the stop: the drives hold from 0
+    height: np.ndarray  # (m,), m
+    acceleration: np.ndarray  # (m,), m/s^2, vertical
     rest: float  # m, height at rest at the end
     peak: float  # m, largest distance from that rest after the stop
     rms: float  # m, root mean square of that distance

@@ -8,9 +8,8 @@ import numpy as np
 from studies.clearance.scenes import ideal, treated, with_play, without_friction
 from studies.stops import StopMotion, halt
 
+from boom_twin import Scene
 from boom_twin.analysis.methods import MethodRun, integrate_with
-from boom_twin.scene.schema import Scene
-from boom_twin.types import Array
 
 RAMP, STOP, BRAKE = 0.3, 0.6, 0.05  # s
 STEP, ROW = 1e-3, 2e-3  # s, of this model; of all rows
@@ -25,11 +24,11 @@ class PostureRun:
 
     posture: str
     pins: str  # "ideal" or "worn"
-    times: Array  # (m,), s
-    tip: Array  # (m, 2), m
-    acceleration: Array  # (m, 2), m/s^2
-    forces: Array  # (m, n), N, of the cylinders
-    penetration: Array  # (m, k), m, of the journals; negative in flight
+    times: np.ndarray  # (m,), s
+    tip: np.ndarray  # (m, 2), m
+    acceleration: np.ndarray  # (m, 2), m/s^2
+    forces: np.ndarray  # (m, n), N, of the cylinders
+    penetration: np.ndarray  # (m, k), m, of the journals; negative in flight
 
 
 @dataclass(frozen=True)
@@ -106,5 +105,5 @@ def compare(own: PostureRun, peer: PostureRun) -> Comparison:
     )
 
 
-def _rms(values: Array) -> float:
+def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))

@@ -9,16 +9,13 @@ from pathlib import Path
 import numpy as np
 from studies.clearance.scenes import ideal
 
-from boom_twin.analysis.equilibrium import settle, statics
-from boom_twin.analysis.initial_state import undeflected
+from boom_twin import Scene, simulate, statics, undeflected
+from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.modal import natural_modes
 from boom_twin.analysis.motions import motion_of
-from boom_twin.analysis.simulate import simulate
 from boom_twin.compiler.compile import BasisName, compile_scene
 from boom_twin.scene.kinematics import posture_angles, skeleton, strokes_of_posture
-from boom_twin.scene.schema import Scene
 from boom_twin.system.atomic_files import write_atomic
-from boom_twin.types import Array
 from boom_twin.validation.study.report import machine, provenance, table, write_json
 
 from .boundary_zeros import BoundaryZero, equilibrium, frequencies
@@ -63,7 +60,7 @@ class PapersStudy:
     zeros: tuple[BoundaryZero, ...]
     bisected: tuple[tuple[float, float], ...]
     bases: tuple[BasisRow, ...]
-    speeds: Array
+    speeds: np.ndarray
     let_go: tuple[LetGoTrace, ...]
     stops: tuple[Comparison, ...]
 

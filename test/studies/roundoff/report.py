@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from boom_twin import Scene
 from boom_twin.analysis.methods import integrate_with
 from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import RHO
-from boom_twin.scene.schema import Scene
 from boom_twin.system.atomic_files import write_atomic
-from boom_twin.types import Array
 from boom_twin.validation.study import scene_changes as made
 from boom_twin.validation.study.long_booms import long_boom, seven_sections
 from boom_twin.validation.study.report import machine, provenance, table, write_json
@@ -72,7 +71,7 @@ def _by_stiffness(scene: Scene) -> Iterator[Loss]:
         yield Loss("extremes", name, float("nan"), one_step(boom, _angles(boom), USUAL, RHO))
 
 
-def _angles(scene: Scene) -> Array:
+def _angles(scene: Scene) -> np.ndarray:
     return motion_of(scene).angles
 
 
@@ -87,9 +86,9 @@ TARGET = 1e-8  # of the boom's length: above it the error may not turn up
 class TurnUp:
     """Errors of the tip. k steps."""
 
-    steps: Array  # (k,), s, falling
-    errors: Array  # (k,), largest error of the tip over `length`
-    accelerations: Array  # (k,), m/s^2, error of the tip's acceleration, rms
+    steps: np.ndarray  # (k,), s, falling
+    errors: np.ndarray  # (k,), largest error of the tip over `length`
+    accelerations: np.ndarray  # (k,), m/s^2, error of the tip's acceleration, rms
     length: float  # m, of the boom
     order: float  # fitted where the scheme's error prevails
 
@@ -119,7 +118,7 @@ def turn_up(scene: Scene, steps: tuple[float, ...] = TURN_UP_STEPS) -> TurnUp:
     return TurnUp(np.array(steps), errors, rough, length, float(order))
 
 
-def _rows(scene: Scene, step: float) -> tuple[Array, Array]:
+def _rows(scene: Scene, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Tip and its acceleration, both (ROWS + 1, 2), m and m/s^2."""
     own = smooth(scene, None, SHARE, RISE, SPAN, step)
     found = integrate_with(scene, own.drive, SPAN, step, round(SPAN / ROWS / step), angles=own.angles)

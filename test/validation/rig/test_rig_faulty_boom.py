@@ -9,11 +9,10 @@ import pytest
 
 pytest.importorskip("exudyn")
 
+from boom_twin import Scene, load_scene
 from boom_twin.errors import UsageError
-from boom_twin.scene import load_scene
 from boom_twin.scene.edit import parameter, parameter_names
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.schema import Scene
 from boom_twin.validation.rig import Move, Programme, Sensors, at_rest, move, record, simulate, statics
 from boom_twin.validation.rig.faults import parse
 from boom_twin.validation.rig.faulty_boom import changes, with_faults, wrong_by

@@ -7,8 +7,8 @@ import pytest
 
 pytest.importorskip("exudyn")
 
+from boom_twin import load_scene
 from boom_twin.errors import UsageError
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, stroke_range
 from boom_twin.validation.rig import BUNDLED_DURATION, Move, Programme, bundled, random_programme
 from boom_twin.validation.rig.motion import BUNDLED_MOVES, RANGE_SAMPLES, TIP_SPEED, tip_speed

@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin.scene import load_scene
+from boom_twin import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.validation.rig import Move, Programme, Scheme, at_rest, move, simulate
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
+from boom_twin import Scene, load_scene
 from boom_twin.reduction.variants import KINDS, variants
-from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.edit import Edit, edited, rewritten
 from boom_twin.scene.load import default_text, examine, parse, structure, with_end_mark
 

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import statics
 from boom_twin.scene.load import examine, with_end_mark
 from boom_twin.validation.study.long_booms import long_boom, seven_sections
 

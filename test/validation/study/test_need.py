@@ -10,13 +10,11 @@ import pytest
 from oracle import booms
 from ruamel.yaml import YAML
 
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import Scene, load_scene, simulate, statics
 from boom_twin.analysis.motions import motion_of
-from boom_twin.analysis.simulate import simulate
 from boom_twin.cli.main import main
 from boom_twin.errors import UsageError
 from boom_twin.reduction.search import Proposal, propose
-from boom_twin.scene import Scene, load_scene
 from boom_twin.scene.edit import edited
 
 

@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 import pytest
 
+from boom_twin import load_scene
 from boom_twin.analysis.methods import Method
-from boom_twin.scene import load_scene
 from boom_twin.validation.study.stability import report as stability
 from boom_twin.validation.study.stability.cases import Case, cases, long_holds
 from boom_twin.validation.study.stability.runner import METHODS, limit_of, one, run
