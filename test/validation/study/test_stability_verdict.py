@@ -15,7 +15,6 @@ from boom_twin.validation.study.stability.verdict import (
     against_rest,
     alternating,
     growth,
-    verdict,
 )
 
 GOOD = Facts("ok", error=1e-4, acceleration=1e-3, force=1e-3, ringing=0.0, force_ringing=0.0, growth=1.0, drift=0.0, passes=1.0)
@@ -24,12 +23,12 @@ GOOD = Facts("ok", error=1e-4, acceleration=1e-3, force=1e-3, ringing=0.0, force
 @pytest.mark.parametrize("name", BOUNDS)
 def test_each_quantity_has_its_bounds(name):
     low, high, symptom = BOUNDS[name]
-    holds, degrades = (verdict(replace(GOOD, **{name: share * low})) for share in (0.99, 1.01))
+    holds, degrades = (replace(GOOD, **{name: share * low}).verdict for share in (0.99, 1.01))
     assert (holds.word, holds.symptom) == ("holds", "")
     assert degrades.word == "degrades" and not degrades.silent
     assert degrades.symptom.startswith(symptom.split("{")[0])
     if np.isfinite(high):
-        failed = verdict(replace(GOOD, **{name: 1.01 * high}))
+        failed = replace(GOOD, **{name: 1.01 * high}).verdict
         assert failed.word == "fails" and failed.silent
 
 
@@ -46,7 +45,7 @@ def test_each_quantity_has_its_bounds(name):
     ],
 )
 def test_a_failure_is_silent_unless_the_solver_says_so(facts, word, silent, symptom):
-    found = verdict(facts)
+    found = facts.verdict
     assert (found.word, found.silent) == (word, silent) and symptom in found.symptom
 
 

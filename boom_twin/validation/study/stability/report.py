@@ -55,7 +55,7 @@ def _progress(line: str) -> None:
 
 
 def _has_no_equilibrium(row: CaseResult) -> bool:
-    return NO_EQUILIBRIUM in row.cells["default"].facts.status
+    return NO_EQUILIBRIUM in row.cells["default"].status
 
 
 def _title(case: Case) -> str:
@@ -154,9 +154,8 @@ def _long(rows: Sequence[CaseResult]) -> str:
     head = ("case", "compared with", "verdict", "drift / path of the tip", "vibration, last quarter / first", "passes")
     lines = []
     for row in rows:
-        cell = row.cells["default"]
-        facts = cell.facts
-        lines.append((row.case.name, row.reference, cell.verdict.mark, facts.drift, facts.growth, facts.passes))
+        facts = row.cells["default"]
+        lines.append((row.case.name, row.reference, facts.verdict.mark, facts.drift, facts.growth, facts.passes))
     return table(head, lines)
 
 
@@ -174,7 +173,7 @@ def _content(rows: list[CaseResult], limits: dict[str, Limit]) -> dict[str, Any]
                 "varied": row.case.varied,
                 "right": row.reference,
                 "methods": {
-                    name: dataclasses.asdict(cell.verdict) | dataclasses.asdict(cell.facts) for name, cell in row.cells.items()
+                    name: dataclasses.asdict(facts.verdict) | dataclasses.asdict(facts) for name, facts in row.cells.items()
                 },
             }
             for row in rows
