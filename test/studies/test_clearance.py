@@ -7,7 +7,6 @@ import pytest
 from studies.clearance.convergence import convergence, one_pin
 from studies.clearance.rest_stop_cost import shifts, swings
 from studies.clearance.scenes import ideal, pins_of, rods_and_joints, treated, with_play
-from studies.stops import halt
 
 from boom_twin import Scene, load_scene
 from boom_twin.scene.schema import IDEAL_BELOW
@@ -19,17 +18,6 @@ def test_a_scene_without_play_gets_the_package_s_pins(two_sections: Scene) -> No
     assert with_play(scene) == scene and ideal(scene) == two_sections
     assert pins_of(treated(scene, "spring-damper")).treatment == "spring-damper"
     assert len(rods_and_joints(load_scene())) == 17
-
-
-@pytest.mark.parametrize("brake", [0.1, 0.01])
-def test_a_halt_is_smooth_and_ends_where_it_says(two_sections: Scene, brake: float) -> None:
-    drive = halt(two_sections, "arch", brake)
-    times = np.linspace(0.0, 1.5, 150_001)
-    strokes, rates = drive(times)
-    assert np.gradient(strokes, times, axis=0)[1:-1] == pytest.approx(rates[1:-1], abs=1e-6)
-    assert strokes[0] == pytest.approx(drive.first) and strokes[-1] == pytest.approx(drive.last)
-    assert not rates[0].any() and np.abs(rates[-1]).max() < 1e-15
-    assert np.abs(rates).max(axis=0) == pytest.approx(np.abs(drive.speed))
 
 
 def test_play_at_rest_follows_the_lever_down_to_the_switch(two_sections: Scene) -> None:

@@ -50,14 +50,11 @@ class Effort:
     ----------
     seconds : float
         CPU time of Exudyn's stepping alone.
-    feeding : float
-        Of which in the Python function that hands the drives their lengths.
     passes, tangents : int
         Newton passes, and tangents made.
     """
 
     seconds: float
-    feeding: float
     passes: int
     tangents: int
 
@@ -85,7 +82,7 @@ class Course:
 def step_through(boom: Boom, course: Course, step: float, output_step: float, scheme: Scheme) -> Effort:
     """Step a boom from its equilibrium through a course; then load and parameters are again those of the equilibrium."""
     count = len(course.strokes) - 1
-    feeding = _feed(boom, course, step)
+    _feed(boom, course, step)
     settings = _settings(count, step, output_step, scheme)
     begun = time.process_time()
     try:
@@ -100,7 +97,7 @@ def step_through(boom: Boom, course: Course, step: float, output_step: float, sc
         course.changes.restore()
     seconds = time.process_time() - begun
     counted = boom.system.sys["dynamicSolver"].it
-    return Effort(seconds, feeding[0], int(counted.newtonStepsCount), int(counted.newtonJacobiCount))
+    return Effort(seconds, int(counted.newtonStepsCount), int(counted.newtonJacobiCount))
 
 
 def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> Any:
@@ -126,8 +123,8 @@ def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> An
     return settings
 
 
-def _feed(boom: Boom, course: Course, step: float) -> list[float]:
-    """Hand the moving drives, before every step, their lengths without force at its end; return the seconds that this takes.
+def _feed(boom: Boom, course: Course, step: float) -> None:
+    """Hand the moving drives, before every step, their lengths without force at its end.
 
     All drives get those of the start at once. Pins with play note then whether they touch. Load and changed parameters are
     those of the step's end, too.
@@ -136,7 +133,6 @@ def _feed(boom: Boom, course: Course, step: float) -> list[float]:
     moving = [(*drive, rest) for drive, rest in zip(boom.drives, rests, strict=True) if min(rest) < max(rest)]
     oils = [(drive[0], _stiffness(boom, i, course).tolist()) for i, drive in enumerate(boom.drives) if _cylinder(boom, i).oil]
     last = [float("nan")] * len(moving)
-    spent = [0.0]
 
     def hand_over(row: int) -> None:
         for i, (drive, name, rest) in enumerate(moving):
@@ -150,11 +146,9 @@ def _feed(boom: Boom, course: Course, step: float) -> list[float]:
             boom.system.SetObjectParameter(drive, "stiffness", stiffness[row])
 
     def before_step(_: Any, at: float) -> bool:
-        begun = time.perf_counter()
         hand_over(round(at / step))
         for bush in boom.bushes:
             bush.watch(boom.system)
-        spent[0] += time.perf_counter() - begun
         return True
 
     for (drive, name), rest in zip(boom.drives, rests, strict=True):
@@ -165,7 +159,6 @@ def _feed(boom: Boom, course: Course, step: float) -> list[float]:
     for bush in boom.bushes:
         bush.entry = None
     boom.system.SetPreStepUserFunction(before_step)
-    return spent
 
 
 def _rests(boom: Boom, index: int, course: Course) -> list[float]:

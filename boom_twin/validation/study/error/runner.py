@@ -155,9 +155,9 @@ def front(rows: Sequence[Row], error: Measure = tip) -> list[Row]:
     return found
 
 
-def fastest(rows: Sequence[Row], most: float, error: Measure = tip) -> Row | None:
-    """Return the fastest row whose error is at most `most`."""
-    return min((row for row in rows if row.good and error(row) <= most), key=lambda row: row.seconds, default=None)
+def fastest(rows: Sequence[Row], most: float) -> Row | None:
+    """Return the fastest row whose tip is wrong by at most `most` (mm)."""
+    return min((row for row in rows if row.good and row.tip_mm <= most), key=lambda row: row.seconds, default=None)
 
 
 def order(rows: Sequence[Row]) -> list[tuple[Row, float | None]]:
