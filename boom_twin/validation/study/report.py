@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -55,15 +55,16 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def provenance() -> str:
-    """Return a paragraph with date, machine, versions and the note on surrogates."""
-    return ", ".join(f"{name} {value}" for name, value in machine().items() if value is not None) + f". {SYNTHETIC}\n"
+def page(parts: Iterable[str]) -> str:
+    """Return a Markdown page of paragraphs, tables and headings; its last line is of date, machine, versions and surrogates."""
+    made = ", ".join(f"{name} {value}" for name, value in machine().items() if value is not None)
+    return "\n\n".join(part.rstrip("\n") for part in (*parts, f"{made}. {SYNTHETIC}") if part) + "\n"
 
 
-def write_json(path: Path, content: Any) -> None:
-    """Write a mapping or list as JSON; numbers that are not finite become null."""
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write the numbers of a study, and the machine, as JSON into a folder that is made if need be."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomic(path, json_text(content, indent=1) + "\n")
+    write_atomic(path, json_text({"machine": machine(), **content}, indent=1) + "\n")
 
 
 def _text(value: object) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from boom_twin import Scene
 from boom_twin.scene.schema import IDEAL_BELOW
 from boom_twin.system.atomic_files import write_atomic
-from boom_twin.validation.study.report import machine, provenance, table, write_json
+from boom_twin.validation.study.report import page, table, write_json
 
 from . import convergence as near
 from .convergence import MEASURES, Convergence, convergence
@@ -45,9 +45,9 @@ def report(scene: Scene, swings: list[Swing], shifts: list[Shift], found: Conver
         f"{len(block.pins)} pins have a radial clearance of {sizes} um. Contact law: {block.contact.law}, restitution "
         f"{block.contact.restitution:g}. `make study` writes all numbers.",
         *_stops(swings), *_rests(shifts), *_convergence(found), *_costs(costs),
-        "Limits: one motion per posture.", provenance(),
+        "Limits: one motion per posture.",
     ]  # fmt: skip
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+    return page(parts)
 
 
 def _stops(found: list[Swing]) -> list[str]:
@@ -133,9 +133,8 @@ def write(scene: Scene, out: Path, quick: bool = False) -> list[Path]:
         convergence(scene, quick),
         costs(scene, quick),
     )
-    out.mkdir(parents=True, exist_ok=True)
     paths = [out / f"clearance{part}" for part in (".json", ".md", ".png", "_static.png", "_convergence.png")]
-    write_json(paths[0], {"machine": machine(), **as_json(found)})
+    write_json(paths[0], as_json(found))
     text = report(scene, found.swings, found.shifts, found.convergence, found.costs)
     write_atomic(paths[1], text)
     traces = [Trace(own.posture, own.model, own.times, own.height, own.acceleration) for own in found.swings]

@@ -16,7 +16,7 @@ from boom_twin.analysis.motions import motion_of
 from boom_twin.compiler.compile import BasisName, compile_scene
 from boom_twin.scene.kinematics import posture_angles, skeleton, strokes_of_posture
 from boom_twin.system.atomic_files import write_atomic
-from boom_twin.validation.study.report import machine, provenance, table, write_json
+from boom_twin.validation.study.report import page, table, write_json
 
 from .boundary_zeros import BoundaryZero, equilibrium, frequencies
 from .low_speed import error_by_speed
@@ -128,9 +128,8 @@ def write(scene: Scene, out: Path, quick: bool = False) -> list[Path]:
     `quick`: only the first posture, and few speeds.
     """
     found = measure(scene, list(scene.postures)[: 1 if quick else None], quick)
-    out.mkdir(parents=True, exist_ok=True)
     paths = [out / name for name in ("papers.json", "papers.md", "papers_postures.png", "papers_low_speed.png")]
-    write_json(paths[0], {"machine": machine(), **_numbers(found)})
+    write_json(paths[0], _numbers(found))
     write_atomic(paths[1], as_markdown(found))
     posture_picture(paths[2], "A stop in the papers' postures", NOTE, "Exudyn", [*_traces(found.stops)])
     low_speed_picture(
@@ -185,9 +184,8 @@ def as_markdown(found: PapersStudy) -> str:
         "[Z] Zhang et al. 2016, *Research on the rigid-flexible multibody dynamics of concrete placing boom*; [R] Ren et al. "
         "2014, doi 10.1155/2014/943847. Their rigs and data are not public, so curves cannot be compared.",
         *_matrices_text(found), *_zeros_text(found), *_bases_text(found), *_low_speed_text(found), *_stops_text(found),
-        provenance(),
     ]  # fmt: skip
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+    return page(parts)
 
 
 def _matrices_text(found: PapersStudy) -> list[str]:

@@ -15,7 +15,7 @@ from boom_twin.analysis.simulate import RHO
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.validation.study import scene_changes as made
 from boom_twin.validation.study.long_booms import long_boom, seven_sections
-from boom_twin.validation.study.report import machine, provenance, table, write_json
+from boom_twin.validation.study.report import page, table, write_json
 from boom_twin.validation.study.stability.cases import short
 from boom_twin.validation.study.stability.setups import smooth
 
@@ -128,9 +128,8 @@ def _rows(scene: Scene, step: float) -> tuple[np.ndarray, np.ndarray]:
 def write(scene: Scene, out: Path, quick: bool = False) -> list[Path]:
     """Measure, and write ``roundoff.json``, ``roundoff.md`` and ``roundoff.png`` into `out`; returns their paths."""
     lost, turned = losses(scene, quick), turn_up(scene, tuple(step for step in TURN_UP_STEPS if step >= FINE or not quick))
-    out.mkdir(parents=True, exist_ok=True)
     paths = [out / f"roundoff.{kind}" for kind in ("json", "md", "png")]
-    write_json(paths[0], {"machine": machine(), "losses": lost, "turn_up": turned})
+    write_json(paths[0], {"losses": lost, "turn_up": turned})
     write_atomic(paths[1], text(lost, turned))
     chain = [loss for loss in lost if loss.group == "sections"]
     shown = {"Riccati": "riccati", "plain product": "plain", "LU of the whole system": "dense"}
@@ -163,6 +162,5 @@ def text(lost: Sequence[Loss], turned: TurnUp) -> str:
         f"{step:.0e} s. The error rises again {verdict} {TARGET:.0e}: accelerations contain the rounding of positions "
         "over h\N{SUPERSCRIPT TWO}.",
         "Limits: one short smooth move of the default boom; long booms are invented.",
-        provenance(),
     ]
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+    return page(parts)
