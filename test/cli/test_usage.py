@@ -95,17 +95,15 @@ def test_help_lists_every_command_and_ends_with_examples(capsys: pytest.CaptureF
         assert text.rstrip().endswith(f"boom_twin {EXAMPLES[name][-1]}")
 
 
-@pytest.mark.system
-def test_as_a_module_and_quiet(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "boom_twin"]
+def test_quiet_leaves_out_what_is_no_result_and_no_failure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     session = str(Path(__file__).parents[2] / "bags" / "arch_session")
-    loud, quiet = (
-        subprocess.run([*command, "info", session, *more], capture_output=True, text=True, timeout=300, check=True)
-        for more in ([], ["--quiet"])
-    )
-    assert loud.stdout == quiet.stdout and loud.stderr.startswith("scene: ") and quiet.stderr == ""
-    failed = subprocess.run([*command, "info", str(tmp_path), "--quiet"], capture_output=True, text=True, timeout=300)
-    assert failed.returncode == 1 and failed.stderr.startswith("boom_twin info: ")
+    assert main(["info", session]) == 0
+    loud = capsys.readouterr()
+    assert main(["info", session, "--quiet"]) == 0
+    quiet = capsys.readouterr()
+    assert loud.out == quiet.out and loud.err.startswith("scene: ") and quiet.err == ""
+    assert main(["info", str(tmp_path), "--quiet"]) == 1
+    assert capsys.readouterr().err.startswith("boom_twin info: ")
 
 
 @pytest.mark.system
