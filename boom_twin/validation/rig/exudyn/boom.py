@@ -20,10 +20,9 @@ from ....errors import UsageError
 from ....scene.kinematics import gravity_in_base
 from ....scene.schema import Cylinder, CylinderPart, Pin, Scene
 from ....types import Array
-from . import masses
+from . import exudyn, items, masses
 from .lumped_masses import lump_masses
 from .masses import Lump, Lumps
-from .module import exudyn, items
 from .pin_clearance import Bush, contact_of, pin_with_play, refuse_other_pins
 from .six_bar import Link, six_bar
 from .system import Boom, BuiltSection, Frame, Station, oil_stiffness, section_frames

@@ -15,7 +15,7 @@ from ....errors import UsageError
 from ....scene.schema import Material, Pin, Scene
 from ....types import Array
 from ...contact_law import HYSTERESIS, Contact, stiffness
-from .module import exudyn
+from . import exudyn
 
 LEAST_GAP = 3e-5  # m, of the radii in K, which grows without bound while the pin becomes ideal
 SMOOTHING = 1e-6  # m, over which contact sets in

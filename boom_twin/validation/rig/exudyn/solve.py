@@ -16,8 +16,8 @@ import numpy as np
 from ....errors import SolverError, UsageError
 from ....scene.schema import Scene
 from ....types import Array
+from . import exudyn
 from .boom import SHEAR_OVER_AXIAL, build
-from .module import exudyn
 from .parameter_changes import ParameterChanges
 from .pin_clearance import pin_with_play
 from .probes import Probes, attach, read

@@ -13,7 +13,7 @@ import numpy as np
 from ....errors import SolverError
 from ....scene.schema import Cylinder
 from ....types import Array
-from .module import exudyn
+from . import exudyn
 from .parameter_changes import ParameterChanges
 from .system import Boom, oil_stiffness
 

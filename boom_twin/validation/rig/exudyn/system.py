@@ -11,8 +11,8 @@ import numpy as np
 from ....scene.kinematics import joint_angles_of_strokes
 from ....scene.schema import Cylinder, Point, Scene
 from ....types import Array
+from . import items
 from .masses import Gathered, LumpedMasses
-from .module import items
 from .pin_clearance import Bush
 
 
