@@ -128,7 +128,7 @@ def test_only_the_sensors_that_are_asked_for(scene: Path, tmp_path: Path) -> Non
     [
         (["--load", "pump:9:130"], "load pump:9:130:0.1: frequency = 9, must be from 0.05 to 2 Hz. Write pump:"),
         (["--load", "wind:15@3"], "load wind:15:5@3: begins at 3 s, must be before the end at 3 s."),
-        (["--sensors", "angles,gps"], "--sensors angles,gps: gps is no sensor of the rig. Give some of angles, imu, forces."),
+        (["--sensors", "angles,gps"], "--sensors angles,gps: 'gps' is no sensor. Give some of angles, imu, forces."),
         (["--fault", "cylinder_force_1.sensor:stuck"], "forces are not recorded. Give --sensors angles,forces,imu."),
         (["--fault", "joint_2.sensor:stuck"], "the boom has joints, cylinders and sections 1 to 1."),
         (["--rate", "20"], "rate = 20, must be from 50 to 1000 Hz"),
