@@ -101,7 +101,7 @@ def step_through(boom: Boom, course: Course, step: float, output_step: float, sc
 
 
 def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> Any:
-    """The sparse solver was the fastest from 4 elements a section on, and as fast as the dense ones below.
+    """Return Exudyn's settings. Its sparse solver was the fastest from 4 elements a section on, and no slower below.
 
     A tangent that is made often keeps at least the pattern of its factors.
     """
@@ -162,7 +162,7 @@ def _feed(boom: Boom, course: Course, step: float) -> None:
 
 
 def _rests(boom: Boom, index: int, course: Course) -> list[float]:
-    """Lengths (m) at which a drive is without force when its pins stand still: its own, and d / k of its rate."""
+    """Return the lengths (m) at which a drive is without force when its pins stand still: its own, and d / k of its rate."""
     cylinder = _cylinder(boom, index)
     lengths: Array = course.strokes[:, index] + cylinder.closed_length
     if cylinder.is_compressible:
