@@ -80,7 +80,6 @@ soak: warm
 	$(BIN)/python test/bench/soak.py --rate 1000
 	$(BIN)/python test/bench/monitor.py --seconds 600
 	$(BIN)/boom_twin study stability --soak --out out/soak
-	$(BIN)/python test/bench/contact_energy.py
 	$(BIN)/python test/bench/kills.py
 
 SECONDS ?= 600

@@ -28,7 +28,7 @@ FIRST = (
 
 
 SYSTEM = (
-    "batch/", "cli/test_isolation", "cli/test_printable", "cli/test_start_up", "docs/test_examples",
+    "batch/", "cli/test_isolation", "cli/test_start_up", "docs/test_examples",
     "extending/", "kernels/test_kernel_cache", "kernels/test_uncompiled", "monitor/test_monitor_browser",
     "monitor/test_monitor_connections", "monitor/test_monitor_recording", "offline/test_kills",
     "ros/", "test_made_once", "twin/test_growth",

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
+from ..types import Stream
 
 if TYPE_CHECKING:
     from ..bag.time_window import TimeWindow
@@ -107,6 +108,18 @@ def refuse_given(args: Namespace, remedy: str, *names: str) -> None:
             first = value[0] if isinstance(value, list) else value
             shown = "" if value is True else f" {first:g}" if isinstance(first, float) else f" {first}"
             raise UsageError(f"--{name.replace('_', '-')}{shown}: {remedy}")
+
+
+SENSORS = {"angles": Stream.ANGLES, "imu": Stream.IMU, "forces": Stream.FORCES}
+"""Sensors beside strokes by their names in ``--sensors``."""
+
+
+def sensors_of(text: str) -> list[str]:
+    """Return the names of `SENSORS` between commas; raise UsageError for another name."""
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if unknown := [name for name in names if name not in SENSORS]:
+        raise UsageError(f"--sensors {text}: {', '.join(map(repr, unknown))} is no sensor. Give some of {', '.join(SENSORS)}.")
+    return names
 
 
 def positive(text: str) -> float:

@@ -41,7 +41,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Calibrate; write the scene and print the result."""
+    """Run the calibration, write the scene and print the result."""
     from ..bag.reader import scan
     from ..calibration.output import as_object, as_text, mapping_path, refuse_overwriting, write_mapping, write_scene
     from ..calibration.run import Choice, calibrate

@@ -8,7 +8,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import BoomTwinError, Fault, SceneError, UsageError
+from ..errors import BoomTwinError, Fault, SceneError
 from ..scene import Scene
 from ..scene.kinematics import strokes_of_posture
 from ..scene.load import DEFAULT_NAME, examine
@@ -17,9 +17,8 @@ from ..scene.schema import Clearance
 from ..scene.segmentation import LEAST_PARTS
 from ..scene.summary import UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from ..system.atomic_files import check_target
-from ..types import Stream
 from . import reduce as need
-from .arguments import add_file, add_json, add_scene, files_of
+from .arguments import SENSORS, add_file, add_json, add_scene, files_of, sensors_of
 from .output import columns, open_scene, print_result, tell
 
 if TYPE_CHECKING:
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 
 PNG = b"\x89PNG"
 """First bytes of a picture; only such a file is replaced."""
-SENSOR_NAMES = {"angles": Stream.ANGLES, "imu": Stream.IMU, "forces": Stream.FORCES}
 SIZE_A = "angle of the section, cylinder force"
 SIZE_B = "angles of section and two links, pin force (2), cylinder force"
 
@@ -43,7 +41,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--sensors",
         metavar="NAME,..",
         help=f"also tell how accurate the estimate of the tip is with these and with fewer, at every posture of the scene: "
-        f"{', '.join(SENSOR_NAMES)}; a name given twice is two such sensors (example: angles,imu,imu)",
+        f"{', '.join(SENSORS)}; a name given twice is two such sensors (example: angles,imu,imu)",
     )
 
 
@@ -52,7 +50,7 @@ def run(args: Namespace) -> int:
     need.refuse_misuse(args)
     if args.picture is not None:
         check_target(args.picture, files_of(args, "scene"), PNG)
-    sensors = None if args.sensors is None else _sensors_of(args.sensors)
+    sensors = None if args.sensors is None else sensors_of(args.sensors)
     scene, oddities = examine(args.scene)
     name = args.scene or DEFAULT_NAME
     drawn = [] if args.picture is None else [f"Written: {_draw(args.picture, scene, name)}"]
@@ -260,49 +258,26 @@ def _table(rows: list[list[str]], left: int = 1) -> list[str]:
     return [f"  {line}" for line in columns(rows, range(left))] if rows else []
 
 
-def _sensors_of(text: str) -> list[Stream]:
-    """Return the sensors named in `text`; raise UsageError for an unknown name."""
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    for name in names:
-        if name not in SENSOR_NAMES:
-            raise UsageError(f"--sensors: {name!r} is no sensor. Known: {', '.join(SENSOR_NAMES)}.")
-    return [SENSOR_NAMES[name] for name in names]
-
-
-def _sets_of(sensors: list[Stream]) -> list[tuple[Stream, ...]]:
-    """Return every selection of sensors once, fewest first, the empty one included."""
-    result = [chosen for count in range(len(sensors) + 1) for chosen in combinations(sensors, count)]
-    return list(dict.fromkeys(result))
-
-
-def _sensor_words(chosen: tuple[Stream, ...]) -> str:
-    """Return a selection as written on the command line."""
-    names = {stream: name for name, stream in SENSOR_NAMES.items()}
-    return ",".join(names[stream] for stream in chosen) or "strokes only"
-
-
-def _accuracy(scene: Scene, sensors: list[Stream]) -> tuple[dict[str, Any], list[str]]:
-    """Return the accuracy at every posture, as values for ``--json`` and as lines."""
+def _accuracy(scene: Scene, sensors: list[str]) -> tuple[dict[str, Any], list[str]]:
+    """Return the accuracy at every posture with every selection of `sensors`, as values for ``--json`` and as lines."""
     from ..deviation.accuracy import accuracy_at
 
     values: dict[str, Any] = {}
+    sets = dict.fromkeys(chosen for count in range(len(sensors) + 1) for chosen in combinations(sensors, count))
     acting = "an unknown load of 0.25 % of the boom's weight comes and goes at the tip"
     lines = ["", f"Accuracy of the estimate at rest, while {acting} (standard deviations)"]
     titles = f"{'tip x, y mm':>16} {'pitch mrad':>11} {'acceleration':>13} {'load N':>14}"
     lines.append(f"  {'posture':12} {'sensors beside strokes':24} {titles}")
     for posture in scene.postures:
-        for chosen in _sets_of(sensors):
+        for chosen in sets:
+            name = ",".join(chosen) or "strokes only"
             try:
-                result = accuracy_at(scene, strokes_of_posture(scene, posture), chosen)
+                result = accuracy_at(scene, strokes_of_posture(scene, posture), tuple(SENSORS[sensor] for sensor in chosen))
             except BoomTwinError as error:
-                lines.append(f"  {posture:12} {_sensor_words(chosen):24} {error}")
+                lines.append(f"  {posture:12} {name:24} {error}")
                 continue
-            values[f"accuracy_{posture}:{_sensor_words(chosen)}"] = [
-                *result.tip.tolist(),
-                *result.acceleration.tolist(),
-                *result.load.tolist(),
-            ]
-            lines.append(f"  {posture:12} {_sensor_words(chosen):24} {_accuracy_row(result)}")
+            values[f"accuracy_{posture}:{name}"] = [*result.tip, *result.acceleration, *result.load]
+            lines.append(f"  {posture:12} {name:24} {_accuracy_row(result)}")
     return values, lines
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..system.json_text import json_text
 from .arguments import add_file, add_json, add_scene, files_of
-from .output import columns, open_scene, plain_values, print_result
+from .output import columns, open_scene, print_result
 
 if TYPE_CHECKING:
     from ..analysis.envelope import Envelope
@@ -119,7 +119,7 @@ def _write(folder: Path, result: Envelope, quantities: list[Quantity], values: d
     from ..plots.envelope import envelope_picture
 
     (folder / "envelope.csv").write_text(_csv(result, quantities), encoding="utf-8")
-    (folder / "envelope.json").write_text(json.dumps(plain_values(values)) + "\n", encoding="utf-8")
+    (folder / "envelope.json").write_text(json_text(values) + "\n", encoding="utf-8")
     bars = [(f"{q.words}, {q.unit}", q.factor * q.values) for q in quantities[1:]]
     envelope_picture(folder / "envelope.png", scene, result, bars)
 

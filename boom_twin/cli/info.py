@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..system.terminal_text import printable
 from ..types import NANO
 from .arguments import SESSION, add_json, add_mapping, add_session_scene, add_window, window_of
-from .output import open_session_scene, print_result
+from .output import columns, open_session_scene, print_result
 
 if TYPE_CHECKING:
     from ..bag.inspect import BagInfo, Tally
@@ -130,24 +130,15 @@ def _part(info: BagInfo, values: dict[str, Any]) -> str:
 
 def _table(info: BagInfo) -> list[str]:
     """Return a table with one line for each topic."""
-    wide = max((len(tally.name) for tally in info.tallies), default=5)
-    kind = max((len(tally.type) for tally in info.tallies), default=4)
-    lines = [
-        f"{'topic':{wide}}  {'type':{kind}}  {'count':>8}  {'Hz':>8}  {'largest gap':>19}  {'not':>6}  "
-        f"{'no':>6}  log time minus stamp, ms",
-        f"{'':{wide}}  {'':{kind}}  {'':>8}  {'':>8}  {'ms':>8} {'at s':>10}  {'rising':>6}  {'stamp':>6}  "
-        f"{'least':>9} {'mean':>9} {'most':>9}",
-    ]
+    late = ["log - stamp, ms: least", "mean", "most"]
+    rows = [["topic", "type", "count", "Hz", "gap, ms", "at s", "not rising", "no stamp", *late]]
     for tally in info.tallies:
         gap = (tally.gap * 1e-6 if tally.gap else None, _gap_at(tally, info.session.start))
         skew = [value and value * 1e3 for value in tally.skew or (None, None, None)]
-        lines.append(
-            f"{tally.name:{wide}}  {tally.type:{kind}}  {tally.count:8d}  {_number(tally.rate, 8, 2)}  "
-            f"{_number(gap[0], 8, 2)} {_number(gap[1], 10, 3)}  {tally.not_increasing:6d}  {tally.unset:6d}  "
-            + " ".join(_number(value, 9, 3) for value in skew)
-        )
-    return lines
+        own = [tally.name, tally.type, str(tally.count), _number(tally.rate, 2), _number(gap[0], 2), _number(gap[1], 3)]
+        rows.append([*own, str(tally.not_increasing), str(tally.unset), *(_number(value, 3) for value in skew)])
+    return columns(rows, left=(0, 1))
 
 
-def _number(value: float | None, width: int, digits: int) -> str:
-    return f"{'-':>{width}}" if value is None else f"{value:{width}.{digits}f}"
+def _number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"

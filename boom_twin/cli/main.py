@@ -12,7 +12,7 @@ import gc
 import os
 import re
 import sys
-from argparse import Action, ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from difflib import get_close_matches
@@ -94,22 +94,11 @@ COMPLETING = "_ARGCOMPLETE"
 """Set in the environment by a shell that asks for completions."""
 
 
-class CommandsFormatter(RawDescriptionHelpFormatter):
-    """Help formatter that keeps the lines of examples, and leaves room for the longest name of a command."""
-
-    def add_argument(self, action: Action) -> None:
-        """Add an argument, and count the indentation of commands, which the base class forgets, so that no line breaks."""
-        super().add_argument(action)
-        for command in self._iter_indented_subactions(action):
-            length = self._current_indent + len(self._format_action_invocation(command))
-            self._action_max_length = max(self._action_max_length, length)
-
-
 class CommandParser(ArgumentParser):
     """Parser whose errors name the nearest option or choice."""
 
     def __init__(self, *args: object, **options: object) -> None:
-        options.setdefault("formatter_class", CommandsFormatter)
+        options.setdefault("formatter_class", RawDescriptionHelpFormatter)
         super().__init__(*args, **options)  # type: ignore[arg-type]
         self._negative_number_matcher = re.compile(r"-\.?\d")  # values, no options: also lists, as -5,-170
 
@@ -203,13 +192,15 @@ def _command(name: str) -> Command:
 
 def _parser(arguments: Sequence[str]) -> ArgumentParser:
     """Return the parser of all commands; only the module of the command that is named gets imported."""
-    parser = CommandParser(prog="boom_twin", description=DESCRIPTION, epilog=EXIT_CODES)
+    listed = [f"  {name:{max(map(len, COMMANDS))}}  {purpose}" for name, purpose in COMMANDS.items()]
+    ends = "\n".join(["commands:", *listed, "", EXIT_CODES])
+    parser = CommandParser(prog="boom_twin", description=DESCRIPTION, epilog=ends)
     parser.add_argument("--version", action="version", version=f"boom_twin {__version__}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, help="see below")
     is_completing = COMPLETING in os.environ
     for name, purpose in COMMANDS.items():
         about = purpose[0].upper() + purpose[1:] + "."
-        own = commands.add_parser(name, help=purpose, description=about, epilog=_epilog(name))
+        own = commands.add_parser(name, description=about, epilog=_epilog(name))
         own.add_argument("--quiet", action="store_true", help="leave out what is told on the way, but for warnings")
         if is_completing or name in arguments:
             _command(name).add_arguments(own)
@@ -219,7 +210,7 @@ def _parser(arguments: Sequence[str]) -> ArgumentParser:
 
 
 def _epilog(command: str) -> str:
-    """Return the lines below the options; none for a command without examples."""
+    """Return the lines below the options; a command that `EXAMPLES` lacks has none."""
     lines = [f"  boom_twin {example}" for example in EXAMPLES.get(command, ())]
     return "\n".join(["examples:", *lines]) if lines else ""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from io import TextIOBase
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from ..errors import Fault
+from ..system.json_text import json_text
 
 if TYPE_CHECKING:
     from ..bag.reader import Session
@@ -104,24 +104,7 @@ def warn_incomplete(session: Session) -> None:
 
 def print_result(is_json: bool, values: Mapping[str, Any], lines: Iterable[str]) -> None:
     """Print `values` as one flat JSON object (null for numbers that are not finite), or `lines` for people."""
-    print(json.dumps(plain_values(values), allow_nan=False) if is_json else "\n".join(lines))
-
-
-def plain_values(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return JSON values; None for numbers that are not finite."""
-    return {key: _plain(value) for key, value in values.items()}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        raise TypeError("the object must be flat")
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and value - value != 0.0:
-        return None
-    return value
+    print(json_text(values) if is_json else "\n".join(lines))
 
 
 def columns(rows: Sequence[Sequence[str]], left: Iterable[int] = (0,)) -> list[str]:

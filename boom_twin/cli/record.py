@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from ..ros.bag.subscriptions import RequestedTopic
 
 
-SMALLEST = 2**20
-SHORTEST = 0.1
+SMALLEST_FILE = 2**20  # bytes
+SHORTEST_FILE = 0.1  # s
 _UNITS = {"": 1, "k": 2**10, "M": 2**20, "G": 2**30}
 
 
@@ -180,8 +180,8 @@ def _wanted(args: Namespace, known: Topics) -> list[RequestedTopic]:
 def long_enough(text: str) -> float:
     """Parse the length of a file in seconds."""
     value = positive(text)
-    if value < SHORTEST:
-        raise ArgumentTypeError(f"{text}: must be at least {SHORTEST:g} s: completing a file takes a while")
+    if value < SHORTEST_FILE:
+        raise ArgumentTypeError(f"{text}: must be at least {SHORTEST_FILE:g} s: completing a file takes a while")
     return value
 
 
@@ -191,6 +191,6 @@ def size(text: str) -> int:
     if match is None:
         raise ArgumentTypeError(f"{text!r} is not a size like 500M or 2G")
     value = int(float(match[1]) * _UNITS[match[2]])
-    if value < SMALLEST:
+    if value < SMALLEST_FILE:
         raise ArgumentTypeError(f"{text}: must be at least 1M: every file repeats the definitions")
     return value

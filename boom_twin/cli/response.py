@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 Flags = NDArray[np.bool_]
 LOW, HIGH, POINTS, RATES, STEPS = 0.05, 30.0, 300, (0.2, 1.2, 201), 1
-FASTEST = 2.0  # Hz, of pumps
-FAR = 0.05  # of the reach: swings beyond are not in proportion to the load
-FAR_WORN = 1e-4  # m, the same on pins with clearance
+FASTEST_PUMP = 2.0  # Hz, of pumps
+SWING_SHARE = 0.05  # of the reach: swings beyond are not in proportion to the load
+SWING_WORN = 1e-4  # m, the same on pins with clearance
 
 
 @dataclass(frozen=True)
@@ -139,7 +139,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
             f"--from {args.low:g} --to {args.high:g} --points {args.points}: frequencies must be above 0 Hz and ascend, with "
             "2 to 1000000 points. Give such."
         )
-    rest = statics(with_all_shapes(scene), strokes=args.strokes, posture=args.posture, modes=MODES)
+    rest = statics(with_all_shapes(scene), strokes=args.strokes, posture=args.posture, modes=MODES_SOUGHT)
     natural = rest.frequencies[(rest.frequencies > args.low) & (rest.frequencies < args.high)]
     force = None if args.drive is not None else tuple(args.tip or UPWARD)
     place = args.strokes, args.posture, force, args.drive
@@ -168,7 +168,7 @@ def _response(scene: Scene, args: Namespace) -> Answer:
     )
 
 
-MODES = 40  # natural frequencies that are looked for within the band
+MODES_SOUGHT = 40  # natural frequencies that are looked for within the band
 BESIDE, SHARP = 1.0 + 1e-6, 3.0
 """Times a natural frequency; a peak that is so much higher than there is bounded by rounding alone."""
 
@@ -203,9 +203,11 @@ def _steady(scene: Scene, args: Namespace) -> Answer:
     from ..plots.frequency_response import steady_state_picture
 
     if args.pump:
-        if args.pump[0] > FASTEST:
+        if args.pump[0] > FASTEST_PUMP:
             remedy = f"{args.pump[0]:g} a minute are {args.pump[0] / 60.0:.3g} Hz, and the rate comes first: --pump 0.35:130."
-            raise UsageError(f"--pump rate = {args.pump[0]:g} Hz: a pump makes at most {FASTEST:g} strokes a second. {remedy}")
+            raise UsageError(
+                f"--pump rate = {args.pump[0]:g} Hz: a pump makes at most {FASTEST_PUMP:g} strokes a second. {remedy}"
+            )
         load, told = pump_load(scene, *args.pump), f"pump pulses of {args.pump[1]:g} N at {args.pump[0]:g} Hz"
     else:
         table, wanted = read_csv(Path(args.load), UsageError), ["t_s", "fx_N", "fy_N"]
@@ -287,10 +289,10 @@ def _map(scene: Scene, args: Namespace) -> Answer:
 
 def _large(scene: Scene, swing: float) -> tuple[str, ...]:
     """Return a warning if the swing is so large that the boom does not respond in proportion."""
-    if scene.clearance is not None and scene.clearance.pins and swing > FAR_WORN:
-        told = f"the largest swing is {swing:.2g} m; beyond {FAR_WORN:g} m journals may roll in their bushes or leave them, and"
-        return (f"{told} a boom on pins with clearance does not answer in proportion. Simulate it",)
-    if swing <= FAR * scene.reach:
-        return ()
-    told = f"the largest swing, {swing:.2g} m, is more than {FAR:g} of the reach, beyond which no boom answers in proportion"
-    return (told,)
+    if scene.clearance is not None and scene.clearance.pins and swing > SWING_WORN:
+        told = f"the largest swing is {swing:.2g} m; beyond {SWING_WORN:g} m journals may roll in their bushes or leave them"
+        return (f"{told}, and a boom on pins with clearance does not answer in proportion. Simulate it",)
+    if swing > SWING_SHARE * scene.reach:
+        share = f"more than {SWING_SHARE:g} of the reach, beyond which no boom answers in proportion"
+        return (f"the largest swing, {swing:.2g} m, is {share}",)
+    return ()

@@ -9,10 +9,8 @@ from typing import NoReturn
 from .. import __version__
 from ..errors import UsageError
 from ..types import StrokeReading
-from .arguments import add_scene, files_of, positive
+from .arguments import add_scene, files_of, positive, sensors_of
 from .output import tell, tell_oddities
-
-SENSORS = ("angles", "imu", "forces")
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -53,14 +51,6 @@ class ListFaults(Action):
         parser.exit()
 
 
-def _recorded(text: str) -> set[str]:
-    """Return the sensors that are named in a list; raise UsageError for an unknown one."""
-    found = {name.strip() for name in text.split(",") if name.strip()}
-    if unknown := sorted(found - set(SENSORS)):
-        raise UsageError(f"--sensors {text}: {', '.join(unknown)} is no sensor of the rig. Give some of {', '.join(SENSORS)}.")
-    return found
-
-
 def _refuse_unrecorded(causes: list[str], recorded: set[str]) -> None:
     """Raise UsageError if a fault is of a sensor that is not recorded."""
     for cause in causes:
@@ -85,7 +75,7 @@ def run(args: Namespace) -> int:
     tell_oddities(assumed.oddities, assumed.source)
     scene = assumed.scene
     duration = BUNDLED_DURATION if args.duration is None else args.duration
-    recorded = _recorded(args.sensors)
+    recorded = set(sensors_of(args.sensors))
     rate = RATE if args.rate is None else args.rate
     sensors = noise_free(rate) if args.clean else Sensors(rate)
     wrong = [faults.parse(text) for text in args.fault]

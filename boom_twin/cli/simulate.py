@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
     Balances = tuple[EnergyBalance, MomentumBalance]
 
-FAR = 1e-3  # m, largest deviation of the first row from the posture's strokes
-FASTEST = 0.5  # m/s, speed above which a warning comes; booms stay below 0.3
-SPARSE = 1.0  # s between rows, above which a warning comes
+POSTURE_DEVIATION = 1e-3  # m, largest deviation of the first row from the posture's strokes
+FASTEST_CYLINDER = 0.5  # m/s, speed above which a warning comes; booms stay below 0.3
+SPARSE_ROWS = 1.0  # s between rows, above which a warning comes
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -269,14 +269,14 @@ def odd_in_drive(times: Array, strokes: Array, stem: str = "stroke") -> list[str
     steps, found = np.diff(times), []
     if not len(steps) or not (steps > 0.0).all():
         return []  # `simulate` refuses it
-    if (usual := float(np.median(steps))) >= SPARSE:
+    if (usual := float(np.median(steps))) >= SPARSE_ROWS:
         found.append(
             f"t_s goes on by {usual:g} s from row to row, {times[-1] - times[0]:g} s in all, and strokes go smoothly between. "
             "If these are ms, divide them by 1000: t_s is in seconds."
         )
     speeds = np.abs(np.diff(strokes, axis=0)) / steps[:, None]
     row, i = np.unravel_index(np.argmax(speeds), speeds.shape)
-    if speeds[row, i] > FASTEST:
+    if speeds[row, i] > FASTEST_CYLINDER:
         found.append(
             f"line {row + 3}: {stem}_{i + 1}_m goes {strokes[row, i]:g} to {strokes[row + 1, i]:g} within {steps[row]:g} s, "
             f"{speeds[row, i]:.3g} m/s; cylinders of booms go at less than 0.3 m/s. Check the value and the times."
@@ -292,11 +292,11 @@ def _angles_near(scene: Scene, posture: str, first: Array, are_lengths: bool) ->
     expected, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)
     drives = drives_at_rest(scene, first, angles) if are_lengths else first
     off = np.abs(expected - drives)
-    if not np.max(off) <= FAR:
+    if not np.max(off) <= POSTURE_DEVIATION:
         i = int(np.argmax(off))
         at_rest = " at rest" if are_lengths else ""
         raise UsageError(
             f"stroke_{i + 1}_m = {drives[i]:.6g} in the first row{at_rest}: posture {posture} has {expected[i]:.6g}, and they "
-            f"may differ by {FAR:g} m. Start in the posture, or name another."
+            f"may differ by {POSTURE_DEVIATION:g} m. Start in the posture, or name another."
         )
     return angles

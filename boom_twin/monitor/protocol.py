@@ -22,15 +22,14 @@ else is JSON in text messages, with a key ``kind``: ``hello``, ``layout``, ``res
 
 from __future__ import annotations
 
-import json
 import struct
 from dataclasses import asdict
-from math import isfinite
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..system.json_text import json_text
 from ..types import SENSORS
 from .data.received_messages import DroppedMessages
 from .data.status import HEALTH, ListedAlarm, Severity, StatusLamp, overall, worst
@@ -84,7 +83,7 @@ def alarms(found: list[ListedAlarm]) -> dict[str, Any]:
 
 def dump(message: Any) -> str:
     """Return a message as JSON text."""
-    return json.dumps(_plain(message), allow_nan=False, separators=(",", ":"))
+    return json_text(message, separators=(",", ":"))
 
 
 def _with_alarms(lamps: list[StatusLamp], alarms: list[StatusLamp]) -> list[StatusLamp]:
@@ -101,13 +100,3 @@ def _group(lamps: list[StatusLamp]) -> dict[str, Any]:
         return {"level": Severity.OFF.name, "reason": "not there", "lamps": []}
     reason = f"{len(lamps)} as expected" if lamp.level == Severity.OK and len(lamps) > 1 else lamp.reason
     return {"level": lamp.level.name, "reason": reason, "lamps": [{**asdict(each), "level": each.level.name} for each in lamps]}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _plain(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    return value

@@ -108,7 +108,7 @@ def deviation(model: Response, full: Response, course: StrokeCourse) -> Deviatio
     return Deviation(float(rest[worst]), course.names[worst], float(np.sqrt(np.mean(move**2))), float(move.max()))
 
 
-# In unknowns, measured on the default boom (`test/bench/parts.py` shows how well they count):
+# In unknowns, measured on the default boom:
 AXIAL = 0.35  # an axial coordinate; other unknowns count as one
 OTHER = 0.6  # more for a flexible part that has not the usual shapes, for which the kernels have code of their own
 COORDINATE_COST = 0.05  # a coordinate of a mass, or a point that turns finitely

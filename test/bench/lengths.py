@@ -17,7 +17,6 @@ import numpy as np
 from boom_twin import replay
 from boom_twin.cli.main import main as boom_twin
 from boom_twin.offline.ground_truth import load_truth
-from boom_twin.types import Array
 
 SECONDS, SETTLED = 60, 2.0  # of a session; s that are not counted
 PUMP, WRONG = ("--load", "pump:0.43:130@5", "--load", "wind:15"), ("--wrong", "0.02", "--rig-seed")
@@ -36,7 +35,7 @@ CASES: dict[str, tuple[str, ...]] = {
 }
 
 
-def rms(rows: Array) -> float:
+def rms(rows: np.ndarray) -> float:
     """Return the root mean square of vectors (k, 2)."""
     return float(np.sqrt(np.mean(np.sum(rows**2, axis=1))))
 

@@ -44,9 +44,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from demo.isolation import isolated
 
-from boom_twin import statics
+from boom_twin import load_scene, statics
 from boom_twin.messages.cdr_decoder import stamp_in
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 
 OUT = {

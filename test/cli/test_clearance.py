@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boom_twin import load_scene
 from boom_twin.cli.main import main
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.load import clearance_text, default_text, with_end_mark
 

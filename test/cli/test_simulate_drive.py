@@ -10,42 +10,69 @@ import pytest
 
 from boom_twin import load_scene, simulate
 from boom_twin.cli.main import main
-from boom_twin.cli.simulate import odd_in_drive
-from boom_twin.errors import UsageError
+from boom_twin.errors import BoomTwinError
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.pump_pulses import ease
 
+HEADER = "t_s,stroke_1_m,stroke_2_m,stroke_3_m,stroke_4_m\n"
 TIMES = np.arange(0.0, 2.0, 0.01)
 STROKES = strokes_of_posture(load_scene(), "arch") + 0.01 * np.sin(np.pi * TIMES)[:, None]
 
 
-def test_an_ordinary_drive_is_not_odd() -> None:
-    assert odd_in_drive(TIMES, STROKES) == []
-    assert odd_in_drive(TIMES[:1], STROKES[:1]) == [] == odd_in_drive(TIMES[::-1], STROKES)
+def drive_file(path: Path, times: np.ndarray, strokes: np.ndarray) -> str:
+    rows = "\n".join(",".join(map(repr, row)) for row in np.column_stack([times, strokes]).tolist())
+    path.write_text(f"{HEADER}{rows}\n", encoding="utf-8")
+    return str(path)
 
 
-def test_times_in_ms_and_jumps_are_told_with_their_place() -> None:
-    (told,) = odd_in_drive(1000.0 * TIMES, STROKES)
-    assert "t_s goes on by 10 s from row to row, 1990 s in all" in told and "divide them by 1000" in told
-    jump = STROKES.copy()
-    jump[100:, 2] += 0.2
-    (told,) = odd_in_drive(TIMES, jump)
-    assert told.startswith("line 102: stroke_3_m goes ") and "within 0.01 s, 20 m/s" in told
+def jumped(size: float) -> np.ndarray:
+    """Strokes of which the first jumps in row 10."""
+    strokes = STROKES[:20].copy()
+    strokes[10:, 0] += size
+    return strokes
 
 
-def test_simulate_says_it_first(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """And then follows the drive as it is."""
-    drive, jump = tmp_path / "drive.csv", STROKES[:20].copy()
-    jump[10:, 0] += 0.02
-    rows = "\n".join(",".join(map(repr, row)) for row in np.column_stack([TIMES[:20], jump]).tolist())
-    drive.write_text(f"t_s,stroke_1_m,stroke_2_m,stroke_3_m,stroke_4_m\n{rows}\n", encoding="utf-8")
-    assert main(["simulate", "--drive", str(drive), "--out", str(tmp_path / "out.csv"), "--no-error-estimate"]) == 0
-    assert f"warning: {drive}: line 12: stroke_1_m goes " in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("times", "strokes", "told"),
+    [
+        (TIMES[:20], STROKES[:20], ""),
+        (TIMES[:20], jumped(0.02), "line 12: stroke_1_m goes "),
+        (1000.0 * TIMES[:4], STROKES[:4], "t_s goes on by 10 s from row to row, 30 s in all"),
+    ],
+)
+def test_a_drive_likely_meant_otherwise_is_told_and_followed(
+    times: np.ndarray, strokes: np.ndarray, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drive = drive_file(tmp_path / "drive.csv", times, strokes)
+    given = ["--drive", drive, "--out", str(tmp_path / "out.csv"), "--no-error-estimate", "--dt", "0.01"]
+    assert main(["simulate", *given]) == 0
+    assert (f"warning: {drive}: {told}" if told else "") in (err := capsys.readouterr().err) and (told or "warning" not in err)
+
+
+def test_a_stroke_out_of_reach_is_told_with_its_row() -> None:
+    with pytest.raises(BoomTwinError, match=r"stroke_2 = 0\.5 m in row 3 of the drive: cylinder 2 travels 0 to 0\.42 m"):
+        simulate(None, [0.0, 0.1, 0.2], [[0.63, 0.16, 0.23, 0.18]] * 2 + [[0.63, 0.5, 0.23, 0.18]])
+
+
+def test_numerical_damping_is_an_option(tmp_path: Path) -> None:
+    drive, tables = drive_file(tmp_path / "drive.csv", TIMES[:20], jumped(0.002)), []
+    for rho in ([], ["--rho", "0.8"], ["--rho", "0.1"]):
+        out = tmp_path / f"out{len(tables)}.csv"
+        assert main(["simulate", "--drive", drive, "--out", str(out), "--no-error-estimate", *rho]) == 0
+        tables.append(out.read_text())
+    assert tables[0] == tables[1] != tables[2]
+    with pytest.raises(SystemExit):
+        main(["simulate", "--drive", drive, "--out", str(tmp_path / "out.csv"), "--rho", "1.1"])
+
+
+def columns(path: Path) -> dict[str, np.ndarray]:
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    return {name: table[name] for name in table.dtype.names}
 
 
 def test_results_of_another_boom_are_replaced_and_no_drive_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, drive = tmp_path / "out.csv", tmp_path / "drive.csv"
-    drive.write_text(f"t_s,stroke_1_m,stroke_2_m,stroke_3_m,stroke_4_m\n0,{','.join(map(str, STROKES[0]))}\n")
+    drive.write_text(f"{HEADER}0,{','.join(map(str, STROKES[0]))}\n")
     command = ["simulate", "--drive", str(drive), "--out", str(out)]
     out.write_text("t_s,stroke_1_m,joint_1_rad,tip_x_m,tip_y_m\n0,0.1,0,1,1\n")
     assert main(command) == 0 and len(out.read_text().splitlines()) == 2
@@ -53,31 +80,6 @@ def test_results_of_another_boom_are_replaced_and_no_drive_is(tmp_path: Path, ca
         out.write_text(other)
         assert main(command) == 1 and out.read_text() == other
         assert "is no earlier result of this command" in capsys.readouterr().err
-
-
-def test_a_stroke_out_of_reach_is_told_with_its_row() -> None:
-    with pytest.raises(UsageError, match=r"stroke_2 = 0\.5 m in row 3 of the drive: cylinder 2 travels 0 to 0\.42 m"):
-        simulate(None, [0.0, 0.1, 0.2], [[0.63, 0.16, 0.23, 0.18]] * 2 + [[0.63, 0.5, 0.23, 0.18]])
-
-
-def test_numerical_damping_is_an_option_as_a_ringing_motion_is_told_to_take(tmp_path: Path) -> None:
-    drive, jump = tmp_path / "drive.csv", STROKES[:20].copy()
-    jump[10:, 0] += 0.002
-    rows = "\n".join(",".join(map(repr, row)) for row in np.column_stack([TIMES[:20], jump]).tolist())
-    drive.write_text(f"t_s,stroke_1_m,stroke_2_m,stroke_3_m,stroke_4_m\n{rows}\n", encoding="utf-8")
-    tables = []
-    for rho in ([], ["--rho", "0.8"], ["--rho", "0.1"]):
-        out = tmp_path / f"out{len(tables)}.csv"
-        assert main(["simulate", "--drive", str(drive), "--out", str(out), "--no-error-estimate", *rho]) == 0
-        tables.append(out.read_text())
-    assert tables[0] == tables[1] != tables[2]
-    with pytest.raises(SystemExit):
-        main(["simulate", "--drive", str(drive), "--out", str(tmp_path / "out.csv"), "--rho", "1.1"])
-
-
-def columns(path: Path) -> dict[str, np.ndarray]:
-    table = np.genfromtxt(path, delimiter=",", names=True)
-    return {name: table[name] for name in table.dtype.names}
 
 
 def written(path: Path, stem: str, rows: np.ndarray) -> str:
@@ -127,7 +129,8 @@ def test_statics_tells_lengths_beside_drives(capsys: pytest.CaptureFixture[str])
     lengths = ",".join(map(repr, at_drives["length_m"]))
     assert main(["statics", f"--lengths={lengths}", "--json"]) == 0
     at_lengths = json.loads(capsys.readouterr().out)
-    assert at_lengths.keys() == at_drives.keys()
+    keys = ["stroke_m", "length_m", "tip_rigid_m", "tip_m", "joint_rad", "cylinder_force_N", "frequencies_Hz"]
+    assert list(at_lengths) == list(at_drives) == keys
     for key in ("stroke_m", "length_m", "tip_m", "joint_rad", "frequencies_Hz"):
         assert at_lengths[key] == pytest.approx(at_drives[key], rel=1e-9), key
     assert main(["statics", f"--lengths={lengths}"]) == 0

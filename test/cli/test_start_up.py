@@ -25,13 +25,13 @@ print(json.dumps([code, sorted(sys.modules)]))
 BAG = Path(__file__).parents[2] / "bags" / "arch_session"
 
 
-def imported_by(*arguments: str, others: tuple[str, ...] = ()) -> tuple[int, set[str]]:
-    """Exit code of a command in a fresh process, and those of the slow modules, and of others, that it has imported."""
+def imported_by(*arguments: str) -> tuple[int, set[str]]:
+    """Exit code of a command in a fresh process, and those of the slow modules that it has imported."""
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, json.dumps(arguments)], capture_output=True, text=True, check=True, timeout=300
     )
     code, modules = json.loads(done.stdout)
-    return code, {*SLOW, *others} & set(modules)
+    return code, {*SLOW} & set(modules)
 
 
 @pytest.mark.parametrize("arguments", [["check"], ["check", "--json"], ["scene"], ["urdf"], ["--help"], ["statics", "--help"]])
@@ -48,12 +48,6 @@ def test_usage_errors_are_told_at_once(command: str) -> None:
     assert code == 2 and slow <= {"rosbags"}
 
 
-def test_a_faulty_scene_is_refused_without_a_compiler(tmp_path: Path) -> None:
-    path = tmp_path / "scene.yaml"
-    path.write_text("sections: []\n", encoding="utf-8")
-    assert imported_by("check", str(path)) == (1, set())
-
-
 def test_what_is_compiled_is_loaded_without_the_compiler() -> None:
     """To compile, numba imports SciPy's BLAS; what is cached is loaded without. The first call fills the cache."""
     imported_by("statics", "--posture", "arch")
@@ -61,13 +55,14 @@ def test_what_is_compiled_is_loaded_without_the_compiler() -> None:
     assert code == 0 and slow == {"numba", "llvmlite", "scipy"}
 
 
-def test_what_a_bag_holds_is_told_without_a_compiler() -> None:
-    """NumPy is there since the session is judged against its scene, whose checks need it."""
+def test_bags_and_faulty_scenes_are_told_of_without_a_compiler(tmp_path: Path) -> None:
     assert imported_by("info", str(BAG)) == (0, {"rosbags"})
+    path = tmp_path / "scene.yaml"
+    path.write_text("sections: []\n", encoding="utf-8")
+    assert imported_by("check", str(path)) == (1, set())
 
 
 def test_the_twin_loads_no_package_of_statistics() -> None:
-    """``scipy.stats`` takes a third of a second; every node and every replay would spend it."""
     code = "import json, sys, boom_twin.twin.twin; print(json.dumps(sorted(sys.modules)))"
     modules = json.loads(subprocess.check_output([sys.executable, "-c", code], text=True, timeout=300))
     assert not {"scipy.stats", "matplotlib", "rosbags", "numba"} & set(modules)

@@ -9,23 +9,21 @@ from __future__ import annotations
 import sys
 import time
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from boom_twin import Stream
 from boom_twin.bag.reader import Session, read, scan
 from boom_twin.bag.session_model import scene_of, settings_of
 from boom_twin.errors import BagError, BoomTwinError
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import Output, Topic, load_topics
 from boom_twin.offline.ground_truth import FILE_NAME as TRUTH
-from boom_twin.offline.ground_truth import TipTruth, load_truth
 from boom_twin.offline.history import draw
 from boom_twin.offline.progress import progress_of
 from boom_twin.offline.recording import Stretch
@@ -34,25 +32,10 @@ from boom_twin.ros.startup import require_rclpy
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.system.received_files import holds_file, open_received
 from boom_twin.system.result_folder import REPLAY, result_folder
-from boom_twin.types import NANO, Array, Stream, sensor_kind
+from boom_twin.types import NANO, sensor_kind
 
 from .isolation import add_domain
 from .processes import DemoProcesses, demo_processes
-
-Positions = dict[int, tuple[float, float]]
-
-
-TIP_SOURCES: dict[str, tuple[tuple[Output, Callable[[Any], Any]], tuple[Output, Callable[[Any], Any]]]] = {
-    "prediction": (
-        (Output.TIP_POSITION, attrgetter("point")),
-        (Output.TIP_ACCELERATION, attrgetter("accel.linear")),
-    ),
-    "estimate": (
-        (Output.ESTIMATE_POSE, attrgetter("pose.pose.position")),
-        (Output.ESTIMATE_ACCELERATION, attrgetter("accel.accel.linear")),
-    ),
-}
-"""Who tells how the tip moves: outputs of its position and its acceleration, and where the vector is in their messages."""
 
 
 @dataclass(frozen=True)
@@ -67,20 +50,20 @@ class DemoResult:
         Messages that arrived.
     latency_ms : ndarray, shape (2,)
         Median and 99 % quantile from the arrival of a stroke to that of its prediction, both at the recorder.
-    tip_errors : dict of str to (float, float)
-        By source, root mean square of position (m) and acceleration (m/s^2) against the truth; empty without one.
     residual_rms : dict of str to float
         Measured minus predicted by channel, in the unit of the sensor.
     """
 
-    positions: Positions
+    positions: dict[int, tuple[float, float]]
     residual_sets: int
-    latency_ms: Array
-    tip_errors: dict[str, tuple[float, float]]
+    latency_ms: np.ndarray
     residual_rms: dict[str, float]
 
-    def as_text(self, session: str, sent: int, equal: int) -> list[str]:
-        """Return the lines of a short table; `sent` strokes were played, a replay reproduced `equal` of the predictions."""
+    def as_text(self, session: str, sent: int, equal: int, summary: dict[str, Any]) -> list[str]:
+        """Return the lines of a short table.
+
+        `sent` strokes were played. A replay, of this `summary`, reproduced `equal` of the predictions.
+        """
         arrived, (median, slowest) = len(self.positions), self.latency_ms
         rows = [
             ("session", session),
@@ -91,9 +74,11 @@ class DemoResult:
             ("equal to a replay", f"{equal} of {arrived}, to the last bit"),
             ("latency, median / 99 %", f"{median:.1f} / {slowest:.1f} ms"),
         ]
-        for source, (position, acceleration) in self.tip_errors.items():
-            amount = f"{position * 1e3:.2f} mm, {acceleration:.3f} m/s^2 rms against the rig's truth"
-            rows.append((f"tip error, {source}", amount))
+        for source, key in (("prediction", "tip"), ("estimate", "tip_estimate")):
+            if f"{key}_error_rms_m" in summary:
+                position, acceleration = summary[f"{key}_error_rms_m"], summary[f"{key}_acceleration_error_rms_m_s2"]
+                amount = f"{position * 1e3:.2f} mm, {acceleration:.3f} m/s^2 rms against the rig's truth"
+                rows.append((f"tip error, {source}", amount))
         for name, value in self.residual_rms.items():
             factor, unit = sensor_kind(name).shown_unit
             rows.append((f"residual {name}", f"{value * factor:.3f} {unit} rms"))
@@ -102,8 +87,6 @@ class DemoResult:
 
 def score(recorded: Path) -> DemoResult:
     """Return the results of one recorded run.
-
-    Errors against the truth are included if the session's truth lies in the same folder.
 
     Raises
     ------
@@ -117,12 +100,10 @@ def score(recorded: Path) -> DemoResult:
         raise BagError(f"{recorded}: the node published no prediction.")
     delays = [time - strokes[stamp_of(msg)] for time, msg in arrived if stamp_of(msg) in strokes]
     residuals = _messages(session, topics.outputs[Output.RESIDUALS])
-    truth = load_truth(recorded)
     return DemoResult(
         positions={stamp_of(msg): (msg.point.x, msg.point.z) for _, msg in arrived},
         residual_sets=len(residuals),
         latency_ms=np.quantile(delays, [0.5, 0.99]) * 1e-6 if delays else np.full(2, np.nan),
-        tip_errors={} if truth is None else _tip_errors(session, truth, min(strokes)),
         residual_rms=_residual_rms([msg for _, msg in residuals]),
     )
 
@@ -133,33 +114,6 @@ def _messages(session: Session, topic: Topic) -> list[tuple[int, Any]]:
     if known is None or known.count == 0:
         return []
     return [(time, msg) for _, time, msg in read(session, {topic.absolute: topic.type})]
-
-
-def _tip_errors(session: Session, truth: TipTruth, first: int) -> dict[str, tuple[float, float]]:
-    """Return the errors of every source whose outputs were recorded: position (m) and acceleration (m/s^2).
-
-    `first` is the stamp (ns) of the truth's first row.
-    """
-    outputs, found = load_topics().outputs, {}
-    for source, roles in TIP_SOURCES.items():
-        (at, position), (when, acceleration) = (_vectors(session, outputs[role], vector_of) for role, vector_of in roles)
-        if len(at) and len(when):
-            found[source] = _rms_off(truth, at, first, position), _rms_off(truth, when, first, acceleration, of_tip=False)
-    return found
-
-
-def _rms_off(truth: TipTruth, stamps: NDArray[np.int64], first: int, told: Array, of_tip: bool = True) -> float:
-    """Return the root mean square distance of what was told at `stamps` (ns) from the truth, which begins at `first` (ns)."""
-    times = (stamps - first) * NANO + truth.times[0]
-    true = truth.at(times, truth.position if of_tip else truth.acceleration)
-    return float(np.sqrt(np.mean(np.sum((told - true) ** 2, axis=1))))
-
-
-def _vectors(session: Session, topic: Topic, vector_of: Callable[[Any], Any]) -> tuple[NDArray[np.int64], Array]:
-    """Return stamps (k,), ns, and x and z (k, 2) of the vectors of an output."""
-    messages = [msg for _, msg in _messages(session, topic)]
-    vectors = [vector_of(msg) for msg in messages]
-    return np.array([stamp_of(msg) for msg in messages], np.int64), np.array([(v.x, v.z) for v in vectors]).reshape(-1, 2)
 
 
 def _residual_rms(residuals: list[Any]) -> dict[str, float]:
@@ -194,7 +148,8 @@ def main() -> int:
             scene, settings = scene_of(recorded), settings_of(recorded).settings
             found = evaluated_replay(building, recorded, scene, settings, also=stretches.append)
             pictures = [path.name for path in draw(found.result, found.history, building.folder)]
-        print("\n".join(live.as_text(f"{session.path.name} ({about})", sent[Stream.STROKES.value], _equal(live, stretches))))
+        name, equal = f"{session.path.name} ({about})", _equal(live, stretches)
+        print("\n".join(live.as_text(name, sent[Stream.STROKES.value], equal, found.result.summary)))
         for path in [recorded, *(args.out / "replay" / name for name in pictures)]:
             print(path)
         print(f"see it in a browser: {sys.executable} -P -m boom_twin.cli.main monitor --bag {recorded}")

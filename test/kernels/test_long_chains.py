@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bench.long_chains import Runner, boom, costs
 from kernels.dense import NUDGE, Dense
 from studies.roundoff.exact_step import one_step
 
+from boom_twin.analysis.equilibrium import settle
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.integrators import GENERALISED_ALPHA, HAT, OFFSET, OLD, prepare
-from boom_twin.kernels.tables import Motion, State
+from boom_twin.kernels.tables import Motion
 from boom_twin.kernels.transfer.time_step import advance
-from boom_twin.scene.kinematics import posture_angles
+from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
+from boom_twin.validation.study.long_booms import long_boom
 
 STEP, RHO, STEPS = 1e-3, 0.8, 20
 LENGTH = 20.0  # m, of every boom
 EPS = np.finfo(float).eps
+SPEED, BEGIN = 1e-2, 5e-2  # travels of a cylinder per second; s from rest to it
+
+
+def boom(count):
+    """A boom of `count` sections with six-bars of all kinds."""
+    return long_boom(count, kinds=("B1", "B2", "B3"))
 
 
 @pytest.mark.parametrize("count", [2, 10, 100, pytest.param(200, marks=pytest.mark.slow)])
@@ -39,10 +46,14 @@ def test_a_step_in_motion_solves_the_equations_of_all_unknowns(count):
     Positions are rounded to `EPS * LENGTH`. The witness divides that by its nudge, times forces of cylinders; accelerations
     multiply it by the gain, times masses.
     """
-    runner = Runner(boom(count))
-    plan, work, state = runner.plan, runner.work, State(*(array.copy() for array in runner.start))
+    scene = boom(count)
+    plan, strokes = compile_scene(scene), strokes_of_posture(scene, "test")
+    state, work = plan.state(), plan.work()
+    settle(plan, state, work, strokes, posture_angles(scene, "test"))
     scheme = prepare(GENERALISED_ALPHA, RHO, STEP, work.weights)
-    for drive, rate in zip(runner.drives[:STEPS], runner.rates[:STEPS], strict=True):
+    speeds = SPEED * np.array([joint.cylinder.max_stroke for joint in scene.joints])
+    for now in STEP * np.arange(1, STEPS + 1):
+        drive, rate = plan.closed_lengths + strokes + speeds * now**2 / (2.0 * BEGIN), speeds * now / BEGIN
         hat, offset = scheme.weights[[HAT, OFFSET], OLD:] @ state.history
         status, _, size = advance(plan.tables, state, work, scheme, drive, rate, 1e-11, np.int64(20), 0.5, None, False)
         assert status == 0
@@ -71,10 +82,3 @@ def test_everything_that_is_stepped_grows_in_proportion():
     ):
         sizes = [amount(plan) for plan in plans]
         assert sizes[2] - sizes[1] == 99 * (sizes[1] - sizes[0])
-
-
-def test_a_section_of_a_long_boom_costs_no_more_than_one_of_a_short_boom():
-    """A square law would give a ratio of 5. What else runs takes cache from the longer boom: measured 1.1 to 1.8."""
-    runners = [Runner(boom(count)) for count in (20, 100)]
-    short, long = costs(runners, 40) / [20, 100]
-    assert long < 2.5 * short

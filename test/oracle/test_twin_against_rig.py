@@ -10,7 +10,7 @@ pytest.importorskip("exudyn")
 from boom_twin import simulate, statics
 from boom_twin.scene.kinematics import stroke_range
 from boom_twin.validation import rig
-from boom_twin.validation.rig.motion import SAMPLES
+from boom_twin.validation.rig.motion import RANGE_SAMPLES
 
 STROKE = 0.04  # m, of every other cylinder within one second
 
@@ -39,7 +39,7 @@ def test_motion(random_boom):
     scene, first = random_boom
     moves = []
     for cylinder in range(0, len(first), 2):
-        room = stroke_range(scene, cylinder, SAMPLES)[1] - first[cylinder]
+        room = stroke_range(scene, cylinder, RANGE_SAMPLES)[1] - first[cylinder]
         change = STROKE if room > 2 * STROKE else -STROKE
         moves.append(rig.Move(cylinder, 0.0, 1.0, first[cylinder] + change))
     drive = rig.Programme(tuple(first), tuple(moves))

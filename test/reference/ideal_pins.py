@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from boom_twin import Scene
 from boom_twin.errors import UsageError
-from boom_twin.scene.schema import Scene
 
 
 def refuse_clearance(scene: Scene, model: str) -> None:

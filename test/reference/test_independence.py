@@ -1,11 +1,11 @@
-"""The reference models know scenes, errors and types of the package, and none of its equations."""
+"""The reference models know scenes and errors of the package, and none of its equations."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
-KNOWN = {"errors", "scene.schema", "types", "validation.contact_law"}
+KNOWN = {"errors", "scene.schema", "validation.contact_law"}
 
 
 def test_reference_models_import_no_equation_of_the_twin() -> None:

@@ -9,7 +9,7 @@ from oracle import booms, lagrange, segments
 from reference.segments.equations import Equations
 from reference.segments.geometry import Linkages, link_headings, pieces
 
-from boom_twin.scene import load_scene
+from boom_twin import load_scene
 
 
 def kept(scene, fineness):

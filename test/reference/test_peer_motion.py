@@ -7,10 +7,10 @@ import pytest
 from oracle import booms
 from reference.segments.stiff_solver import follow
 
+from boom_twin import load_scene
 from boom_twin.analysis.methods import integrate_with
 from boom_twin.analysis.motions import motion_of
 from boom_twin.errors import SolverError, UsageError
-from boom_twin.scene import load_scene
 
 DURATION, ROW = 1.0, 0.01
 

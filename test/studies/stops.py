@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from boom_twin import Scene
 from boom_twin.analysis.motions import motion_of
 from boom_twin.scene.pump_pulses import ease
-from boom_twin.scene.schema import Scene
-from boom_twin.types import Array
 from boom_twin.validation.study.stability.setups import FULL_STROKE, ease_integral
 
 RAMP, STOP = 0.3, 1.0  # s, until full speed; begin of braking
@@ -27,9 +26,9 @@ class StopMotion:
         Strokes at the start, m; full speed, m/s.
     """
 
-    angles: Array
-    first: Array
-    speed: Array
+    angles: np.ndarray
+    first: np.ndarray
+    speed: np.ndarray
     brake: float
     ramp: float = RAMP
     stop: float = STOP
@@ -40,11 +39,11 @@ class StopMotion:
         return self.stop + self.brake
 
     @property
-    def last(self) -> Array:
+    def last(self) -> np.ndarray:
         """Strokes (m) in the end, shape (n,)."""
         return np.asarray(self(np.array([self.still]))[0][0])
 
-    def __call__(self, times: Array) -> tuple[Array, Array]:
+    def __call__(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
         x, y = np.clip(times / self.ramp, 0.0, 1.0), np.clip((times - self.stop) / self.brake, 0.0, 1.0)
         cruise = np.clip(times, self.ramp, self.stop) - self.ramp

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
-from studies.clearance import report as clearance
-from studies.clearance.convergence import Convergence, MotionRows, convergence, errors, one_pin
+from studies.clearance.convergence import convergence, one_pin
 from studies.clearance.rest_stop_cost import shifts, swings
 from studies.clearance.scenes import ideal, pins_of, rods_and_joints, treated, with_play
-from studies.stops import halt
 
-from boom_twin.scene import Scene, load_scene
+from boom_twin import Scene, load_scene
 from boom_twin.scene.schema import IDEAL_BELOW
 
 
@@ -23,17 +18,6 @@ def test_a_scene_without_play_gets_the_package_s_pins(two_sections: Scene) -> No
     assert with_play(scene) == scene and ideal(scene) == two_sections
     assert pins_of(treated(scene, "spring-damper")).treatment == "spring-damper"
     assert len(rods_and_joints(load_scene())) == 17
-
-
-@pytest.mark.parametrize("brake", [0.1, 0.01])
-def test_a_halt_is_smooth_and_ends_where_it_says(two_sections: Scene, brake: float) -> None:
-    drive = halt(two_sections, "arch", brake)
-    times = np.linspace(0.0, 1.5, 150_001)
-    strokes, rates = drive(times)
-    assert np.gradient(strokes, times, axis=0)[1:-1] == pytest.approx(rates[1:-1], abs=1e-6)
-    assert strokes[0] == pytest.approx(drive.first) and strokes[-1] == pytest.approx(drive.last)
-    assert not rates[0].any() and np.abs(rates[-1]).max() < 1e-15
-    assert np.abs(rates).max(axis=0) == pytest.approx(np.abs(drive.speed))
 
 
 def test_play_at_rest_follows_the_lever_down_to_the_switch(two_sections: Scene) -> None:
@@ -53,38 +37,11 @@ def test_swings_of_a_stop(two_sections: Scene) -> None:
     assert all(own.peak > own.rms > 0.0 and own.effective > 0.0 for own in found.values())
 
 
-def test_errors_are_shares_of_what_is_right() -> None:
-    right = MotionRows(np.ones((5, 2)), np.full((5, 2), 2.0), np.full((5, 1), 4.0))
-    wrong = MotionRows(np.ones((5, 2)) + 1e-3, np.full((5, 2), 2.2), np.full((5, 1), 5.0))
-    assert errors([wrong], right)[0] == pytest.approx([1.0, 10.0, 25.0])
-
-
-@pytest.fixture(scope="module")
-def converged(two_sections: Scene) -> Convergence:
-    return convergence(with_play(two_sections), "arch", True)
-
-
-def test_the_independent_model_agrees(two_sections: Scene, converged: Convergence) -> None:
-    found = converged
+def test_the_independent_model_agrees(two_sections: Scene) -> None:
+    found = convergence(with_play(two_sections), True)
     assert [(line.program, line.against) for line in found.lines] == [
         ("boom_twin", "own"), ("boom_twin", "own"), ("boom_twin", "independent"), ("SciPy", "independent"),
     ]  # fmt: skip
     against = found.lines[2]
     assert against.errors[-1, 0] < 0.01 and against.errors[-1, 2] < 1.0
     assert not one_pin(with_play(two_sections), 0).is_flexible(0)
-
-
-def test_the_files(two_sections: Scene, converged: Convergence, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def convergence_before(*given: object) -> Convergence:
-        assert given == (with_play(two_sections), "arch", True)
-        return converged
-
-    monkeypatch.setattr(clearance, "convergence", convergence_before)
-    written = clearance.write(two_sections, tmp_path / "out", True, "arch")
-    assert sorted(written) == sorted((tmp_path / "out").iterdir())
-    values = json.loads(written[0].read_text())
-    assert len(values["stops"]) == 6 and len(values["rests"]) == 4 and values["costs"][0]["pins"] == 0
-    text = written[1].read_text()
-    assert all(title in text for title in ("## After a stop", "## At rest", "## Convergence", "## What a pin costs"))
-    assert "nan" not in text and "surrogate" in text
-    assert all(path.read_bytes()[:4] == b"\x89PNG" for path in written[2:])

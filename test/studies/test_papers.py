@@ -7,18 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from studies.clearance.scenes import with_play
-from studies.papers import low_speed, report
+from studies.papers import low_speed
 from studies.papers.boundary_zeros import bisect, equilibrium, frequencies
-from studies.papers.pictures import LetGoTrace
 from studies.papers.postures import compare, run_own, run_peer
 from studies.papers.sweep_matrices import boundary_solution, chain_of, difference
 
-from boom_twin import load_scene
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import Scene, load_scene, statics
 from boom_twin.analysis.methods import integrate_with
 from boom_twin.analysis.motions import motion_of
 from boom_twin.errors import UsageError
-from boom_twin.scene.schema import Scene
 
 SCENE = load_scene()
 LOADED = Scene.model_validate(
@@ -59,13 +56,8 @@ def test_clearance_has_no_such_matrices() -> None:
         chain_of(with_play(SCENE), 0.02, 1e-2)
 
 
-@pytest.fixture(scope="module")
-def zero():
-    """Of the boundary, in the arch."""
-    return equilibrium(SCENE, "arch")
-
-
-def test_bisection_finds_what_newton_finds(zero):
+def test_bisection_finds_what_newton_finds():
+    zero = equilibrium(SCENE, "arch")
     assert abs(zero.bisected - zero.newton) < 1e-7
     assert zero.newton == pytest.approx(float(statics(SCENE, posture="arch", modes=0).joints[0]), abs=1e-12)
     assert abs(zero.residual) < 2.0  # N m, of 33 000: what 1e-7 rad of the oil's spring is
@@ -75,13 +67,8 @@ def test_bisection_finds_what_newton_finds(zero):
         bisect(lambda x: x * x + 1.0, -1.0, 1.0, 1e-3)
 
 
-@pytest.fixture(scope="module")
-def speeds() -> np.ndarray:
-    """Errors of the low-speed form at two speeds."""
-    return low_speed.error_by_speed(SCENE, motion_of(SCENE), (6.0, 3.0), 5e-3)
-
-
-def test_leaving_velocity_terms_out_errs_with_the_square_of_the_speed(speeds: np.ndarray) -> None:
+def test_leaving_velocity_terms_out_errs_with_the_square_of_the_speed() -> None:
+    speeds = low_speed.error_by_speed(SCENE, motion_of(SCENE), (6.0, 3.0), 5e-3)
     slopes = np.log(speeds[1, 1:] / speeds[0, 1:]) / np.log(speeds[1, 0] / speeds[0, 0])
     assert slopes == pytest.approx([2.0, 2.0], abs=0.15)
     assert 5e-4 < speeds[1, 1] < 2e-3  # m
@@ -93,28 +80,9 @@ def test_with_them_it_is_the_motion_of_the_sweep() -> None:
     assert np.abs(low_speed.tip_of_move(SCENE, move, 2e-3)[:, :2] - swept.tip).max() < 1e-9
 
 
-@pytest.fixture(scope="module")
-def stop():
-    """A stop in the arch on four worn pins by both programs."""
-    return compare(run_own(SCENE, "arch", "worn", 0.9), run_peer(SCENE, "arch", "worn", 0.9, 5e-4))
-
-
-def test_four_worn_pins_in_a_stop_are_those_of_the_independent_code(stop):
+def test_four_worn_pins_in_a_stop_are_those_of_the_independent_code():
+    stop = compare(run_own(SCENE, "arch", "worn", 0.9), run_peer(SCENE, "arch", "worn", 0.9, 5e-4))
     assert stop.own.penetration.shape[1] == 4
     assert 0.65 < stop.flight < 0.9  # the drives brake from 0.6 s on; a journal flies when the boom swings back
     assert stop.tip < 1e-3 and stop.tip_throughout < 1e-3
     assert stop.forces < 0.05 and stop.penetration < 0.10
-
-
-def test_the_page_and_its_pictures(zero, speeds, stop, tmp_path, monkeypatch):
-    times = np.linspace(0.0, 1.0, 50)
-    traces = tuple(LetGoTrace(name, times, -100.0 * times, -50.0) for name in ("drives held", "drives lift the boom"))
-    base = report.BasisRow("arch", 0.3, (1.0, 2.0, 3.0, 4.0), (1.02, 2.02, 3.02, 4.02))
-    check = report.MatrixCheck(1e-3, ("A", "B1"), (1e-14, 1e-13), 1e-8)
-    found = report.PapersStudy((check,), (zero,), ((1.0, 1.0),), (base,), speeds, traces, (stop,))
-    monkeypatch.setattr(report, "measure", lambda *_: found)
-    written = report.write(SCENE, tmp_path / "out", quick=True, posture="arch")
-    assert sorted(path.name for path in written) == sorted(path.name for path in (tmp_path / "out").iterdir())
-    text = (tmp_path / "out" / "papers.md").read_text(encoding="utf-8")
-    assert "not public" in text and "surrogates" in text and "1 natural frequencies differ" in text
-    assert f"power {report.slope(found):.2f}" in text

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from studies.roundoff import report
 from studies.roundoff.dense_solver import Kinematics
 from studies.roundoff.exact_step import digits, one_step
-from studies.roundoff.report import TARGET, TURN_UP_STEPS, TurnUp, turn_up
+from studies.roundoff.report import TARGET, TURN_UP_STEPS, turn_up
 
+from boom_twin import load_scene
 from boom_twin.analysis.equilibrium import set_undeformed
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.transfer.forward_kinematics import place
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles
 from boom_twin.validation.study.long_booms import long_boom
 
@@ -50,17 +49,3 @@ def test_error_of_the_tip_falls_with_the_square_of_the_step():
     assert found.order == pytest.approx(2.0, abs=0.05)
     assert not found.turned_up_above_target
     assert found.floor[1] < 0.1 * TARGET
-
-
-def test_a_turn_up_above_the_target_is_seen():
-    steps = np.array([1e-3, 1e-4, 1e-5])
-    assert TurnUp(steps, np.array([1e-6, 1e-7, 2e-7]), steps, 1.0, 2.0).turned_up_above_target
-    assert not TurnUp(steps, np.array([1e-6, 1e-9, 2e-7]), steps, 1.0, 2.0).turned_up_above_target
-
-
-def test_the_page():
-    scene = long_boom(2)
-    lost = [report.Loss("extremes", "2", 2.0, one_step(scene, posture_angles(scene, "test"), 1e-3, 0.8))]
-    steps = np.array([1e-3, 1e-4])
-    text = report.text(lost, TurnUp(steps, 1e-9 * steps, steps, 10.0, 2.0))
-    assert "| 2 | 36 |" in text and "rises again below 1e-08" in text and "surrogates" in text

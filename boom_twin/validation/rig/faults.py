@@ -150,7 +150,7 @@ class RigFault:
 
     @property
     def number(self) -> int:
-        """The i of its cause, from 1; 0 if it has none."""
+        """Return the i of its cause, from 1; 0 if it has none."""
         found = re.search(r"_(\d+)", self.cause)
         return 0 if found is None else int(found[1])
 
@@ -159,7 +159,7 @@ FORM = "CAUSE:KIND[:SIZE][@ONSET[+RAMP][..END]]"
 
 
 def parse(text: str) -> RigFault:
-    """The fault that is written as `FORM` says.
+    """Parse a fault that is written as `FORM` says.
 
     Raises
     ------
@@ -221,7 +221,7 @@ def largest_size(fault: RigFault, scene: Scene, duration: float) -> float:
 
 
 def listing() -> list[str]:
-    """All causes, kinds, and what their sizes are, a line each."""
+    """Return all causes and kinds with the meaning of their sizes, a line each."""
     lines = [f"{'cause':41} {'kind':9} size"]
     for form, kinds in _CAUSES.items():
         cause = _words(form, "I")
@@ -248,7 +248,7 @@ SPIKE_SHARE = 0.02  # of the readings
 
 
 def spoil(session: RigSession, faults: Sequence[RigFault], seed: int) -> RigSession:
-    """The session with the sensor faults among `faults`; readings without a fault stay, bit for bit, and so does the truth.
+    """Return the session with the sensor faults among `faults`. Readings without a fault and the truth stay, bit for bit.
 
     Parameters
     ----------
@@ -286,7 +286,7 @@ def _readings(cause: str) -> str:
 
 
 def _spoiled(fault: RigFault, times: Array, read: Array, true: Array, share: Array, rng: np.random.Generator) -> Array:
-    """Readings (m,) of the one sensor with `share` (m,) of the fault; those with nothing of it are not used."""
+    """Return the readings (m,) of one sensor with `share` (m,) of the fault; those with nothing of it are not used."""
     size = share * fault.size
     match fault.kind:
         case "bias":

@@ -18,7 +18,7 @@ JOURNAL = 0.025  # m, radius of a pin that the scene does not list
 
 
 def changes(scene: Scene, faults: Sequence[RigFault]) -> tuple[Scene, list[Change]]:
-    """`scene` with those physical `faults` that are there at first, and how it changes by those that come or go.
+    """Return `scene` with the physical `faults` that are there at first, and its changes by those that come or go.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def _gone(fault: RigFault, times: Array) -> Array:
 
 
 def with_faults(scene: Scene, faults: Sequence[RigFault]) -> Scene:
-    """`scene` with the physical ones of `faults` in full; those of sensors are passed over.
+    """Return `scene` with the physical ones of `faults` in full; those of sensors are passed over.
 
     A pin that the scene does not list gets a journal of 25 mm radius.
 
@@ -62,7 +62,7 @@ def with_faults(scene: Scene, faults: Sequence[RigFault]) -> Scene:
 
 
 def _worn(scene: Scene, at: str, more: float) -> Scene:
-    """The pin `at` with `more` radial clearance (m) than it has."""
+    """Return `scene` with `more` radial clearance (m) of the pin `at`."""
     clearance = scene.clearance or Clearance()
     pins = {pin.at: pin for pin in clearance.pins}
     pin = pins.get(at) or Pin(at=at, pin_radius=JOURNAL, radial_clearance=0.0)
@@ -70,12 +70,12 @@ def _worn(scene: Scene, at: str, more: float) -> Scene:
     return scene.model_copy(update={"clearance": clearance.model_copy(update={"pins": tuple(pins.values())})})
 
 
-MOST = 0.3  # share; twice as much is drawn at most, and every parameter stays positive
+MOST_WRONG = 0.3  # share; twice as much is drawn at most, and every parameter stays positive
 KEYS = ("k", "d", "EI", "mass")
 
 
 def wrong_by(scene: Scene, share: float, seed: int) -> Scene:
-    """Every k, d, EI and section mass, mass of link, barrel and rod multiplied by 1 + `share` z of its own.
+    """Return `scene` with every k, d, EI and mass of section, link, barrel and rod multiplied by 1 + `share` z of its own.
 
     z is standard normal, drawn again beyond 2; masses take their inertia with them. Payload, line fill, geometry and material
     damping stay, for they are known, or nothing is predicted from them that a sensor could tell.
@@ -85,8 +85,8 @@ def wrong_by(scene: Scene, share: float, seed: int) -> Scene:
     UsageError
         `share` is not from 0 to 0.3.
     """
-    if not 0.0 <= share <= MOST:
-        raise UsageError(f"wrong by {share:g}: must be from 0 to {MOST:g}, as a share of every parameter. 0.02 is 2 %.")
+    if not 0.0 <= share <= MOST_WRONG:
+        raise UsageError(f"wrong by {share:g}: must be from 0 to {MOST_WRONG:g}, as a share of every parameter. 0.02 is 2 %.")
     rng = np.random.default_rng([seed, 2])
     names = [name for name in parameter_names(scene) if name.split(".")[-1] in KEYS]
     scene = with_parameters(scene, {name: parameter(scene, name) * _factor(share, rng) for name in names})

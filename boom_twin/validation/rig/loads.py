@@ -71,11 +71,11 @@ class PumpLoad:
         return f"pump:{self.frequency:g}:{self.height:g}:{self.change_over:g}" + _onset(self.onset)
 
     def force(self, times: Array, _duration: float, _seed: Sequence[int]) -> Array:
-        """Force (m,) in N, upward, at `times` (m,) in s."""
+        """Return the force (m,) in N, upward, at `times` (m,) in s."""
         return self.height * pump_pulses(times - self.onset, self.frequency, self.change_over)
 
     def direction(self, inclination: float) -> Array:
-        """Unit vector (2,) in the axes of a base that is inclined so (rad): vertical, up."""
+        """Return the unit vector (2,) in the axes of a base that is inclined so (rad): vertical, up."""
         return upward(inclination)
 
 
@@ -110,12 +110,12 @@ class WindLoad:
         return f"wind:{self.deviation:g}:{self.time_scale:g}" + _onset(self.onset)
 
     def spectrum(self, frequencies: Array) -> Array:
-        """One-sided power spectral density (N^2/Hz) at `frequencies` (Hz)."""
+        """Return the one-sided power spectral density (N^2/Hz) at `frequencies` (Hz)."""
         scaled = 1.0 + 70.8 * (self.time_scale * frequencies) ** 2
         return np.asarray(4.0 * self.time_scale * self.deviation**2 / scaled ** (5.0 / 6.0))
 
     def force(self, times: Array, duration: float, seed: Sequence[int]) -> Array:
-        """Force (m,) in N, forward, at `times` (m,) in s up to `duration`: a Fourier series of coefficients drawn by `seed`."""
+        """Return the force (m,) in N, forward, at `times` (m,) in s up to `duration`, by Fourier terms drawn by `seed`."""
         period = SPREAD * max(duration, SPREAD * self.time_scale)
         count = math.ceil(period / COARSE)
         lines = np.arange(1, count // 2) / (count * COARSE)
@@ -127,7 +127,7 @@ class WindLoad:
         return np.asarray(wind * ease(times - self.onset))
 
     def direction(self, inclination: float) -> Array:
-        """Unit vector (2,) in the axes of a base that is inclined so (rad): horizontal, forward."""
+        """Return the unit vector (2,) in the axes of a base that is inclined so (rad): horizontal, forward."""
         return np.array([math.cos(inclination), -math.sin(inclination)])
 
 
@@ -141,7 +141,7 @@ def _onset(onset: float) -> str:
 
 
 def parse(text: str) -> RigLoad:
-    """The load that is written as `FORM` says.
+    """Parse a load that is written as `FORM` says.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def check(loads: Sequence[RigLoad], duration: float) -> None:
 
 
 def tip_load(scene: Scene, loads: Sequence[RigLoad], duration: float, seed: int) -> TipLoad:
-    """The sum of `loads` in the axes of the scene's base, up to `duration` (s); the wind is drawn by `seed`."""
+    """Return the sum of `loads` in the axes of the scene's base, up to `duration` (s); the wind is drawn by `seed`."""
     inclination = scene.base.inclination
     directed = [(load, load.direction(inclination), [seed, number]) for number, load in enumerate(loads)]
 

@@ -17,7 +17,7 @@ from .exudyn.system import section_frames
 
 
 def ease_rate(x: Array) -> Array:
-    """Derivative of `ease` by x."""
+    """Return the derivative of `ease` by x."""
     x = np.clip(x, 0.0, 1.0)
     return np.asarray(30.0 * (x * (1.0 - x)) ** 2)
 
@@ -33,7 +33,7 @@ class Move:
 
     @property
     def end(self) -> float:
-        """Second at which the target is reached."""
+        """Return the second at which the target is reached."""
         return self.start + self.duration
 
 
@@ -63,7 +63,7 @@ class Programme:
                     )
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """Strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
+        """Return strokes (m) and rates (m/s), each (m, n), at `times` (m,) in s."""
         times = np.asarray(times, float)
         strokes = np.tile(np.array(self.first), (len(times), 1))
         rates = np.zeros_like(strokes)
@@ -102,14 +102,14 @@ BUNDLED_MOVES = (
 """Cylinder (0-based), start (s), duration (s), target (m): for the default scene from its posture arch."""
 
 TIP_SPEED = 1.2  # m/s, bound of random programmes, by rigid kinematics
-SAMPLES = 91  # of a joint's range
+RANGE_SAMPLES = 91  # of a joint's range
 MARGIN = 0.08  # of the range of a stroke, kept free at both ends
 HOLD, DURATION = (3.0, 8.0), (1.5, 6.0)  # s
 FIRST_HOLD = 3.0  # s
 
 
 def bundled(scene: Scene) -> Programme:
-    """The programme of the bundled session, 60 s that end in a hold: from posture arch, or else the scene's first.
+    """Return the programme of the bundled session, 60 s that end in a hold: from posture arch, or else the scene's first.
 
     A boom with other joints than the default scene's makes moves of the same shares of its cylinders' ranges, as far as they
     have room; they are smaller where the tip would be faster than `TIP_SPEED`.
@@ -130,12 +130,12 @@ def bundled(scene: Scene) -> Programme:
 
 
 def _scaled(scene: Scene, first: Array, usual: Scene) -> Programme:
-    """The bundled moves as shares of the ranges of other cylinders, from `first` (m); further ones move as those four."""
+    """Return the bundled moves as shares of the ranges of other cylinders, from `first` (m)."""
     at = strokes_of_posture(usual, "arch")
-    wide = [high - low for low, high in (stroke_range(usual, i, SAMPLES) for i in range(len(at)))]
+    wide = [high - low for low, high in (stroke_range(usual, i, RANGE_SAMPLES) for i in range(len(at)))]
     moves = []
     for i, start in enumerate(first.tolist()):
-        low, high = stroke_range(scene, i, SAMPLES)
+        low, high = stroke_range(scene, i, RANGE_SAMPLES)
         free, model = MARGIN * (high - low), i % len(at)
         for move in (move for move in BUNDLED_MOVES if move.cylinder == model):
             target = start + (high - low) * (move.target - float(at[model])) / wide[model]
@@ -152,7 +152,7 @@ def _scaled(scene: Scene, first: Array, usual: Scene) -> Programme:
 
 
 def random_programme(scene: Scene, posture: str, duration: float, seed: int) -> Programme:
-    """Moves of one to three cylinders at once with holds between, in range and slower than `TIP_SPEED` at the tip.
+    """Draw moves of one to three cylinders at once with holds between, in range and slower than `TIP_SPEED` at the tip.
 
     Parameters
     ----------
@@ -180,17 +180,17 @@ def random_programme(scene: Scene, posture: str, duration: float, seed: int) -> 
 
 
 def tip_speed(scene: Scene, programme: Programme, times: Array) -> Array:
-    """Speed of the tip (m/s) between successive `times` (m,), shape (m - 1,), of the undeformed boom."""
+    """Return the speed of the undeformed boom's tip (m/s) between successive `times` (m,), shape (m - 1,)."""
     end = (scene.sections[-1].length, 0.0)
     path = np.array([section_frames(scene, strokes)[-1].point(end) for strokes in programme(times)[0]])
     return np.asarray(np.hypot(*np.diff(path, axis=0).T) / np.diff(times))
 
 
 def _reachable(scene: Scene, now: Array, cylinders: list[int], span: float, rng: np.random.Generator) -> Array:
-    """Random targets of some cylinders, drawn nearer until the tip is slow enough."""
+    """Draw targets of some cylinders, and draw them nearer until the tip is slow enough."""
     aim = now.copy()
     for i in cylinders:
-        low, high = stroke_range(scene, i, SAMPLES)
+        low, high = stroke_range(scene, i, RANGE_SAMPLES)
         if low >= high:
             raise UsageError(f"cylinder_{i + 1}: no stroke is within both max_stroke and range_deg. Widen one.")
         free = MARGIN * (high - low)

@@ -55,7 +55,7 @@ def noise_free(rate: float = RATE) -> Sensors:
 
 
 def sampling_stamps(sensors: Sensors, duration: float, start: int, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Stamps (ns, int64) within `duration` (s) after `start` (ns), uniformly jittered about the grid.
+    """Draw stamps (ns, int64) within `duration` (s) after `start` (ns), uniformly jittered about the grid.
 
     The grid begins half a period after the start, so that no jitter reaches beyond either end.
     """
@@ -65,7 +65,7 @@ def sampling_stamps(sensors: Sensors, duration: float, start: int, rng: np.rando
 
 
 def read(true: Array, sigma: float, resolution: float, rng: np.random.Generator) -> Array:
-    """Values with normal noise of `sigma`, rounded to `resolution`; all in one unit, any shape."""
+    """Return values with normal noise of `sigma`, rounded to `resolution`; all in one unit, any shape."""
     noisy = true + sigma * rng.standard_normal(true.shape)
     return noisy if resolution == 0.0 else np.asarray(np.rint(noisy / resolution) * resolution)
 

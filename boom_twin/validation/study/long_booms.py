@@ -48,12 +48,12 @@ class _Sizes:
     modulus: float
 
 
-def long_boom(count: int, length: float = 20.0, kinds: Sequence[str] = ("B1",)) -> Scene:
-    """Return a boom of `count` equal sections (2 or more), `length` m in all, with the posture ``test``: a gentle arch.
+def long_boom(count: int, kinds: Sequence[str] = ("B1",)) -> Scene:
+    """Return a boom of `count` equal sections (2 or more), 20 m in all, with the posture ``test``: a gentle arch.
 
     `kinds` of joints 2, 3, .. are taken in turn.
     """
-    return boom_of(np.full(count, length / count), kinds, np.linspace(50.0, 0.0, count))
+    return boom_of(np.full(count, 20.0 / count), kinds, np.linspace(50.0, 0.0, count))
 
 
 def seven_sections() -> Scene:

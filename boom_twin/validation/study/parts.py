@@ -27,7 +27,7 @@ from ...reduction.variants import Variant, variants
 from ...scene.schema import Scene
 from ...system.atomic_files import write_atomic
 from ...types import Array
-from .report import machine, provenance, table, write_json
+from .report import page, table, write_json
 
 ROUNDS, QUICK_ROUNDS = 30, 5
 QUICK_DURATION = 2.0  # s
@@ -114,9 +114,8 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     """
     course = course_of(scene, posture, QUICK_DURATION if quick else DURATION)
     found = measure(scene, course, QUICK_ROUNDS if quick else ROUNDS)
-    out.mkdir(parents=True, exist_ok=True)
     paths = [out / f"parts.{kind}" for kind in ("json", "md", "png")]
-    write_json(paths[0], {"machine": machine(), **as_json(found)})
+    write_json(paths[0], as_json(found))
     write_atomic(paths[1], as_markdown(found))
     parts_picture(paths[2], bars(found), "surrogate parameters; one motion, another may differ")
     return paths
@@ -165,9 +164,8 @@ def as_markdown(found: PartsStudy) -> str:
         "`parts.json` adds the edits, other frequencies, and single sections with other mode numbers.",
         table(HEAD, [_row(found, part) for part in found.shown]),
         "Limits: another motion may differ. Leaving out several parts may cause larger errors.",
-        provenance(),
     ]
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+    return page(parts)
 
 
 def _row(found: PartsStudy, part: VariantCost) -> Sequence[object]:

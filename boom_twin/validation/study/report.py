@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import math
 import platform
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,6 +12,7 @@ from typing import Any
 
 from ...system.atomic_files import write_atomic
 from ...system.cores import usable_cores
+from ...system.json_text import json_text
 
 PACKAGES = ("numpy", "scipy", "numba", "exudyn", "boom_twin")
 
@@ -56,15 +55,16 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def provenance() -> str:
-    """Return a paragraph with date, machine, versions and the note on surrogates."""
-    return ", ".join(f"{name} {value}" for name, value in machine().items() if value is not None) + f". {SYNTHETIC}\n"
+def page(parts: Iterable[str]) -> str:
+    """Return a Markdown page of paragraphs, tables and headings; its last line is of date, machine, versions and surrogates."""
+    made = ", ".join(f"{name} {value}" for name, value in machine().items() if value is not None)
+    return "\n\n".join(part.rstrip("\n") for part in (*parts, f"{made}. {SYNTHETIC}") if part) + "\n"
 
 
-def write_json(path: Path, content: Any) -> None:
-    """Write a mapping or list as JSON; numbers that are not finite become null."""
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write the numbers of a study, and the machine, as JSON into a folder that is made if need be."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomic(path, json.dumps(_plain(content), indent=1, allow_nan=False, ensure_ascii=False) + "\n")
+    write_atomic(path, json_text({"machine": machine(), **content}, indent=1) + "\n")
 
 
 def _text(value: object) -> str:
@@ -73,18 +73,3 @@ def _text(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
     return str(value).replace("|", "\\|")
-
-
-def _plain(value: Any) -> Any:
-    """Return a value made of dict, list, str, int, finite float, bool and None only."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        value = dataclasses.asdict(value)
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from reference.ideal_pins import refuse_clearance
 
-from boom_twin.scene.schema import Cylinder, Joint, Scene
-from boom_twin.types import Array
+from boom_twin import Scene
+from boom_twin.scene.schema import Cylinder, Joint
 
 from .equations import Jet, angle, constant, coordinates, cos, inverse, root, sin
 from .geometry import gravity_in_base, half_segment, link_headings, pieces, pins, rigid_masses, spring_stiffness
@@ -59,7 +59,7 @@ class Segments:
         self.scene, self.fineness = scene, fineness
         self.gravity = gravity_in_base(scene)
 
-    def start(self, angles: Array) -> Array:
+    def start(self, angles: np.ndarray) -> np.ndarray:
         """Coordinates of the undeformed boom at relative joint angles (rad)."""
         q: list[float] = []
         heading = 0.0
@@ -72,11 +72,11 @@ class Segments:
             q += [0.0] * (2 * sum(piece.springs for piece in pieces(self.scene, i, self.fineness)))
         return np.array(q)
 
-    def lengths(self, angles: Array) -> Array:
+    def lengths(self, angles: np.ndarray) -> np.ndarray:
         """Cylinder lengths (m) of the undeformed boom."""
         return np.array([length.v for length in self.place(self.start(angles)).lengths])
 
-    def place(self, q: Array) -> SegmentBoom:
+    def place(self, q: np.ndarray) -> SegmentBoom:
         """The boom at coordinates q."""
         jets, n = iter(coordinates(q)), len(q)
         (px, py), (cx, cy) = self.scene.base.pivot, self.scene.base.cylinder_pin

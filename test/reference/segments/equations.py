@@ -14,13 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from boom_twin.scene.schema import Scene
-from boom_twin.types import Array
+from boom_twin import Scene
 
 from .geometry import Bodies, Linkages, gravity_in_base, oil_stiffness
 from .kinematics import Quantities, carried, chain_points, fixed, joined, segment_tables, spans
 
-Drive = Callable[[float], tuple[Array, Array, Array]]
+Drive = Callable[[float], tuple[np.ndarray, np.ndarray, np.ndarray]]
 """Time (s) -> lengths (m), rates (m/s) and accelerations (m/s^2) of the drives, each (n,)."""
 
 
@@ -31,7 +30,7 @@ class PlacedBoom:
     masses: Quantities
     turns: Quantities
     lengths: Quantities
-    joints: Array
+    joints: np.ndarray
     tip: Quantities
 
 
@@ -54,7 +53,7 @@ class Equations:
         """Number of coordinates."""
         return len(self.tables.stiffness)
 
-    def place(self, q: Array, v: Array) -> PlacedBoom:
+    def place(self, q: np.ndarray, v: np.ndarray) -> PlacedBoom:
         """The boom at coordinates q with rates v."""
         t, bodies = self.tables, self.bodies
         points, headings = chain_points(t, self.scene.base.pivot, q, v)
@@ -97,7 +96,7 @@ class Equations:
             )
         return found[0], found[1]
 
-    def accelerations(self, time: float, q: Array, v: Array) -> tuple[Array, Array, PlacedBoom]:
+    def accelerations(self, time: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, PlacedBoom]:
         """Second derivatives of the coordinates, forces of all cylinders (N, tension positive), and the boom."""
         placed = self.place(q, v)
         forces = self._spring_forces(time, placed)
@@ -109,7 +108,7 @@ class Equations:
         forces[self.rigid] = solution[self.size :]
         return np.asarray(solution[: self.size]), forces, placed
 
-    def state_jacobian(self, q: Array, v: Array) -> Array:
+    def state_jacobian(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Derivative of (q', q'') by (q, q'), shape (2 n, 2 n), from elastic and damping forces alone.
 
         What gravity and inertia forces add is small beside them; an implicit solver's Newton passes need no more.
@@ -126,17 +125,17 @@ class Equations:
         found[n:] = -np.linalg.solve(matrix, right)[:n]
         return found
 
-    def _spring_forces(self, time: float, placed: PlacedBoom) -> Array:
+    def _spring_forces(self, time: float, placed: PlacedBoom) -> np.ndarray:
         """Forces (N) of the oil springs and dampers; 0 for incompressible cylinders."""
         length, rate, _ = self.drive(time)
         k = self._stiffness(length)
         return np.asarray(k * (placed.lengths.value - length) + self.d * (placed.lengths.rate - rate))
 
-    def _stiffness(self, lengths: Array) -> Array:
+    def _stiffness(self, lengths: np.ndarray) -> np.ndarray:
         """Return the stiffness of the oil springs, N/m, for drives so long (m)."""
         return np.array([oil_stiffness(j.cylinder, float(at)) for j, at in zip(self.scene.joints, lengths, strict=True)])
 
-    def _generalised(self, placed: PlacedBoom, q: Array, v: Array) -> Array:
+    def _generalised(self, placed: PlacedBoom, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Forces on the coordinates: weight, inertia forces at zero second derivatives, springs of the segments."""
         load = self.weight - self.mass[:, None] * placed.masses.bias
         moment = self.inertia * placed.turns.bias
@@ -144,16 +143,16 @@ class Equations:
         force = load.ravel() @ placed.masses.jacobian.reshape(-1, n) - moment @ placed.turns.jacobian
         return np.asarray(force - self.tables.stiffness * q - self.tables.damping * v)
 
-    def _mass_matrix(self, placed: PlacedBoom) -> Array:
+    def _mass_matrix(self, placed: PlacedBoom) -> np.ndarray:
         rows = (np.sqrt(self.mass)[:, None, None] * placed.masses.jacobian).reshape(-1, self.size)
         turning = np.sqrt(self.inertia)[:, None] * placed.turns.jacobian
         return np.asarray(rows.T @ rows + turning.T @ turning)
 
-    def _demand(self, time: float, placed: PlacedBoom) -> Array:
+    def _demand(self, time: float, placed: PlacedBoom) -> np.ndarray:
         return np.asarray((self.drive(time)[2] - placed.lengths.bias)[self.rigid])
 
     @staticmethod
-    def _bordered(matrix: Array, g: Array) -> Array:
+    def _bordered(matrix: np.ndarray, g: np.ndarray) -> np.ndarray:
         return np.block([[matrix, g.T], [g, np.zeros((len(g), len(g)))]])
 
 
@@ -162,7 +161,7 @@ class Jet:
 
     __slots__ = ("g", "h", "v")
 
-    def __init__(self, v: float, g: Array, h: Array) -> None:
+    def __init__(self, v: float, g: np.ndarray, h: np.ndarray) -> None:
         self.v, self.g, self.h = v, g, h
 
     def __add__(self, other: Jet | float) -> Jet:
@@ -190,7 +189,7 @@ class Jet:
         return Jet(value, first * self.g, first * self.h + second * np.outer(self.g, self.g))
 
 
-def coordinates(values: Array) -> list[Jet]:
+def coordinates(values: np.ndarray) -> list[Jet]:
     """One jet for each coordinate."""
     n = len(values)
     return [Jet(float(v), row, np.zeros((n, n))) for v, row in zip(values, np.eye(n), strict=True)]

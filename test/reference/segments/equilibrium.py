@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from boom_twin.errors import SolverError
-from boom_twin.types import Array
 
 from .boom import SegmentBoom, Segments
 from .equations import Jet
@@ -16,7 +15,7 @@ SETTLED = 1e-11  # m and rad, largest increment
 LONGEST = 0.1  # m and rad, in one pass
 
 
-def energy(model: Segments, boom: SegmentBoom, drive: Array) -> tuple[Jet, list[Jet]]:
+def energy(model: Segments, boom: SegmentBoom, drive: np.ndarray) -> tuple[Jet, list[Jet]]:
     """Potential energy (J), and the list of all constraints: closures first, then incompressible cylinders."""
     n = len(boom.tip[0].g)
     v, g, h = 0.0, np.zeros(n), np.zeros((n, n))
@@ -34,7 +33,9 @@ def energy(model: Segments, boom: SegmentBoom, drive: Array) -> tuple[Jet, list[
     return Jet(v, g, h), constraints
 
 
-def equilibrium(model: Segments, drive: Array, angles: Array) -> tuple[Array, SegmentBoom, Array, Array]:
+def equilibrium(
+    model: Segments, drive: np.ndarray, angles: np.ndarray
+) -> tuple[np.ndarray, SegmentBoom, np.ndarray, np.ndarray]:
     """Newton's method on the energy, from the undeformed boom at relative joint `angles` (rad).
 
     Returns

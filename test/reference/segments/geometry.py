@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from boom_twin.scene.schema import Cylinder, CylinderPart, Joint, Point, RigidPart, Scene
-from boom_twin.types import Array
+from boom_twin import Scene
+from boom_twin.scene.schema import Cylinder, CylinderPart, Joint, Point, RigidPart
 
 
 class Bodies:
@@ -61,9 +61,9 @@ def _cylinder_part(part: CylinderPart | None) -> tuple[float, float, float]:
 class Angles:
     """Heading of a link against the head before, and its derivatives by the joint angle; each of shape (joints,)."""
 
-    value: Array
-    first: Array
-    second: Array
+    value: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
 
 
 class Linkages:
@@ -76,7 +76,7 @@ class Linkages:
         self.right = np.array([joint.lR for joint in joints], dtype=float)
         self.side = np.array([_side(joint) for joint in joints])
 
-    def angles(self, phi: Array) -> tuple[Angles, Angles]:
+    def angles(self, phi: np.ndarray) -> tuple[Angles, Angles]:
         """Links L (from D) and R (from E) at joint angles `phi` (rad), shape (joints,).
 
         The diagonal D->E has length r and heading a; by the law of cosines L is turned from it by an angle that depends on
@@ -98,7 +98,7 @@ class Linkages:
         )
 
 
-def _opening(span: Angles, own: Array, other: Array) -> Angles:
+def _opening(span: Angles, own: np.ndarray, other: np.ndarray) -> Angles:
     """Angle between the diagonal and the link of length `own` (m), over the joint angle."""
     r, excess = span.value, own**2 - other**2
     cosine = (r + excess / r) / (2.0 * own)
@@ -175,7 +175,7 @@ def spring_stiffness(scene: Scene, index: int, length: float) -> tuple[float, fl
     return elastic * section.I / length, elastic * section.A / length
 
 
-def gravity_in_base(scene: Scene) -> Array:
+def gravity_in_base(scene: Scene) -> np.ndarray:
     """Gravity (m/s^2), shape (2,), in the axes of the base."""
     turn, (gx, gy) = -scene.base.inclination, scene.gravity
     return np.array([math.cos(turn) * gx - math.sin(turn) * gy, math.sin(turn) * gx + math.cos(turn) * gy])

@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from boom_twin.scene.schema import Scene
-from boom_twin.types import Array
+from boom_twin import Scene
 
 from .geometry import half_segment, pieces, pins, rigid_masses, spring_stiffness
 
@@ -48,17 +47,17 @@ class SegmentTables:
         The tip's point.
     """
 
-    turn: Array
-    stretch: Array
-    length: Array
+    turn: np.ndarray
+    stretch: np.ndarray
+    length: np.ndarray
     link: Places
-    ahead: Array
-    aside: Array
-    share: Array
-    mass: Array
-    inertia: Array
-    stiffness: Array
-    damping: Array
+    ahead: np.ndarray
+    aside: np.ndarray
+    share: np.ndarray
+    mass: np.ndarray
+    inertia: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
     root: Places
     head: Places
     rod_pin: int
@@ -164,10 +163,10 @@ class Quantities:
     jacobian : ndarray, shape (p, n) or (p, 2, n)
     """
 
-    value: Array
-    rate: Array
-    jacobian: Array
-    bias: Array
+    value: np.ndarray
+    rate: np.ndarray
+    jacobian: np.ndarray
+    bias: np.ndarray
 
     def __getitem__(self, which: slice | Places) -> Quantities:
         return Quantities(*(values[which] for values in (self.value, self.rate, self.jacobian, self.bias)))
@@ -184,7 +183,7 @@ def fixed(place: tuple[float, float], n: int) -> Quantities:
     return Quantities(np.array([place]), np.zeros((1, 2)), np.zeros((1, 2, n)), np.zeros((1, 2)))
 
 
-def carried(origin: Quantities, turns: Quantities, ahead: Array, aside: Array) -> Quantities:
+def carried(origin: Quantities, turns: Quantities, ahead: np.ndarray, aside: np.ndarray) -> Quantities:
     """Points at (`ahead`, `aside`), each (p,) in m, in frames that turn about the points `origin`."""
     c, s = np.cos(turns.value), np.sin(turns.value)
     arm = np.stack([ahead * c - aside * s, ahead * s + aside * c], axis=1)
@@ -197,7 +196,9 @@ def carried(origin: Quantities, turns: Quantities, ahead: Array, aside: Array) -
     )
 
 
-def chain_points(tables: SegmentTables, base: tuple[float, float], q: Array, v: Array) -> tuple[Quantities, Quantities]:
+def chain_points(
+    tables: SegmentTables, base: tuple[float, float], q: np.ndarray, v: np.ndarray
+) -> tuple[Quantities, Quantities]:
     """All points of `tables` and the headings of its links at coordinates q with rates v, each (n,)."""
     t = tables
     heading, omega, stretch, speed = t.turn @ q, t.turn @ v, t.stretch @ q, t.stretch @ v
@@ -222,7 +223,7 @@ def chain_points(tables: SegmentTables, base: tuple[float, float], q: Array, v: 
     return points, turns
 
 
-def _summed(steps: Array) -> Array:
+def _summed(steps: np.ndarray) -> np.ndarray:
     """Sums of all steps before each one, and nothing before the first; the last sum is left out."""
     sums = np.zeros_like(steps)
     np.cumsum(steps[:-1], axis=0, out=sums[1:])

@@ -9,9 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from boom_twin import Scene
 from boom_twin.errors import SolverError, UsageError
-from boom_twin.scene.schema import Scene
-from boom_twin.types import Array
 
 from .boom import Segments
 from .equations import Drive, Equations
@@ -41,10 +40,10 @@ class SegmentMotion:
     coordinates : int
     """
 
-    tip: Array
-    tip_acceleration: Array
-    joints: Array
-    cylinder_forces: Array
+    tip: np.ndarray
+    tip_acceleration: np.ndarray
+    joints: np.ndarray
+    cylinder_forces: np.ndarray
     seconds: float
     evaluations: int
     coordinates: int
@@ -53,8 +52,8 @@ class SegmentMotion:
 def follow(
     scene: Scene,
     drive: Drive,
-    angles: Array,
-    times: Array,
+    angles: np.ndarray,
+    times: np.ndarray,
     fineness: int,
     tolerance: float,
     solver: Solver = "Radau",
@@ -100,14 +99,14 @@ def follow(
     return SegmentMotion(tip, acceleration, joints, forces, min(seconds), int(found.nfev), size)
 
 
-def _solved(equations: Equations, start: Array, times: Array, tolerance: float, solver: Solver) -> Any:
+def _solved(equations: Equations, start: np.ndarray, times: np.ndarray, tolerance: float, solver: Solver) -> Any:
     """The solver's states at `times`, from rest at the coordinates `start`; SolverError if it gave up."""
     size = len(start)
 
-    def rates(at: float, state: Array) -> Array:
+    def rates(at: float, state: np.ndarray) -> np.ndarray:
         return np.concatenate([state[size:], equations.accelerations(at, state[:size], state[size:])[0]])
 
-    def slopes(_: float, state: Array) -> Array:
+    def slopes(_: float, state: np.ndarray) -> np.ndarray:
         return equations.state_jacobian(state[:size], state[size:])
 
     absolute = ABSOLUTE * tolerance * np.repeat([1.0, 10.0], size)
@@ -121,7 +120,7 @@ def _solved(equations: Equations, start: Array, times: Array, tolerance: float, 
     return found
 
 
-def _start(scene: Scene, lengths: Array, angles: Array, fineness: int) -> Array:
+def _start(scene: Scene, lengths: np.ndarray, angles: np.ndarray, fineness: int) -> np.ndarray:
     """Equilibrium in the coordinates of `Equations`: those of `Segments` without the headings of links."""
     model = Segments(scene, fineness)
     q, *_ = equilibrium(model, lengths, angles)
@@ -132,6 +131,8 @@ def _start(scene: Scene, lengths: Array, angles: Array, fineness: int) -> Array:
     return np.asarray(q[np.array(kept)])
 
 
-def _row(equations: Equations, at: float, q: Array, v: Array) -> tuple[Array, Array, Array, Array]:
+def _row(
+    equations: Equations, at: float, q: np.ndarray, v: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     acceleration, forces, placed = equations.accelerations(at, q, v)
     return placed.tip.value[0], placed.tip.jacobian[0] @ acceleration + placed.tip.bias[0], placed.joints, forces

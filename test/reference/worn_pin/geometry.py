@@ -18,8 +18,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from boom_twin.types import Array
-
 Document = dict[str, Any]  # a scene's file, or a part of it
 
 
@@ -111,7 +109,7 @@ def _solved(a: complex, b: complex, wanted: complex) -> tuple[float, float]:
     return (b.conjugate() * wanted).imag / area, (a.conjugate() * wanted).imag / area
 
 
-Headings = Sequence[float] | Array
+Headings = Sequence[float] | np.ndarray
 Complexes = NDArray[np.complex128]
 
 

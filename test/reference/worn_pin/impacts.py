@@ -9,12 +9,10 @@ from typing import Any, cast
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from boom_twin.types import Array
-
 MOST = 20_000  # pieces of a motion
 
-Rates = Callable[[float, Array, float | None], Sequence[float] | Array]
-Gap = Callable[[float, Array], tuple[float, float]]
+Rates = Callable[[float, np.ndarray, float | None], Sequence[float] | np.ndarray]
+Gap = Callable[[float, np.ndarray], tuple[float, float]]
 Piece = tuple[Any, float | None]
 
 
@@ -48,19 +46,19 @@ class Episode:
 class ContactMotion:
     """States (m, n) at times (m,), the entry speed that held at each (nan in flight), and the episodes of contact."""
 
-    times: Array
-    states: Array
-    entries: Array
+    times: np.ndarray
+    states: np.ndarray
+    entries: np.ndarray
     episodes: list[Episode]
 
 
 def follow(
     rates: Rates,
     gap: Gap,
-    start: Sequence[float] | Array,
-    times: Array,
+    start: Sequence[float] | np.ndarray,
+    times: np.ndarray,
     rtol: float = 1e-8,
-    atol: float | Array = 1e-10,
+    atol: float | np.ndarray = 1e-10,
     breaks: Sequence[float] = (),
     longest: float = np.inf,
     method: str = "Radau",
@@ -93,7 +91,7 @@ def follow(
 
 
 def _pieces(
-    rates: Rates, gap: Gap, now: float, state: Array, stops: Sequence[float], options: dict[str, Any]
+    rates: Rates, gap: Gap, now: float, state: np.ndarray, stops: Sequence[float], options: dict[str, Any]
 ) -> Iterator[Piece]:
     """Solutions between touches, releases and stops, each with the entry speed that held."""
     depth, rate = gap(now, state)
@@ -116,16 +114,16 @@ def _events(gap: Gap, touching: bool) -> tuple[Any, Any]:
     """Return the events of the gap's change of sign, which ends a piece, and of its maxima."""
     last: dict[float, tuple[float, float]] = {}
 
-    def once(time: float, state: Array) -> tuple[float, float]:
+    def once(time: float, state: np.ndarray) -> tuple[float, float]:
         if time not in last:
             last.clear()
             last[time] = gap(time, state)
         return last[time]
 
-    def crossing(time: float, state: Array, entry: float | None) -> float:
+    def crossing(time: float, state: np.ndarray, entry: float | None) -> float:
         return once(time, state)[0]
 
-    def turning(time: float, state: Array, entry: float | None) -> float:
+    def turning(time: float, state: np.ndarray, entry: float | None) -> float:
         return once(time, state)[1]
 
     end, top = cast(Any, crossing), cast(Any, turning)
@@ -133,7 +131,7 @@ def _events(gap: Gap, touching: bool) -> tuple[Any, Any]:
     return end, top
 
 
-def _rows(pieces: Sequence[Piece], times: Array) -> tuple[Array, Array]:
+def _rows(pieces: Sequence[Piece], times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """States and entry speeds at given times; a touch belongs to what follows it."""
     which = np.searchsorted([found.t[0] for found, _ in pieces], times, side="right") - 1
     states = [pieces[k][0].sol(time) for k, time in zip(which, times, strict=True)]

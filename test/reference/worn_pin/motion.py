@@ -24,7 +24,6 @@ import numpy as np
 from scipy.optimize import brentq
 
 from boom_twin.errors import UsageError
-from boom_twin.types import Array
 from boom_twin.validation.contact_law import Contact
 
 from . import geometry
@@ -64,14 +63,14 @@ class PinMotion:
     `phi`, `tension` (N, of the oil) and `energy` (J, oil, weight and motion, without that of the contact): (m,).
     """
 
-    times: Array
-    tip: Array
-    acceleration: Array
-    offset: Array
-    force: Array
-    phi: Array
-    tension: Array
-    energy: Array
+    times: np.ndarray
+    tip: np.ndarray
+    acceleration: np.ndarray
+    offset: np.ndarray
+    force: np.ndarray
+    phi: np.ndarray
+    tension: np.ndarray
+    energy: np.ndarray
     episodes: list[Episode]
 
 
@@ -99,7 +98,7 @@ class PinnedBoom:
         self,
         drive: Drive,
         rest: Rest,
-        times: Array,
+        times: np.ndarray,
         breaks: Sequence[float] = (),
         tolerance: float = 1e-8,
         method: str = "LSODA",
@@ -129,7 +128,7 @@ class PinnedBoom:
         )  # fmt: skip
         return self._rows(drive, found, zero + found.states)
 
-    def rates(self, drive: tuple[float, float], state: Array, entry: float | None) -> list[float]:
+    def rates(self, drive: tuple[float, float], state: np.ndarray, entry: float | None) -> list[float]:
         """Derivative of (phi, l, psi, phi', l', psi') at length and rate of the drive."""
         phi, length, psi, turn, speed, swing = (float(value) for value in state)
         c, g, u, placed = self.cylinder, self.gravity, exp(1j * psi), self.part.at(phi)
@@ -141,18 +140,18 @@ class PinnedBoom:
         bends = moment / placed.inertia, pull / c.rod_mass + dot(g, u) + arm * swing**2, tilt / c.inertia(length)
         return [turn, speed, swing, *bends]
 
-    def gap(self, state: Array) -> tuple[float, float]:
+    def gap(self, state: np.ndarray) -> tuple[float, float]:
         """Gap (m, positive in contact) and its rate (m/s)."""
         offset, rate = self.pin(state)
         distance = abs(offset)
         return self._bush.gap(offset), dot(offset, rate) / distance if distance else abs(rate)
 
-    def pin(self, state: Array) -> tuple[complex, complex]:
+    def pin(self, state: np.ndarray) -> tuple[complex, complex]:
         """Offset (m) of the pin in the bush and its rate (m/s), complex."""
         phi, length, psi, turn, speed, swing = (float(value) for value in state)
         return self._pin(length, exp(1j * psi), turn, speed, swing, self.part.at(phi).pin)
 
-    def energy(self, drive: float, state: Array) -> float:
+    def energy(self, drive: float, state: np.ndarray) -> float:
         """Return the energy of motion, weight and oil, J, without that of the contact."""
         phi, length, psi, turn, speed, swing = state
         placed = self.part.at(phi)
@@ -183,7 +182,7 @@ class PinnedBoom:
         rate = (speed + 1j * length * swing) * u - bush.first * turn
         return self.cylinder.pin + length * u - bush.value, rate
 
-    def _rows(self, drive: Drive, found: ContactMotion, states: Array) -> PinMotion:
+    def _rows(self, drive: Drive, found: ContactMotion, states: np.ndarray) -> PinMotion:
         pins = [self.pin(state) for state in states]
         entries = [None if np.isnan(entry) else entry for entry in found.entries]
         drives = [drive(time) for time in found.times]
@@ -200,17 +199,17 @@ class PinnedBoom:
             found.episodes,
         )
 
-    def _tip_acceleration(self, drive: tuple[float, float], state: Array, entry: float | None) -> complex:
+    def _tip_acceleration(self, drive: tuple[float, float], state: np.ndarray, entry: float | None) -> complex:
         arm = self.part.tip_at(state[0]) - self.part.pivot
         return complex((1j * self.rates(drive, state, entry)[3] - state[3] ** 2) * arm)
 
 
-def _pairs(values: Sequence[complex]) -> Array:
+def _pairs(values: Sequence[complex]) -> np.ndarray:
     both = np.array(values)
     return np.column_stack([both.real, both.imag])
 
 
-def freed(document: Document, headings: Sequence[float] | Array, index: int, contact: Contact | None) -> PinnedBoom:
+def freed(document: Document, headings: Sequence[float] | np.ndarray, index: int, contact: Contact | None) -> PinnedBoom:
     """`PinnedBoom` of cylinder `index` (0-based): what lies outboard turns as one body, what lies inboard is ground.
 
     Parameters

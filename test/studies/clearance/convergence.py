@@ -15,9 +15,9 @@ from reference.worn_pin.geometry import cylinder_length
 from reference.worn_pin.motion import PinMotion, PinnedBoom, freed
 from studies.stops import StopMotion, halt
 
+from boom_twin import Scene
 from boom_twin.analysis.methods import MethodRun, integrate_with
-from boom_twin.scene.schema import Cylinder, Joint, Scene
-from boom_twin.types import Array
+from boom_twin.scene.schema import Cylinder, Joint
 from boom_twin.validation.contact_law import HYSTERESIS, Contact, stiffness
 
 from .scenes import pin_like, pins_of, treated, with_pins, without_friction
@@ -38,37 +38,21 @@ MEASURES = ("tip, mm", "acceleration of the tip, %", "force of the pin, %")
 class MotionRows:
     """m rows: tip (m), its acceleration (m/s^2), contact forces (N)."""
 
-    tip: Array
-    acceleration: Array
-    force: Array
+    tip: np.ndarray
+    acceleration: np.ndarray
+    force: np.ndarray
 
 
 @dataclass(frozen=True)
 class ErrorCurve:
-    """One program on one boom, coarse to fine.
+    """One program on one boom, coarse to fine."""
 
-    Attributes
-    ----------
-    case : str
-        "one pin, rigid boom" or "all rods' pins, elastic boom".
-    program : str
-        "boom_twin" or "SciPy".
-    against : str
-        The reference: "own" or "independent".
-    marks : tuple of float
-        Steps (s), or tolerances of SciPy.
-    errors : ndarray, shape (k, 3)
-        See `MEASURES`; rms over the rows, shares of the quantity's own rms.
-    seconds : tuple of float
-        Run time, for `span` seconds.
-    """
-
-    case: str
-    program: str
-    against: str
-    marks: tuple[float, ...]
-    errors: Array
-    seconds: tuple[float, ...]
+    case: str  # "one pin, rigid boom" or "all rods' pins, elastic boom"
+    program: str  # "boom_twin" or "SciPy"
+    against: str  # the reference: "own" or "independent"
+    marks: tuple[float, ...]  # steps (s), or tolerances of SciPy
+    errors: np.ndarray  # (k, 3), see `MEASURES`: rms over the rows, shares of the quantity's own rms
+    seconds: tuple[float, ...]  # run time, for `span` seconds
 
 
 @dataclass(frozen=True)
@@ -76,21 +60,21 @@ class Convergence:
     """All lines, how far both references of the one pin are apart (`MEASURES`), and how long the motions last (s)."""
 
     lines: tuple[ErrorCurve, ...]
-    apart: Array
+    apart: np.ndarray
     span: float
 
 
-def convergence(scene: Scene, posture: str | None, quick: bool = False) -> Convergence:
+def convergence(scene: Scene, quick: bool = False) -> Convergence:
     """Both booms; without the independent model if no cylinder has k, barrel and rod."""
     span, steps = STOP + SPAN, QUICK_STEPS if quick else STEPS
     finest = QUICK_FINEST if quick else FINEST
     full = treated(scene, "contact")
-    lines = [_own("all rods' pins, elastic boom", full, _stopped(full, posture, None), span, steps, finest)[0]]
+    lines = [_own("all rods' pins, elastic boom", full, _stopped(full, None), span, steps, finest)[0]]
     index = _free(scene)
     if index is None:
         return Convergence(tuple(lines), np.full(3, np.nan), span)
     one = one_pin(full, index)
-    drive = _stopped(one, posture, index)
+    drive = _stopped(one, index)
     line, own, tracks = _own("one pin, rigid boom", one, drive, span, steps, finest)
     tolerances = QUICK_TOLERANCES if quick else TOLERANCES
     independent = peer(one, index, drive, span, QUICK_TIGHTEST if quick else TIGHTEST)[0]
@@ -99,19 +83,15 @@ def convergence(scene: Scene, posture: str | None, quick: bool = False) -> Conve
         line,
         ErrorCurve(line.case, "boom_twin", "independent", steps, errors(tracks, independent), line.seconds),
         ErrorCurve(
-            line.case,
-            "SciPy",
-            "independent",
-            tolerances,
-            errors([track for track, _ in runs], independent),
+            line.case, "SciPy", "independent", tolerances, errors([track for track, _ in runs], independent),
             tuple(seconds for _, seconds in runs),
         ),
-    ]
+    ]  # fmt: skip
     return Convergence(tuple(lines), errors([own], independent)[0], span)
 
 
-def _stopped(scene: Scene, posture: str | None, only: int | None) -> StopMotion:
-    drive = halt(scene, posture, BRAKE, only)
+def _stopped(scene: Scene, only: int | None) -> StopMotion:
+    drive = halt(scene, None, BRAKE, only)
     return StopMotion(drive.angles, drive.first, drive.speed, BRAKE, RAMP, STOP)
 
 
@@ -137,7 +117,7 @@ def _track(run: MethodRun) -> MotionRows:
     return MotionRows(run.tip, run.tip_acceleration, run.pins[:, :, 2])
 
 
-def errors(tracks: Sequence[MotionRows], right: MotionRows) -> Array:
+def errors(tracks: Sequence[MotionRows], right: MotionRows) -> np.ndarray:
     """`MEASURES` of every track, shape (k, 3)."""
 
     def off(track: MotionRows) -> list[float]:
@@ -150,7 +130,7 @@ def errors(tracks: Sequence[MotionRows], right: MotionRows) -> Array:
     return np.array([off(track) for track in tracks])
 
 
-def _rms(values: Array) -> float:
+def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 

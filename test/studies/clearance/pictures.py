@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boom_twin.plots.style import BLUE, GREEN, GREY, INK, ORANGE, SKY, TONES, picture
-from boom_twin.types import Array
 
 from .convergence import MEASURES, Convergence
 
@@ -27,9 +26,9 @@ class Trace:
 
     posture: str
     model: str
-    times: Array
-    height: Array
-    acceleration: Array
+    times: np.ndarray
+    height: np.ndarray
+    acceleration: np.ndarray
 
 
 def swing_picture(path: Path, title: str, note: str, traces: list[Trace], until: float) -> None:
@@ -56,8 +55,8 @@ class RestOffsetCurve:
 
     posture: str
     pin: str
-    clearances: Array
-    shifts: Array
+    clearances: np.ndarray
+    shifts: np.ndarray
 
 
 def sinking_picture(path: Path, title: str, note: str, found: list[RestOffsetCurve], switch: float) -> None:

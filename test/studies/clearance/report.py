@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from boom_twin.errors import UsageError
-from boom_twin.scene.schema import IDEAL_BELOW, Scene
+from boom_twin import Scene
+from boom_twin.scene.schema import IDEAL_BELOW
 from boom_twin.system.atomic_files import write_atomic
-from boom_twin.validation.study.report import machine, provenance, table, write_json
+from boom_twin.validation.study.report import page, table, write_json
 
 from . import convergence as near
 from .convergence import MEASURES, Convergence, convergence
@@ -45,9 +45,9 @@ def report(scene: Scene, swings: list[Swing], shifts: list[Shift], found: Conver
         f"{len(block.pins)} pins have a radial clearance of {sizes} um. Contact law: {block.contact.law}, restitution "
         f"{block.contact.restitution:g}. `make study` writes all numbers.",
         *_stops(swings), *_rests(shifts), *_convergence(found), *_costs(costs),
-        "Limits: one motion per posture.", provenance(),
+        "Limits: one motion per posture.",
     ]  # fmt: skip
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+    return page(parts)
 
 
 def _stops(found: list[Swing]) -> list[str]:
@@ -121,29 +121,20 @@ class Study:
     costs: list[Cost]
 
 
-def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
+def write(scene: Scene, out: Path, quick: bool = False) -> list[Path]:
     """Measure, and write ``clearance.json``, ``clearance.md`` and pictures into `out`; returns their paths.
 
-    The pins are those of the scene, or else the package's. Stops and rests are in all postures of the scene, convergence and
-    cost from `posture`.
-
-    Raises
-    ------
-    UsageError
-        The scene has no posture.
+    The pins are those of the scene, or else the package's. Stops and rests are in all postures of the scene.
     """
-    if not scene.postures:
-        raise UsageError("postures: the scene has none, and the study starts from them. Add one.")
     scene, postures = with_play(scene), tuple(scene.postures)
     found = Study(
         swings(scene, postures, QUICK_HOLD if quick else HOLD),
         shifts(scene, postures, QUICK_COUNT if quick else COUNT),
-        convergence(scene, posture, quick),
-        costs(scene, posture, quick),
+        convergence(scene, quick),
+        costs(scene, quick),
     )
-    out.mkdir(parents=True, exist_ok=True)
     paths = [out / f"clearance{part}" for part in (".json", ".md", ".png", "_static.png", "_convergence.png")]
-    write_json(paths[0], {"machine": machine(), **as_json(found)})
+    write_json(paths[0], as_json(found))
     text = report(scene, found.swings, found.shifts, found.convergence, found.costs)
     write_atomic(paths[1], text)
     traces = [Trace(own.posture, own.model, own.times, own.height, own.acceleration) for own in found.swings]

@@ -9,13 +9,13 @@ import numpy as np
 from reference.worn_pin import geometry
 from studies.stops import StopMotion, halt
 
-from boom_twin.analysis.equilibrium import rest_at, statics
+from boom_twin import Scene, statics
+from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.methods import MethodRun, integrate_with
 from boom_twin.analysis.motions import motion_of
 from boom_twin.compiler.plan import first_row, taken_apart
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.scene.schema import IDEAL_BELOW, Scene
-from boom_twin.types import Array
+from boom_twin.scene.schema import IDEAL_BELOW
 
 from .scenes import Treatment, ideal, pin_like, rods_and_joints, treated, with_pins
 
@@ -26,26 +26,16 @@ COUNT, QUICK_COUNT = 13, 3
 
 @dataclass(frozen=True)
 class Shift:
-    """Tip at rest with play in one rod's pin against ideal pins. k clearances, falling to `IDEAL_BELOW`.
-
-    Attributes
-    ----------
-    clearances, shifts, penetrations : ndarray, shape (k,)
-        m; distance of the tips; how far the journal presses into the bush.
-    force : float
-        Of the pin at the last clearance, N.
-    lever, loaded : float
-        The tip's way for the cylinder's: of the rigid boom's geometry, and of the loaded elastic boom with ideal pins.
-    """
+    """Tip at rest with play in one rod's pin against ideal pins. k clearances, falling to `IDEAL_BELOW`."""
 
     posture: str
     pin: str
-    clearances: Array
-    shifts: Array
-    penetrations: Array
-    force: float
-    lever: float
-    loaded: float
+    clearances: np.ndarray  # (k,), m
+    shifts: np.ndarray  # (k,), m, distance of the tips
+    penetrations: np.ndarray  # (k,), m, how far the journal presses into the bush
+    force: float  # N, of the pin at the last clearance
+    lever: float  # the tip's way for the cylinder's, of the rigid boom's geometry
+    loaded: float  # the same of the loaded elastic boom with ideal pins
 
     @property
     def jump(self) -> float:
@@ -53,7 +43,7 @@ class Shift:
         return float(self.shifts[-1])
 
     @property
-    def ratios(self) -> Array:
+    def ratios(self) -> np.ndarray:
         """Shifts over loaded lever x (clearance + penetration), shape (k,)."""
         return np.asarray(self.shifts / (self.loaded * (self.clearances + self.penetrations)))
 
@@ -70,7 +60,7 @@ def shifts(scene: Scene, postures: tuple[str, ...], count: int = COUNT) -> list[
     return found
 
 
-def _shift(scene: Scene, posture: str, index: int, levers: tuple[float, float], tip: Array, count: int) -> Shift:
+def _shift(scene: Scene, posture: str, index: int, levers: tuple[float, float], tip: np.ndarray, count: int) -> Shift:
     clearances = np.geomspace(WIDEST, IDEAL_BELOW, count)
     clearances[-1] = IDEAL_BELOW
     name = f"cylinder_{index + 1}.rod"
@@ -88,7 +78,7 @@ def _loaded(scene: Scene, posture: str, index: int) -> float:
     return float(np.hypot(*(ways[1] - ways[0])) / (2.0 * NUDGE))
 
 
-def _rest(scene: Scene, posture: str, more: float | Array = 0.0) -> tuple[Array, Array, Array]:
+def _rest(scene: Scene, posture: str, more: float | np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Tip (2,) in m, joint angles (n,) in rad, pins (k, 4) as in `compiler.plan`."""
     plan, state, _ = rest_at(scene, strokes_of_posture(scene, posture) + more, posture_angles(scene, posture))
     found = taken_apart(plan, first_row(plan, state))
@@ -103,29 +93,17 @@ MODELS = ("ideal", "contact", "spring-damper")
 
 @dataclass(frozen=True)
 class Swing:
-    """The tip after a stop, in one posture with one kind of pins. m rows.
-
-    Attributes
-    ----------
-    times, height, acceleration : ndarray, shape (m,)
-        s, from the stop (the drives hold from 0); height over the rest at the end with ideal pins, m; vertical, m/s^2.
-    rest : float
-        Height at rest at the end, m, likewise.
-    peak, rms : float
-        Largest distance from that rest after the stop, and its root mean square, m.
-    effective : float
-        Vertical acceleration after the stop, root mean square, m/s^2.
-    """
+    """The tip after a stop, in one posture with one kind of pins. m rows; heights over the rest with ideal pins at the end."""
 
     posture: str
     model: str
-    times: Array
-    height: Array
-    acceleration: Array
-    rest: float
-    peak: float
-    rms: float
-    effective: float
+    times: np.ndarray  # (m,), s from the stop: the drives hold from 0
+    height: np.ndarray  # (m,), m
+    acceleration: np.ndarray  # (m,), m/s^2, vertical
+    rest: float  # m, height at rest at the end
+    peak: float  # m, largest distance from that rest after the stop
+    rms: float  # m, root mean square of that distance
+    effective: float  # m/s^2, root mean square of the vertical acceleration after the stop
 
 
 def swings(scene: Scene, postures: tuple[str, ...], hold: float = HOLD) -> list[Swing]:
@@ -173,19 +151,14 @@ class Cost:
     violent: float
 
 
-def costs(scene: Scene, posture: str | None, quick: bool = False) -> list[Cost]:
+def costs(scene: Scene, quick: bool = False) -> list[Cost]:
     """Return costs of play in no pin, the first rod's, all rods', and all joints' too; least of several runs that lie apart."""
     cases = list(_cases(scene))
     gentle, least = QUICK_GENTLE if quick else GENTLE, np.full((len(cases), 2), np.inf)
     for _ in range(QUICK_REPEATS if quick else REPEATS):
-        least = np.minimum(least, [_seconds(one, posture, gentle) for _, _, one in cases])
+        least = np.minimum(least, [_seconds(one, gentle) for _, _, one in cases])
     rows = zip(cases, (least * STEP / (gentle, VIOLENT)).tolist(), strict=True)
     return [Cost(count, name, *times) for (count, name, _), times in rows]
-
-
-def hard_stop(scene: Scene, posture: str | None) -> StopMotion:
-    """Return a motion to full speed and to a stop, harder than any operator would make it."""
-    return replace(halt(scene, posture, HARD_BRAKE), ramp=RAMP, stop=STOP)
 
 
 def _cases(scene: Scene) -> Iterator[tuple[int, str, Scene]]:
@@ -197,8 +170,9 @@ def _cases(scene: Scene) -> Iterator[tuple[int, str, Scene]]:
             yield count, treatment, treated(with_pins(scene, own), treatment)
 
 
-def _seconds(scene: Scene, posture: str | None, gentle: float) -> list[float]:
+def _seconds(scene: Scene, gentle: float) -> list[float]:
     """Run times (s) of both motions."""
-    move = motion_of(scene, posture)
-    runs = ((move, gentle), (hard_stop(scene, posture), VIOLENT))
+    move = motion_of(scene)
+    hard = replace(halt(scene, None, HARD_BRAKE), ramp=RAMP, stop=STOP)  # harder than any operator would make it
+    runs = ((move, gentle), (hard, VIOLENT))
     return [integrate_with(scene, drive, span, STEP, round(span / STEP), angles=move.angles).seconds for drive, span in runs]

@@ -7,9 +7,10 @@ from typing import Literal
 
 from ruamel.yaml import YAML
 
+from boom_twin import Scene
 from boom_twin.scene.checks.values import names_of
 from boom_twin.scene.load import clearance_text
-from boom_twin.scene.schema import Clearance, Pin, Scene
+from boom_twin.scene.schema import Clearance, Pin
 
 Treatment = Literal["contact", "spring-damper"]
 

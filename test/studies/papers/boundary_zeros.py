@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from reference.ideal_pins import refuse_clearance
 
+from boom_twin import Scene
 from boom_twin.analysis.equilibrium import clamp_pins, rest_at, set_undeformed
 from boom_twin.analysis.modal import natural_modes
 from boom_twin.compiler.compile import compile_scene
@@ -22,8 +23,6 @@ from boom_twin.kernels.tables import OK, Z_FORCE_A, Z_SECTION, Motion
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.scene.schema import Scene
-from boom_twin.types import Array
 
 WIDTH = 1e-7  # rad, the papers' tolerance of the interval
 BEYOND, LONGEST, SETTLED, PASSES = 0.05, 0.1, 1e-11, 60  # rad
@@ -77,7 +76,7 @@ def equilibrium(scene: Scene, posture: str) -> BoundaryZero:
 class HeldBoom:
     """A boom at rest at strokes (m) next to joint angles (rad), both (n,), whose section 1 is held at an angle."""
 
-    def __init__(self, scene: Scene, strokes: Array, angles: Array) -> None:
+    def __init__(self, scene: Scene, strokes: np.ndarray, angles: np.ndarray) -> None:
         self._plan = compile_scene(scene)
         self._angles, self._drive = angles, self._plan.closed_lengths + strokes
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from boom_twin.kernels.elements.cylinder import compliance_and_lag
 from boom_twin.kernels.tables import Motion, Tables
-from boom_twin.types import Array
 
 Complex = NDArray[np.complex128]
 Vector = Any  # of floats, or complex while a map is differentiated
@@ -30,11 +29,11 @@ class Step(NamedTuple):
 
     tables: Tables
     motion: Motion
-    drive: Array
-    drive_rate: Array
+    drive: np.ndarray
+    drive_rate: np.ndarray
 
 
-def jacobian(function: Callable[[Vector], Vector], at: Array) -> Array:
+def jacobian(function: Callable[[Vector], Vector], at: np.ndarray) -> np.ndarray:
     """Derivatives (k, n) of an analytic map at a point (n,)."""
     columns = []
     for i in range(len(at)):
@@ -44,14 +43,14 @@ def jacobian(function: Callable[[Vector], Vector], at: Array) -> Array:
     return np.stack(columns, axis=1)
 
 
-def affine(function: Callable[[Vector], Vector], at: Array) -> Array:
+def affine(function: Callable[[Vector], Vector], at: np.ndarray) -> np.ndarray:
     """Transfer matrix (7, 7) of a map between state vectors of six entries, the seventh being 1."""
     u, found = jacobian(function, at), np.eye(7)
     found[:6, :6], found[:6, 6] = u, np.real(function(at.astype(complex))) - u @ at
     return found
 
 
-def condensed(function: Callable[[Vector, Vector], tuple[Vector, Vector]], at: Array, inner: Array) -> Array:
+def condensed(function: Callable[[Vector, Vector], tuple[Vector, Vector]], at: np.ndarray, inner: np.ndarray) -> np.ndarray:
     """Transfer matrix (7, 7) of a map with inner unknowns: (Z_I, u) -> (Z_O, residual), the residual being zero.
 
     Z_O = o + o_Z dZ + o_u du,  0 = r + r_Z dZ + r_u du.

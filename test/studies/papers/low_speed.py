@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from reference.ideal_pins import refuse_clearance
 
+from boom_twin import Scene
 from boom_twin.analysis.drive import STEP_TOLERANCE
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.motions import Motion as StrokeMotion
@@ -22,14 +23,12 @@ from boom_twin.kernels.integrators import GENERALISED_ALPHA, HAT, OFFSET, OLD, R
 from boom_twin.kernels.tables import OK, SENTENCES, Motion, State, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
-from boom_twin.scene.schema import Scene
-from boom_twin.types import Array
 
 SPAN = 1e-4  # rad or m, of a difference quotient
 PASSES = 20
 
 
-def tip_of_move(scene: Scene, move: StrokeMotion, step: float, every: int = 1, velocity_terms: bool = True) -> Array:
+def tip_of_move(scene: Scene, move: StrokeMotion, step: float, every: int = 1, velocity_terms: bool = True) -> np.ndarray:
     """Tip (m, rad) after every `every` steps of `step` (s), shape (rows, 3), from rest; ideal pins.
 
     Parameters
@@ -72,9 +71,9 @@ def _solve(
     state: State,
     work: Work,
     scheme: tuple[float, float],
-    hat: Array,
-    offset: Array,
-    drive: tuple[Array, Array],
+    hat: np.ndarray,
+    offset: np.ndarray,
+    drive: tuple[np.ndarray, np.ndarray],
     velocity_terms: bool,
 ) -> None:
     """Newton passes of one step; gain and rate of the `scheme`, lengths and rates of the `drive`. `hat` is written."""
@@ -98,7 +97,7 @@ def _solve(
     raise SolverError(f"a step fails: {SENTENCES[1]}.")
 
 
-def _along(plan: Plan, state: State, work: Work, increments: Array) -> Array:
+def _along(plan: Plan, state: State, work: Work, increments: np.ndarray) -> np.ndarray:
     """J times `increments` of the unknowns, for all histories; the state stays."""
     z, share = state.z.copy(), SPAN / max(float(np.max(plan.tables.scale * np.abs(increments))), 1e-300)
     sides = []
@@ -111,7 +110,7 @@ def _along(plan: Plan, state: State, work: Work, increments: Array) -> Array:
     return np.asarray((sides[0] - sides[1]) / (2.0 * share))
 
 
-def error_by_speed(scene: Scene, move: StrokeMotion, rises: tuple[float, ...], step: float = 1e-3) -> Array:
+def error_by_speed(scene: Scene, move: StrokeMotion, rises: tuple[float, ...], step: float = 1e-3) -> np.ndarray:
     """The move made within each of `rises` (s): fastest tip (m/s), largest and rms error of the tip (m); shape (rises, 3)."""
     found = []
     for rise in rises:

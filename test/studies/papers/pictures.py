@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from boom_twin.plots.style import BLUE, GREY, INK, ORANGE, picture
-from boom_twin.types import Array
 
 LOOKS = {  # pins, program: colour, width, dashes
     ("ideal", "own"): (GREY, 2.4, "-"),
@@ -28,10 +27,10 @@ class StopTrace:
     posture: str
     pins: str
     program: str
-    times: Array
-    rise: Array
-    acceleration: Array
-    force: Array
+    times: np.ndarray
+    rise: np.ndarray
+    acceleration: np.ndarray
+    force: np.ndarray
 
 
 def posture_picture(path: Path, title: str, note: str, peer: str, traces: list[StopTrace]) -> None:
@@ -62,12 +61,14 @@ class LetGoTrace:
     """
 
     name: str
-    times: Array
-    height: Array
+    times: np.ndarray
+    height: np.ndarray
     rest: float
 
 
-def low_speed_picture(path: Path, title: str, note: str, speeds: Array, errors: Array, traces: list[LetGoTrace]) -> None:
+def low_speed_picture(
+    path: Path, title: str, note: str, speeds: np.ndarray, errors: np.ndarray, traces: list[LetGoTrace]
+) -> None:
     """Write the tip of booms that are let go, and errors (m) of the low-speed form over the fastest tip (m/s), both (k,)."""
     with picture(path, title, note, (16.0, 6.8)) as figure:
         left, right = figure.subplots(1, 2)

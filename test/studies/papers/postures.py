@@ -8,9 +8,8 @@ import numpy as np
 from studies.clearance.scenes import ideal, treated, with_play, without_friction
 from studies.stops import StopMotion, halt
 
+from boom_twin import Scene
 from boom_twin.analysis.methods import MethodRun, integrate_with
-from boom_twin.scene.schema import Scene
-from boom_twin.types import Array
 
 RAMP, STOP, BRAKE = 0.3, 0.6, 0.05  # s
 STEP, ROW = 1e-3, 2e-3  # s, of this model; of all rows
@@ -21,55 +20,29 @@ NEAR = 4e-6  # m, of the gap, from which on a journal flies
 
 @dataclass(frozen=True)
 class PostureRun:
-    """A stop in one posture by one program. m rows, n cylinders, k pins with clearance.
-
-    Attributes
-    ----------
-    pins : str
-        ``ideal`` or ``worn``.
-    times : ndarray, shape (m,)
-        s.
-    tip, acceleration : ndarray, shape (m, 2)
-        m, m/s^2.
-    forces : ndarray, shape (m, n)
-        Of the cylinders, N.
-    penetration : ndarray, shape (m, k)
-        Of the journals, m; negative in flight.
-    """
+    """A stop in one posture by one program. m rows, n cylinders, k pins with clearance."""
 
     posture: str
-    pins: str
-    times: Array
-    tip: Array
-    acceleration: Array
-    forces: Array
-    penetration: Array
+    pins: str  # "ideal" or "worn"
+    times: np.ndarray  # (m,), s
+    tip: np.ndarray  # (m, 2), m
+    acceleration: np.ndarray  # (m, 2), m/s^2
+    forces: np.ndarray  # (m, n), N, of the cylinders
+    penetration: np.ndarray  # (m, k), m, of the journals; negative in flight
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Both programs, and how far they are apart.
-
-    Attributes
-    ----------
-    flight : float
-        When a journal first left its bush, s; the end where none did. Errors are taken up to there.
-    tip, tip_throughout : float
-        rms distance, m; the second to the end, whatever flies.
-    forces, acceleration : float
-        rms difference as a share of the rms.
-    penetration : float
-        Largest difference as a share of the largest penetration; NaN for ideal pins.
-    """
+    """Both programs, and how far they are apart. Differences are rms, up to the first flight of a journal."""
 
     own: PostureRun
     peer: PostureRun
-    flight: float
-    tip: float
-    tip_throughout: float
-    forces: float
-    acceleration: float
-    penetration: float
+    flight: float  # s, when a journal first left its bush; the end where none did
+    tip: float  # m
+    tip_throughout: float  # m, to the end, whatever flies
+    forces: float  # share of their rms
+    acceleration: float  # share of its rms
+    penetration: float  # largest difference as a share of the largest penetration; NaN for ideal pins
 
 
 def stop_in(scene: Scene, posture: str) -> StopMotion:
@@ -132,5 +105,5 @@ def compare(own: PostureRun, peer: PostureRun) -> Comparison:
     )
 
 
-def _rms(values: Array) -> float:
+def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))

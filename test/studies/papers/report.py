@@ -9,18 +9,14 @@ from pathlib import Path
 import numpy as np
 from studies.clearance.scenes import ideal
 
-from boom_twin.analysis.equilibrium import settle, statics
-from boom_twin.analysis.initial_state import undeflected
+from boom_twin import Scene, simulate, statics, undeflected
+from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.modal import natural_modes
 from boom_twin.analysis.motions import motion_of
-from boom_twin.analysis.simulate import simulate
 from boom_twin.compiler.compile import BasisName, compile_scene
-from boom_twin.errors import UsageError
 from boom_twin.scene.kinematics import posture_angles, skeleton, strokes_of_posture
-from boom_twin.scene.schema import Scene
 from boom_twin.system.atomic_files import write_atomic
-from boom_twin.types import Array
-from boom_twin.validation.study.report import machine, provenance, table, write_json
+from boom_twin.validation.study.report import page, table, write_json
 
 from .boundary_zeros import BoundaryZero, equilibrium, frequencies
 from .low_speed import error_by_speed
@@ -64,7 +60,7 @@ class PapersStudy:
     zeros: tuple[BoundaryZero, ...]
     bisected: tuple[tuple[float, float], ...]
     bases: tuple[BasisRow, ...]
-    speeds: Array
+    speeds: np.ndarray
     let_go: tuple[LetGoTrace, ...]
     stops: tuple[Comparison, ...]
 
@@ -126,23 +122,14 @@ def _let_go(scene: Scene, posture: str) -> tuple[LetGoTrace, ...]:
     return tuple(found)
 
 
-def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
+def write(scene: Scene, out: Path, quick: bool = False) -> list[Path]:
     """Measure, and write ``papers.json``, ``papers.md`` and two pictures into the folder `out`; returns their paths.
 
-    `posture`: only this one; `quick`: only the first, and few speeds.
-
-    Raises
-    ------
-    UsageError
-        The scene names no posture.
+    `quick`: only the first posture, and few speeds.
     """
-    postures = [posture] if posture else list(scene.postures)[: 1 if quick else None]
-    if not postures:
-        raise UsageError("postures: none in this scene. Name at least one: the study starts there.")
-    found = measure(scene, postures, quick)
-    out.mkdir(parents=True, exist_ok=True)
+    found = measure(scene, list(scene.postures)[: 1 if quick else None], quick)
     paths = [out / name for name in ("papers.json", "papers.md", "papers_postures.png", "papers_low_speed.png")]
-    write_json(paths[0], {"machine": machine(), **_numbers(found)})
+    write_json(paths[0], _numbers(found))
     write_atomic(paths[1], as_markdown(found))
     posture_picture(paths[2], "A stop in the papers' postures", NOTE, "Exudyn", [*_traces(found.stops)])
     low_speed_picture(
@@ -197,9 +184,8 @@ def as_markdown(found: PapersStudy) -> str:
         "[Z] Zhang et al. 2016, *Research on the rigid-flexible multibody dynamics of concrete placing boom*; [R] Ren et al. "
         "2014, doi 10.1155/2014/943847. Their rigs and data are not public, so curves cannot be compared.",
         *_matrices_text(found), *_zeros_text(found), *_bases_text(found), *_low_speed_text(found), *_stops_text(found),
-        provenance(),
     ]  # fmt: skip
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+    return page(parts)
 
 
 def _matrices_text(found: PapersStudy) -> list[str]:

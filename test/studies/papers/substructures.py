@@ -24,7 +24,6 @@ from boom_twin.compiler.plan import Plan
 from boom_twin.errors import UsageError
 from boom_twin.kernels.elements.linkage import LINK_L
 from boom_twin.kernels.tables import BEAM, BODY, JOINT_B, OFFSET, ROD_PIN, STATION, Z_LINK_L, Z_LINK_R, Z_SECTION, State
-from boom_twin.types import Array
 
 from .element_matrices import (
     QX,
@@ -65,12 +64,12 @@ class Substructure:
     name: str
     first: int
     last: int
-    matrix: Array
-    inlet: Array
-    outlet: Array
+    matrix: np.ndarray
+    inlet: np.ndarray
+    outlet: np.ndarray
 
 
-def substructures(scene_kinds: Sequence[str], plan: Plan, state: State, step: Step, forces: Array) -> list[Substructure]:
+def substructures(scene_kinds: Sequence[str], plan: Plan, state: State, step: Step, forces: np.ndarray) -> list[Substructure]:
     """The whole chain, A first.
 
     Parameters
@@ -99,13 +98,13 @@ def substructures(scene_kinds: Sequence[str], plan: Plan, state: State, step: St
     return chain
 
 
-def _vector(state: State, forces: Array, cut: int) -> Array:
+def _vector(state: State, forces: np.ndarray, cut: int) -> np.ndarray:
     """State vector (6,) at a cut."""
     qx, qy, moment = forces[cut]
     return np.array([*state.frames[cut, :3], moment, qx, qy])
 
 
-Element = tuple[Callable[[Vector, Vector], tuple[Vector, Vector]], Array]
+Element = tuple[Callable[[Vector, Vector], tuple[Vector, Vector]], np.ndarray]
 """Map of an element, (Z_I, q) -> (Z_O, residual), and its inner unknowns q."""
 
 
@@ -124,7 +123,7 @@ def _element(state: State, step: Step, operation: int) -> Element:
     return lambda z, q: (offset(z, place), q), np.zeros(0)
 
 
-def _elements(state: State, step: Step, operations: range, z: Array) -> tuple[Array, Array]:
+def _elements(state: State, step: Step, operations: range, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Product (7, 7) of the transfer matrices of bodies, offsets and beams, and the vector behind them."""
     product = np.eye(7)
     for k in operations:
@@ -141,14 +140,14 @@ def _behind(state: State, step: Step, operations: range, z: Vector) -> Vector:
     return z
 
 
-def _solved(function: Callable[[Vector], Vector], guess: Array) -> Array:
+def _solved(function: Callable[[Vector], Vector], guess: np.ndarray) -> np.ndarray:
     """Zero of a map that is all but linear in what is looked for."""
     for _ in range(3):
         guess = guess - np.linalg.solve(jacobian(function, guess), np.real(function(guess.astype(complex))))
     return guess
 
 
-def _first(state: State, step: Step, rod: int, stop: int, forces: Array) -> Substructure:
+def _first(state: State, step: Step, rod: int, stop: int, forces: np.ndarray) -> Substructure:
     """Substructure A: root, cylinder, and section 1 up to the next pin C."""
     t, place = step.tables, None
     outlet, base = t.outlets[t.operations[rod].row], t.linkages[0]
@@ -188,7 +187,7 @@ def _first(state: State, step: Step, rod: int, stop: int, forces: Array) -> Subs
     return Substructure("A", 1, stop, matrix, first, last)
 
 
-def _root(state: State, step: Step, rod: int, before: Array) -> tuple[Array, Array]:
+def _root(state: State, step: Step, rod: int, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Product of what lies between the base pivot and the rod pin's frame, and the vector at the pivot."""
 
     def end(force: Vector) -> Vector:
@@ -198,7 +197,7 @@ def _root(state: State, step: Step, rod: int, before: Array) -> tuple[Array, Arr
     return _elements(state, step, range(1, rod), first)[0], first
 
 
-def _later(kind: str, state: State, step: Step, cuts: tuple[int, int, int], forces: Array) -> Substructure:
+def _later(kind: str, state: State, step: Step, cuts: tuple[int, int, int], forces: np.ndarray) -> Substructure:
     """Substructure B: from the cut before pin C, over the six-bar, to the next cut."""
     start, joint, stop = cuts
     t = step.tables

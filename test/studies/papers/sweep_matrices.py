@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from boom_twin import Scene
 from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.motions import motion_of
@@ -17,8 +18,6 @@ from boom_twin.kernels.tables import OK, Motion, State, Work
 from boom_twin.kernels.transfer.matrix_product import SIX, new_product, open_end, transfer_matrix
 from boom_twin.kernels.transfer.riccati_sweep import FREE, clear_cut, sweep_in
 from boom_twin.kernels.transfer.time_step import ANEW, LONGEST_INCREMENT, advance
-from boom_twin.scene.schema import Scene
-from boom_twin.types import Array
 
 from .element_matrices import Step
 from .substructures import Substructure, substructures
@@ -45,7 +44,7 @@ def step_of_move(scene: Scene, span: float, length: float, basis: BasisName = "e
     return plan, state, work, Step(plan.tables, motion, drive, rates)
 
 
-def forces_at_cuts(plan: Plan, state: State, work: Work, step: Step) -> Array:
+def forces_at_cuts(plan: Plan, state: State, work: Work, step: Step) -> np.ndarray:
     """qx, qy (N) and M (N m) at every cut, shape (operations + 1, 3); they mean something where nothing is carried."""
     count = len(plan.tables.operations)
     found = np.zeros((count + 1, 3))
@@ -59,7 +58,7 @@ def forces_at_cuts(plan: Plan, state: State, work: Work, step: Step) -> Array:
     return found
 
 
-def chain_of(scene: Scene, span: float, length: float) -> tuple[list[Substructure], list[Array]]:
+def chain_of(scene: Scene, span: float, length: float) -> tuple[list[Substructure], list[np.ndarray]]:
     """Substructures of a boom on its reference move, and the same matrices (7, 7) by the sweep."""
     plan, state, work, step = step_of_move(scene, span, length)
     forces = forces_at_cuts(plan, state, work, step)
@@ -67,7 +66,7 @@ def chain_of(scene: Scene, span: float, length: float) -> tuple[list[Substructur
     return own, [swept(plan, state, work, step, forces, one) for one in own]
 
 
-def swept(plan: Plan, state: State, work: Work, step: Step, forces: Array, one: Substructure) -> Array:
+def swept(plan: Plan, state: State, work: Work, step: Step, forces: np.ndarray, one: Substructure) -> np.ndarray:
     """Transfer matrix (7, 7) of a substructure as the sweep condenses it, about the same vectors."""
     room, force = new_product(plan.tables), forces[one.last].copy()
     u = np.zeros((6, 7))
@@ -88,7 +87,7 @@ def swept(plan: Plan, state: State, work: Work, step: Step, forces: Array, one: 
     return found
 
 
-def difference(one: Array, other: Array) -> float:
+def difference(one: np.ndarray, other: np.ndarray) -> float:
     """Return the difference of two transfer matrices as a share of the larger, with displacements and forces scaled alike."""
     ratio = np.sqrt(np.abs(one[3:6, :3]).max() / np.abs(one[:3, 3:6]).max())
     scale = np.array([1.0, 1.0, 1.0, ratio, ratio, ratio, 1.0])
@@ -96,7 +95,7 @@ def difference(one: Array, other: Array) -> float:
     return float(np.abs(a - b).max() / np.abs(a).max())
 
 
-def boundary_solution(chain: Sequence[Substructure]) -> Array:
+def boundary_solution(chain: Sequence[Substructure]) -> np.ndarray:
     """Return the base vector (6,) by the product of all matrices; the base's place and the free tip are known."""
     product = np.eye(7)
     for one in chain:

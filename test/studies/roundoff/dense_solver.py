@@ -19,7 +19,6 @@ from boom_twin.compiler.plan import Plan
 from boom_twin.kernels.elements.cylinder import BARREL
 from boom_twin.kernels.elements.linkage import LINK_L
 from boom_twin.kernels.tables import BEAM, BODY, JOINT_A, JOINT_B, OFFSET, ROD_PIN, STATION, Z_LAMBDA, Z_LINK_L, Z_LINK_R
-from boom_twin.types import Array
 
 Long = np.longdouble
 
@@ -31,9 +30,9 @@ class FrameIncrements:
     x: np.longdouble
     y: np.longdouble
     theta: np.longdouble
-    rows: Array
+    rows: np.ndarray
 
-    def point(self, x: float, y: float) -> tuple[Array, Array]:
+    def point(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
         """A point (x, y) (m) in the axes of this frame: where it is, shape (2,), and its increments, shape (2, unknowns)."""
         c, s = np.cos(self.theta), np.sin(self.theta)
         bx, by = c * x - s * y, s * x + c * y
@@ -45,7 +44,7 @@ class FrameIncrements:
         at, moved = self.point(x, y)
         return FrameIncrements(at[0], at[1], self.theta, np.stack([*moved, self.rows[2]]))
 
-    def turned(self, theta: np.longdouble, row: Array) -> FrameIncrements:
+    def turned(self, theta: np.longdouble, row: np.ndarray) -> FrameIncrements:
         """The frame at the same place with an orientation of its own."""
         return FrameIncrements(self.x, self.y, theta, np.stack([self.rows[0], self.rows[1], row]))
 
@@ -55,10 +54,10 @@ class Kinematics:
     """Increments by unknown at an undeformed state `z`: of all histories, of closures, of pins."""
 
     plan: Plan
-    z: Array
-    moved: Array = field(init=False)
-    closures: list[tuple[int, Array]] = field(default_factory=list)
-    pins: dict[tuple[int, int], tuple[Array, Array]] = field(default_factory=dict)
+    z: np.ndarray
+    moved: np.ndarray = field(init=False)
+    closures: list[tuple[int, np.ndarray]] = field(default_factory=list)
+    pins: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         size = len(self.plan.names)

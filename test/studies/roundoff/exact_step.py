@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import linalg
 
+from boom_twin import Scene
 from boom_twin.analysis.equilibrium import set_undeformed
 from boom_twin.analysis.methods import FAMILIES
 from boom_twin.compiler.compile import compile_scene
@@ -20,8 +21,6 @@ from boom_twin.kernels.tables import OK, Motion, State, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.matrix_product import new_product, plain_pass
 from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
-from boom_twin.scene.schema import Scene
-from boom_twin.types import Array
 
 from .dense_solver import Kinematics, Long
 
@@ -32,25 +31,14 @@ ROUNDS = 12  # of equilibration, and most of refinement
 
 @dataclass(frozen=True)
 class StepRoundoff:
-    """Round-off in one step of a boom.
-
-    Attributes
-    ----------
-    unknowns : int
-    condition : float
-        Of the whole equilibrated system, in the 1-norm.
-    riccati, plain, dense : float
-        Relative error of the tip's increment: of the sweep, of the plain product (NaN if it gave none), of LU of the whole.
-    exact : float
-        What the last refinement of the exact solution changed, relative.
-    """
+    """Round-off in one step of a boom: relative errors of the tip's increment by each way of solving."""
 
     unknowns: int
-    condition: float
-    riccati: float
-    plain: float
-    dense: float
-    exact: float
+    condition: float  # of the whole equilibrated system, in the 1-norm
+    riccati: float  # error of the sweep
+    plain: float  # error of the plain product, NaN if it gave no increment
+    dense: float  # error of LU of the whole
+    exact: float  # what the last refinement of the exact solution changed
 
 
 def digits(error: float) -> float:
@@ -58,7 +46,7 @@ def digits(error: float) -> float:
     return 16.0 if not math.isfinite(error) else min(16.0, max(0.0, math.log10(max(error, EPS) / EPS)))
 
 
-def one_step(scene: Scene, angles: Array, step: float, rho: float) -> StepRoundoff:
+def one_step(scene: Scene, angles: np.ndarray, step: float, rho: float) -> StepRoundoff:
     """Compare on a boom at rest at joint `angles` (rad), undeformed, that gravity begins to move; step in s."""
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
@@ -71,7 +59,7 @@ def one_step(scene: Scene, angles: Array, step: float, rho: float) -> StepRoundo
     exact, last = system.solve()
     tip = kinematics.tip
 
-    def error(increments: Array | None) -> float:
+    def error(increments: np.ndarray | None) -> float:
         if increments is None or not np.isfinite(increments).all():
             return math.nan
         return float(np.linalg.norm(tip @ (increments - exact)) / np.linalg.norm(tip @ exact))
@@ -86,7 +74,7 @@ def one_step(scene: Scene, angles: Array, step: float, rho: float) -> StepRoundo
     )
 
 
-def _riccati(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> bool:
+def _riccati(plan: Plan, state: State, work: Work, motion: Motion, drive: np.ndarray) -> bool:
     clear_cut(work, FREE)
     last, still = np.int64(len(plan.tables.operations)), np.zeros(plan.joints)
     status, _, _ = sweep_in(plan.tables, state, work, motion, drive, still, ROOT, last, FREE, work.condensed)
@@ -94,7 +82,7 @@ def _riccati(plan: Plan, state: State, work: Work, motion: Motion, drive: Array)
     return bool(status == OK)
 
 
-def _plain(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -> bool:
+def _plain(plan: Plan, state: State, work: Work, motion: Motion, drive: np.ndarray) -> bool:
     """Return True if the plain product gives finite increments; its status does not count, as lost digits are measured."""
     product = new_product(plan.tables)
     plain_pass(plan.tables, state, work, motion, drive, np.zeros(plan.joints), product)
@@ -102,8 +90,8 @@ def _plain(plan: Plan, state: State, work: Work, motion: Motion, drive: Array) -
 
 
 def _increments(
-    plan: Plan, state: State, work: Work, motion: Motion, solve: Callable[[Plan, State, Work, Motion, Array], bool]
-) -> Array | None:
+    plan: Plan, state: State, work: Work, motion: Motion, solve: Callable[[Plan, State, Work, Motion, np.ndarray], bool]
+) -> np.ndarray | None:
     """Increments per unit of gravity: half the difference of two small loads, which cancels what closures lack to rounding.
 
     That lack, times the gain, is a force too; the load grows with the gain to stay far above its rounding.
@@ -120,7 +108,7 @@ def _increments(
 class _System:
     """The whole system in extended precision, equilibrated and factored in double."""
 
-    def __init__(self, plan: Plan, kinematics: Kinematics, gain: float, rate: float, drives: Array) -> None:
+    def __init__(self, plan: Plan, kinematics: Kinematics, gain: float, rate: float, drives: np.ndarray) -> None:
         t, size = plan.tables, len(plan.names)
         self.moved, self.mass = kinematics.moved, (plan.masses * gain).astype(Long)
         self.mass[:size] = 0.0
@@ -145,7 +133,7 @@ class _System:
         self.factors = linalg.lu_factor(self.whole)
         self.first = self._solved(self.load.astype(float))
 
-    def solve(self) -> tuple[Array, float]:
+    def solve(self) -> tuple[np.ndarray, float]:
         """The solution by iterative refinement, and the relative size of the last change."""
         x, change = self.first.astype(Long), math.inf
         for _ in range(ROUNDS):
@@ -163,13 +151,13 @@ class _System:
         inverse, _ = linalg.lapack.dgecon(self.factors[0], norm)
         return float(1.0 / inverse) if inverse > 0.0 else math.inf
 
-    def _solved(self, right: Array) -> Array:
+    def _solved(self, right: np.ndarray) -> np.ndarray:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", linalg.LinAlgWarning)
             return np.asarray(self.scale * linalg.lu_solve(self.factors, self.scale * right))
 
 
-def _equilibrated(matrix: Array) -> Array:
+def _equilibrated(matrix: np.ndarray) -> np.ndarray:
     """Scale (n,) for rows and columns that brings the largest entry of each near 1."""
     scale = np.ones(len(matrix))
     for _ in range(ROUNDS):

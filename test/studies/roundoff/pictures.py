@@ -8,14 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boom_twin.plots.style import BLUE, GREY, INK, ORANGE, SKY, picture
-from boom_twin.types import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
 def roundoff_picture(
-    path: Path, title: str, steps: Array, errors: Array, target: float, counts: Array, digits: dict[str, Array], note: str = ""
+    path: Path,
+    title: str,
+    steps: np.ndarray,
+    errors: np.ndarray,
+    target: float,
+    counts: np.ndarray,
+    digits: dict[str, np.ndarray],
+    note: str = "",
 ) -> None:
     """Write two panels: `errors` of the tip over `steps` (s); `digits` lost by each way of solving over `counts` sections."""
     with picture(path, title, note, (16.0, 7.0)) as figure:
@@ -24,7 +30,7 @@ def roundoff_picture(
         _digits(right, counts, digits)
 
 
-def _errors(axes: Axes, steps: Array, errors: Array, target: float) -> None:
+def _errors(axes: Axes, steps: np.ndarray, errors: np.ndarray, target: float) -> None:
     axes.loglog(steps, errors, "o-", color=BLUE, label="default method")
     square = errors[0] * (steps / steps[0]) ** 2
     shown = square >= 0.3 * errors.min()
@@ -36,7 +42,7 @@ def _errors(axes: Axes, steps: Array, errors: Array, target: float) -> None:
     axes.legend(loc="lower right")
 
 
-def _digits(axes: Axes, counts: Array, digits: dict[str, Array]) -> None:
+def _digits(axes: Axes, counts: np.ndarray, digits: dict[str, np.ndarray]) -> None:
     looks = zip(digits.items(), ((BLUE, "o-"), (ORANGE, "s-"), (SKY, "^--"), (INK, "v--")), strict=False)
     for (name, lost), (colour, line) in looks:
         axes.semilogx(counts, lost, line, color=colour, label=name)

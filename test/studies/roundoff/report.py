@@ -8,16 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from boom_twin.analysis.methods import Method, integrate_with
+from boom_twin import Scene
+from boom_twin.analysis.methods import integrate_with
 from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import RHO
-from boom_twin.scene.kinematics import section_angles
-from boom_twin.scene.schema import Scene
 from boom_twin.system.atomic_files import write_atomic
-from boom_twin.types import Array
 from boom_twin.validation.study import scene_changes as made
 from boom_twin.validation.study.long_booms import long_boom, seven_sections
-from boom_twin.validation.study.report import machine, provenance, table, write_json
+from boom_twin.validation.study.report import page, table, write_json
 from boom_twin.validation.study.stability.cases import short
 from boom_twin.validation.study.stability.setups import smooth
 
@@ -73,7 +71,7 @@ def _by_stiffness(scene: Scene) -> Iterator[Loss]:
         yield Loss("extremes", name, float("nan"), one_step(boom, _angles(boom), USUAL, RHO))
 
 
-def _angles(scene: Scene) -> Array:
+def _angles(scene: Scene) -> np.ndarray:
     return motion_of(scene).angles
 
 
@@ -86,27 +84,13 @@ TARGET = 1e-8  # of the boom's length: above it the error may not turn up
 
 @dataclass(frozen=True)
 class TurnUp:
-    """Errors of the tip. k steps.
+    """Errors of the tip. k steps."""
 
-    Attributes
-    ----------
-    steps : ndarray, shape (k,)
-        s, falling.
-    errors : ndarray, shape (k,)
-        Largest error of the tip over `length`.
-    accelerations : ndarray, shape (k,)
-        Error of the tip's acceleration, rms, m/s^2.
-    length : float
-        Of the boom, m.
-    order : float
-        Fitted where the scheme's error prevails.
-    """
-
-    steps: Array
-    errors: Array
-    accelerations: Array
-    length: float
-    order: float
+    steps: np.ndarray  # (k,), s, falling
+    errors: np.ndarray  # (k,), largest error of the tip over `length`
+    accelerations: np.ndarray  # (k,), m/s^2, error of the tip's acceleration, rms
+    length: float  # m, of the boom
+    order: float  # fitted where the scheme's error prevails
 
     @property
     def floor(self) -> tuple[float, float]:
@@ -121,9 +105,9 @@ class TurnUp:
         return bool(rises.size and self.errors[rises[0]] > TARGET)
 
 
-def turn_up(scene: Scene, steps: tuple[float, ...] = TURN_UP_STEPS, method: Method | None = None) -> TurnUp:
+def turn_up(scene: Scene, steps: tuple[float, ...] = TURN_UP_STEPS) -> TurnUp:
     """March a short smooth move by all `steps` (s), among them `COARSE` and `FINE`."""
-    found = {step: _rows(scene, step, method) for step in steps}
+    found = {step: _rows(scene, step) for step in steps}
     weight = FINE**2 / (COARSE**2 - FINE**2)
     right = [fine + weight * (fine - coarse) for fine, coarse in zip(found[FINE], found[COARSE], strict=True)]
     length = sum(section.length for section in scene.sections)
@@ -134,21 +118,18 @@ def turn_up(scene: Scene, steps: tuple[float, ...] = TURN_UP_STEPS, method: Meth
     return TurnUp(np.array(steps), errors, rough, length, float(order))
 
 
-def _rows(scene: Scene, step: float, method: Method | None) -> tuple[Array, Array]:
+def _rows(scene: Scene, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Tip and its acceleration, both (ROWS + 1, 2), m and m/s^2."""
     own = smooth(scene, None, SHARE, RISE, SPAN, step)
-    found = integrate_with(scene, own.drive, SPAN, step, round(SPAN / ROWS / step), method, angles=own.angles)
+    found = integrate_with(scene, own.drive, SPAN, step, round(SPAN / ROWS / step), angles=own.angles)
     return found.tip, found.tip_acceleration
 
 
-def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
+def write(scene: Scene, out: Path, quick: bool = False) -> list[Path]:
     """Measure, and write ``roundoff.json``, ``roundoff.md`` and ``roundoff.png`` into `out`; returns their paths."""
-    if posture is not None:
-        scene = scene.model_copy(update={"postures": {posture: section_angles(scene, posture)}})
     lost, turned = losses(scene, quick), turn_up(scene, tuple(step for step in TURN_UP_STEPS if step >= FINE or not quick))
-    out.mkdir(parents=True, exist_ok=True)
     paths = [out / f"roundoff.{kind}" for kind in ("json", "md", "png")]
-    write_json(paths[0], {"machine": machine(), "losses": lost, "turn_up": turned})
+    write_json(paths[0], {"losses": lost, "turn_up": turned})
     write_atomic(paths[1], text(lost, turned))
     chain = [loss for loss in lost if loss.group == "sections"]
     shown = {"Riccati": "riccati", "plain product": "plain", "LU of the whole system": "dense"}
@@ -181,6 +162,5 @@ def text(lost: Sequence[Loss], turned: TurnUp) -> str:
         f"{step:.0e} s. The error rises again {verdict} {TARGET:.0e}: accelerations contain the rounding of positions "
         "over h\N{SUPERSCRIPT TWO}.",
         "Limits: one short smooth move of the default boom; long booms are invented.",
-        provenance(),
     ]
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+    return page(parts)

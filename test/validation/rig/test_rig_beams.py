@@ -7,9 +7,8 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin.scene import load_scene
+from boom_twin import Scene, load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.schema import Scene
 from boom_twin.validation.rig import at_rest
 from boom_twin.validation.rig.exudyn.probes import read
 

@@ -7,10 +7,10 @@ import pytest
 
 pytest.importorskip("exudyn")
 
+from boom_twin import load_scene
 from boom_twin.errors import UsageError
-from boom_twin.scene import load_scene
 from boom_twin.validation.rig import Move, Programme
-from boom_twin.validation.rig.faults import RigFault, check, drifting, parse
+from boom_twin.validation.rig.faults import RigFault, check, drifting, listing, parse
 
 
 @pytest.mark.parametrize(
@@ -59,17 +59,35 @@ def test_refused(text, told):
         parse(text)
 
 
-def test_refused_of_a_scene():
-    scene = load_scene()
-    check([parse("joint_4.sensor:bias:1@59")], scene, 60.0)
-    with pytest.raises(UsageError, match=r"cylinder_5\.k.*sections 1 to 4"):
-        check([parse("cylinder_5.k:softer:0.1")], scene, 60.0)
-    with pytest.raises(UsageError, match=r"cylinder_1\.k changes by another fault too"):
-        check([parse("cylinder_1.k:softer:0.1@5"), parse("cylinder_1.k:softer:0.2@9")], scene, 60.0)
-    with pytest.raises(UsageError, match=r"size = 0\.05, must be at most 0\.042 on this boom"):
-        check([parse("cylinder_2.drive:drift:0.05@50")], scene, 60.0)
-    with pytest.raises(UsageError, match="begins at 60 s, must be before the end at 60 s"):
-        check([parse("joint_4.sensor:bias:1@60")], scene, 60.0)
+@pytest.mark.parametrize(
+    ("texts", "told"),
+    [
+        (["cylinder_5.k:softer:0.1"], r"cylinder_5\.k.*sections 1 to 4"),
+        (["cylinder_1.k:softer:0.1@5", "cylinder_1.k:softer:0.2@9"], r"cylinder_1\.k changes by another fault too"),
+        (["cylinder_2.drive:drift:0.05@50"], r"size = 0\.05, must be at most 0\.042 on this boom"),
+        (["joint_4.sensor:bias:1@60"], "begins at 60 s, must be before the end at 60 s"),
+        (["tip.payload:more:1e6"], "on this boom"),
+        (["line_fill:more:1e4"], "on this boom"),
+        (["tip.payload:less:20"], "on this boom"),
+        (["joint_2.sensor:bias:90"], "on this boom"),
+        (["cylinder_1.sensor:spikes:-20"], "on this boom"),
+        (["joint_1.sensor:noisy:1e9"], "on this boom"),
+        (["joint_angles.delay:late:3600"], "on this boom"),
+        (["cylinder_2.sensor:scale:-5"], "on this boom"),
+    ],
+)
+def test_what_no_rig_can_have_is_refused(texts, told):
+    check([parse("joint_4.sensor:bias:1@59")], load_scene(), 60.0)
+    with pytest.raises(UsageError, match=told):
+        check([parse(text) for text in texts], load_scene(), 60.0)
+
+
+def test_the_list_names_every_cause_and_kind():
+    text = "\n".join(listing())
+    for cause in ("cylinder_I.k", "section_I.EI", "tip.payload", "joint_angles.delay", "cylinder_I.rod.clearance"):
+        assert f"\n{cause} " in text
+    assert all(f" {kind} " in text for kind in ("softer", "more", "less", "bias", "dropout", "late", "missing"))
+    assert max(map(len, text.splitlines())) < 130
 
 
 def test_a_leak_moves_the_drive_and_stays():

@@ -9,11 +9,10 @@ import pytest
 
 pytest.importorskip("exudyn")
 
+from boom_twin import Scene, load_scene
 from boom_twin.errors import UsageError
-from boom_twin.scene import load_scene
 from boom_twin.scene.edit import parameter, parameter_names
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.schema import Scene
 from boom_twin.validation.rig import Move, Programme, Sensors, at_rest, move, record, simulate, statics
 from boom_twin.validation.rig.faults import parse
 from boom_twin.validation.rig.faulty_boom import changes, with_faults, wrong_by
@@ -33,27 +32,16 @@ def test_softer_by_its_share(text):
     assert set(changed.values()) == {1.0}
 
 
-def test_more_on_what_is_there():
-    scene = with_faults(load_scene(), [parse("tip.payload:more:20"), parse("line_fill:more:2")])
-    again = with_faults(scene, [parse("tip.payload:more:5"), parse("joint_1.sensor:bias:1")])
-    assert again.tip.payload == 25.0 and again.line_fill == 2.0
-
-
-def test_less_of_what_is_there():
+def test_faults_add_to_what_is_there(cantilever):
     scene = with_faults(load_scene(), [parse("tip.payload:more:60"), parse("line_fill:more:2")])
-    again = with_faults(scene, [parse("tip.payload:less:20"), parse("line_fill:less:2")])
-    assert again.tip.payload == 40.0 and not again.line_fill
-
-
-def test_play_grows():
-    scene = with_faults(load_scene(), [parse("cylinder_2.rod.clearance:play:0.0005")])
-    (pin,) = scene.pins_of("cylinder_2")
-    assert pin.at == "cylinder_2.rod" and pin.radial_clearance == 5e-4
-    (pin,) = with_faults(scene, [parse("cylinder_2.rod.clearance:play:0.0002")]).pins_of("cylinder_2")
-    assert pin.radial_clearance == pytest.approx(7e-4)
-
-
-def test_no_oil_spring_cannot_soften(cantilever):
+    more = with_faults(scene, [parse("tip.payload:more:5"), parse("joint_1.sensor:bias:1")])
+    less = with_faults(scene, [parse("tip.payload:less:20"), parse("line_fill:less:2")])
+    assert (more.tip.payload, more.line_fill) == (65.0, 2.0) and less.tip.payload == 40.0 and not less.line_fill
+    worn = with_faults(load_scene(), [parse("cylinder_2.rod.clearance:play:0.0005")])
+    again = with_faults(worn, [parse("cylinder_2.rod.clearance:play:0.0002")])
+    ((first,), (second,)) = (each.pins_of("cylinder_2") for each in (worn, again))
+    assert first.at == "cylinder_2.rod" and first.radial_clearance == 5e-4
+    assert second.radial_clearance == pytest.approx(7e-4)
     with pytest.raises(UsageError, match=r"cylinder_1\.k: the scene has no such parameter"):
         with_faults(Scene.model_validate(cantilever), [parse("cylinder_1.k:softer:0.3")])
 

@@ -9,11 +9,10 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin import load_scene, statics
+from boom_twin import Scene, load_scene, statics
 from boom_twin.errors import UsageError
 from boom_twin.scene.edit import with_parameters
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.schema import Scene
 from boom_twin.validation.rig import Programme, simulate
 from boom_twin.validation.rig.loads import PumpLoad, WindLoad, check, parse, tip_load
 from boom_twin.validation.rig.motion import ease
@@ -30,9 +29,6 @@ from boom_twin.validation.rig.motion import ease
 )
 def test_text_and_back(text, load):
     assert parse(text) == load and str(load) == text
-
-
-def test_what_is_left_out_has_a_default():
     assert parse("pump:0.43:130") == PumpLoad(0.43, 130.0, 0.1, 0.0) and parse("wind:15") == WindLoad(15.0, 5.0, 0.0)
 
 
@@ -49,17 +45,13 @@ def test_what_is_left_out_has_a_default():
         ("pump:0.5:130:1.2", "change-over = 1.2, must be from 0.01 to 1 s, half a period"),
         ("wind:-15", "deviation = -15, must be from 0.1 to 500 N"),
         ("wind:15:0", "time scale = 0, must be from 0.1 to 60 s"),
+        ("pump:0.43:130@20", "begins at 20 s, must be before the end at 20 s"),
         ("wind:15@-1", "onset = -1 s, must be finite and at least 0"),
     ],
 )
 def test_refused(text, told):
     with pytest.raises(UsageError, match=told):
-        parse(text)
-
-
-def test_refused_after_the_end():
-    with pytest.raises(UsageError, match="begins at 20 s, must be before the end at 20 s"):
-        check([parse("wind:15"), parse("pump:0.43:130@20")], 20.0)
+        check([parse(text)], 20.0)
 
 
 def test_pulses_are_on_for_half_of_each_period():

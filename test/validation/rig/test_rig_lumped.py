@@ -10,14 +10,12 @@ import pytest
 
 pytest.importorskip("exudyn")
 
+from boom_twin import load_scene
 from boom_twin.errors import UsageError
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.schema import Clearance, Pin, Scene
+from boom_twin.scene.schema import Clearance, Pin
 from boom_twin.validation.rig import Move, Programme, Scheme, at_rest, move
-from boom_twin.validation.rig.exudyn.lumped_masses import lump_masses
 from boom_twin.validation.rig.exudyn.probes import read
-from boom_twin.validation.rig.exudyn.system import section_frames
 
 REFERENCE = Path(__file__).parents[2] / "data" / "reference"
 
@@ -71,28 +69,6 @@ def test_the_error_studys_booms_move_as_the_reference(elements, lumped, scheme, 
     acceleration = np.sqrt(np.mean(expected["tip_ax_m_s2"] ** 2 + expected["tip_ay_m_s2"] ** 2))
     assert 1e3 * away("tip_x_m", "tip_y_m") < most_mm
     assert away("tip_ax_m_s2", "tip_ay_m_s2") < most_acceleration * acceleration
-
-
-def test_nothing_is_lost_in_lumping():
-    """What weighs and is not carried by the base is the cylinders and the two-force links."""
-    scene = load_scene()
-    strokes = strokes_of_posture(scene, "arch")
-    found = lump_masses(scene, section_frames(scene, strokes), strokes)
-    bearers = [*found.links, *(lumps for section in found.sections for lumps in section.values())]
-    first, *others = scene.joints
-    length = first.cylinder.closed_length + strokes[0]
-    barrel, rod = first.cylinder.barrel, first.cylinder.rod
-    expected = barrel.mass * barrel.com / length + rod.mass * (1.0 - rod.com / length)
-    for joint in others:
-        expected += joint.cylinder.barrel.mass + joint.cylinder.rod.mass + (joint.mL if joint.kind == "B3" else joint.mR)
-    assert sum(lump.mass for bearer in bearers for lump in bearer.weight) == pytest.approx(expected)
-
-
-def test_rigid_sections_without_cylinder_parts(one_rigid):
-    scene = Scene.model_validate(one_rigid)
-    strokes = strokes_of_posture(scene, "up")
-    lumped, bodies = (at_rest(scene, strokes, 1, lumped=lumped) for lumped in (True, False))
-    assert lumped.forces == pytest.approx(bodies.forces, rel=1e-9)
 
 
 def test_play_needs_the_rod():

@@ -7,11 +7,11 @@ import pytest
 
 pytest.importorskip("exudyn")
 
+from boom_twin import load_scene
 from boom_twin.errors import UsageError
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, stroke_range
 from boom_twin.validation.rig import BUNDLED_DURATION, Move, Programme, bundled, random_programme
-from boom_twin.validation.rig.motion import BUNDLED_MOVES, SAMPLES, tip_speed
+from boom_twin.validation.rig.motion import BUNDLED_MOVES, RANGE_SAMPLES, TIP_SPEED, tip_speed
 
 SCENE = load_scene()
 
@@ -46,20 +46,35 @@ def test_overlapping_moves_are_refused():
         Programme((0.0,), (Move(0, 1.0, 2.0, 0.2), Move(0, 2.0, 1.0, 0.1)))
 
 
-def test_programmes_stay_in_range(programme):
+def test_programmes_stay_in_range_and_slow_enough(programme):
     strokes = programme(np.linspace(0.0, 60.0, 121))[0]
     for cylinder in range(4):
-        low, high = stroke_range(SCENE, cylinder, SAMPLES)
+        low, high = stroke_range(SCENE, cylinder, RANGE_SAMPLES)
         assert low < strokes[:, cylinder].min() and strokes[:, cylinder].max() < high
     assert np.isfinite([joint_angles_of_strokes(SCENE, row) for row in strokes[::10]]).all()  # raises if out of reach
-
-
-def test_programmes_are_slow_enough(programme):
     fastest = tip_speed(SCENE, programme, np.linspace(0.0, 60.0, 601)).max()
     assert 0.3 < fastest < 1.3
 
 
+@pytest.mark.parametrize("sections", [1, 2, 3])
+def test_another_boom_makes_moves_within_its_own_ranges(sections):
+    postures = {"low": SCENE.postures["arch"][:sections]}
+    scene = SCENE.model_copy(
+        update={"sections": SCENE.sections[:sections], "joints": SCENE.joints[:sections], "postures": postures}
+    )
+    times, drive = np.linspace(0.0, BUNDLED_DURATION, 401), bundled(scene)
+    strokes, _ = drive(times)
+    for i in range(sections):
+        low, high = stroke_range(scene, i, RANGE_SAMPLES)
+        assert low <= strokes[:, i].min() < strokes[:, i].max() <= high
+        assert np.ptp(strokes[:, i]) > 0.04 * (high - low)
+    assert tip_speed(scene, drive, times).max() <= TIP_SPEED
+    with pytest.raises(UsageError, match="no posture to start from"):
+        bundled(scene.model_copy(update={"postures": {}}))
+
+
 def test_bundled_programme_begins_and_ends_in_a_hold():
+    assert bundled(SCENE).moves == BUNDLED_MOVES == bundled(SCENE.with_(payload=30)).moves
     assert min(move.start for move in BUNDLED_MOVES) == 3.0
     assert BUNDLED_DURATION - max(move.end for move in BUNDLED_MOVES) >= 3.0
     assert {move.cylinder for move in BUNDLED_MOVES} == {0, 1, 2, 3}

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin.scene.schema import Scene
+from boom_twin import Scene
 from boom_twin.validation.rig import Move, Programme, noise_free, observe, simulate
 from boom_twin.validation.rig.sensors import Sensors
 from boom_twin.validation.rig.session import EPOCH

@@ -8,9 +8,9 @@ from oracle.oscillation import mean_frequency
 
 pytest.importorskip("exudyn")
 
+from boom_twin import Scene
 from boom_twin.errors import UsageError
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
-from boom_twin.scene.schema import Scene
 from boom_twin.validation.rig import Move, Programme, simulate
 
 

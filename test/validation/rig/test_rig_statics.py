@@ -7,8 +7,8 @@ import pytest
 
 pytest.importorskip("exudyn")
 
+from boom_twin import Scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, stroke_curve, strokes_of_posture
-from boom_twin.scene.schema import Scene
 from boom_twin.validation.rig import statics
 
 G = 9.81

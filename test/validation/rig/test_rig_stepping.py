@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin.scene import load_scene
+from boom_twin import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.validation.rig import Move, Programme, Scheme, at_rest, move, simulate
 
@@ -23,8 +23,7 @@ def test_moving_again_and_otherwise():
     for name, values in rows.items():
         assert np.array_equal(values, again[name]), name
         assert values == pytest.approx(fresh[name], rel=1e-9, abs=1e-9), name
-    assert effort.feeding > 0.0 and effort.seconds > 0.0
-    assert effort.passes >= 200 and effort.tangents < 50
+    assert effort.seconds > 0.0 and effort.passes >= 200 and effort.tangents < 50
     anew, dearer = move(resting, drive, 0.4, 2e-3, 4e-3, Scheme(kept=0, tolerance=1e-3))
     assert anew["tip_y_m"] == pytest.approx(rows["tip_y_m"], abs=2e-6)
     assert dearer.tangents == dearer.passes >= 200

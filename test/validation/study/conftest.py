@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from oracle import booms
 
-from boom_twin.scene.schema import Scene
+from boom_twin import Scene
 
 
 @pytest.fixture(scope="session")

@@ -8,25 +8,21 @@ import math
 import re
 from contextlib import redirect_stderr
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from oracle import booms
 
+from boom_twin import load_scene
 from boom_twin.analysis.methods import Method
 from boom_twin.analysis.motions import motion_of
 from boom_twin.cli.main import main
-from boom_twin.errors import SolverError
-from boom_twin.scene import load_scene
 from boom_twin.validation.study.error import problem as error_problem
 from boom_twin.validation.study.error import report as error
 from boom_twin.validation.study.error import runner as error_run
 from boom_twin.validation.study.error.cases import Own, Peer, own_cases, peer_cases
-from boom_twin.validation.study.error.pareto import fastest, front, order, same_step
 from boom_twin.validation.study.error.problem import Problem, pose
-from boom_twin.validation.study.error.runner import Row, Runner
-from boom_twin.validation.study.scene_changes import with_modes
+from boom_twin.validation.study.error.runner import Runner
 
 
 @pytest.fixture(scope="module")
@@ -132,16 +128,6 @@ def test_without_exudyn_the_report_goes_on(tmp_path, monkeypatch):
     assert reason in (tmp_path / "error.md").read_text()
 
 
-def test_independent_reference_that_fails_is_told(monkeypatch):
-    def fail(*_, **__):
-        raise SolverError("The rig stopped.")
-
-    monkeypatch.setattr(error_problem, "load_rig", lambda: (SimpleNamespace(at_rest=fail), ""))
-    scene = load_scene()
-    found = pose(scene, motion_of(scene, duration=0.2), True)
-    assert found.exudyn is None and found.missing == "The rig stopped."
-
-
 def test_failures_are_rows(problem, monkeypatch):
     runner = Runner(problem)
     lost = runner.row(Own(2.5e-4, Method(product="plain")))
@@ -150,64 +136,3 @@ def test_failures_are_rows(problem, monkeypatch):
     assert refused.status.startswith("UsageError: duration") and not refused.good
     monkeypatch.setattr(error_run, "load_rig", lambda: (None, "no exudyn"))
     assert runner.row(Peer(1e-3, 4, 1, 1e-3)).status == "RuntimeError: no exudyn"
-
-
-def test_rounds_give_the_fastest(problem, monkeypatch):
-    runner, turns = Runner(problem), iter([3.0, 9.0, 1.0, 2.0, 5.0])
-    monkeypatch.setattr(runner, "row", lambda case: Row(case, 1.0, 0.1, seconds=next(turns)))
-    ticks = []
-    (row,) = runner.rows([Own()], 5, lambda: ticks.append(1))
-    assert row.seconds == 1.0 and len(ticks) == 5
-
-
-def made(seconds, wrong, acceleration=0.1, case=None):
-    """A row with given numbers."""
-    return Row(case or Own(), wrong, acceleration, math.nan, math.nan, seconds)
-
-
-def test_front_and_fastest_of_made_up_rows():
-    a, b, c, d = made(1.0, 4.0), made(2.0, 2.0), made(3.0, 3.0), made(4.0, 1.0)
-    failed = Row(Own(), status="no")
-    assert front([d, c, failed, b, a]) == [a, b, d]
-    assert fastest([d, c, b, a], 3.0) is b and fastest([a], 3.0) is None
-
-
-def test_equal_step_is_met_by_the_fastest_that_is_exact_enough(problem, monkeypatch):
-    exact, fast, wrong = (Peer(1e-3, n, 1, 1e-3) for n in (8, 4, 2))
-    rows = [made(0.3, 0.1, case=exact), made(0.2, 0.25, case=fast), made(0.1, 0.9, case=wrong), made(0.01, 0.1)]
-    runner, times = Runner(problem), iter([1.0, 3.0, 2.0, 8.0])
-    monkeypatch.setattr(runner, "row", lambda case: made(next(times), 0.1, case=case))
-    found = same_step(runner, rows, 2)
-    assert found["exudyn_method"] == fast.label and (found["ratio_of_medians"], found["ratio_of_minima"]) == (5.5 / 1.5, 3.0)
-    assert same_step(runner, rows[-1:], 2) is None
-
-
-def test_labels_tell_the_peers_apart():
-    labels = {case.label for case in peer_cases(False)}
-    assert len(labels) == 4 * 6 + 3 * 3
-    assert "Exudyn, 1 element, lumped, tangent kept for 1 pass, tolerance 0.001" in labels
-    assert "Exudyn, 16 elements, tangent anew, tolerance 0.001" in labels
-
-
-def test_order_of_made_up_rows():
-    rows = [made(1.0, 4.0, case=Own(2e-3)), made(2.0, 1.0, case=Own(1e-3))]
-    assert [slope for _, slope in order(rows[::-1])] == [None, pytest.approx(2.0)]
-
-
-def test_modes_leave_rigid_sections_rigid():
-    scene = load_scene()
-    sections = tuple(s.model_copy(update={"modes": m}) for s, m in zip(scene.sections, (None, 0, 2, 5), strict=True))
-    changed = with_modes(scene.model_copy(update={"sections": sections}), 6)
-    assert [changed.modes_of(i) for i in range(4)] == [6, 0, 6, 6]
-    assert Own(axial=False).scene(scene).axial is False and Own().scene(scene) is scene
-
-
-def test_cases_are_distinct():
-    cases = [*own_cases(load_scene(), False), *peer_cases(False)]
-    assert len(set(cases)) == len(cases)
-    assert cases[0].label == "generalised-alpha 0.8"
-    assert {case.label for case in cases if isinstance(case, Own)} >= {
-        "houbolt", "park", "wilson 1.4", "newmark 0.5", "generalised-alpha 0.8, one pass",
-        "generalised-alpha 0.8, plain product", "generalised-alpha 0.8, 6 modes, cantilever modes",
-        "generalised-alpha 0.8, no axial coordinate, no geometric stiffness",
-    }  # fmt: skip

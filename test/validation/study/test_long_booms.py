@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import statics
 from boom_twin.scene.load import examine, with_end_mark
 from boom_twin.validation.study.long_booms import long_boom, seven_sections
 
@@ -32,7 +32,7 @@ def check(scene, folder):
 
 def test_more_sections_are_the_same_boom_in_more_pieces():
     sags = []
-    for count in (4, 16, 64, 200):
+    for count in (4, 16, 64):
         found = statics(long_boom(count), posture="test", modes=0)
         sags.append(np.linalg.norm(found.tip - found.tip_rigid))
     assert np.ptp(sags) < 0.15 * np.mean(sags)

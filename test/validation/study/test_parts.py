@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from studies.clearance.scenes import with_play
 
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import Scene, statics
 from boom_twin.reduction import deviation
 from boom_twin.reduction.variants import KINDS, Variant, variants, without
-from boom_twin.scene import Scene
 from boom_twin.scene.edit import Edit
 from boom_twin.validation.study import parts
 

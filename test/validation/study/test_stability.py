@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 import pytest
 
+from boom_twin import load_scene
 from boom_twin.analysis.methods import Method
-from boom_twin.scene import load_scene
 from boom_twin.validation.study.stability import report as stability
 from boom_twin.validation.study.stability.cases import Case, cases, long_holds
 from boom_twin.validation.study.stability.runner import METHODS, limit_of, one, run
@@ -44,14 +44,11 @@ def test_the_ends_are_within_the_cylinders(longest):
 # -- cases ------------------------------------------------------------------------------------------------------------
 
 
-def test_names_of_cases_are_unique():
-    found = [*cases(load_scene()), *long_holds(load_scene())]
-    assert len({(case.group, case.name) for case in found}) == len(found)
-
-
 @pytest.mark.slow  # those of the quick cases are made below
 def test_all_setups_can_be_made():
-    for case in [*cases(load_scene()), *long_holds(load_scene())]:
+    found = [*cases(load_scene()), *long_holds(load_scene())]
+    assert len({(case.group, case.name) for case in found}) == len(found)
+    for case in found:
         setup = case.make()
         steps = setup.duration / (setup.step * setup.every)
         assert abs(steps - round(steps)) < 1e-6 and 0.0 < setup.still < setup.duration

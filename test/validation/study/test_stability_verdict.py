@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,6 @@ from boom_twin.validation.study.stability.verdict import (
     against_rest,
     alternating,
     growth,
-    verdict,
 )
 
 GOOD = Facts("ok", error=1e-4, acceleration=1e-3, force=1e-3, ringing=0.0, force_ringing=0.0, growth=1.0, drift=0.0, passes=1.0)
@@ -22,45 +23,30 @@ GOOD = Facts("ok", error=1e-4, acceleration=1e-3, force=1e-3, ringing=0.0, force
 @pytest.mark.parametrize("name", BOUNDS)
 def test_each_quantity_has_its_bounds(name):
     low, high, symptom = BOUNDS[name]
-    holds, degrades = (verdict(facts_with(name, share * low)) for share in (0.99, 1.01))
+    holds, degrades = (replace(GOOD, **{name: share * low}).verdict for share in (0.99, 1.01))
     assert (holds.word, holds.symptom) == ("holds", "")
     assert degrades.word == "degrades" and not degrades.silent
     assert degrades.symptom.startswith(symptom.split("{")[0])
     if np.isfinite(high):
-        failed = verdict(facts_with(name, 1.01 * high))
+        failed = replace(GOOD, **{name: 1.01 * high}).verdict
         assert failed.word == "fails" and failed.silent
 
 
-def facts_with(name, value):
-    return Facts(**{**vars(GOOD), name: value})
-
-
-def test_a_failure_with_a_status_is_not_silent():
-    found = verdict(Facts("the equations did not converge"))
-    assert (found.word, found.silent, found.symptom) == ("fails", False, "the equations did not converge")
-
-
-def test_a_failure_with_a_doubt_is_not_silent():
-    found = verdict(Facts(**{**vars(GOOD), "error": 0.5, "doubt": "the step is coarse"}))
-    assert found.word == "fails" and not found.silent
-    assert found.symptom.endswith("(it says: the step is coarse)")
-
-
-def test_without_a_solution_a_status_is_right_and_numbers_are_wrong():
-    assert verdict(Facts("no equilibrium", solvable=False)).word == "refuses"
-    numbers = verdict(Facts("ok", solvable=False))
-    assert numbers.word == "fails" and numbers.silent
-
-
-def test_what_is_not_finite_fails_and_what_has_no_meaning_does_not_count():
-    assert verdict(facts_with("error", np.inf)).silent
-    assert verdict(facts_with("drift", np.nan)).word == "holds"
-
-
-def test_the_worst_symptom_stands_first():
-    found = verdict(Facts(**{**vars(GOOD), "error": 0.02, "growth": 50.0}))
-    assert found.word == "fails" and found.symptom.startswith("vibration grows 50-fold")
-    assert "tip wrong by 0.02" in found.symptom
+@pytest.mark.parametrize(
+    ("facts", "word", "silent", "symptom"),
+    [
+        (Facts("the equations did not converge"), "fails", False, "the equations did not converge"),
+        (replace(GOOD, error=0.5, doubt="the step is coarse"), "fails", False, "(it says: the step is coarse)"),
+        (Facts("no equilibrium", solvable=False), "refuses", False, ""),
+        (Facts("ok", solvable=False), "fails", True, ""),
+        (replace(GOOD, error=np.inf), "fails", True, ""),
+        (replace(GOOD, drift=np.nan), "holds", False, ""),
+        (replace(GOOD, error=0.02, growth=50.0), "fails", True, "vibration grows 50-fold"),
+    ],
+)
+def test_a_failure_is_silent_unless_the_solver_says_so(facts, word, silent, symptom):
+    found = facts.verdict
+    assert (found.word, found.silent) == (word, silent) and symptom in found.symptom
 
 
 # -- facts ------------------------------------------------------------------------------------------------------------
@@ -78,15 +64,11 @@ def made_up(step=1e-2, duration=4.0, growing=0.0, ring=0.0, shift=0.0):
     return MethodRun(times, tip, acceleration, forces * 0.0, forces, no_pins, 1.0, len(times) - 1, 1.5, "ok")
 
 
-def test_the_same_motion_has_no_error():
+def test_error_is_a_share_of_the_path():
     facts = against_motion(made_up(), made_up(), 1.0)
     assert (facts.error, facts.acceleration, facts.force, facts.ringing) == (0.0, 0.0, 0.0, 0.0)
     assert facts.growth == pytest.approx(1.0) and facts.passes == 1.5
-
-
-def test_error_is_a_share_of_the_path():
-    right = made_up()
-    assert against_motion(made_up(shift=0.01), right, 1.0).error == pytest.approx(0.05)
+    assert against_motion(made_up(shift=0.01), made_up(), 1.0).error == pytest.approx(0.05)
 
 
 def test_ringing_is_what_changes_sign_from_row_to_row():

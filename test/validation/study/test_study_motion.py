@@ -7,9 +7,9 @@ import pytest
 from oracle import booms
 from oracle.conftest import random_scene
 
+from boom_twin import load_scene
 from boom_twin.analysis.motions import TURN, motion_of
 from boom_twin.errors import UsageError
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 

@@ -20,10 +20,9 @@ from ....errors import UsageError
 from ....scene.kinematics import gravity_in_base
 from ....scene.schema import Cylinder, CylinderPart, Pin, Scene
 from ....types import Array
-from . import masses
+from . import exudyn, items, masses
 from .lumped_masses import lump_masses
 from .masses import Lump, Lumps
-from .module import exudyn, items
 from .pin_clearance import Bush, contact_of, pin_with_play, refuse_other_pins
 from .six_bar import Link, six_bar
 from .system import Boom, BuiltSection, Frame, Station, oil_stiffness, section_frames
@@ -33,7 +32,7 @@ SHEAR_OVER_AXIAL = 10.0  # GA = 10 EA: Euler-Bernoulli in effect; of the default
 
 
 def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSection:
-    """Section `index` (0-based) of about `elements` finite elements; a rigid frame carries every cylinder pin."""
+    """Add section `index` (0-based) of about `elements` finite elements. A rigid frame carries every cylinder pin."""
     borne = boom.lumps.sections[index] if boom.lumps else {}
     if not boom.scene.is_flexible(index):
         return BuiltSection(None, [_station(boom, frame, 0.0, masses.rigid_section(boom.scene, index), [*borne.values()])])
@@ -54,7 +53,7 @@ def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSec
 
 
 def _station(boom: Boom, frame: Frame, x: float, own: list[Lump], borne: list[Lumps]) -> Station:
-    """A rigid frame with its `own` masses and with what it bears for its neighbours."""
+    """Add a rigid frame with its `own` masses and with what it bears for its neighbours."""
     mass = masses.gather([*own, *(lump for lumps in borne for lump in lumps.inertia)], x)
     weight = masses.gather([*own, *(lump for lumps in borne for lump in lumps.weight)], x) if borne else None
     node = boom.node(frame.point((x, 0.0)), frame.angle)
@@ -62,7 +61,7 @@ def _station(boom: Boom, frame: Frame, x: float, own: list[Lump], borne: list[Lu
 
 
 def _bracket_places(scene: Scene, index: int) -> list[float]:
-    """Places (m) on the flexible part of a section where a cylinder is pinned to it."""
+    """Return the places (m) on the flexible part of a section where a cylinder is pinned to it."""
     section = scene.sections[index]
     assert section.beam is not None
     places = []
@@ -104,7 +103,7 @@ def _beam_part(boom: Boom, frame: Frame, index: int, ends: tuple[Station, Statio
 
 
 def shear_stiffness(shear: float, bending: float, length: float) -> float:
-    """Shear stiffness (N) of an element: the beam's, `shear`, in series with 12 EI / `length`^2.
+    """Return the shear stiffness (N) of an element: the beam's, `shear`, in series with 12 EI / `length`^2.
 
     An element of constant curvature lacks the bending of a constant shear force, whose flexibility is length^2 / 12 EI. Given
     back as shear, it makes nodes of a straight beam exact under loads at nodes; a `length` of 0 leaves it out.
@@ -125,7 +124,7 @@ def add_pivot(boom: Boom, index: int) -> None:
 
 
 def add_joint(boom: Boom, frames: list[Frame], index: int, stroke: float) -> None:
-    """Cylinder of joint `index` (0-based) with its drive at `stroke` (m), and the links that it works on."""
+    """Add the cylinder of joint `index` (0-based) with its drive at `stroke` (m), and the links that it works on."""
     cylinder = boom.scene.joints[index].cylinder
     if index == 0:
         place = boom.scene.sections[0].rod_pin
@@ -145,7 +144,7 @@ def add_joint(boom: Boom, frames: list[Frame], index: int, stroke: float) -> Non
 
 
 def _six_bar(boom: Boom, frames: list[Frame], index: int) -> tuple[int, int, tuple[Array, Array]]:
-    """Links of a B joint; gives the markers of barrel pin and rod pin with their places."""
+    """Add the links of a B joint; return the markers of barrel pin and rod pin with their places."""
     linkage, carrier, turned = six_bar(boom.scene, frames, index), boom.sections[index - 1], boom.sections[index]
     if boom.lumps:
         bearing = _link(boom, linkage.bearing, boom.lumps.links[index])
@@ -167,7 +166,7 @@ def _six_bar(boom: Boom, frames: list[Frame], index: int) -> tuple[int, int, tup
 
 
 def _link(boom: Boom, link: Link, borne: Lumps | None = None) -> int:
-    """Body of a link, with what it bears for its neighbours."""
+    """Add the body of a link, with what it bears for its neighbours."""
     node = boom.node(np.array([link.frame.x, link.frame.y]), link.frame.angle)
     if borne is None:
         return boom.body(node, link.mass, link.lump.com, link.lump.inertia)
@@ -176,7 +175,7 @@ def _link(boom: Boom, link: Link, borne: Lumps | None = None) -> int:
 
 
 def _drive(boom: Boom, cylinder: Cylinder, pins: tuple[int, int], stroke: float) -> None:
-    """Oil spring and damper between the pins, or the drive length itself where the scene names no oil spring."""
+    """Add oil spring and damper between the pins, or the drive length itself where the scene names no oil spring."""
     length = cylinder.closed_length + stroke
     if not cylinder.is_compressible:
         drive = boom.system.AddObject(items.ObjectConnectorDistance(markerNumbers=[*pins], distance=length))
@@ -196,9 +195,9 @@ def _drive(boom: Boom, cylinder: Cylinder, pins: tuple[int, int], stroke: float)
 def _cylinder_part(
     boom: Boom, part: CylinderPart | None, pins: tuple[int, int], ends: tuple[Array, Array], worn: Pin | None = None
 ) -> int:
-    """Barrel or rod: pinned at its own end, its axis through the other end (so the two parts slide on each other).
+    """Add barrel or rod, pinned at its own end. Its axis goes through the other end, so the two parts slide on each other.
 
-    Gives the marker of its own end, which is off the pin's where the pin is `worn`.
+    Return the marker of its own end, which is off the pin's where the pin is `worn`.
     """
     if part is None or part.mass == part.inertia == 0.0:
         return pins[0]
@@ -230,16 +229,16 @@ def build(
     lumped: bool = False,
     shear_over_axial: float = SHEAR_OVER_AXIAL,
 ) -> Boom:
-    """The undeformed boom with its drives at absolute `strokes` (m), shape (n,); sensors may still be added.
+    """Build the undeformed boom with its drives at absolute `strokes` (m), shape (n,). Sensors may still be added.
 
     Parameters
     ----------
     elements : int
         Finite elements per flexible section, at least one per part between cylinder brackets.
     nodally_exact : bool
-        Whether few elements bend as many do; see `sections.shear_stiffness`.
+        True if few elements bend as many do; see `shear_stiffness`.
     lumped : bool
-        Whether cylinders and two-force links are no bodies, their masses lumped; see `lumped_masses`.
+        True if cylinders and two-force links are no bodies, their masses lumped; see `lumped_masses`.
     shear_over_axial : float
         GA over EA.
 

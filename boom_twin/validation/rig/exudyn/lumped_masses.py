@@ -22,7 +22,7 @@ NO_PART = CylinderPart(mass=0.0, inertia=0.0, com=0.0)
 
 
 def lump_masses(scene: Scene, frames: list[Frame], strokes: Array) -> LumpedMasses:
-    """Lumps of all cylinders and two-force links, for straight sections at `frames` and `strokes` (m), shape (n,)."""
+    """Return the lumps of cylinders and two-force links, for straight sections at `frames` and `strokes` (m), shape (n,)."""
     found = LumpedMasses.none(len(frames))
     for index, joint in enumerate(scene.joints):
         length = joint.cylinder.closed_length + float(strokes[index])
@@ -36,7 +36,7 @@ def lump_masses(scene: Scene, frames: list[Frame], strokes: Array) -> LumpedMass
 
 
 def _first_cylinder(found: LumpedMasses, scene: Scene, length: float) -> None:
-    """Cylinder on the base: seen from its rod pin, masses at their distances from the barrel pin."""
+    """Add the cylinder on the base: seen from its rod pin, masses at their distances from the barrel pin."""
     cylinder, place = scene.joints[0].cylinder, scene.sections[0].rod_pin
     assert place is not None
     barrel, rod = cylinder.barrel or NO_PART, cylinder.rod or NO_PART
@@ -57,7 +57,7 @@ def _two_force_link(found: LumpedMasses, linkage: SixBar, index: int) -> None:
 
 
 def _cylinder(found: LumpedMasses, scene: Scene, frames: list[Frame], linkage: SixBar, index: int, length: float) -> None:
-    """Cylinder of a six-bar, between a bracket of the section before the joint and the bearing link."""
+    """Add the cylinder of a six-bar, between a bracket of the section before the joint and the bearing link."""
     cylinder = scene.joints[index].cylinder
     barrel, rod = cylinder.barrel or NO_PART, cylinder.rod or NO_PART
     bracket, link = found.on_section(index - 1, linkage.bracket[0]), found.links[index]
@@ -71,7 +71,7 @@ def _cylinder(found: LumpedMasses, scene: Scene, frames: list[Frame], linkage: S
 
 
 def _barrel_centre(carrier: Frame, linkage: SixBar, distance: float) -> Point:
-    """Centre of a barrel, `distance` (m) from its pin towards the rod pin, in the axes of the section that carries it."""
+    """Return the centre of a barrel, `distance` (m) from its pin towards the rod pin, in its section's axes."""
     pin = carrier.point(linkage.bracket)
     axis = linkage.bearing.frame.point(linkage.rod_pin) - pin
     x, y = carrier.local(pin + distance * axis / float(np.hypot(*axis)))

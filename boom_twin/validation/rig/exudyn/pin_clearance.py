@@ -15,7 +15,7 @@ from ....errors import UsageError
 from ....scene.schema import Material, Pin, Scene
 from ....types import Array
 from ...contact_law import HYSTERESIS, Contact, stiffness
-from .module import exudyn
+from . import exudyn
 
 LEAST_GAP = 3e-5  # m, of the radii in K, which grows without bound while the pin becomes ideal
 SMOOTHING = 1e-6  # m, over which contact sets in
@@ -34,7 +34,7 @@ class Bush:
     node : int
         Of the rod, which moves with the journal.
     held : bool
-        Whether a spring holds the journal in the middle instead.
+        True if a spring holds the journal in the middle instead.
     entry : float or None
         Speed of approach (m/s) when it touched; None in flight.
     """
@@ -81,12 +81,12 @@ class Bush:
 
 
 def pin_with_play(scene: Scene, index: int) -> Pin | None:
-    """The rod pin of cylinder `index` (0-based) if it has play."""
+    """Return the rod pin of cylinder `index` (0-based) if it has play."""
     return next((pin for pin in scene.pins_of(f"cylinder_{index + 1}") if pin.at.endswith(".rod")), None)
 
 
 def contact_of(scene: Scene, pin: Pin) -> Contact:
-    """The law by which a pin touches its bush."""
+    """Return the law by which a pin touches its bush."""
     assert scene.clearance is not None
     law = scene.clearance.contact
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ....types import Array
-from .module import exudyn, items
+from . import exudyn, items
 from .system import Boom, Station
 
 _FORCE = {"distance": exudyn.OutputVariableType.Force, "referenceLength": exudyn.OutputVariableType.ForceLocal}

@@ -31,7 +31,7 @@ class Link:
 
     @property
     def lump(self) -> Lump:
-        """Mass of the link about its middle."""
+        """Return the mass of the link about its middle."""
         return Lump(self.mass, (0.0, 0.0), self.mass * self.length**2 / 12)
 
 
@@ -42,7 +42,7 @@ class SixBar:
     Attributes
     ----------
     bears_right : bool
-        Whether the right link bears the rod pin.
+        True if the right link bears the rod pin.
     rod_pin : Point
         m, in the axes of the link that bears it.
     bracket, hinge : Point
@@ -61,17 +61,17 @@ class SixBar:
 
     @property
     def bearing(self) -> Link:
-        """The link that bears the rod pin."""
+        """Return the link that bears the rod pin."""
         return self.right if self.bears_right else self.left
 
     @property
     def two_force(self) -> Link:
-        """The other link."""
+        """Return the other link."""
         return self.left if self.bears_right else self.right
 
 
 def six_bar(scene: Scene, frames: list[Frame], index: int) -> SixBar:
-    """Linkage of joint `index` (0-based) between straight sections at `frames`."""
+    """Return the linkage of joint `index` (0-based) between straight sections at `frames`."""
     joint, length = scene.joints[index], scene.sections[index - 1].length
     assert joint.C and joint.D and joint.E and joint.lL and joint.lR
     hinge = (length + joint.D[0], joint.D[1])
@@ -87,13 +87,13 @@ def six_bar(scene: Scene, frames: list[Frame], index: int) -> SixBar:
 
 
 def _between(start: Array, end: Array) -> Frame:
-    """Frame in the middle of two places, x from the first to the second."""
+    """Return the frame in the middle of two places, x from the first to the second."""
     middle = (start + end) / 2
     return Frame(float(middle[0]), float(middle[1]), math.atan2(end[1] - start[1], end[0] - start[0]))
 
 
 def _apex(start: Array, end: Array, from_start: float, from_end: float, is_right: bool) -> Array:
-    """Third corner, left or right of start->end, of the triangle with these two sides (law of cosines)."""
+    """Return the third corner, left or right of start->end, of the triangle with these two sides (law of cosines)."""
     base = end - start
     span = float(np.hypot(*base))
     opening = math.acos((span**2 + from_start**2 - from_end**2) / (2 * span * from_start))

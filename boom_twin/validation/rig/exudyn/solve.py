@@ -16,8 +16,8 @@ import numpy as np
 from ....errors import SolverError, UsageError
 from ....scene.schema import Scene
 from ....types import Array
+from . import exudyn
 from .boom import SHEAR_OVER_AXIAL, build
-from .module import exudyn
 from .parameter_changes import ParameterChanges
 from .pin_clearance import pin_with_play
 from .probes import Probes, attach, read
@@ -25,8 +25,8 @@ from .stepping import Course, Effort, Scheme, step_through
 from .system import Boom, section_frames
 
 PASSES = 40
-SETTLED = 1e-6  # m and rad, last increment; what is left is near its square
-LONGEST = 0.2  # m and rad, in one pass
+LAST_INCREMENT = 1e-6  # m and rad, last increment; what is left is near its square
+LONGEST_INCREMENT = 0.2  # m and rad, in one pass
 NUDGE = 1e-5  # m and rad, of the difference quotient
 
 
@@ -46,8 +46,8 @@ def find_equilibrium(system: Any, aim: str) -> None:
         longest = float(np.abs(increment[:moving]).max())
         if not np.isfinite(longest):
             break
-        state += increment * min(1.0, LONGEST / max(longest, 1e-300))
-        if longest < SETTLED:
+        state += increment * min(1.0, LONGEST_INCREMENT / max(longest, 1e-300))
+        if longest < LAST_INCREMENT:
             residual(state)
             data.SetODE2Coordinates(state[:moving], exudyn.ConfigurationType.Initial)
             return
@@ -55,7 +55,7 @@ def find_equilibrium(system: Any, aim: str) -> None:
 
 
 def _residual_of(system: Any) -> tuple[Any, int]:
-    """Function from the state (coordinates, then multipliers) to Exudyn's residual, and the number of coordinates."""
+    """Return Exudyn's residual as a function of the state (coordinates, then multipliers), and the number of coordinates."""
     solver, settings = exudyn.MainSolverStatic(), exudyn.SimulationSettings()
     settings.solution.file.write = False
     settings.staticSolver.useLoadFactor = False
@@ -73,7 +73,7 @@ def _residual_of(system: Any) -> tuple[Any, int]:
 
 
 def _tangent(residual: Any, state: Array, moving: int) -> Array:
-    """Derivative of the residual; it is linear in the multipliers, which may be nudged by as much as 1 kN."""
+    """Return the derivative of the residual. It is linear in the multipliers, which may be nudged by as much as 1 kN."""
     columns = np.empty((len(state), len(state)))
     for i in range(len(state)):
         nudge, ahead, behind = NUDGE if i < moving else 1e3, state.copy(), state.copy()
@@ -94,7 +94,7 @@ Change = tuple[Scene, Callable[[Array], Array]]
 
 
 def statics(scene: Scene, strokes: Array, elements: int = 16) -> dict[str, list[float]]:
-    """Equilibrium under gravity at absolute `strokes` (m), shape (n,).
+    """Solve the equilibrium under gravity at absolute `strokes` (m), shape (n,).
 
     Returns
     -------
@@ -127,7 +127,7 @@ def simulate(
     load: TipLoad | None = None,
     changes: Sequence[Change] = (),
 ) -> dict[str, Array]:
-    """Motion from rest in the equilibrium of the drive's first strokes.
+    """Integrate the motion from rest in the equilibrium of the drive's first strokes.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def move(
     load: TipLoad | None = None,
     changes: Sequence[Change] = (),
 ) -> tuple[dict[str, Array], Effort]:
-    """`simulate` from a boom at rest by a chosen scheme, and what its stepping took."""
+    """Integrate the motion of a boom at rest by a chosen scheme; return the columns of `simulate` and the effort."""
     every = _ratio("output_step", output_step, step)
     count = _ratio("t_end", t_end, step)
     times: Array = step * np.arange(count + 1, dtype=np.float64)
@@ -204,7 +204,7 @@ def move(
 
 
 def _built_alike(boom: Boom, scene: Scene, strokes: Array) -> Boom:
-    """The boom of another scene, built as `boom` was."""
+    """Build the boom of another scene as `boom` was built."""
     return build(scene, strokes, boom.elements, boom.nodally_exact, boom.lumps is not None, boom.shear_over_axial)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ....errors import SolverError
 from ....scene.schema import Cylinder
 from ....types import Array
-from .module import exudyn
+from . import exudyn
 from .parameter_changes import ParameterChanges
 from .system import Boom, oil_stiffness
 
@@ -50,14 +50,11 @@ class Effort:
     ----------
     seconds : float
         CPU time of Exudyn's stepping alone.
-    feeding : float
-        Of which in the Python function that hands the drives their lengths.
     passes, tangents : int
         Newton passes, and tangents made.
     """
 
     seconds: float
-    feeding: float
     passes: int
     tangents: int
 
@@ -85,7 +82,7 @@ class Course:
 def step_through(boom: Boom, course: Course, step: float, output_step: float, scheme: Scheme) -> Effort:
     """Step a boom from its equilibrium through a course; then load and parameters are again those of the equilibrium."""
     count = len(course.strokes) - 1
-    feeding = _feed(boom, course, step)
+    _feed(boom, course, step)
     settings = _settings(count, step, output_step, scheme)
     begun = time.process_time()
     try:
@@ -100,11 +97,11 @@ def step_through(boom: Boom, course: Course, step: float, output_step: float, sc
         course.changes.restore()
     seconds = time.process_time() - begun
     counted = boom.system.sys["dynamicSolver"].it
-    return Effort(seconds, feeding[0], int(counted.newtonStepsCount), int(counted.newtonJacobiCount))
+    return Effort(seconds, int(counted.newtonStepsCount), int(counted.newtonJacobiCount))
 
 
 def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> Any:
-    """The sparse solver was the fastest from 4 elements a section on, and as fast as the dense ones below.
+    """Return Exudyn's settings. Its sparse solver was the fastest from 4 elements a section on, and no slower below.
 
     A tangent that is made often keeps at least the pattern of its factors.
     """
@@ -126,8 +123,8 @@ def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> An
     return settings
 
 
-def _feed(boom: Boom, course: Course, step: float) -> list[float]:
-    """Hand the moving drives, before every step, their lengths without force at its end; return the seconds that this takes.
+def _feed(boom: Boom, course: Course, step: float) -> None:
+    """Hand the moving drives, before every step, their lengths without force at its end.
 
     All drives get those of the start at once. Pins with play note then whether they touch. Load and changed parameters are
     those of the step's end, too.
@@ -136,7 +133,6 @@ def _feed(boom: Boom, course: Course, step: float) -> list[float]:
     moving = [(*drive, rest) for drive, rest in zip(boom.drives, rests, strict=True) if min(rest) < max(rest)]
     oils = [(drive[0], _stiffness(boom, i, course).tolist()) for i, drive in enumerate(boom.drives) if _cylinder(boom, i).oil]
     last = [float("nan")] * len(moving)
-    spent = [0.0]
 
     def hand_over(row: int) -> None:
         for i, (drive, name, rest) in enumerate(moving):
@@ -150,11 +146,9 @@ def _feed(boom: Boom, course: Course, step: float) -> list[float]:
             boom.system.SetObjectParameter(drive, "stiffness", stiffness[row])
 
     def before_step(_: Any, at: float) -> bool:
-        begun = time.perf_counter()
         hand_over(round(at / step))
         for bush in boom.bushes:
             bush.watch(boom.system)
-        spent[0] += time.perf_counter() - begun
         return True
 
     for (drive, name), rest in zip(boom.drives, rests, strict=True):
@@ -165,11 +159,10 @@ def _feed(boom: Boom, course: Course, step: float) -> list[float]:
     for bush in boom.bushes:
         bush.entry = None
     boom.system.SetPreStepUserFunction(before_step)
-    return spent
 
 
 def _rests(boom: Boom, index: int, course: Course) -> list[float]:
-    """Lengths (m) at which a drive is without force when its pins stand still: its own, and d / k of its rate."""
+    """Return the lengths (m) at which a drive is without force when its pins stand still: its own, and d / k of its rate."""
     cylinder = _cylinder(boom, index)
     lengths: Array = course.strokes[:, index] + cylinder.closed_length
     if cylinder.is_compressible:

@@ -11,8 +11,8 @@ import numpy as np
 from ....scene.kinematics import joint_angles_of_strokes
 from ....scene.schema import Cylinder, Point, Scene
 from ....types import Array
+from . import items
 from .masses import Gathered, LumpedMasses
-from .module import items
 from .pin_clearance import Bush
 
 
@@ -35,16 +35,16 @@ class BuiltSection:
 
     @property
     def root(self) -> Station:
-        """The rigid frame of the pivot."""
+        """Return the rigid frame of the pivot."""
         return self.stations[0]
 
     @property
     def head(self) -> Station:
-        """The rigid frame of the next pivot; of a rigid section, its only one."""
+        """Return the rigid frame of the next pivot; of a rigid section, its only one."""
         return self.stations[-1]
 
     def at(self, x: float) -> Station:
-        """The rigid frame that carries a point at `x` (m)."""
+        """Return the rigid frame that carries a point at `x` (m)."""
         if self.beam is None or x <= self.beam[0]:
             return self.root
         if x >= self.beam[1]:
@@ -62,7 +62,7 @@ class Boom:
         Exudyn's SystemContainer and MainSystem.
     sections : list of BuiltSection
     nodally_exact : bool
-        Whether a straight, lightly bent beam is exact at its nodes however few they are.
+        True if a straight, lightly bent beam is exact at its nodes however few they are.
     shear_over_axial : float
         GA over EA.
     elements : int
@@ -92,11 +92,11 @@ class Boom:
     tip_load: int = -1
 
     def marker(self, body: int, local: Point) -> int:
-        """A point of a rigid body, in the body's axes."""
+        """Add a marker on a rigid body, in the body's axes."""
         return int(self.system.AddMarker(items.MarkerBodyRigid(bodyNumber=body, localPosition=[*local, 0.0])))
 
     def point(self, station: Station, place: Point) -> int:
-        """A point of a section, in the section's axes."""
+        """Add a marker on a section, in the section's axes."""
         return self.marker(station.body, (place[0] - station.x, place[1]))
 
     def pin(self, one: int, other: int) -> None:
@@ -111,7 +111,7 @@ class Boom:
         self.bushes.append(bush)
 
     def node(self, place: Array, angle: float) -> int:
-        """A new node with three unknowns."""
+        """Add a node with three unknowns."""
         return int(self.system.AddNode(items.NodeRigidBody2D(referenceCoordinates=[*place, angle])))
 
     def rod(self, one: int, other: int, length: float) -> None:
@@ -119,7 +119,7 @@ class Boom:
         self.system.AddObject(items.ObjectConnectorDistance(markerNumbers=[one, other], distance=length))
 
     def body(self, node: int, mass: float, com: Point, inertia: float, weight: Gathered | None = None) -> int:
-        """A rigid body on a node; inertia (kg m^2) about the NODE. Its mass weighs where it is, or as `weight` says."""
+        """Add a rigid body on a node; inertia (kg m^2) about the NODE. Its mass weighs where it is, or as `weight` says."""
         body = int(
             self.system.AddObject(items.ObjectRigidBody2D(mass=mass, inertia=inertia, centerOfMass=[*com], nodeNumber=node))
         )
@@ -131,7 +131,7 @@ class Boom:
         return body
 
     def push(self, load: Array) -> None:
-        """External force at the tip from now on, shape (2,), N, in the base's axes."""
+        """Set the external force at the tip from now on, shape (2,), N, in the base's axes."""
         self.system.SetLoadParameter(self.tip_load, "loadVector", [*load, 0.0])
 
     def weigh(self, body: int) -> None:
@@ -149,19 +149,19 @@ class Frame:
     angle: float
 
     def point(self, local: Point) -> Array:
-        """Base coordinates (2,) of a point given in the section's axes."""
+        """Return the base coordinates (2,) of a point given in the section's axes."""
         c, s = math.cos(self.angle), math.sin(self.angle)
         return np.array([self.x + c * local[0] - s * local[1], self.y + s * local[0] + c * local[1]])
 
     def local(self, place: Array) -> Array:
-        """Coordinates (2,) in the section's axes of a point given in the base's."""
+        """Return the coordinates (2,) in the section's axes of a point given in the base's."""
         c, s = math.cos(self.angle), math.sin(self.angle)
         x, y = place[0] - self.x, place[1] - self.y
         return np.array([c * x + s * y, c * y - s * x])
 
 
 def section_frames(scene: Scene, strokes: Array) -> list[Frame]:
-    """Frames of the straight sections on incompressible cylinders at absolute `strokes` (m)."""
+    """Return the frames of the straight sections on incompressible cylinders at absolute `strokes` (m)."""
     angles = np.cumsum(joint_angles_of_strokes(scene, strokes))
     frames, origin = [], np.array(scene.base.pivot)
     for section, angle in zip(scene.sections, angles, strict=True):
@@ -171,7 +171,7 @@ def section_frames(scene: Scene, strokes: Array) -> list[Frame]:
 
 
 def oil_stiffness(cylinder: Cylinder, strokes: Array) -> Array:
-    """Stiffness (N/m) of a compressible cylinder with its drive at `strokes` (m), shape as `strokes`."""
+    """Return the stiffness (N/m) of a compressible cylinder with its drive at `strokes` (m), shape as `strokes`."""
     if cylinder.oil is None:
         assert cylinder.k is not None
         return np.full(strokes.shape, cylinder.k)

@@ -11,9 +11,8 @@ from ....plots.study import Curve, Panel, work_precision_picture
 from ....plots.style import BLUE, ORANGE, SKY, TONES
 from ....scene.schema import Scene
 from .cases import PAPERS, Own, Peer
-from .pareto import Measure, acceleration, front, of, tip
 from .problem import Problem
-from .runner import Row
+from .runner import Measure, Row, acceleration, front, of, tip
 
 NOTE = "surrogate parameters; computed, not measured on a rig"
 OWN: dict[str, Any] = {"color": SKY, "linewidth": 0, "marker": ".", "markersize": 6}

@@ -12,12 +12,11 @@ from ....analysis.motions import DURATION, motion_of
 from ....offline.progress import progress_of
 from ....scene.schema import Scene
 from ....system.atomic_files import write_atomic
-from ..report import machine, provenance, table, write_json
+from ..report import page, table, write_json
 from .cases import PAPERS, Case, Own, Peer, own_cases, peer_cases
-from .pareto import EQUAL, acceleration, fastest, front, of, order, same_step, tip
 from .pictures import methods_picture, programs_picture
 from .problem import Problem, build, pose
-from .runner import ROUNDS, Row, Runner
+from .runner import EQUAL, ROUNDS, Row, Runner, acceleration, fastest, front, of, order, same_step, tip
 
 QUICK_DURATION = 0.6  # s
 TURNS, QUICK_TURNS = 5, 2  # runs of each program at the same step
@@ -40,7 +39,6 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     rows = runner.rows(cases, rounds, lambda: bar.update(1))
     bar.close()
     duel = same_step(runner, rows, QUICK_TURNS if quick else TURNS)
-    out.mkdir(parents=True, exist_ok=True)
     paths = [out / name for name in ("error.json", "error.md", "error.png", "error_methods.png")]
     write_json(paths[0], _content(problem, rows, duel))
     write_atomic(paths[1], report(problem, rows, duel))
@@ -69,9 +67,8 @@ def report(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -
         "## Limits",
         "One motion of one boom. Other work may share the machine, so only ratios within this page count. Exudyn's models and "
         "schemes are the fastest of those tried. Another setting may be faster.",
-        provenance(),
     ]
-    return "\n\n".join(part.rstrip("\n") for part in parts if part) + "\n"
+    return page(parts)
 
 
 def _setting(problem: Problem) -> str:
@@ -168,7 +165,6 @@ def _name(row: Row) -> str:
 def _content(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -> dict[str, Any]:
     fronts = {name: {id(row) for row in front(rows, error)} for name, error in (("tip", tip), ("acceleration", acceleration))}
     return {
-        "machine": machine(),
         "motion": problem.motion.label,
         "references": {
             reference.what: {"tip_mm": reference.tip_mm, "acceleration": reference.acceleration}

@@ -56,10 +56,10 @@ STEPS = (  # step, rise, duration (s), share of the move
 )  # fmt: skip
 COUNTS = (2, 3, 5, 10, 20, 50, 100, 200)
 PAYLOADS = (0.1, 1.0, 3.0, 10.0)
-MODES = (1, 2, 4, 6, 8, 10)
+MODE_COUNTS = (1, 2, 4, 6, 8, 10)
 HANGING = (0.0, -90.0, -90.0, -90.0)  # deg
 FOLDED = (80.0, -80.0, -240.0, -400.0)  # deg
-HOLD, DAY, STEP = 600.0, 86400.0, 2e-2  # s
+TEN_MINUTES, DAY, LARGE_STEP = 600.0, 86400.0, 2e-2  # s
 
 
 def cases(scene: Scene) -> tuple[Case, ...]:
@@ -152,15 +152,15 @@ def _stops(scene: Scene) -> Iterator[Case]:
     yield Case(group, "k 1e11 N/m", stops, partial(dead_stop, made.cylinders(scene, 1e11)))
     yield Case(group, "incompressible", stops, partial(dead_stop, made.cylinders(scene, None)))
     yield Case(group, "rigid sections", stops, partial(dead_stop, made.with_modes(scene, 0)))
-    yield Case(group, "dt 2e-2 s", stops, partial(dead_stop, scene, STEP))
+    yield Case(group, "dt 2e-2 s", stops, partial(dead_stop, scene, LARGE_STEP))
 
 
 def _holds(scene: Scene) -> Iterator[Case]:
-    make = partial(smooth, scene, None, 1.0, 1.5, HOLD, STEP)
+    make = partial(smooth, scene, None, 1.0, 1.5, TEN_MINUTES, LARGE_STEP)
     yield Case("hold", "10 min", "dt 20 ms, after the move", make, "equilibrium", True)
-    free = partial(smooth, made.undamped(scene), None, 1.0, 1.5, HOLD, STEP)
+    free = partial(smooth, made.undamped(scene), None, 1.0, 1.5, TEN_MINUTES, LARGE_STEP)
     yield Case("hold", "10 min, undamped", "dt 20 ms, after the move, no beta and no d", free, "swing", True)
-    stiff = partial(smooth, made.undamped(made.cylinders(scene, None)), None, 1.0, 1.5, HOLD, STEP)
+    stiff = partial(smooth, made.undamped(made.cylinders(scene, None)), None, 1.0, 1.5, TEN_MINUTES, LARGE_STEP)
     yield Case("hold", "10 min, incompressible", "dt 20 ms, after the move, no k, no damping", stiff, "swing")
 
 
@@ -168,9 +168,9 @@ def _payload_and_modes(scene: Scene) -> Iterator[Case]:
     for share in PAYLOADS:
         make = partial(smooth, made.loaded(scene, share))
         yield Case("payload", f"{share:g} x boom", "of the boom's mass, at the tip", make, quick=share == PAYLOADS[-1])
-    for count in MODES:
+    for count in MODE_COUNTS:
         make = partial(smooth, made.with_modes(scene, count))
-        yield Case("modes", f"{count} a part", "bending coordinates", make, quick=count == MODES[-1])
+        yield Case("modes", f"{count} a part", "bending coordinates", make, quick=count == MODE_COUNTS[-1])
 
 
 def long_holds(scene: Scene) -> tuple[Case, ...]:
@@ -180,6 +180,6 @@ def long_holds(scene: Scene) -> tuple[Case, ...]:
         ("24 h, undamped", made.undamped(scene), "swing"),
     )
     return tuple(
-        Case("hold", name, "dt 20 ms, after the move", partial(smooth, boom, None, 1.0, 1.5, DAY, STEP, 50), truth)
+        Case("hold", name, "dt 20 ms, after the move", partial(smooth, boom, None, 1.0, 1.5, DAY, LARGE_STEP, 50), truth)
         for name, boom, truth in booms
     )

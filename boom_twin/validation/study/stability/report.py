@@ -13,7 +13,7 @@ from ....plots.study import MatrixRow, matrix_picture
 from ....scene.kinematics import section_angles
 from ....scene.schema import Scene
 from ....system.atomic_files import write_atomic
-from ..report import machine, provenance, table, write_json
+from ..report import page, table, write_json
 from .cases import Case, cases, long_holds
 from .runner import METHODS, CaseResult, Limit, limit_of, run
 from .setups import move_in_words
@@ -55,7 +55,7 @@ def _progress(line: str) -> None:
 
 
 def _has_no_equilibrium(row: CaseResult) -> bool:
-    return NO_EQUILIBRIUM in row.cells["default"].facts.status
+    return NO_EQUILIBRIUM in row.cells["default"].status
 
 
 def _title(case: Case) -> str:
@@ -66,7 +66,6 @@ def write_files(
     out: Path, rows: list[CaseResult], long_rows: list[CaseResult], limits: dict[str, Limit], move: str
 ) -> list[Path]:
     """Write all files; `long_rows` are holds of a day, `move` tells of the scene's motion."""
-    out.mkdir(parents=True, exist_ok=True)
     paths = [out / f"stability.{kind}" for kind in ("json", "md", "png")]
     write_json(paths[0], _content(rows + long_rows, limits))
     write_atomic(paths[1], text(rows, long_rows, limits, move))
@@ -99,8 +98,8 @@ def text(rows: Sequence[CaseResult], long_rows: Sequence[CaseResult], limits: di
         parts += ["".join(_limit(name, limit) for name, limit in limits.items())]
     if long_rows:
         parts += ["## Holds of 24 simulated hours", _long(long_rows)]
-    parts += ["Limits: one move. Cases with another geometry use invented booms.", provenance()]
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+    parts += ["Limits: one move. Cases with another geometry use invented booms."]
+    return page(parts)
 
 
 def _meanings() -> str:
@@ -154,9 +153,8 @@ def _long(rows: Sequence[CaseResult]) -> str:
     head = ("case", "compared with", "verdict", "drift / path of the tip", "vibration, last quarter / first", "passes")
     lines = []
     for row in rows:
-        cell = row.cells["default"]
-        facts = cell.facts
-        lines.append((row.case.name, row.reference, cell.verdict.mark, facts.drift, facts.growth, facts.passes))
+        facts = row.cells["default"]
+        lines.append((row.case.name, row.reference, facts.verdict.mark, facts.drift, facts.growth, facts.passes))
     return table(head, lines)
 
 
@@ -164,7 +162,6 @@ def _content(rows: list[CaseResult], limits: dict[str, Limit]) -> dict[str, Any]
     """Return everything that was found."""
     silent = [(row.case, method) for row in rows for method, cell in row.cells.items() if cell.verdict.silent]
     return {
-        "machine": machine(),
         "methods": METHODS,
         "bounds": {name: {"degrades": low, "fails": high} for name, (low, high, _) in BOUNDS.items()},
         "cases": [
@@ -174,7 +171,7 @@ def _content(rows: list[CaseResult], limits: dict[str, Limit]) -> dict[str, Any]
                 "varied": row.case.varied,
                 "right": row.reference,
                 "methods": {
-                    name: dataclasses.asdict(cell.verdict) | dataclasses.asdict(cell.facts) for name, cell in row.cells.items()
+                    name: dataclasses.asdict(facts.verdict) | dataclasses.asdict(facts) for name, facts in row.cells.items()
                 },
             }
             for row in rows

@@ -16,7 +16,7 @@ from ....types import Array
 from ..scene_changes import lighter_gravity
 from .cases import Case
 from .setups import Setup
-from .verdict import CaseVerdict, Facts, against_motion, against_rest, verdict
+from .verdict import Facts, against_motion, against_rest
 
 METHODS: dict[str, Method] = {
     "default": Method(),
@@ -35,28 +35,16 @@ REFERENCE = Method(tolerance=1e-10)
 NOTHING = "there is no solution"
 FINER, FINEST = 8, 5e-6  # divisor of the step for the reference; its smallest step (s), below which round-off prevails
 HALVINGS = 20  # bisections of the load limit
-WIDTH = 1e-6  # relative tolerance of a frequency
-
-
-@dataclass(frozen=True)
-class Cell:
-    """Result of one method in one case."""
-
-    facts: Facts
-
-    @property
-    def verdict(self) -> CaseVerdict:
-        """Return the verdict on the facts."""
-        return verdict(self.facts)
+FREQUENCY_TOLERANCE = 1e-6  # relative tolerance of a frequency
 
 
 @dataclass(frozen=True)
 class CaseResult:
-    """Case with its reference in words and a cell for each method."""
+    """Case with its reference in words and what each method did."""
 
     case: Case
     reference: str
-    cells: dict[str, Cell]
+    cells: dict[str, Facts]
 
 
 def run(
@@ -76,13 +64,13 @@ def one(case: Case, methods: dict[str, Method]) -> CaseResult:
         setup = case.make()
         judge, reference = _judge(case, setup)
     except SolverError as error:
-        return CaseResult(case, NOTHING, dict.fromkeys(methods, Cell(Facts(str(error), solvable=False))))
+        return CaseResult(case, NOTHING, dict.fromkeys(methods, Facts(str(error), solvable=False)))
 
-    def cell(method: Method) -> Cell:
+    def cell(method: Method) -> Facts:
         try:
-            return Cell(judge(_march(setup, setup.step, setup.every, method)))
+            return judge(_march(setup, setup.step, setup.every, method))
         except SolverError as error:
-            return Cell(Facts(str(error), solvable=case.truth != "none"))
+            return Facts(str(error), solvable=case.truth != "none")
 
     return CaseResult(case, reference, {name: cell(method) for name, method in methods.items()})
 
@@ -165,4 +153,4 @@ def _slowest(setup: Setup, share: float) -> float:
         plan, state, work = rest_at(lighter_gravity(setup.scene, share), *_strokes(setup, 0.0))
     except SolverError:
         return float("nan")
-    return natural_modes(plan, state, work, 1, WIDTH)[0].frequency
+    return natural_modes(plan, state, work, 1, FREQUENCY_TOLERANCE)[0].frequency

@@ -14,8 +14,8 @@ from ....scene.pump_pulses import ease
 from ....scene.schema import Scene
 from ....types import Array
 
-SHARE = 0.05  # distance of the start from the end, over a cylinder's travel
-SAMPLES = 1001  # angles over a joint's range
+TRAVEL_SHARE = 0.05  # distance of the start from the end, over a cylinder's travel
+RANGE_SAMPLES = 1001  # angles over a joint's range
 FULL_STROKE = 10.0  # s, duration of a full stroke at full speed
 
 
@@ -115,8 +115,8 @@ def dead_stop(scene: Scene, step: float = 1e-3) -> Setup:
 
 def to_the_ends(scene: Scene, longest: bool) -> Setup:
     """Move all cylinders from near their longest or shortest allowed stroke to that stroke."""
-    ends = np.array([stroke_range(scene, i, SAMPLES) for i in range(len(scene.joints))])
+    ends = np.array([stroke_range(scene, i, RANGE_SAMPLES) for i in range(len(scene.joints))])
     last, other = (ends[:, 1], ends[:, 0]) if longest else (ends[:, 0], ends[:, 1])
-    first = last + SHARE * (other - last)
+    first = last + TRAVEL_SHARE * (other - last)
     move = Motion("to the ends", joint_angles_of_strokes(scene, first), first, last - first, 1.0, 2.0)
     return Setup(scene, move, move.angles, 2.0, 1e-3, 1.0)

@@ -62,6 +62,26 @@ class Facts:
     lasting: float = math.nan
     passes: float = math.nan
 
+    @property
+    def verdict(self) -> CaseVerdict:
+        """Return the verdict by `BOUNDS`. Infinite values exceed every bound; NaN exceeds none."""
+        if self.status != "ok":
+            return CaseVerdict("fails" if self.solvable else "refuses", self.status)
+        warned = f" (it says: {self.doubt})" if self.doubt else ""
+        if not self.solvable:
+            return CaseVerdict("fails", "gives numbers where there is no solution" + warned, silent=not self.doubt)
+        failing, degrading = list[str](), list[str]()
+        for name, (degrades, fails, symptom) in BOUNDS.items():
+            value = getattr(self, name)
+            beyond = failing if value > fails or math.isinf(value) else degrading if value > degrades else None
+            if beyond is not None:
+                beyond.append(symptom.format(f"{float(f'{value:.2g}'):g}"))
+        if not failing and not degrading:
+            return CaseVerdict("holds", "")
+        return CaseVerdict(
+            "fails" if failing else "degrades", "; ".join(failing + degrading) + warned, bool(failing) and not self.doubt
+        )
+
 
 @dataclass(frozen=True)
 class CaseVerdict:
@@ -89,26 +109,6 @@ BOUNDS: dict[str, tuple[float, float, str]] = {
     "lasting": (10.0, math.inf, "cylinder forces are wrong for {} steps after the jump of speed"),
     "passes": (6.0, math.inf, "slow Newton: {} passes a step"),
 }
-
-
-def verdict(facts: Facts) -> CaseVerdict:
-    """Return the verdict on `facts` by `BOUNDS`. Infinite values exceed every bound; NaN exceeds none."""
-    if facts.status != "ok":
-        return CaseVerdict("fails" if facts.solvable else "refuses", facts.status)
-    warned = f" (it says: {facts.doubt})" if facts.doubt else ""
-    if not facts.solvable:
-        return CaseVerdict("fails", "gives numbers where there is no solution" + warned, silent=not facts.doubt)
-    failing, degrading = list[str](), list[str]()
-    for name, (degrades, fails, symptom) in BOUNDS.items():
-        value = getattr(facts, name)
-        beyond = failing if value > fails or math.isinf(value) else degrading if value > degrades else None
-        if beyond is not None:
-            beyond.append(symptom.format(f"{float(f'{value:.2g}'):g}"))
-    if not failing and not degrading:
-        return CaseVerdict("holds", "")
-    return CaseVerdict(
-        "fails" if failing else "degrades", "; ".join(failing + degrading) + warned, bool(failing) and not facts.doubt
-    )
 
 
 def against_motion(found: MethodRun, right: MethodRun, still: float, jump: float = math.nan) -> Facts:
