@@ -107,10 +107,11 @@ def shows_what_was_said(page: Any, witness: Witness) -> None:
     def are_the_lamps() -> bool:
         """They are those of one of the newest messages; an alarm stands in the place of the lamp for all alarms."""
         texts = page.locator("#lamps tr").all_inner_texts()[1:]
-        lamps = {row[1].strip(): (row[2], row[3].strip()) for row in (text.split("\t") for text in texts)}
+        rows = [row for row in (text.split("\t") for text in texts) if len(row) > 3]  # as long as nothing is told there is none
+        lamps = {row[1].strip(): (row[2], row[3].strip()) for row in rows}
         newest = [{each.name.partition(": ")[2]: each for each in msg.status} for msg in witness.diagnostics[-4:]]
         judged = {alarm.channel for msg in witness.health[-4:] for alarm in decode_health(msg)}
-        return bool(judged) and all(  # the source's angles lack the boom's deflection
+        return bool(lamps and judged) and all(  # the source's angles lack the boom's deflection
             name in judged
             or any(
                 name in each and level.endswith(LEVELS[each[name].level[0]].name) and words == each[name].message
