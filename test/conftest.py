@@ -21,8 +21,8 @@ from made_once import MadeOnce
 
 FIRST = (
     "health/test_health_twin", "oracle/test_segments", "oracle/test_twin_against_rig", "report/test_compare",
-    "ros/test_ros_demo", "ros/test_ros_lifecycle", "ros/test_ros_page", "ros/test_ros_robust", "offline/test_replay_errors",
-    "plots/test_replay_pictures", "validation/rig/test_rig_play", "validation/study/test_need",
+    "ros/test_ros_demo", "ros/test_ros_two_booms", "ros/test_ros_page_live", "ros/test_ros_recording",
+    "offline/test_replay_errors", "plots/test_replay_pictures", "validation/rig/test_rig_play", "validation/study/test_need",
 )  # fmt: skip
 """Files that take longest: begun first, or one process is left with one of them when the others are done."""
 
@@ -36,7 +36,7 @@ SYSTEM = (
 """Folders and files whose tests start processes; single ones elsewhere have the mark themselves."""
 
 USUAL = (
-    "monitor/test_monitor_browser.py::test_the_first_glance", "ros/test_ros_hostile", "ros/test_ros_layouts",
+    "monitor/test_monitor_browser.py::test_the_first_glance", "ros/test_ros_messages", "ros/test_ros_layouts",
     "ros/test_ros_receive_queue",
 )  # fmt: skip
 """Run by `make test` all the same: one page in a browser, one round trip over DDS, and what starts no process."""

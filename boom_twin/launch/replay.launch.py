@@ -49,10 +49,8 @@ ARGUMENTS = [
     DeclareLaunchArgument("rviz", default_value="true", choices=FLAG, description="start RViz"),
     DeclareLaunchArgument("record", default_value="", description="new folder to record the session into; empty: none"),
 ]
-PASSED_ON = (
-    "scene", "params_file", "mapping", "namespace", "frame_prefix", "state_publisher", "monitor", "rviz", "record",
-)  # fmt: skip
-"""Arguments that are passed to ``twin.launch.py``."""
+PLAYER = ("rate", "start", "wait")
+"""Arguments of the player alone; all but these and ``bag`` are passed to ``twin.launch.py``."""
 LAST = 3.0
 """Time after the end of the session for node and recorder to take the last messages, s."""
 KEPT = {"scene": "scene:=FILE", "mapping": "mapping:=FILE"}
@@ -66,7 +64,8 @@ def generate_launch_description() -> LaunchDescription:
 
 def twin(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     """Return ``twin.launch.py`` on the session's clock. Scene and mapping default to those of the session."""
-    given = {name: LaunchConfiguration(name).perform(context) for name in PASSED_ON}
+    names = [each.name for each in ARGUMENTS if each.name not in ("bag", *PLAYER)]
+    given = {name: LaunchConfiguration(name).perform(context) for name in names}
     bag = Path(LaunchConfiguration("bag").perform(context))
     publishable(scan(bag))  # raises if nothing of it can be played
     values = read_parameters(Path(given["params_file"]), given["namespace"])
@@ -91,8 +90,7 @@ def kept_files(bag: Path, names: list[str]) -> dict[str, str]:
 def player(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     """Return the player of the session's inputs and clock, which waits for the node and for the recorder, if any."""
     bag, record = (LaunchConfiguration(name).perform(context) for name in ("bag", "record"))
-    names = ("rate", "start", "wait", "namespace")
-    options = [part for name in names for part in (f"--{name}", LaunchConfiguration(name).perform(context))]
+    options = [part for name in (*PLAYER, "namespace") for part in (f"--{name}", LaunchConfiguration(name).perform(context))]
     command = python_command("boom_twin.cli.main", "play", bag, "--clock", *options)
     command += ["--listeners", "2" if record else "1"]
     over = TimerAction(period=LAST, actions=[Shutdown(reason="the session has been played")])

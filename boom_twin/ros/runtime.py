@@ -86,7 +86,10 @@ class CallbackTurns:
     def __init__(self, node: Node, is_due: Callable[[], bool]) -> None:
         self._node, self._is_due = node, is_due
         self._turn, self._last = Future(), 0.0
-        self._executors = [events_executor, SingleThreadedExecutor]
+        self._executors: list[Callable[[], Any]] = [
+            lambda: import_module("rclpy.experimental").EventsExecutor(),
+            SingleThreadedExecutor,
+        ]
         self._executor: Any = None
 
     def __enter__(self) -> Self:
@@ -136,13 +139,6 @@ class CallbackTurns:
                 self._executor.remove_node(self._node)
             self._executor = None
             del self._executors[0]
-
-
-def events_executor() -> Any:
-    """Return the events executor of rclpy; ImportError where it is missing."""
-    from rclpy.experimental import EventsExecutor
-
-    return EventsExecutor()
 
 
 _BOTH = Signature([Parameter(name, Parameter.POSITIONAL_ONLY) for name in ("data", "info")])

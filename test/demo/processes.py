@@ -140,7 +140,6 @@ class DemoProcesses:
             self.check()
             if time.monotonic() > end:
                 raise BoomTwinError(f"node, recorder and player did not find each other within {PATIENCE:g} s.")
-        player.refuse_other_publishers()
 
     def end(self) -> None:
         """End all processes, the last first."""

@@ -17,37 +17,24 @@ import pytest
 from demo.isolation import Isolation
 from made_once import MadeOnce
 
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import Stream, load_scene, statics
+from boom_twin.bag.reader import read_both, scan
 from boom_twin.bag.session_files import write_session
-from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.scene import load_scene
+from boom_twin.bag.writer import SessionWriter
+from boom_twin.messages.mapping import load_mapping
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 PATIENCE = 240.0  # s; the first node compiles
 SECONDS, RATE = 4.0, 200.0
 
 
-def waited_ns(pid: int) -> dict[str, int]:
-    """How long each thread of a process, and of those that it started, waited for a core that others had, by its number."""
-    found = {}
-    for task in Path(f"/proc/{pid}/task").glob("*"):
-        with suppress(OSError):
-            found[task.name] = int((task / "schedstat").read_text().split()[1])
-            for child in (task / "children").read_text().split():
-                found |= waited_ns(int(child))
-    return found
+def mapping_with(qos: str) -> str:
+    """The text of a mapping whose inputs have this quality of service."""
+    return "inputs:\n" + "".join(f"  {stream.value}: {{qos: {{{qos}}}}}\n" for stream in Stream)
 
 
 class Process:
-    """A child whose output is kept.
-
-    Attributes
-    ----------
-    ended_after : float
-        Of the last `end`: how long it took, s, less what it waited for cores that other processes had.
-    """
-
-    ended_after = 0.0
+    """A child whose output is kept."""
 
     def __init__(self, log: Path, *arguments: str, stdin: int | None = subprocess.DEVNULL) -> None:
         self._log = log
@@ -61,45 +48,32 @@ class Process:
     def pid(self) -> int:
         return self._child.pid
 
-    def processor_s(self) -> float:
-        """Processor time of the child so far, s: unlike the clock, it stands still while other processes have the cores."""
-        fields = Path(f"/proc/{self.pid}/stat").read_text().rsplit(")", 1)[1].split()
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
     @property
-    def is_running(self) -> bool:
-        return self._child.poll() is None
+    def children(self) -> list[int]:
+        return [int(pid) for pid in Path(f"/proc/{self.pid}/task/{self.pid}/children").read_text().split()]
 
     def said(self) -> str:
         return self._log.read_text()
 
-    def wait_for(self, text: str) -> None:
-        """Until it has said so."""
+    def wait_for(self, text: str) -> str:
+        """What it has said, as soon as `text` is in it."""
         end = time.monotonic() + PATIENCE
-        while text not in self.said():
-            assert self._child.poll() is None and time.monotonic() < end, f"no {text!r} in:\n{self.said()}"
+        while text not in (said := self.said()):
+            assert self._child.poll() is None and time.monotonic() < end, f"no {text!r} in:\n{said}"
             time.sleep(0.05)
+        return said
 
     def send(self, number: signal.Signals) -> None:
         self._child.send_signal(number)
 
     def stop(self, number: signal.Signals = signal.SIGTERM) -> int:
         """Exit code after a signal."""
-        self._child.send_signal(number)
-        return self.end(10.0)
+        self.send(number)
+        return self.end()
 
-    def end(self, patience: float = PATIENCE) -> int:
-        """Exit code; an error if it goes on for `patience`, s, in which it could have had a core."""
-        began, before = time.monotonic(), waited_ns(self.pid)
-        waited = before.copy()
-        while self._child.poll() is None:
-            waited |= waited_ns(self.pid)
-            starved = sum(waited.values()) - sum(before.get(task, 0) for task in waited)
-            self.ended_after = time.monotonic() - began - 1e-9 * starved
-            if self.ended_after > patience:
-                raise subprocess.TimeoutExpired(self._child.args, patience)
-            time.sleep(0.01)
-        return self._child.returncode
+    def end(self) -> int:
+        """Exit code."""
+        return self._child.wait(PATIENCE)
 
     def close(self) -> None:
         with suppress(ProcessLookupError):  # its children too
@@ -146,6 +120,22 @@ def spawn_node(spawn: Callable[..., Process]) -> Callable[..., Process]:
         return spawn("boom_twin.ros.node.main", *(["--ros-args", *arguments] if arguments else []))
 
     return start
+
+
+@pytest.fixture(scope="session")
+def reliable(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """ROS arguments of a node that misses nothing of what a rig sends."""
+    path = tmp_path_factory.mktemp("mapping") / "reliable.yaml"
+    path.write_text(mapping_with("reliability: reliable"))
+    return ["-p", f"mapping:={path}"]
+
+
+@pytest.fixture(scope="session")
+def mapping(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """With this one node and recorder miss nothing of `reliable_bag`, though they may find its player late."""
+    path = tmp_path_factory.mktemp("mapping") / "kept.yaml"
+    path.write_text(mapping_with("reliability: reliable, durability: transient_local"))
+    return path
 
 
 class Remote:
@@ -245,60 +235,28 @@ def bag(motion: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> Pat
     return path
 
 
-class Bench:
-    """Sends to a node and listens to it."""
-
-    def __init__(self) -> None:
-        import rclpy
-        from diagnostic_msgs.msg import DiagnosticArray
-        from geometry_msgs.msg import PointStamped
-        from sensor_msgs.msg import Imu, JointState
-
-        self.node = rclpy.create_node("bench")
-        self.strokes = self.node.create_publisher(JointState, "cylinder_strokes", 100)
-        self.imu = self.node.create_publisher(Imu, "tip_imu", 100)
-        self.answers: list[int] = []
-        self.diagnostics: list[Any] = []
-        self.tip = self.node.create_subscription(
-            PointStamped, "/boom_twin/tip/position", lambda msg: self.answers.append(stamp_of(msg)), 100
-        )
-        self.node.create_subscription(DiagnosticArray, "/diagnostics", self.diagnostics.append, 10)
-
-    def until(self, condition: Callable[[], bool], patience: float = 60.0) -> None:
-        """Listen until it holds."""
-        import rclpy
-
-        end = time.monotonic() + patience
-        while not condition():
-            assert time.monotonic() < end, self.statuses()
-            rclpy.spin_once(self.node, timeout_sec=0.05)
-
-    def until_matched(self) -> None:
-        """Listen until the node hears strokes and is heard: it may match this listener a moment after it is matched here."""
-        self.until(lambda: self.strokes.get_subscription_count() == 1 and self.tip.get_publisher_count() == 1)
-        ready = time.monotonic() + 0.5
-        self.until(lambda: time.monotonic() > ready)
-
-    def statuses(self) -> dict[str, Any]:
-        """The newest diagnostics by name."""
-        return {status.name: status for status in self.diagnostics[-1].status} if self.diagnostics else {}
-
-    def values(self, name: str) -> dict[str, str]:
-        status = self.statuses().get(name)
-        return {} if status is None else {pair.key: pair.value for pair in status.values}
+@pytest.fixture(scope="session")
+def reliable_bag(bag: Path, mapping: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same, played with the quality of service of `mapping`."""
+    path, inputs = tmp_path_factory.mktemp("session") / "bag", load_mapping(mapping).inputs
+    topics = {topic.absolute: topic for topic in inputs.values() if scan(bag).find(topic.absolute) is not None}
+    with SessionWriter(path, topics) as writer:
+        for name, log_time, data, _ in read_both(scan(bag), {name: topic.type for name, topic in topics.items()}):
+            writer.write_encoded(name, log_time, data)
+    return path
 
 
-@pytest.fixture
-def bench(domain: None) -> Iterator[Bench]:
-    made = Bench()
-    yield made
-    made.node.destroy_node()
+@pytest.fixture(scope="module")
+def new_rig(domain: None) -> Iterator[Callable[..., Any]]:
+    """Makes a `ros_rig.Rig`; all are gone after the module."""
+    from ros_rig import Rig
 
+    made: list[Rig] = []
 
-@pytest.fixture
-def node(spawn_node: Callable[..., Any]) -> Iterator[Any]:
-    """An active node, gone after the test."""
-    made = spawn_node()
-    made.wait_for("active;")
-    yield made
-    made.close()
+    def make(*arguments: str) -> Rig:
+        made.append(Rig(*arguments))
+        return made[-1]
+
+    yield make
+    for rig in made:
+        rig.close()

@@ -54,18 +54,9 @@ def test_the_page_of_the_node(spawn: Callable[..., Any], trap: Trap, loud: None,
     assert not (tmp_path / "overwritten").exists()
 
 
+@pytest.mark.slow
 def test_the_demonstration(spawn: Callable[..., Any], trap: Trap, demo_path: None, loud: None, tmp_path: Path) -> None:
     demo = spawn("start", "demo.demo", "--bag", "bag", "--duration", "1", "--out", "out")
     assert demo.end() == 0 and trap.sprung() == "", demo.said()
     assert (tmp_path / "received" / "out" / "recorded" / "metadata.yaml").is_file()
     assert not (tmp_path / "overwritten").exists()
-
-
-def test_the_launch_files_start_no_python_of_their_own() -> None:
-    """They use the command line that all others use."""
-    import boom_twin
-
-    for path in (Path(boom_twin.__file__).parent / "launch").iterdir():
-        if path.suffix == ".py":
-            text = path.read_text(encoding="utf-8")
-            assert "sys.executable" not in text and ("ExecuteProcess(" not in text or "python_command(" in text)

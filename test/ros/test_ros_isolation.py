@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +17,8 @@ pytest.importorskip("rclpy")
 import rclpy
 from demo import isolation as module
 from demo.isolation import Isolation, isolated
+from eventually import eventually
+from ros_rig import spin_until
 from sensor_msgs.msg import JointState
 
 from boom_twin.errors import BoomTwinError
@@ -45,25 +46,17 @@ FREE = ("FASTRTPS_DEFAULT_PROFILES_FILE", "ROS_AUTOMATIC_DISCOVERY_RANGE")
 @contextmanager
 def rig_in(domain: int, log: Path) -> Iterator[None]:
     """It runs, in the same domain, and knows nothing of isolation."""
-    known = {name: value for name, value in os.environ.items() if name not in FREE}
-    with log.open("w") as file:
-        process = subprocess.Popen(
-            [sys.executable, "-c", RIG], env={**known, "ROS_DOMAIN_ID": str(domain)}, stdout=file, stderr=file
-        )
+    known = {name: value for name, value in os.environ.items() if name not in FREE} | {"ROS_DOMAIN_ID": str(domain)}
+    with log.open("w") as file, subprocess.Popen([sys.executable, "-c", RIG], env=known, stdout=file, stderr=file) as process:
         try:
-            until(lambda: "there" in log.read_text() or process.poll() is not None)
-            assert process.poll() is None, log.read_text()
+            eventually(lambda: _says(log, "there"), 120.0)
             yield
         finally:
             process.kill()
-            process.wait()
 
 
-def until(condition: Callable[[], bool], patience: float = 60.0) -> None:
-    end = time.monotonic() + patience
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.05)
+def _says(log: Path, word: str) -> None:
+    assert word in log.read_text()
 
 
 @pytest.fixture
@@ -72,26 +65,21 @@ def unguarded(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "refuse_foreign", lambda topics: None)
 
 
-def test_the_tests_run_in_a_domain_that_nobody_uses(isolation: Isolation) -> None:
+def test_no_two_runs_share_a_domain_and_the_environment_is_put_back(
+    isolation: Isolation, unguarded: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert int(os.environ["ROS_DOMAIN_ID"]) == isolation.domain > 101
     assert os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
-
-
-def test_no_two_runs_share_a_domain(unguarded: None) -> None:
+    monkeypatch.setenv("ROS_STATIC_PEERS", "192.0.2.1")
+    before = dict(os.environ)
     with isolated() as one, isolated() as other, isolated() as third:
+        assert "ROS_STATIC_PEERS" not in os.environ
         assert len({one.domain, other.domain, third.domain}) == 3
         assert min(one.domain, other.domain, third.domain) > 101
         with pytest.raises(BoomTwinError, match=f"domain {one.domain} is claimed by another"), isolated(one.domain):
             pass
     with isolated(one.domain) as again:
         assert again.domain == one.domain
-
-
-def test_the_environment_is_put_back(unguarded: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_STATIC_PEERS", "192.0.2.1")
-    before = dict(os.environ)
-    with isolated():
-        assert "ROS_STATIC_PEERS" not in os.environ
     assert dict(os.environ) == before
 
 
@@ -133,20 +121,18 @@ def test_a_rig_in_the_same_domain_neither_feeds_nor_is_fed(isolation: Isolation,
         return len(node.get_publishers_info_by_topic(TOPIC)) == 2
 
     with rig_in(isolation.domain, tmp_path / "rig"):
-        until(is_seen)  # discovered, so it would be heard
-        for _ in range(100):
-            send()
+        spin_until(node, is_seen)  # discovered, so it would be heard
+        spin_until(node, lambda: is_seen() and len(heard) > 50)
     node.destroy_node()
-    assert len(heard) > 50 and set(heard) == {"isolated"}
+    assert set(heard) == {"isolated"}
     assert "fed by" not in (tmp_path / "rig").read_text()
 
 
-@pytest.mark.parametrize("demo", ["demo", "demo_live"])
 def test_a_demonstration_refuses_a_domain_in_use(
-    demo: str, isolation: Isolation, bag: Path, spawn: Callable[..., Any], demo_path: None, tmp_path: Path
+    isolation: Isolation, bag: Path, spawn: Callable[..., Any], demo_path: None, tmp_path: Path
 ) -> None:
     with rig_in(free := unclaimed(), tmp_path / "rig"):
-        process = spawn(f"demo.{demo}", "--bag", str(bag), "--out", str(tmp_path / "out"), "--domain", str(free))
+        process = spawn("demo.demo", "--bag", str(bag), "--out", str(tmp_path / "out"), "--domain", str(free))
         assert process.end() == 1
     assert f"ROS domain {free} is in use" in process.said() and "Traceback" not in process.said()
     assert "/some_rig" in process.said() or "a node without a known name" in process.said()

@@ -10,12 +10,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from eventually import eventually
 
 pytest.importorskip("rclpy")
 
@@ -24,6 +24,7 @@ from boom_twin.bag.reader import scan
 from boom_twin.bag.session_model import mapping_of, scene_of
 from boom_twin.messages.topic_table import Output
 from boom_twin.scene.load import default_text
+from boom_twin.types import Stream
 
 LAUNCH = Path(boom_twin.__file__).parent / "launch"
 PYTHON = os.environ.get("LAUNCH_PYTHON", sys.executable)
@@ -83,10 +84,11 @@ class Launched:
         return "".join(path.read_text() for path in (self._log, *sorted(self._ros.rglob("*.log"))))
 
     def wait_for(self, *texts: str) -> None:
-        end = time.monotonic() + PATIENCE
-        while not all(text in self.said() for text in texts):
-            assert self.process.poll() is None and time.monotonic() < end, f"no {texts} in:\n{self.said()}"
-            time.sleep(0.1)
+        def all_said() -> None:
+            said = self.said()
+            assert all(text in said for text in texts), f"no {texts} in:\n{said}"
+
+        eventually(all_said, PATIENCE)
 
     def end(self, number: signal.Signals | None = None) -> int:
         if number is not None:
@@ -139,86 +141,82 @@ def start(isolation: Any, tmp_path: Path) -> Iterator[Start]:
         each.close()
 
 
-def test_without_a_screen_and_without_cpp(start: Start, tmp_path: Path) -> None:
-    """Node and recorder in a namespace; the recording knows what the launch was given."""
-    scene, mapping = tmp_path / "boom.yaml", tmp_path / "mapping.yaml"
-    scene.write_text("# of this rig\n" + default_text())
-    mapping.write_text("inputs: {tip_imu: {delay: 0.01}}\n")
-    out = tmp_path / "session"
-    given = {"namespace": "front", "frame_prefix": "front/", "state_publisher": "false", "record": out}
-    launched = start("twin", **given, scene=scene, mapping=mapping)
-    launched.wait_for("active; listening to /front/cylinder_strokes", "recording")
-    end = time.monotonic() + PATIENCE
-    while '"front/base_link"' not in (out / "session.yaml").read_text():
-        assert time.monotonic() < end
-        time.sleep(0.1)
+def parameters(folder: Path, node: str) -> dict[str, Path]:
+    """A parameter file, and the scene and the mapping that it names."""
+    found = {name: folder / f"{name}.yaml" for name in ("scene", "mapping", "params_file")}
+    found["scene"].write_text(default_text() + "# of the file\n")
+    found["mapping"].write_text("inputs: {tip_imu: {delay: 0.01}}\n")
+    own = {"scene": f'"{found["scene"]}"', "mapping": f'"{found["mapping"]}"', "frame_prefix": "file/", "payload": "7.5"}
+    blocks = "".join(f"    {key}: {value}\n" for key, value in (own | {"use_sim_time": "true"}).items())
+    found["params_file"].write_text(f"{node}:\n  ros__parameters:\n{blocks}")
+    return found
+
+
+def kept(launched: Launched, out: Path, word: str) -> tuple[str, Any]:
+    """Scene and topics that a recording has, once `word` of the node is in it and all has been ended."""
+
+    def is_told() -> None:
+        assert word in (out / "session.yaml").read_text()
+
+    eventually(is_told, PATIENCE)
     launched.end(signal.SIGINT)
     assert launched.is_gone() and "Traceback" not in launched.said()
-    kept = mapping_of(out).topics
-    assert {topic.name.split("/")[1] for topic in kept.inputs.values()} == {"front"}
-    assert kept.outputs[Output.SHAPE].absolute == "/front/boom_twin/shape"
-    assert (kept.frame, [topic.delay for topic in kept.inputs.values()]) == ("front/base_link", [0.0, 0.0, 0.01, 0.0])
-    assert scene_of(out).text.startswith("# of this rig\n")
+    return scene_of(out).text, mapping_of(out).topics
 
 
-def test_robot_state_publisher_is_told_everything(start: Start) -> None:
-    names = ("robot_state_publisher", "rviz2")
-    launched = start("twin", *names, namespace="rear", frame_prefix="rear/", ignore_timestamp="true", rviz="true")
-    launched.wait_for("stand-in robot_state_publisher", "stand-in rviz2", "<robot", "ignore_timestamp", "TF Prefix")
+def test_the_parameter_file_holds_where_no_argument_is_given(start: Start, tmp_path: Path) -> None:
+    """Empty arguments are not given. Node, recorder, robot_state_publisher and RViz in a namespace are all told."""
+    given = {"namespace": "front", "params_file": parameters(tmp_path, "/front/boom_twin")["params_file"]}
+    out, names = tmp_path / "session", ("robot_state_publisher", "rviz2")
+    launched = start("twin", *names, **given, record=out, ignore_timestamp="true", rviz="true")
+    launched.wait_for("active; listening to /front/cylinder_strokes", "recording", "use_sim_time: true", "ignore_timestamp")
+    launched.wait_for("stand-in robot_state_publisher", "stand-in rviz2", "<robot", "frame_prefix: file/", "TF Prefix")
     said = launched.said()
-    assert "__ns:=/rear" in said and "joint_states:=boom_twin/joint_states" in said
-    assert "frame_prefix: rear/" in said and "Fixed Frame: rear/base_link" in said and "tip_pitch" in said
-    launched.wait_for("active;")
-    launched.end(signal.SIGINT)
-    assert launched.is_gone()
+    assert "__ns:=/front" in said and "joint_states:=boom_twin/joint_states" in said
+    assert "Fixed Frame: file/base_link" in said and "tip_pitch" in said
+    scene, topics = kept(launched, out, "payload: 7.5")
+    assert {topic.name.split("/")[1] for topic in topics.inputs.values()} == {"front"}
+    assert topics.outputs[Output.SHAPE].absolute == "/front/boom_twin/shape"
+    assert (topics.frame, [topic.delay for topic in topics.inputs.values()]) == ("file/base_link", [0.0, 0.0, 0.01, 0.0])
+    assert scene.endswith("# of the file\n")
 
 
-@pytest.mark.parametrize("name", ["/**", "/front/boom_twin"])
-def test_the_parameter_file_holds_where_no_argument_is_given(start: Start, tmp_path: Path, name: str) -> None:
-    """Empty arguments are not given; those that are win, whatever name the file gives the node."""
-    scene, mapping, params = (tmp_path / f"{each}.yaml" for each in ("boom", "mapping", "params"))
-    scene.write_text(default_text() + "# of the file\n")
-    mapping.write_text("inputs: {tip_imu: {delay: 0.01}}\n")
-    own = {"scene": f'"{scene}"', "mapping": f'"{mapping}"', "frame_prefix": "file/", "use_sim_time": "true", "payload": "7.5"}
-    blocks = "".join(f"    {key}: {value}\n" for key, value in own.items())
-    params.write_text(f"{name}:\n  ros__parameters:\n{blocks}")
-    out = tmp_path / "session"
-    given = {"namespace": "front", "params_file": params, "record": out}
-    launched = start("twin", "robot_state_publisher", **given)
-    launched.wait_for("active;", "recording", "frame_prefix: file/", "use_sim_time: true")
-    end = time.monotonic() + PATIENCE
-    while "payload: 7.5" not in (out / "session.yaml").read_text():
-        assert time.monotonic() < end
-        time.sleep(0.1)
-    launched.end(signal.SIGINT)
-    assert mapping_of(out).topics.frame == "file/base_link" and scene_of(out).text.endswith("# of the file\n")
-    launched = start(
-        "twin", "robot_state_publisher", params_file=params, namespace="front", frame_prefix="given/", monitor="false"
-    )
-    launched.wait_for("active;", "frame_prefix: given/", "use_sim_time: true")
-    launched.end(signal.SIGINT)
-    assert launched.is_gone()
+def test_arguments_win_without_a_screen_and_without_cpp(start: Start, tmp_path: Path) -> None:
+    """Whatever name the file gives the node."""
+    scene, mapping, out = tmp_path / "given.yaml", tmp_path / "other.yaml", tmp_path / "session"
+    scene.write_text("# given\n" + default_text())
+    mapping.write_text("inputs: {tip_imu: {delay: 0.02}}\n")
+    given = {"scene": scene, "mapping": mapping, "frame_prefix": "given/", "namespace": "front", "state_publisher": "false"}
+    launched = start("twin", **given, params_file=parameters(tmp_path, "/**")["params_file"], record=out)
+    launched.wait_for("active;", "recording")
+    text, topics = kept(launched, out, '"given/base_link"')
+    assert text.startswith("# given\n")
+    assert (topics.frame, topics.inputs[Stream.IMU].delay) == ("given/base_link", 0.02)
+
+
+NO_CPP = {"state_publisher": "false"}
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("name", "arguments", "words"),
     [
-        ({}, "package robot_state_publisher is not in AMENT_PREFIX_PATH: install it, or say state_publisher:=false"),
-        ({"state_publisher": "false", "rviz": "true"}, "package rviz2 is not in AMENT_PREFIX_PATH"),
-        ({"state_publisher": "false", "scene": "/no/such/boom.yaml"}, "/no/such/boom.yaml"),
-        ({"state_publisher": "false", "mapping": "/no/such/mapping.yaml"}, "/no/such/mapping.yaml"),
-        ({"state_publisher": "false", "params_file": "/no/such/twin.yaml"}, "/no/such/twin.yaml"),
-        ({"state_publisher": "perhaps"}, "perhaps"),
+        ("twin", {}, "package robot_state_publisher is not in AMENT_PREFIX_PATH: install it, or say state_publisher:=false"),
+        ("twin", NO_CPP | {"rviz": "true"}, "package rviz2 is not in AMENT_PREFIX_PATH"),
+        ("twin", NO_CPP | {"scene": "/no/such/boom.yaml"}, "/no/such/boom.yaml"),
+        ("twin", NO_CPP | {"mapping": "/no/such/mapping.yaml"}, "/no/such/mapping.yaml"),
+        ("twin", NO_CPP | {"params_file": "/no/such/twin.yaml"}, "/no/such/twin.yaml"),
+        ("twin", {"state_publisher": "perhaps"}, "perhaps"),
+        ("replay", NO_CPP | {"rviz": "false", "bag": "/no/such/bag"}, "/no/such/bag"),
     ],
 )
-def test_what_fails_leaves_nothing_behind(start: Start, arguments: dict[str, str], words: str) -> None:
-    launched = start("twin", **arguments)
+def test_what_fails_leaves_nothing_behind(start: Start, name: str, arguments: dict[str, str], words: str) -> None:
+    launched = start(name, **arguments)
     assert launched.end() == 1
     assert launched.is_gone() and words in launched.said()
     assert "process started" not in launched.said()
 
 
-def test_a_node_that_cannot_start_ends_all(start: Start, tmp_path: Path) -> None:
+def test_a_node_that_cannot_start_ends_all(start: Start) -> None:
     launched = start("twin", "robot_state_publisher", frame_prefix="/front/")
     launched.end()
     assert launched.is_gone() and "frame_prefix = '/front/'" in launched.said()
@@ -232,9 +230,3 @@ def test_a_session_is_played_into_the_twin_and_all_ends_with_it(start: Start, ba
     found = scan(out)
     strokes, positions = (found.find(f"/front/{name}") for name in ("cylinder_strokes", "boom_twin/tip/position"))
     assert strokes is not None and positions is not None and min(strokes.count, positions.count) > 100
-
-
-def test_a_session_that_cannot_be_played_starts_nothing(start: Start, tmp_path: Path) -> None:
-    launched = start("replay", bag=tmp_path / "none", state_publisher="false", rviz="false")
-    assert launched.end() == 1
-    assert launched.is_gone() and "process started" not in launched.said() and "none" in launched.said()

@@ -1,4 +1,4 @@
-"""A recorded live run: every reader reads the same values, and its replay gives what the node published."""
+"""A recorded live run: every reader reads the same values, and its replay gives what the node published, bit for bit."""
 
 from __future__ import annotations
 
@@ -9,63 +9,82 @@ import shutil
 import signal
 import struct
 import subprocess
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
 
-import numpy as np
 from mcap.reader import make_reader
+from ros_rig import all_stored, published
 from rosbags.highlevel import AnyReader
 from ruamel.yaml import YAML
 
-from boom_twin.bag.reader import read, read_both, scan
+from boom_twin import Settings, load_scene, load_settings, replay
+from boom_twin.bag.reader import read_both, scan
 from boom_twin.bag.writer import SessionWriter
-from boom_twin.config.settings import Settings
+from boom_twin.messages.report_encoder import decode_changes
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.messages.type_store import jazzy
-from boom_twin.offline.replay import replay
-from boom_twin.scene import load_scene
+from boom_twin.ros.bag.player import Player
+from boom_twin.ros.bag.recorder import COMPLETE
 from boom_twin.scene.load import default_text
 from boom_twin.types import Stream
 
 ROOT = Path(__file__).parents[2]
+PARAMETERS = ROOT / "msg_config" / "twin.yaml"
 CLIENT, MODULES = ROOT / "test" / "clients" / "read.cjs", ROOT / ".node"
 NODE_JS = shutil.which("node") or shutil.which("node", path=MODULES / "venv" / "bin")
 IS_INSTALLED = NODE_JS is not None and (MODULES / "node_modules").is_dir()
 TOPICS = load_topics()
 Values = dict[str, list[list[str]]]
-RARE = (Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY)
+RARE = (Output.CHANGES, Output.HEALTH, Output.TIP_UNCERTAINTY, Output.SHAPE)
+ASKED: dict[int, Callable[[Any], Any]] = {
+    300: lambda remote: remote.set("payload", 35.0),  # the model is made beside the samples, which takes its time
+    900: lambda remote: remote.trigger("rezero/joint_2"),
+    1200: lambda remote: remote.trigger("reset"),
+    1500: lambda remote: remote.set("gap", 0.2),
+    1800: lambda remote: remote.trigger("rezero/cylinder_1"),
+    1950: lambda remote: remote.set("line_fill", 8.0),
+    2200: lambda remote: remote.trigger("acknowledge"),
+}
+"""What is done after so many messages."""
 
 
 @pytest.fixture(scope="module")
-def recorded(spawn: Callable[..., Any], spawn_node: Callable[..., Any], bag: Path, tmp_path_factory: Any) -> Path:
-    """Inputs and outputs of a live run, recorded in a process of its own into several files.
+def recorded(
+    spawn: Callable[..., Any],
+    spawn_node: Callable[..., Any],
+    reliable_bag: Path,
+    mapping: Path,
+    remote: Any,
+    tmp_path_factory: Any,
+) -> Path:
+    """Inputs and outputs of a live run, recorded in a process of its own; much is asked of the node meanwhile.
 
     The node's scene has a text of its own, which the recorder is not given.
     """
-    from boom_twin.ros.bag.player import Player
-    from boom_twin.ros.bag.recorder import COMPLETE
-
     out = tmp_path_factory.mktemp("recording") / "bag"
     scene = out.parent / "scene.yaml"
     scene.write_text(default_text() + "# a copy\n")
-    node = spawn_node("-p", f"scene:={scene}")
+    node = spawn_node("--params-file", str(PARAMETERS), "-p", f"scene:={scene}", "-p", f"mapping:={mapping}")
     node.wait_for("active;")
-    recorder = spawn("boom_twin.cli.main", "record", "--out", str(out), "--split-duration", "1.5")
-    player = Player(scan(bag))
+    recorder = spawn("boom_twin.cli.main", "record", "--out", str(out), "--mapping", str(mapping), "--split-duration", "1.5")
+    player = Player(scan(reliable_bag))
     recorder.wait_for(COMPLETE)
     assert player.wait(60.0, listeners=2) == []
-    for _ in player.play():
-        pass
-    time.sleep(1.0)
+    for sent, _ in enumerate(player.play(), 1):
+        if (act := ASKED.get(sent)) is not None:
+            answer = act(remote)
+            assert getattr(answer, "success", None) or getattr(answer, "successful", None), answer
+    all_stored(remote.node)
     player.close()
+    assert sent == scan(reliable_bag).topics[0].count * 3
     assert recorder.stop(signal.SIGINT) == 0, recorder.said()
     assert "no scene is kept" not in recorder.said()
     assert node.stop(signal.SIGINT) == 0, node.said()
@@ -111,12 +130,9 @@ def test_every_topic_was_recorded(recorded: Path, values: Values) -> None:
     assert len(list(recorded.glob("*.mcap"))) >= 3
     assert sheet["scene"] == default_text() + "# a copy\n"  # as the node told it
     assert "baseline" not in sheet  # the package's own
-    assert sheet["twin"] == {
-        "scene": str(recorded.parent / "scene.yaml"),
-        "mapping": "",
-        "frame_prefix": "",
-        **Settings().model_dump(),
-    }
+    settings = load_settings(PARAMETERS).model_dump()
+    assert sheet["twin"].keys() == {"scene", "mapping", "frame_prefix", *Settings.model_fields}
+    assert sheet["twin"]["imu_sigma"] == settings["imu_sigma"]
 
 
 def test_the_reader_of_mcap_gives_the_same_bytes(recorded: Path) -> None:
@@ -147,37 +163,48 @@ def test_an_independent_client_reads_the_same_values(recorded: Path, values: Val
             assert one == other, topic
 
 
-@pytest.fixture(scope="module")
-def again(recorded: Path, values: Values, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The bag that a replay of the recorded inputs writes: of all strokes that the node answered."""
-    answered = {tuple(message[1:3]) for message in values[TOPICS.outputs[Output.TIP_POSITION].absolute]}
-    session, accepted = scan(recorded), tmp_path_factory.mktemp("accepted") / "bag"
-    keys = {topic.absolute: stream for stream, topic in TOPICS.inputs.items()}
-    wanted = {name: TYPES[stream] for name, stream in keys.items() if stream is not Stream.FORCES}  # none is sent here
-    with SessionWriter(accepted, {stream.value: topic for stream, topic in TOPICS.inputs.items()}) as writer:
-        for name, log_time, data, message in read_both(session, wanted):
-            if keys[name] is not Stream.STROKES or tuple(list(_flat(message))[:2]) in answered:
-                writer.write_encoded(keys[name].value, log_time, data)
-    out = tmp_path_factory.mktemp("replay")
-    replay(accepted, load_scene(), out)
-    return out / "bag"
+def test_what_was_asked_is_in_the_recording(recorded: Path, motion: dict[str, Any]) -> None:
+    topic = TOPICS.outputs[Output.CHANGES]
+    changes = [decode_changes(msg) for *_, msg in read_both(scan(recorded), {topic.absolute: topic.type})]
+    assert [change.from_rest for change in changes] == [True, True, False, True, False, True, True]
+    assert [change.settings["payload"] for change in changes] == [-1.0] + 6 * [35.0]
+    assert (changes[-1].settings["line_fill"], changes[-1].settings["gap"]) == (8.0, 0.2)
+    assert set(changes[-1].zeros) == {"joint_2", "cylinder_1"}
+    stamps = [stamp for stamp, _ in published(recorded, TOPICS, Output.TIP_POSITION)]
+    assert stamps == motion["stamps_ns"].tolist()
+    residuals = [
+        jazzy().deserialize_cdr(data, TYPES[Output.RESIDUALS]) for _, data in published(recorded, TOPICS, Output.RESIDUALS)
+    ]
+    deviations = [msg.effort[0] for msg in residuals if msg.name[0] == "tip_imu_x"]
+    assert min(deviations) >= load_settings(PARAMETERS).imu_sigma  # the node read its parameter file
 
 
-def _published(path: Path, key: Output) -> list[tuple[int, bytes]]:
-    """Stamp and CDR of every message of one output; encoded anew, because rclpy does not clear the bytes between values."""
-    found, encode = read(scan(path), {TOPICS.outputs[key].absolute: TYPES[key]}), jazzy().serialize_cdr
-    stamped = [(message.markers[0] if key is Output.SHAPE else message, message) for _, _, message in found]
-    return [(stamp_of(holder), bytes(encode(message, TYPES[key]))) for holder, message in stamped]
+def left_out(recorded: Path) -> set[Output]:
+    """Outputs that an overloaded node did not make at every stamp, by its own words."""
+    topic = TOPICS.outputs[Output.DIAGNOSTICS]
+    statuses = [status for *_, msg in read_both(scan(recorded), {topic.absolute: topic.type}) for status in msg.status]
+    told = {pair.key for status in statuses for pair in status.values if pair.value != "0"}
+    found = {Output.SHAPE} if "shapes left_out" in told else set()
+    return found | ({Output.HEALTH, Output.TIP_UNCERTAINTY} if "looks at health left_out" in told else set())
 
 
-@pytest.mark.parametrize("key", [key for key in Output if key not in (Output.DIAGNOSTICS, Output.RESIDUALS)])
-def test_a_replay_gives_what_the_node_published(recorded: Path, again: Path, key: Output) -> None:
-    live = _published(recorded, key)
-    assert len(live) > (0 if key in RARE else 30)
-    assert live == _published(again, key)
-
-
-def test_a_replay_gives_the_residuals_that_the_node_published(recorded: Path, again: Path) -> None:
-    live, here = _published(recorded, Output.RESIDUALS), _published(again, Output.RESIDUALS)
-    assert len(live) == len(set(live)) > 1000
-    assert set(live) <= set(here)
+def test_a_replay_gives_what_the_node_published(recorded: Path, bag: Path, tmp_path: Path) -> None:
+    """Of all samples as they were sent, and what was asked of the node."""
+    inputs = {topic.absolute: stream for stream, topic in TOPICS.inputs.items() if stream is not Stream.FORCES}  # none is sent
+    topic = TOPICS.outputs[Output.CHANGES]
+    changes = {stamp_of(msg): data for *_, data, msg in read_both(scan(recorded), {topic.absolute: topic.type})}
+    with SessionWriter(tmp_path / "bag", TOPICS.inputs | {Output.CHANGES: topic}) as writer:
+        for name, log_time, data, msg in read_both(scan(bag), {name: TYPES[stream] for name, stream in inputs.items()}):
+            if inputs[name] is Stream.STROKES and (change := changes.get(stamp_of(msg))):
+                writer.write_encoded(Output.CHANGES, log_time, change)
+            writer.write_encoded(inputs[name], log_time, data)
+    result = replay(tmp_path / "bag", load_scene(), tmp_path / "out", load_settings(PARAMETERS))
+    compared = set(Output) - {Output.DIAGNOSTICS, Output.RESIDUALS} - left_out(recorded)
+    assert compared >= {Output.TIP_POSITION, Output.CHANGES, Output.ESTIMATE_POSE}
+    for key in compared:
+        live = published(recorded, TOPICS, key)
+        assert len(live) > (0 if key in RARE else 100), key
+        assert live == published(tmp_path / "out" / "bag", TOPICS, key), key
+    live, here = (published(path, TOPICS, Output.RESIDUALS) for path in (recorded, tmp_path / "out" / "bag"))
+    assert sorted(live) == sorted(here)
+    assert {"load": 2, "zero": 2, "reset": 1, "limits": 1}.items() <= result.summary["events"].items()

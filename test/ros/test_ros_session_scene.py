@@ -1,102 +1,110 @@
-"""A recorder beside a node in a namespace: the scene is the node's, the mapping names the topics that were heard."""
+"""A recorder beside a node in a namespace, with sensors of other names and units: a replay needs nothing but the recording."""
 
 from __future__ import annotations
 
 import json
 import signal
-import time
-from array import array
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy")
 
-import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PointStamped
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_rig import Rig, all_stored, joint_state, published
 from ruamel.yaml import YAML
 from sensor_msgs.msg import JointState
 
+from boom_twin.bag.session_model import mapping_of
 from boom_twin.cli.main import main
+from boom_twin.messages.sample_decoder import stamp_of
+from boom_twin.messages.topic_table import Output
+from boom_twin.ros.bag.recorder import COMPLETE
 from boom_twin.scene.load import default_text
 
-ROWS = 200
+MAPPING = """
+inputs:
+  cylinder_strokes: {name: rig/joint_states, qos: {reliability: reliable, depth: 500}}
+  joint_angles: {name: rig/joint_states, qos: {reliability: reliable, depth: 500}}
+outputs:
+  tip_position: {qos: {durability: transient_local, depth: 1}}
+sensors:
+  cylinder_1: {name: lift, unit: mm, sign: -1, zero: 900.0}
+  joint_2: {name: knee, unit: deg}
+"""
 BASELINE = "description: learnt\nangle_error: 0.0001\n"
+ROWS = 200
 
 
-class Rig:
-    """Publishes strokes and angles in the namespace, and hears what the node says of itself."""
-
-    def __init__(self) -> None:
-        self.node = rclpy.create_node("rig")
-        self.strokes = self.node.create_publisher(JointState, "/front/cylinder_strokes", 500)
-        self.angles = self.node.create_publisher(JointState, "/front/joint_angles", 500)
-        self.told: dict[str, Any] = {}
-        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._hear, 100)
-
-    def _hear(self, message: Any) -> None:
-        self.told.update({status.name: status for status in message.status})
-
-    def until(self, condition: Callable[[], bool], act: Callable[[], None] = lambda: None) -> None:
-        end = time.monotonic() + 120.0
-        while not condition():
-            assert time.monotonic() < end, {name: status.message for name, status in self.told.items()}
-            act()
-            rclpy.spin_once(self.node, timeout_sec=0.02)
-
-    def send(self, publisher: Any, kind: str, stamp: int, values: Any) -> None:
-        names = [f"{kind}_{i + 1}" for i in range(len(values))]
-        message = JointState(name=names, position=array("d", values))
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
-        publisher.publish(message)
+def message(stamp: int, strokes: Any, angles: Any) -> JointState:
+    """One for all sensors; angles come with some only."""
+    names = ["spare", "cylinder_4", "cylinder_3", "cylinder_2", "lift"]
+    values = [7.0, strokes[3], strokes[2], strokes[1], 900.0 - 1e3 * strokes[0]]
+    if angles is not None:
+        names += ["joint_1", "knee", "joint_3", "joint_4"]
+        values += [angles[0], np.degrees(angles[1]), angles[2], angles[3]]
+    return joint_state(stamp, names, values)
 
 
-def test_scene_baseline_and_names_come_from_the_node(
-    spawn: Callable[..., Any], spawn_node: Callable[..., Any], motion: dict[str, Any], tmp_path: Path, capsys: Any
+def test_scene_baseline_and_names_are_those_of_the_node(
+    spawn: Callable[..., Any],
+    spawn_node: Callable[..., Any],
+    new_rig: Callable[..., Rig],
+    motion: dict[str, Any],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    (tmp_path / "scene.yaml").write_text(default_text() + "# a copy\n")
-    (tmp_path / "baseline.yaml").write_text(BASELINE)
-    files = ["-p", f"scene:={tmp_path / 'scene.yaml'}", "-p", f"baseline:={tmp_path / 'baseline.yaml'}"]
-    node, rig, out = spawn_node("-r", "__ns:=/front", *files), Rig(), tmp_path / "bag"
-    node.wait_for("active; listening to /front/cylinder_strokes")
+    texts = {"scene": default_text() + "# a copy\n", "baseline": BASELINE, "mapping": MAPPING}
+    files = {name: tmp_path / f"{name}.yaml" for name in texts}
+    for name, text in texts.items():
+        files[name].write_text(text)
+    node = spawn_node("-r", "__ns:=/front", *(part for name in texts for part in ("-p", f"{name}:={files[name]}")))
+    node.wait_for("active; listening to /front/rig/joint_states, /front/tip_imu")
+    rig, out = new_rig("/front"), tmp_path / "bag"
+    publisher = rig.node.create_publisher(JointState, "rig/joint_states", 500)
 
-    def five() -> None:
-        rig.send(rig.strokes, "cylinder", time.time_ns(), [*motion["strokes"][0], 0.1])
+    strange = joint_state(1, ["lift", "cylinder_2", "cylinder_3", "cylinder_4", "cylinder_5"], [0.1] * 5)
+    told = f"names cylinder_5; the scene ({files['scene']}) has 4 cylinders"
 
-    name = "front/boom_twin: cylinder_strokes"
-    rig.until(lambda: name in rig.told and rig.told[name].level == b"\x02", five)
-    said = rig.told[name].message
-    assert f"cylinder_strokes names cylinder_5; the scene ({tmp_path / 'scene.yaml'}) has 4 cylinders" in said
+    def is_told() -> bool:
+        return any(told in status.message and status.level == b"\x02" for msg in rig.diagnostics for status in msg.status)
 
-    recorder = spawn("boom_twin.cli.main", "record", "--out", str(out), "--ros-args", "-r", "__ns:=/front")
-    sheet = out / "session.yaml"
-    rig.until(lambda: sheet.is_file() and BASELINE.splitlines()[0] in sheet.read_text() and "# a copy" in sheet.read_text())
-    rig.until(lambda: min(each.get_subscription_count() for each in (rig.strokes, rig.angles)) >= 2)
-    time.sleep(0.5)  # a subscription may know of its publisher a moment after the publisher of it
+    rig.until(is_told, lambda: publisher.publish(strange))
+    record = ("record", "--out", str(out), "--mapping", str(files["mapping"]), "--ros-args", "-r", "__ns:=/front")
+    recorder, sheet = spawn("boom_twin.cli.main", *record), out / "session.yaml"
+    recorder.wait_for(COMPLETE)
+    rig.until(lambda: publisher.get_subscription_count() == 2)
+    rig.until(lambda: BASELINE.splitlines()[0] in sheet.read_text() and "# a copy" in sheet.read_text())
     for row in range(ROWS):
-        stamp = int(motion["stamps_ns"][row])
-        rig.send(rig.strokes, "cylinder", stamp, motion["strokes"][row])
-        rig.send(rig.angles, "joint", stamp, motion["joints"][row])
-        time.sleep(0.004)
-    time.sleep(1.0)
-    rig.node.destroy_node()
-    assert recorder.stop(signal.SIGINT) == 0, recorder.said()
-    assert node.stop() == 0
-    assert f"{ROWS:9d} {ROWS:9d} {0:14d}  /front/cylinder_strokes" in recorder.said()
+        angles = motion["joints"][row] if row % 4 == 0 else None
+        publisher.publish(message(motion["stamps_ns"][row], motion["strokes"][row], angles))
+    last, late = int(motion["stamps_ns"][ROWS - 1]), list[int]()
+    rig.until(lambda: bool(rig.answers) and rig.answers[-1][0] == last)
+    keeping = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    topic = "/front/boom_twin/tip/position"
+    rig.node.create_subscription(PointStamped, topic, lambda msg: late.append(stamp_of(msg)), keeping)
+    rig.until(lambda: late == [last])
+    all_stored(rig.node, "front")
+    assert recorder.stop(signal.SIGINT) == node.stop() == 0, recorder.said()
     assert "no scene is kept" not in recorder.said()
 
     kept = YAML(typ="safe").load(sheet.read_text())
-    assert (kept["scene"], kept["baseline"]) == (default_text() + "# a copy\n", BASELINE)
-    mapping = YAML(typ="safe").load(kept["mapping"])
-    assert mapping["inputs"]["joint_angles"]["name"] == "/front/joint_angles"
-    assert mapping["outputs"]["tip_position"]["name"] == "/front/boom_twin/tip/position"
+    assert (kept["scene"], kept["baseline"]) == (texts["scene"], BASELINE)
+    topics = mapping_of(out).topics
+    assert topics.outputs[Output.TIP_POSITION].name == topic
+    assert {each.name.rpartition("/")[0] for each in topics.inputs.values()} == {"/front", "/front/rig"}
     assert main(["info", str(out), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    optional = ("tip_imu", "cylinder_forces")
-    lacking = [each for each in told["missing_for_replay"] if not any(name in each for name in optional)]
-    assert told["scene"] == f"{sheet}, scene" and not lacking
+    found = json.loads(capsys.readouterr().out)
+    assert found["scene"] == f"{sheet}, scene"
+    assert all("tip_imu" in each or "cylinder_forces" in each for each in found["missing_for_replay"]), found
     assert main(["replay", str(out), "--out", str(tmp_path / "out"), "--no-pictures", "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
-    assert (summary["samples"], summary["scene"], summary["baseline"]) == (ROWS, f"{sheet}, scene", f"{sheet}, baseline")
+    assert {name: summary[name] for name in texts} == {name: f"{sheet}, {name}" for name in texts}
+    assert (summary["samples"], summary["dropped"]) == (ROWS, 0)
+    for key in (Output.TIP_POSITION, Output.RESIDUALS):
+        live = published(out, topics, key)
+        assert len(live) >= ROWS - 1 and live == published(tmp_path / "out" / "bag", topics, key)

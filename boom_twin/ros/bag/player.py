@@ -15,9 +15,9 @@ from rosgraph_msgs.msg import Clock
 
 from ...bag.advice import publishable
 from ...bag.reader import Session, read_both
-from ...errors import BagError, BoomTwinError
+from ...errors import BagError
 from ...types import NANO, SECOND
-from ..runtime import node_name, qos_profile
+from ..runtime import qos_profile
 from .subscriptions import installed_class
 
 CLOCK = "/clock"
@@ -97,14 +97,6 @@ class Player:
         if timeout > 0.0:
             time.sleep(SETTLE)
         return unmatched
-
-    def refuse_other_publishers(self) -> None:
-        """Raise BoomTwinError if another node publishes one of the topics."""
-        for name in self._publishers:
-            ends = self._node.get_publishers_info_by_topic(name)
-            if len(ends) > 1:
-                names = ", ".join(sorted(node_name(end) for end in ends))
-                raise BoomTwinError(f"{name} is published by {names}. Only one publisher may run. End the other first.")
 
     def length(self, start: float = 0.0, duration: float | None = None) -> float:
         """Return the length (s) of a part of the session; raise BagError if it starts after the end."""

@@ -40,39 +40,28 @@ TEXTS = ("scene", "baseline")
 COMPLETE = "every required topic has a publisher"
 
 
-class _RemoteValue:
-    """Value that is asked of another node once, as soon as its service `is_ready`; `read` finds it in the answer."""
+class _TwinValues:
+    """Values that the node ``boom_twin`` is asked for once: its ``parameters``, and by the services' names its `TEXTS`."""
 
-    def __init__(self, is_ready: Callable[[], bool], ask: Callable[[], Future], read: Callable[[Any], Any]) -> None:
-        self._is_ready, self._ask, self._read = is_ready, ask, read
-        self._answer: Future | None = None
-        self._is_told = False
+    def __init__(self, node: Node) -> None:
+        client = AsyncParameterClient(node, NODE)
+        self._services = {"parameters": (client.services_are_ready, partial(client.get_parameters, list(NAMES)))}
+        for name in TEXTS:
+            service = node.create_client(Trigger, f"{NODE}/{name}")
+            self._services[name] = service.service_is_ready, partial(service.call_async, Trigger.Request())
+        self._answers: dict[str, Future] = {}
 
-    def poll(self) -> Any:
-        """Return the value once, as soon as it is known; None at any other time."""
-        if self._answer is None:
-            self._answer = self._ask() if self._is_ready() else None
-        if self._is_told or self._answer is None or not self._answer.done():
-            return None
-        self._is_told = True
-        return self._read(self._answer.result())
+    def poll(self) -> dict[str, object]:
+        """Call the services that are there by now; return the values that have come since the last call."""
+        for name in [name for name, (is_ready, _) in self._services.items() if is_ready()]:
+            self._answers[name] = self._services.pop(name)[1]()
+        come = {name: self._answers.pop(name).result() for name in [*self._answers] if self._answers[name].done()}
+        return {name: _parameters(answer) if name == "parameters" else str(answer.message) for name, answer in come.items()}
 
 
-def _twin_values(node: Node) -> dict[str, _RemoteValue]:
-    """Return the values to ask of the node ``boom_twin``: its ``parameters``, and by the services' names its `TEXTS`."""
-
-    def read_parameters(response: Any) -> dict[str, object]:
-        pairs = zip(NAMES, response.values, strict=False)
-        return {name: value for name, each in pairs if (value := parameter_value_to_python(each)) is not None}
-
-    client = AsyncParameterClient(node, NODE)
-    ask = partial(client.get_parameters, list(NAMES))
-    found = {"parameters": _RemoteValue(client.services_are_ready, ask, read_parameters)}
-    for name in TEXTS:
-        service = node.create_client(Trigger, f"{NODE}/{name}")
-        ask = partial(service.call_async, Trigger.Request())
-        found[name] = _RemoteValue(service.service_is_ready, ask, lambda response: str(response.message))
-    return found
+def _parameters(response: Any) -> dict[str, object]:
+    pairs = zip(NAMES, response.values, strict=False)
+    return {name: value for name, each in pairs if (value := parameter_value_to_python(each)) is not None}
 
 
 class _Channel:
@@ -96,9 +85,10 @@ class _Channel:
             found = subscription_of(self._node, self.wanted)
             if found is None:
                 return 0
-            self._key, self._type = self._storage.add(found.recorded), found.recorded.type
+            kind, qos, recorded = found
+            self._key, self._type = self._storage.add(recorded), recorded.type
             take = with_information(self._store)
-            self._subscription = self._node.create_subscription(found.kind, self.wanted.name, take, found.qos, raw=True)
+            self._subscription = self._node.create_subscription(kind, self.wanted.name, take, qos, raw=True)
         self._tell_other_types()
         number: int = self._subscription.get_publisher_count()
         self._has_one = self._has_one and number <= 1
@@ -173,7 +163,7 @@ class Recorder:
         self._node, self._storage, self._thresholds, self._tell = node, storage, thresholds, tell
         self._channels = [_Channel(each, node, storage, tell) for each in wanted]
         self._publisher = DiagnosticsPublisher(node, load_topics().outputs[Output.DIAGNOSTICS])
-        self._judge, self._twin_values = ComponentJudge("recording"), _twin_values(node)
+        self._judge, self._twin_values = ComponentJudge("recording"), _TwinValues(node)
 
     def run(self, stopped: Callable[[], bool], on_twin: Callable[[Mapping[str, object]], None]) -> list[TopicCount]:
         """Record until `stopped`, which is asked every `boom_twin.ros.runtime.WAKE` s; return the counts by topic.
@@ -215,7 +205,7 @@ class Recorder:
                 if self._look() and not is_complete:
                     is_complete = True
                     self._tell(COMPLETE)
-                if told := {name: value for name, each in self._twin_values.items() if (value := each.poll())}:
+                if told := self._twin_values.poll():
                     on_twin(told)
                 if looks % LOOKS == 0:
                     self._publish()

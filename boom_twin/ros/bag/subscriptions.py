@@ -126,15 +126,6 @@ class RequestedTopic:
         return self.topic is None or self.topic.required
 
 
-@dataclass(frozen=True, slots=True)
-class TopicSubscription:
-    """Subscription of a topic: message class, QoS, and its entry in the bag."""
-
-    kind: Any
-    qos: QoSProfile
-    recorded: Recorded
-
-
 def requested_topics(names: Sequence[str], known: Mapping[str, Topic]) -> list[RequestedTopic]:
     """Return the topics named on a command line: ``NAME`` or ``NAME:package/msg/Name``.
 
@@ -200,8 +191,8 @@ def with_mapped(text: str, place: tuple[str, ...], value: str) -> str:
     return with_value(text if plain(text) else "{}", place, value)
 
 
-def subscription_of(node: Any, wanted: RequestedTopic) -> TopicSubscription | None:
-    """Return the subscription of a topic, or None while its type is unknown.
+def subscription_of(node: Any, wanted: RequestedTopic) -> tuple[Any, QoSProfile, Recorded] | None:
+    """Return message class, QoS and entry in the bag of a topic, or None while its type is unknown.
 
     Raises
     ------
@@ -210,7 +201,7 @@ def subscription_of(node: Any, wanted: RequestedTopic) -> TopicSubscription | No
     """
     if wanted.topic is not None:
         topic = wanted.topic
-        return TopicSubscription(installed_class(topic.type), qos_profile(topic.qos, DEPTH), recorded(topic))
+        return installed_class(topic.type), qos_profile(topic.qos, DEPTH), recorded(topic)
     publishers = node.get_publishers_info_by_topic(wanted.name)
     types = {wanted.type} if wanted.type else {each.topic_type for each in publishers}
     if len(types) > 1:
@@ -222,7 +213,7 @@ def subscription_of(node: Any, wanted: RequestedTopic) -> TopicSubscription | No
     is_known = type_name in jazzy().types
     type_hash = jazzy().hash_rihs01(type_name) if is_known else str(publishers[0].topic_type_hash)
     described = Recorded.offered(wanted.name, type_name, definition_of(kind), qos, type_hash)
-    return TopicSubscription(kind, qos_profile(qos, DEPTH), described)
+    return kind, qos_profile(qos, DEPTH), described
 
 
 def _qos(offered: list[QoSProfile]) -> Qos:

@@ -57,7 +57,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._twin: Twin | None = None
         self._page: MonitorProcess | None = None
         self._outputs: dict[Output, LifecyclePublisher] = {}
-        self._handles: dict[Output, Any] = {}  # of the same in rclpy's C++ part
         self._subscriptions_in: list[Subscription[Any]] = []
         self._refused = ""
         self._service_change_state.callback = partial(self._change_state, self._service_change_state.callback)
@@ -111,7 +110,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             if key is not Output.DIAGNOSTICS:
                 kind = message_class(topic.type)
                 self._outputs[key] = self.create_lifecycle_publisher(kind, topic.name, qos_profile(topic.qos))
-                self._handles[key] = self._outputs[key].handle
         if self.get_parameter("monitor").value:
             mapping, scene = (self.get_parameter(name).value for name in ("mapping", "scene"))
             self._page = MonitorProcess(self, self._topics, mapping, scene)
@@ -205,7 +203,6 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         gc.unfreeze()
 
     def _discard(self) -> None:
-        self._handles.clear()
         for publisher in self._outputs.values():
             self.destroy_lifecycle_publisher(publisher)
         self._outputs.clear()
@@ -260,8 +257,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         The node is active here, so the publishers' own check of its state is bypassed.
         """
         for key, encoded in self._encoder.fill(report, self._is_wanted):
-            self._handles[key].publish_raw(encoded)
+            self._outputs[key].handle.publish_raw(encoded)
 
     def _is_wanted(self, key: Output) -> bool:
-        is_heard: bool = self._handles[key].get_subscription_count() > 0
+        is_heard: bool = self._outputs[key].handle.get_subscription_count() > 0
         return is_heard or self._topics.outputs[key].qos.durability == "transient_local"

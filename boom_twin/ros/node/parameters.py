@@ -64,10 +64,8 @@ def declare(node: Node) -> None:
     UsageError
         A value given at start has the wrong type or is out of range, or is of a parameter that there is not, or no more.
     """
-    for name, remedy in RETIRED.items():
-        if node.declare_parameter(name, descriptor=ParameterDescriptor(dynamic_typing=True)).value is not None:
-            raise UsageError(f"{SOURCE}: {name}: {remedy}. See msg_config/twin.yaml.")
-        node.undeclare_parameter(name)
+    for name in sorted(node._parameter_overrides.keys() & RETIRED.keys()):
+        raise UsageError(f"{SOURCE}: {name}: {RETIRED[name]}. See msg_config/twin.yaml.")
     try:
         for row in TABLE:
             node.declare_parameter(row.name, row.default, _descriptor(row))
