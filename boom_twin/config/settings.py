@@ -178,9 +178,10 @@ class Settings(BaseModel):
     jump_back: float = setting(1.0, "s", LIMIT, "step back of a stamp below which the sample may be late", True)
     leap: float = setting(3600.0, "s", LIMIT, "step of the first stamps of angles above which it is confirmed", True)
     exaggeration: float = setting(10.0, "1", POSITIVE, "factor of the displacements drawn large in ~/shape")
-    tip_deviation: float = setting(0.02, "m", POSITIVE, "deviation of an angle, as it moves the tip, that is an alarm")
+    tip_deviation: float = setting(0.005, "m", POSITIVE, "deviation of an angle, as it moves the tip, that is an alarm")
     force_deviation: float = setting(5e3, "N", POSITIVE, "deviation of a cylinder force that is an alarm")
     tip_load_limit: float = setting(500.0, "N", POSITIVE, "force at the tip beside the known load that is an alarm")
+    name_odds: float = setting(0.95, "1", PROBABILITY, "posterior probability from which on a cause is named")
     force_scale: float = setting(1.0e5, "N", POSITIVE, "cylinder force that has the full colour in ~/shape")
 
     @classmethod

@@ -233,9 +233,9 @@ class BoomPredictor:
         f.masked[:], f.deaf[:] = masked, strokes
 
     def doubt(self, channels: Collection[str]) -> None:
-        """Allow a large drift of the zeros of these angle sensors and axes of the IMU."""
-        names = channels_of(self.plan.joints)
-        places = [*names[Stream.IMU], "", "", *names[Stream.ANGLES]]  # as zeros stand among the states, mount and scale between
+        """Allow a large drift of the zeros of these sensors: angles, forces, axes of the IMU."""
+        names = channels_of(self.plan.joints)  # places as zeros stand among the states, mount and scale of the IMU between
+        places = [*names[Stream.IMU], "", "", *names[Stream.ANGLES], *names[Stream.FORCES]]
         for place, name in enumerate(places):
             if name in channels:
                 self.filters.drift[place] = DOUBTED_DRIFT

@@ -1,34 +1,32 @@
-"""Name a fault of a boom by fault twins: twins of a changed scene that take the same samples.
+"""Fault twins: twins of a changed boom that take the same samples as the twin of the boom as it is believed to be.
 
-The filter of a twin tells the logarithm of the likelihood of all that was read (`BoomPredictor.evidence`). A fault hypothesis
-is a twin whose scene has the fault, or a twin that lets a sensor's zero drift. Its gain over the twin of the scene itself, from
-the best onset on until the end, is the evidence of that fault. A load that comes at once may pass for a softer part for some
-seconds, but not for longer. A cause is named if its posterior probability is high enough.
+The filter of a twin tells the logarithm of the likelihood of all that was read (`BoomPredictor.evidence`). A fault twin has a
+scene with one fault, or lets a sensor's zero drift; `causes` decides by its gains. A twin with the named fault becomes the one
+that others are compared with: so a second fault, and the end of the first, are named in the same way.
 
-Innovations of one sample are not independent of those of the next, so gains count for less than they say: `TEMPER`. A healthy
-rig whose parameters are 2 % off the scene gains up to 60 nats by a softer part: a name needs 75, `HEAD_START` and the odds.
+The twins run in a thread of their own, a second of samples at a time. A verdict is given `DELAY` after that second, so a live
+node and a replay give it with the same sample.
 """
 
 from __future__ import annotations
 
-import math
+from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..scene.edit import loaded, parameter, parameter_names, with_parameters
 from ..scene.schema import Scene
-from ..scene.summary import explain
-from ..types import SECOND, Alarm, Change, Ranked, Stream, channels_of
+from ..types import SECOND, Alarm, Change, Ranked, Stream
+from .causes import MEMORY, TEMPER, Evidence, Fault, Hypothesis, Verdict, hypothesis, possible_faults, told
 
-LOSS = 0.25  # share of k or EI that a hypothesis takes off
-LOAD = 0.02  # share of the boom's mass that a hypothesis adds to the load, or takes off
-NAME_ODDS = 0.95  # posterior probability required to name a cause
-HEAD_START = 50.0  # nats of the hypothesis that nothing is wrong
-TEMPER = math.log(20.0) / 25.0  # power of likelihoods: 25 nats more make a cause 20 times as probable
-SETTLING = 2.0  # s from a start in which the filters find vibration and zeros
+SIZES = 0.4, 0.7, 1.0, 1.4, 1.8  # times the size of a named fault, by which its true size is found
+CERTAIN = 3.0  # standard deviations of its size that a named fault has at least
+SPACING = 18_000_000  # ns between samples of a stream that fault twins take: 50 Hz tell all that the boom does
+SETTLING = 2  # s from a start in which the filters find vibration and zeros
+DELAY = 2 * SECOND  # ns after the end of a second, at which its verdict is given
 
 
 class Follower(Protocol):
@@ -45,120 +43,208 @@ class Follower(Protocol):
     def update_block(self, block: Any, /) -> object:
         """Take the samples of a block."""
 
-
-class Hypothesis(NamedTuple):
-    """Fault hypothesis of a boom.
-
-    cause : parameter of the scene, or a sensor; empty if nothing is wrong. kind : the fault in a word. scene : with the fault.
-    payload, line_fill : how much more the boom carries, kg and kg/m. doubted : channels whose zeros may drift by any amount.
-    """
-
-    cause: str
-    kind: str
-    scene: Scene
-    payload: float = 0.0
-    line_fill: float = 0.0
-    doubted: tuple[str, ...] = ()
-
-    @property
-    def is_softer(self) -> bool:
-        """Return True if a part of the boom is softer."""
-        return self.kind == "softer"
-
-    def load(self, payload: float, line_fill: float) -> dict[str, float]:
-        """Return the load (kg, kg/m) of a twin where the load is said to be this; below 0 it is that of the scene."""
-        told = loaded(self.scene, payload, line_fill)
-        return {
-            "payload": max(parameter(told, "tip.payload") + self.payload, 0.0),
-            "line_fill": max(parameter(told, "line_fill") + self.line_fill, 0.0),
-        }
+    def leave_out_as(self, other: Any, /) -> None:
+        """Leave out the channels that another twin leaves out."""
 
 
-def hypotheses(scene: Scene) -> list[Hypothesis]:
-    """Return everything that is compared for a boom; the first is that nothing is wrong."""
-    mass, names = explain(scene).mass, parameter_names(scene)
-    found = [Hypothesis("", "", scene)]
-    for name in names:
-        if name.endswith((".k", ".EI")):
-            softer = with_parameters(scene, {name: (1.0 - LOSS) * parameter(scene, name)})
-            found.append(Hypothesis(name, "softer", softer))
-    for sign, kind in ((1.0, "more"), (-1.0, "less")):
-        if sign > 0.0 or parameter(scene, "tip.payload") > 0.0:
-            found.append(Hypothesis("tip.payload", kind, scene, payload=sign * LOAD * mass))
-        if sign > 0.0 or parameter(scene, "line_fill") > 0.0:
-            found.append(Hypothesis("line_fill", kind, scene, line_fill=sign * LOAD * mass / scene.reach))
-    channels = channels_of(len(scene.joints))
-    doubts = [(name,) for name in channels[Stream.ANGLES]] + [channels[Stream.IMU]]
-    return found + [Hypothesis(f"{each[0]}.sensor", "off", scene, doubted=each) for each in doubts]
+class _Second(NamedTuple):
+    """Samples of a second that begins at a stamp (ns), or a change before the samples that follow."""
+
+    stamp: int
+    block: Any = None
+    change: Change | None = None
 
 
 class FaultTwins:
-    """Twins of all fault hypotheses, which take the same samples.
+    """Twins of all fault hypotheses.
 
     Parameters
     ----------
     scene : Scene
         With its load.
     make : callable
-        Hypothesis -> its twin.
-
-    Attributes
-    ----------
-    hypotheses : list of Hypothesis
-    twins : list of Follower
-        One for each of them.
+        Hypothesis, whether the health of its sensors is judged -> its twin.
+    odds : float
+        Posterior probability from which on a cause is named.
+    is_live : bool
+        True if nobody may wait for a verdict: on a busy processor it is given later than `DELAY`.
     """
 
-    def __init__(self, scene: Scene, make: Callable[[Hypothesis], Follower]) -> None:
-        self.hypotheses = hypotheses(scene)
-        self.twins = [make(each) for each in self.hypotheses]
-        self._stamps: list[int] = []
-        self._evidence: list[list[float]] = []
+    def __init__(
+        self, scene: Scene, make: Callable[[Hypothesis, bool], Follower], odds: float = 0.95, is_live: bool = False
+    ) -> None:
+        self._scene, self._make, self._odds, self._is_live = scene, make, odds, is_live
+        self._lasting: dict[str, Alarm] = {}
+        self._pending: list[Any] = []
+        self._second: int | None = None
+        self._taken: dict[tuple[int, int], int] = {}  # stamp of the newest sample taken, by stream and channels
+        self._worker = ThreadPoolExecutor(1, "fault twins")
+        self._results: deque[tuple[int, Future[list[Alarm]]]] = deque()
+        self._recent: deque[_Second] = deque(maxlen=MEMORY)
+        self._change: Change | None = None
+        self._named: dict[Fault, Alarm] = {}
+        self._begin()
+
+    # -- samples in
 
     def take(self, block: Any) -> None:
-        """Let all twins take a block of samples, a second of it at a time."""
-        cuts = (np.flatnonzero(np.diff(block.stamps // SECOND) > 0) + 1).tolist()
-        for rows in map(slice, [0, *cuts], [*cuts, len(block.stamps)]):
-            part = block._replace(streams=block.streams[rows], stamps=block.stamps[rows], values=block.values[rows])
-            for twin in self.twins:
-                twin.update_block(part)
-            self._stamps.append(int(part.stamps[0]))
-            self._evidence.append([twin.evidence for twin in self.twins])
+        """Take a block of samples, in the order in which the twin takes them."""
+        start, seconds = 0, block.stamps // SECOND
+        while start < len(seconds):
+            if self._second is None:
+                self._second = int(seconds[start])
+            is_other = (seconds[start:] > self._second) | (seconds[start:] < self._second - 1)
+            end = start + int(np.argmax(is_other)) if is_other.any() else len(seconds)
+            if end > start:
+                self._pending.append(self._thinned(block, slice(start, end)))
+            if end < len(seconds):
+                self._close()
+            start = end
 
     def change(self, change: Change) -> None:
-        """Repeat a change from the recorded session; each twin adds the load of its hypothesis."""
-        load = change.settings["payload"], change.settings["line_fill"]
-        for each, twin in zip(self.hypotheses, self.twins, strict=True):
-            twin.requests.repeat(replace(change, settings=change.settings | each.load(*load)))
+        """Take a change before the samples that follow."""
+        self._close()
+        self._hand_over(_Second(change.stamp, change=change))
 
-    def judge(self) -> Alarm | None:
-        """Return an alarm with the cause that explains what was read, or None if nothing is wrong or no cause is certain.
+    def _thinned(self, block: Any, rows: slice) -> Any:
+        """Return the samples of part of a block that come at least `SPACING` after the one before of the same channels."""
+        streams, stamps, values = block.streams[rows], block.stamps[rows], block.values[rows]
+        channels = np.isfinite(values) @ (1 << np.arange(values.shape[1]))
+        chosen = list[int]()
+        for row, (code, stamp, there) in enumerate(zip(streams.tolist(), stamps.tolist(), channels.tolist(), strict=True)):
+            if not 0 <= stamp - self._taken.get((code, there), stamp - SPACING) < SPACING:
+                self._taken[code, there] = stamp
+                chosen.append(row)
+        return block._replace(streams=streams[chosen], stamps=stamps[chosen], values=values[chosen])
 
-        Only lost stiffness is named. A load or a sensor that explains the readings as well keeps a name away.
+    def _close(self) -> None:
+        """Give the samples of the last second to the twins."""
+        if parts := [part for part in self._pending if len(part.stamps)]:
+            columns = zip(*((part.streams, part.stamps, part.values) for part in parts), strict=True)
+            streams, stamps, values = map(np.concatenate, columns)
+            block = parts[0]._replace(streams=streams, stamps=stamps, values=values)
+            self._hand_over(_Second((self._second or 0) * SECOND, block))
+        self._pending, self._second = [], None
+
+    def _hand_over(self, second: _Second) -> None:
+        self._results.append((second.stamp + SECOND + DELAY, self._worker.submit(self._follow, second)))
+
+    # -- alarms out
+
+    def news(self, stamp: int) -> list[Alarm]:
+        """Return the alarms that begin or end, by all seconds that ended `DELAY` before a stamp (ns)."""
+        found = list[Alarm]()
+        while self._results and self._results[0][0] <= stamp and (not self._is_live or self._results[0][1].done()):
+            found += self._results.popleft()[1].result()
+        for alarm in found:
+            if alarm.until is None:
+                self._lasting[str(alarm.cause)] = alarm
+            else:
+                del self._lasting[str(alarm.cause)]
+        return found
+
+    @property
+    def alarms(self) -> list[Alarm]:
+        """Alarms that last."""
+        return list(self._lasting.values())
+
+    # -- in the worker's thread
+
+    def _begin(self) -> None:
+        """Make twins of the boom as believed, without each fault that it is known to have, and with each other fault."""
+        known = tuple(self._named)
+        causes = {fault.cause for fault in known}
+        self._faults = [*known, *(fault for fault in possible_faults(self._scene) if fault.cause not in causes)]
+        fewer = [tuple(each for each in known if each is not gone) for gone in known]
+        more = [(*known, fault) for fault in self._faults[len(known) :]]
+        self._hypotheses = [hypothesis(self._scene, faults) for faults in [known, *fewer, *more]]
+        self._twins = [self._made(each, place == 0) for place, each in enumerate(self._hypotheses)]
+        self._decision, self._evidence, self._age = Evidence(self._faults, self._odds), np.zeros(len(self._twins)), 0
+
+    def _made(self, each: Hypothesis, is_judged: bool) -> Follower:
+        twin = self._make(each, is_judged)
+        if self._change is not None:
+            twin.requests.repeat(_changed(self._change, each))
+        return twin
+
+    def _follow(self, second: _Second) -> list[Alarm]:
+        """Let all twins take a second or a change; return the alarm that it begins or ends, if any."""
+        if second.change is not None:
+            self._recent.clear()
+            self._change = second.change
+            for each, twin in zip(self._hypotheses, self._twins, strict=True):
+                twin.requests.repeat(_changed(second.change, each))
+            return []
+        self._recent.append(second)
+        for each, twin in zip(self._hypotheses, self._twins, strict=True):
+            twin.leave_out_as(self._twins[0])
+            twin.update_block(_in_time(second.block, each))
+        before, self._evidence = self._evidence, np.array([twin.evidence for twin in self._twins])
+        grown = self._evidence - before
+        self._age += 1
+        if self._age <= SETTLING:
+            return []
+        verdict = self._decision.take(second.stamp, grown[1:] - grown[0])
+        return [] if verdict is None else self._name(verdict)
+
+    def _name(self, verdict: Verdict) -> list[Alarm]:
+        """Believe in a fault, or in the end of one; return its alarm."""
+        fault = self._faults[verdict.place]
+        if fault in self._named:
+            news = [replace(self._named.pop(fault), until=verdict.onset)]
+        elif fault.cause == "oil.k":
+            self._named[fault], news = Alarm("oil", "softer", verdict.onset, None, fault.cause, ""), []
+        else:
+            sized, spread = self._sized(fault, verdict.onset)
+            if sized.size < CERTAIN * spread:
+                self._decision = Evidence(self._faults, self._odds)
+                return []
+            ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
+            alarm = Alarm(fault.channel, fault.kind, verdict.onset, None, fault.cause, told(sized, spread), ranked)
+            self._named[sized] = alarm
+            news = [alarm]
+        self._begin()
+        return news
+
+    def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float]:
+        """Return a fault with its most likely size, and the standard deviation of that, by twins over the recent seconds.
+
+        The logarithm of the likelihood is a parabola through the best of `SIZES` and its neighbours.
         """
-        stamps = np.array(self._stamps, np.int64)
-        settled = stamps >= stamps[:1] + round(SETTLING * SECOND)  # no evidence is counted before
-        if not settled.any():
-            return None
-        evidence = np.array(self._evidence)[settled]
-        gains = evidence[:, 1:] - evidence[:, :1]
-        onsets = len(gains) - 1 - gains[::-1].argmin(axis=0)  # the latest of the lows
-        rises = gains[-1] - gains.min(axis=0)
-        best = int(np.argmax(rises))
-        causes: dict[str, float] = {"": HEAD_START}
-        for each, rise in zip(self.hypotheses[1:], rises.tolist(), strict=True):
-            causes[each.cause] = max(causes.get(each.cause, 0.0), rise)
-        weights = np.exp(TEMPER * (np.array(list(causes.values())) - max(causes.values())))
-        chances = dict(zip(causes, (weights / weights.sum()).tolist(), strict=True))
-        named = self.hypotheses[1 + best]
-        if chances[named.cause] < NAME_ODDS or not named.is_softer:
-            return None
-        ranked = sorted((Ranked(cause, chance, ()) for cause, chance in chances.items() if cause), key=lambda r: -r.probability)
-        channel = named.cause.partition(".")[0]
-        since = int(stamps[settled][onsets[best] + 1] if onsets[best] else stamps[0])
-        part = "oil spring of " if named.cause.endswith(".k") else ""
-        told = (
-            f"{part}{channel.replace('_', ' ')} is softer than the scene says (probability {chances[named.cause]:.3f}); "
-            "look for air in the oil and loose pins, or cracks"
-        )
-        return Alarm(channel, named.kind, since, None, named.cause, told, tuple(ranked[:3]))
+        if not fault.size:
+            return fault, 0.0
+        sizes = np.array(SIZES) * fault.size
+        totals = []
+        for size in sizes.tolist():
+            each = hypothesis(self._scene, (*self._named, fault._replace(size=size)))
+            twin = self._made(each, False)
+            start = 0.0
+            for second in self._recent:
+                twin.update_block(_in_time(second.block, each))
+                if second.stamp < onset:
+                    start = twin.evidence
+            totals.append(twin.evidence - start)
+        best = min(max(int(np.argmax(totals)), 1), len(sizes) - 2)
+        near = slice(best - 1, best + 2)
+        curve, slope, _ = np.polyfit(sizes[near] - sizes[best], totals[near], 2)
+        if curve >= 0.0:
+            return fault._replace(size=float(sizes[int(np.argmax(totals))])), float(sizes[1] - sizes[0])
+        size = float(np.clip(sizes[best] - 0.5 * slope / curve, sizes[0], sizes[-1]))
+        return fault._replace(size=size), float((-2.0 * TEMPER * curve) ** -0.5)
+
+
+def _in_time(block: Any, each: Hypothesis) -> Any:
+    """Return a block as it comes if streams are as late as a hypothesis says, in the order of time."""
+    if not each.delays:
+        return block
+    stamps = block.stamps.copy()
+    for stream, delay in each.delays:
+        stamps -= round(delay * SECOND) * (block.streams == list(Stream).index(stream))
+    order = np.argsort(stamps, kind="stable")
+    return block._replace(streams=block.streams[order], stamps=stamps[order], values=block.values[order])
+
+
+def _changed(change: Change, each: Hypothesis) -> Change:
+    """Return a change with the load that the boom of a hypothesis has then."""
+    load = each.load(change.settings["payload"], change.settings["line_fill"])
+    return replace(change, settings=change.settings | load)

@@ -12,8 +12,10 @@ from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
 from .angle_reading import AngleReading
 from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows, PredictionRows
+from .causes import explains
 from .delay_monitor import DelayMonitor
 from .deviations import SIGMAS, DeviationMonitor
+from .fault_twins import FaultTwins
 from .force_reading import ForceReading
 from .imu_mount import KNOWN, ImuMount
 from .sensor_check import NOISE_OVER, SensorCheck, sensor_ranges
@@ -38,11 +40,17 @@ class HealthMonitor:
         Mounts of the angle sensors.
     absent : collection of str
         Channels without a sensor, see `boom_twin.Twin`.
+
+    Attributes
+    ----------
+    fault_twins : FaultTwins or None
+        They name causes.
     """
 
     def __init__(
         self, scene: Scene, settings: Settings, mounts: tuple[Mount | None, ...], absent: Collection[str] = ()
     ) -> None:
+        self.fault_twins: FaultTwins | None = None
         self._settings, self._channels = settings, channels_of(len(scene.joints))
         self._ranges = sensor_ranges(scene, mounts)
         self._uncertain = UNCERTAIN * settings.stroke_variance
@@ -123,6 +131,8 @@ class HealthMonitor:
         done = self._blocks.close(stamp)
         news = [alarm for block in done if block.followed for alarm in self._judge(block)]
         news += self._load.take(stamp, *load)
+        if done and self.fault_twins is not None:
+            news += self.fault_twins.news(done[-1].end)
         if not done or not (news or done[-1].end - self._told >= PERIOD or self._told > done[-1].end):
             return None
         self._told = done[-1].end
@@ -136,8 +146,10 @@ class HealthMonitor:
             yield from (alarm for alarm in sensors.alarms if not self._angles.explains(alarm))
         yield from (*self._angles.alarms, *self._forces.alarms)
         yield from (alarm for alarm in (self._mount.alarm, self._delay.alarm, self._load.alarm) if alarm is not None)
-        for deviations in self._deviations.values():
-            yield from deviations.alarms
+        named = [] if self.fault_twins is None else self.fault_twins.alarms
+        for stream, deviations in self._deviations.items():
+            yield from (alarm for alarm in deviations.alarms if not any(explains(each, stream, alarm) for each in named))
+        yield from named
 
     def _judge(self, block: Block) -> list[Alarm]:
         """Return the alarms that a block begins or ends."""

@@ -1,0 +1,136 @@
+"""The decision which fault is named, by made-up gains a second, and by stand-ins for twins."""
+
+import math
+
+import numpy as np
+import pytest
+
+from boom_twin import load_scene
+from boom_twin.health.causes import HEAD_START, MOST_GAIN, TEMPER, Evidence, Fault, hypothesis, possible_faults
+from boom_twin.health.fault_twins import FaultTwins
+from boom_twin.twin.blocks import SampleBlock
+from boom_twin.types import SECOND, Change
+
+SPRING, SECTION, LOAD = (
+    Fault("cylinder_2.k", "softer", 0.25),
+    Fault("section_2.EI", "softer", 0.25),
+    Fault("tip.payload", "more", 20.0),
+)
+ENOUGH = HEAD_START + math.log(19.0) / TEMPER  # nats for odds of 0.95 to 0.05
+
+
+def verdict(faults, gains):
+    """Return the first verdict on gains (seconds, faults), and the second in which it comes."""
+    evidence = Evidence(faults)
+    for second, row in enumerate(gains):
+        if (found := evidence.take(second * SECOND, np.array(row, float))) is not None:
+            return found, second
+    return None, None
+
+
+def test_a_name_needs_its_posterior():
+    """A cause is named once its gain since the onset makes it 19 times as probable as that nothing is wrong."""
+    found, second = verdict([SPRING, SECTION], [[0.0, 0.0]] * 20 + [[5.0, 0.0]] * 30)
+    assert second - 20 + 1 == math.ceil(ENOUGH / 5.0)
+    assert (found.place, found.onset) == (0, 20 * SECOND)
+    assert found.ranked[0] == ("cylinder_2.k", pytest.approx(0.95, abs=0.05))
+    assert sum(chance for _, chance in found.ranked) <= 1.0
+
+
+def test_one_second_is_never_enough():
+    """What rules single seconds, such as a valve that opens under a load, names nothing."""
+    burst = [[0.0, 0.0]] * 20 + [[1e4, 0.0]] * int(ENOUGH / MOST_GAIN) + [[-1.0, 0.0]] * 30
+    assert verdict([SPRING, SECTION], burst) == (None, None)
+
+
+def test_no_name_where_another_cause_explains_as_much():
+    """Two causes that explain the readings alike keep each other's name away; a gap of 25 nats decides."""
+    assert verdict([SPRING, SECTION], [[8.0, 7.8]] * 60) == (None, None)
+    assert verdict([SPRING, SECTION], [[8.0, 6.0]] * 60)[0].place == 0
+
+
+def test_a_load_from_the_start_is_that_of_the_scene():
+    """A load is named if it comes, not if the boom has had it from the start; a soft spring is named either way."""
+    assert verdict([LOAD, SPRING], [[3.0, 0.0]] * 60) == (None, None)
+    found, _ = verdict([LOAD, SPRING], [[1.0, 0.0]] * 20 + [[8.0, 0.0]] * 30)
+    assert (found.place, found.onset) == (0, 20 * SECOND)
+    assert verdict([LOAD, SPRING], [[0.0, 3.0]] * 60)[0].place == 1
+
+
+def test_a_hypothesis_is_the_scene_with_its_faults():
+    """Faults change what they are named after, together, and warm oil softens every cylinder."""
+    scene = load_scene()
+    both = hypothesis(
+        scene, [Fault("cylinder_2.k", "softer", 0.25), Fault("tip_imu.sensor", "off"), Fault("line_fill", "more", 2.0)]
+    )
+    assert both.scene.joints[1].cylinder.k == 0.75 * scene.joints[1].cylinder.k
+    assert both.scene.joints[0] == scene.joints[0]
+    assert both.doubted == {"tip_imu_x", "tip_imu_z"}
+    assert both.load(-1.0, -1.0)["line_fill"] == 2.0
+    assert both.load(30.0, 5.0) == {"payload": 30.0, "line_fill": 7.0}
+    (oil,) = (fault for fault in possible_faults(scene) if fault.cause == "oil.k")
+    for before, warm in zip(scene.joints, hypothesis(scene, [oil]).scene.joints, strict=True):
+        assert warm.cylinder.k == pytest.approx(0.9 * before.cylinder.k)
+
+
+class Follower:
+    """A twin whose evidence grows by nats a second that depend on its boom and on the stamp; keeps the changes it is told."""
+
+    def __init__(self, rate):
+        self.evidence, self.changes, self._rate = 0.0, [], rate
+
+    def update_block(self, block):
+        """Take a second of samples."""
+        self.evidence += self._rate(int(block.stamps[0]) // SECOND)
+
+    def leave_out_as(self, _other):
+        """Leave out nothing."""
+
+    @property
+    def requests(self):
+        return self
+
+    def repeat(self, change):
+        """Keep the change."""
+        self.changes.append(change)
+
+
+def spring_of(each):
+    """Return the share of its stiffness that spring 2 of a hypothesis has lost."""
+    return 1.0 - each.scene.joints[1].cylinder.k / load_scene().joints[1].cylinder.k
+
+
+def test_a_fault_comes_and_goes():
+    """A fault is named with its size from its onset on; the twins that lack it end the alarm where they gain."""
+
+    def made(each, _is_judged):
+        lost = spring_of(each)
+        return Follower(lambda second: -100.0 * (lost - (0.3 if 20 <= second < 60 else 0.0)) ** 2)
+
+    twins, found = FaultTwins(load_scene(), made), []
+    for second in range(120):
+        stamps = np.array([second * SECOND, second * SECOND + SECOND // 2])
+        twins.take(SampleBlock(np.zeros(2, np.int64), stamps, np.zeros((2, 4))))
+        found += twins.news(second * SECOND)
+    begun, ended = found
+    assert (begun.channel, begun.cause, begun.kind, begun.since) == ("cylinder_2", "cylinder_2.k", "softer", 20 * SECOND)
+    assert "by 30 %" in begun.told
+    assert (ended.cause, ended.since, ended.until) == ("cylinder_2.k", begun.since, 60 * SECOND)
+    assert twins.alarms == []
+
+
+def test_a_recorded_load_is_the_load_of_all_twins():
+    """A change of the load while recording reaches every twin, with what its hypothesis adds."""
+    made = []
+
+    def make(each, _is_judged):
+        made.append((each, Follower(lambda _: 0.0)))
+        return made[-1][1]
+
+    twins = FaultTwins(load_scene(), make)
+    twins.change(Change(0, False, {"payload": 30.0, "line_fill": -1.0, "tip_load_limit": 500.0}, {}))
+    twins.news(10 * SECOND)  # waits for the thread
+    for each, twin in made:
+        (change,) = twin.changes
+        assert change.settings["payload"] == pytest.approx(30.0 + each.payload)
+        assert change.settings["tip_load_limit"] == 500.0
