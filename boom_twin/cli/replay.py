@@ -43,9 +43,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     usual = "what is known of this rig while all is well; by default as the session was recorded, else the package's"
     add_file(parser, "--baseline", usual)
-    purpose = (
-        "name what is wrong with the boom, if one cause explains the readings, by twins that have it; takes ten times as long"
-    )
+    purpose = "name causes of what health sees, by twins of booms that have a fault; takes about five times as long"
     parser.add_argument("--causes", action="store_true", help=purpose)
     parser.add_argument("--no-health", action="store_true", help="do not judge the rig's health")
     purpose = "do not write the result bag; output_sha256 of the summary is null then, all else is the same"

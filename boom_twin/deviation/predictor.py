@@ -32,7 +32,7 @@ from .estimate_row import MODES
 from .models import start_models
 from .posture import Posture, linearise, new_posture
 from .sensor_model import mounting_of
-from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, drive_place, new_filters
+from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, drive_place, new_filters, zero_place
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
 WIDTH = 1e-6  # relative accuracy of natural frequencies
@@ -234,11 +234,18 @@ class BoomPredictor:
 
     def doubt(self, channels: Collection[str]) -> None:
         """Allow a large drift of the zeros of these sensors: angles, forces, axes of the IMU."""
-        names = channels_of(self.plan.joints)  # places as zeros stand among the states, mount and scale of the IMU between
+        self.filters.drift[self._zeros_of(channels)] = DOUBTED_DRIFT
+
+    def zeros(self, channels: Collection[str]) -> tuple[Array, Array]:
+        """Return the estimated zeros of these sensors, in their units, and their variances, in the order of the states."""
+        places = zero_place(self.posture) + np.array(self._zeros_of(channels))
+        return self.filters.mean[ESTIMATE, places], self.filters.spread[ESTIMATE, places, places]
+
+    def _zeros_of(self, channels: Collection[str]) -> list[int]:
+        """Return the places of the zeros of these sensors among those of all."""
+        names = channels_of(self.plan.joints)  # mount and scale of the IMU stand between
         places = [*names[Stream.IMU], "", "", *names[Stream.ANGLES], *names[Stream.FORCES]]
-        for place, name in enumerate(places):
-            if name in channels:
-                self.filters.drift[place] = DOUBTED_DRIFT
+        return [place for place, name in enumerate(places) if name in channels]
 
     def rebase(self, shift: int) -> None:
         """Shift stamps by `shift` (ns) from now on."""

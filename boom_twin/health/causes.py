@@ -38,7 +38,8 @@ class Fault(NamedTuple):
     """Fault of a boom.
 
     cause : parameter of the scene, a sensor, or the delay of a stream. kind : ``softer``, ``more``, ``less``, ``off`` or
-    ``late``. size : share that is lost, kg, kg/m, s; 0 of a sensor, whose zero may drift by any amount.
+    ``late``. size : share that is lost, kg, kg/m, s; or the change of a sensor's zero, rad, m/s^2 or N. The hypothesis of such
+    a fault lets the zero drift by any amount.
     """
 
     cause: str
@@ -111,7 +112,8 @@ def possible_faults(scene: Scene) -> list[Fault]:
         found.append(Fault(cause, "more", size))
         if parameter(scene, cause) > 0.0:
             found.append(Fault(cause, "less", size))
-    sensors = [*channels_of(len(scene.joints))[Stream.ANGLES], "tip_imu"]
+    names_of = channels_of(len(scene.joints))
+    sensors = [*names_of[Stream.ANGLES], "tip_imu", *names_of[Stream.FORCES]]
     found += [Fault(f"{name}.sensor", "off") for name in sensors]
     return [*found, Fault(f"{Stream.ANGLES.value}.delay", "late", LATE)]
 
@@ -196,11 +198,14 @@ def told(fault: Fault, spread: float) -> str:
             f"Add that to the delay of {fault.channel} in the mapping."
         )
     if fault.cause == "tip_imu.sensor":
-        return "the tip IMU very likely reads wrong (zero, mount or stamps), or the base tilts. Compare both at rest."
-    number = fault.channel.rpartition("_")[2]
+        size = f"{fault.size:+.2f} m/s^2 (+-{spread:.2f} m/s^2)"
+        return f"the tip IMU very likely reads wrong by {size}: zero, mount or stamps, or the base tilts. Compare both at rest."
+    if fault.channel.startswith("cylinder_force"):
+        return f"{name} very likely reads wrong by {fault.size:+.0f} N (+-{spread:.0f} N). Check the sensor's zero and scale."
+    number, size = fault.channel.rpartition("_")[2], f"{math.degrees(fault.size):+.2f} deg (+-{math.degrees(spread):.2f} deg)"
     return (
-        f"the angle sensor of joint {number} or the stroke transducer of cylinder {number} very likely reads wrong. "
-        "Compare both at rest, then set the zero."
+        f"the angle sensor of joint {number}, or the stroke transducer of its cylinder, very likely reads wrong, "
+        f"by {size} as an angle. Compare both at rest, then set the zero."
     )
 
 

@@ -11,19 +11,24 @@ node and a replay give it with the same sample.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..errors import BoomTwinError
 from ..scene.schema import Scene
-from ..types import SECOND, Alarm, Change, Ranked, Stream
+from ..types import SECOND, Alarm, Array, Change, Ranked, Stream
 from .causes import MEMORY, TEMPER, Evidence, Fault, Hypothesis, Verdict, hypothesis, possible_faults, told
+
+Flags = NDArray[np.bool_]
 
 SIZES = 0.4, 0.7, 1.0, 1.4, 1.8  # times the size of a named fault, by which its true size is found
 CERTAIN = 3.0  # standard deviations of its size that a named fault has at least
+CAME_BACK = 0.3  # of the change of a zero, below which it has come back
 SPACING = 18_000_000  # ns between samples of a stream that fault twins take: 50 Hz tell all that the boom does
 SETTLING = 2  # s from a start in which the filters find vibration and zeros
 DELAY = 2 * SECOND  # ns after the end of a second, at which its verdict is given
@@ -43,15 +48,19 @@ class Follower(Protocol):
     def update_block(self, block: Any, /) -> object:
         """Take the samples of a block."""
 
-    def leave_out_as(self, other: Any, /) -> None:
-        """Leave out the channels that another twin leaves out."""
+    def zeros(self, channels: Collection[str], /) -> tuple[Array, Array]:
+        """Estimated zeros of sensors, and their variances."""
+
+    def leave_out(self, masked: Flags, strokes: Flags, /) -> None:
+        """Leave out measured channels, and strokes."""
 
 
 class _Second(NamedTuple):
-    """Samples of a second that begins at a stamp (ns), or a change before the samples that follow."""
+    """Samples of a second that begins at a stamp (ns), without channels that fail; or a change before those that follow."""
 
     stamp: int
     block: Any = None
+    left_out: tuple[Flags, Flags] | None = None
     change: Change | None = None
 
 
@@ -63,52 +72,50 @@ class FaultTwins:
     scene : Scene
         With its load.
     make : callable
-        Hypothesis, whether the health of its sensors is judged -> its twin.
+        Hypothesis -> its twin.
     odds : float
         Posterior probability from which on a cause is named.
     is_live : bool
         True if nobody may wait for a verdict: on a busy processor it is given later than `DELAY`.
     """
 
-    def __init__(
-        self, scene: Scene, make: Callable[[Hypothesis, bool], Follower], odds: float = 0.95, is_live: bool = False
-    ) -> None:
+    def __init__(self, scene: Scene, make: Callable[[Hypothesis], Follower], odds: float = 0.95, is_live: bool = False) -> None:
         self._scene, self._make, self._odds, self._is_live = scene, make, odds, is_live
         self._lasting: dict[str, Alarm] = {}
         self._pending: list[Any] = []
         self._second: int | None = None
+        self._left_out: tuple[Flags, Flags] | None = None
         self._taken: dict[tuple[int, int], int] = {}  # stamp of the newest sample taken, by stream and channels
         self._worker = ThreadPoolExecutor(1, "fault twins")
         self._results: deque[tuple[int, Future[list[Alarm]]]] = deque()
         self._recent: deque[_Second] = deque(maxlen=MEMORY)
         self._change: Change | None = None
         self._named: dict[Fault, Alarm] = {}
+        self._zeros_before: dict[str, tuple[int, float]] = {}  # place among a sensor's zeros, and its value before the onset
         self._begin()
 
     # -- samples in
 
+    def reach(self, stamp: int, left_out: Callable[[], tuple[Flags, Flags]]) -> None:
+        """Note the stamp (ns) of the next sample; if a second ends there, ask for the channels that are left out by then."""
+        second = stamp // SECOND
+        if self._second is not None and not self._second - 1 <= second <= self._second:
+            self._left_out = left_out()
+            self._close()
+        self._second = second if self._second is None else self._second
+
     def take(self, block: Any) -> None:
-        """Take a block of samples, in the order in which the twin takes them."""
-        start, seconds = 0, block.stamps // SECOND
-        while start < len(seconds):
-            if self._second is None:
-                self._second = int(seconds[start])
-            is_other = (seconds[start:] > self._second) | (seconds[start:] < self._second - 1)
-            end = start + int(np.argmax(is_other)) if is_other.any() else len(seconds)
-            if end > start:
-                self._pending.append(self._thinned(block, slice(start, end)))
-            if end < len(seconds):
-                self._close()
-            start = end
+        """Take samples of one second, in the order in which the twin takes them."""
+        self._pending.append(self._thinned(block))
 
     def change(self, change: Change) -> None:
         """Take a change before the samples that follow."""
         self._close()
         self._hand_over(_Second(change.stamp, change=change))
 
-    def _thinned(self, block: Any, rows: slice) -> Any:
-        """Return the samples of part of a block that come at least `SPACING` after the one before of the same channels."""
-        streams, stamps, values = block.streams[rows], block.stamps[rows], block.values[rows]
+    def _thinned(self, block: Any) -> Any:
+        """Return the samples of a block that come at least `SPACING` after the one before of the same channels."""
+        streams, stamps, values = block.streams, block.stamps, block.values
         channels = np.isfinite(values) @ (1 << np.arange(values.shape[1]))
         chosen = list[int]()
         for row, (code, stamp, there) in enumerate(zip(streams.tolist(), stamps.tolist(), channels.tolist(), strict=True)):
@@ -123,7 +130,7 @@ class FaultTwins:
             columns = zip(*((part.streams, part.stamps, part.values) for part in parts), strict=True)
             streams, stamps, values = map(np.concatenate, columns)
             block = parts[0]._replace(streams=streams, stamps=stamps, values=values)
-            self._hand_over(_Second((self._second or 0) * SECOND, block))
+            self._hand_over(_Second((self._second or 0) * SECOND, block, self._left_out))
         self._pending, self._second = [], None
 
     def _hand_over(self, second: _Second) -> None:
@@ -154,15 +161,22 @@ class FaultTwins:
         """Make twins of the boom as believed, without each fault that it is known to have, and with each other fault."""
         known = tuple(self._named)
         causes = {fault.cause for fault in known}
-        self._faults = [*known, *(fault for fault in possible_faults(self._scene) if fault.cause not in causes)]
-        fewer = [tuple(each for each in known if each is not gone) for gone in known]
-        more = [(*known, fault) for fault in self._faults[len(known) :]]
-        self._hypotheses = [hypothesis(self._scene, faults) for faults in [known, *fewer, *more]]
-        self._twins = [self._made(each, place == 0) for place, each in enumerate(self._hypotheses)]
-        self._decision, self._evidence, self._age = Evidence(self._faults, self._odds), np.zeros(len(self._twins)), 0
+        fewer = [(fault, tuple(each for each in known if each is not fault)) for fault in known if fault.kind != "off"]
+        more = [(fault, (*known, fault)) for fault in possible_faults(self._scene) if fault.cause not in causes]
+        self._faults, self._hypotheses, self._twins = list[Fault](), list[Hypothesis](), list[Follower]()
+        for fault, faults in [(None, known), *fewer, *more]:
+            try:
+                each = hypothesis(self._scene, faults)
+                self._twins.append(self._made(each))
+            except BoomTwinError:  # a boom that cannot be, such as one that its softer part cannot hold
+                continue
+            self._hypotheses.append(each)
+            self._faults += [] if fault is None else [fault]
+        self._decision, self._age = Evidence(self._faults, self._odds), 0
+        self._evidence = np.zeros(len(self._twins))
 
-    def _made(self, each: Hypothesis, is_judged: bool) -> Follower:
-        twin = self._make(each, is_judged)
+    def _made(self, each: Hypothesis) -> Follower:
+        twin = self._make(each)
         if self._change is not None:
             twin.requests.repeat(_changed(self._change, each))
         return twin
@@ -177,13 +191,18 @@ class FaultTwins:
             return []
         self._recent.append(second)
         for each, twin in zip(self._hypotheses, self._twins, strict=True):
-            twin.leave_out_as(self._twins[0])
+            if second.left_out is not None:
+                twin.leave_out(*second.left_out)
             twin.update_block(_in_time(second.block, each))
         before, self._evidence = self._evidence, np.array([twin.evidence for twin in self._twins])
         grown = self._evidence - before
         self._age += 1
         if self._age <= SETTLING:
             return []
+        if (fault := self._back_again()) is not None:
+            news = [replace(self._named.pop(fault), until=second.stamp)]
+            self._begin()
+            return news
         verdict = self._decision.take(second.stamp, grown[1:] - grown[0])
         return [] if verdict is None else self._name(verdict)
 
@@ -196,7 +215,7 @@ class FaultTwins:
             self._named[fault], news = Alarm("oil", "softer", verdict.onset, None, fault.cause, ""), []
         else:
             sized, spread = self._sized(fault, verdict.onset)
-            if sized.size < CERTAIN * spread:
+            if abs(sized.size) < CERTAIN * spread:
                 self._decision = Evidence(self._faults, self._odds)
                 return []
             ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
@@ -206,31 +225,62 @@ class FaultTwins:
         self._begin()
         return news
 
-    def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float]:
-        """Return a fault with its most likely size, and the standard deviation of that, by twins over the recent seconds.
+    def _back_again(self) -> Fault | None:
+        """Return a named fault of a sensor whose zero is nearly what it was before the onset."""
+        for fault in self._named:
+            if fault.kind == "off":
+                axis, before = self._zeros_before[fault.cause]
+                now, _ = self._twins[0].zeros(hypothesis(self._scene, (fault,)).doubted)
+                if abs(now[axis] - before) < CAME_BACK * abs(fault.size):
+                    return fault
+        return None
 
-        The logarithm of the likelihood is a parabola through the best of `SIZES` and its neighbours.
-        """
-        if not fault.size:
-            return fault, 0.0
+    def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float]:
+        """Return a fault with its most likely size, and the standard deviation of that, by twins over the recent seconds."""
+        if fault.kind == "off":
+            return self._change_of_zero(fault, onset)
         sizes = np.array(SIZES) * fault.size
-        totals = []
-        for size in sizes.tolist():
-            each = hypothesis(self._scene, (*self._named, fault._replace(size=size)))
-            twin = self._made(each, False)
-            start = 0.0
-            for second in self._recent:
-                twin.update_block(_in_time(second.block, each))
-                if second.stamp < onset:
-                    start = twin.evidence
-            totals.append(twin.evidence - start)
+        totals = [self._total(fault._replace(size=size), onset) for size in sizes.tolist()]
         best = min(max(int(np.argmax(totals)), 1), len(sizes) - 2)
         near = slice(best - 1, best + 2)
-        curve, slope, _ = np.polyfit(sizes[near] - sizes[best], totals[near], 2)
+        curve, slope, _ = np.polyfit(sizes[near] - sizes[best], totals[near], 2)  # a log likelihood is a parabola at its top
         if curve >= 0.0:
             return fault._replace(size=float(sizes[int(np.argmax(totals))])), float(sizes[1] - sizes[0])
         size = float(np.clip(sizes[best] - 0.5 * slope / curve, sizes[0], sizes[-1]))
         return fault._replace(size=size), float((-2.0 * TEMPER * curve) ** -0.5)
+
+    def _total(self, fault: Fault, onset: int) -> float:
+        """Return the log likelihood of the recent seconds from the onset on; very low if no boom can have that fault."""
+        start = now = 0.0
+        try:
+            for stamp, twin in self._repeated(fault):
+                now = twin.evidence
+                start = now if stamp < onset else start
+        except BoomTwinError:
+            return -1e9
+        return now - start
+
+    def _change_of_zero(self, fault: Fault, onset: int) -> tuple[Fault, float]:
+        """Return a fault of a sensor with the change of its zero since the onset; of an IMU, that of the axis that shows it."""
+        doubted = hypothesis(self._scene, (fault,)).doubted
+        before: Any = None
+        for stamp, twin in self._repeated(fault):
+            now = twin.zeros(doubted)
+            before = now if before is None or stamp < onset else before
+        change, spread = now[0] - before[0], np.sqrt(now[1] + before[1])
+        axis = int(np.argmax(np.abs(change) / spread))
+        self._zeros_before[fault.cause] = axis, float(before[0][axis])
+        return fault._replace(size=float(change[axis])), float(spread[axis])
+
+    def _repeated(self, fault: Fault) -> Iterator[tuple[int, Follower]]:
+        """Run a twin that has a fault over the recent seconds; yield the stamp of each, and the twin after it."""
+        each = hypothesis(self._scene, (*self._named, fault))
+        twin = self._made(each)
+        for second in self._recent:
+            if second.left_out is not None:
+                twin.leave_out(*second.left_out)
+            twin.update_block(_in_time(second.block, each))
+            yield second.stamp, twin
 
 
 def _in_time(block: Any, each: Hypothesis) -> Any:

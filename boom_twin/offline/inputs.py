@@ -20,7 +20,7 @@ from ..bag.session_model import (
 )  # fmt: skip
 from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
-from ..errors import BagError
+from ..errors import BagError, UsageError
 from ..messages.topic_table import Topics
 from ..scene.edit import anew
 from ..scene.load import SceneSource, as_scene
@@ -46,6 +46,10 @@ class ReplayOptions:
     namespace: str = ""
     with_bag: bool = True
     causes: bool = False
+
+    def __post_init__(self) -> None:
+        if self.causes and not self.health:
+            raise UsageError("causes: they are named by health, which is off. Leave health on.")
 
 
 USUAL = ReplayOptions()
@@ -109,11 +113,11 @@ class ReplayInputs:
         incomplete = {"session_incomplete": self.session.incomplete} if self.session.incomplete else {}
         return found | ({} if self.window == WHOLE else window) | incomplete
 
-    def twin(self) -> Twin:
-        """Return a twin for the session."""
+    def twin(self, causes: bool = False) -> Twin:
+        """Return a twin for the session, which names causes of faults if that is asked for."""
         mounts, usual = self.topics.mounts(len(self.scene.joints)), self.baseline
         baseline = None if usual is None else usual.baseline
-        return Twin(self.scene, self.settings, mounts, baseline, self.strokes.reading, self.topics.absent)
+        return Twin(self.scene, self.settings, mounts, baseline, self.strokes.reading, self.topics.absent, causes=causes)
 
     def refuse(self, reason: str) -> None:
         """Raise BagError if there is a `reason` for which the session is of another boom than the scene."""

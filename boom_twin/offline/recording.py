@@ -319,10 +319,6 @@ class Recording:
         """
         return slice(None if self._rows_by_first_clock is None else max(0, self._rows_by_first_clock - before))
 
-    def add_alarm(self, alarm: Alarm) -> None:
-        """Keep an alarm that was found when all samples were read."""
-        self._alarms.all.append(alarm)
-
     def alarms(self) -> list[Alarm]:
         """Return all alarms, each once with its latest values, in the order of their beginning."""
         return sorted(self._alarms.all, key=lambda alarm: alarm.since)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,9 +22,7 @@ from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
 from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
-from ..health.fault_twins import FaultTwins, Hypothesis
 from ..messages.sample_decoder import ODDITIES
-from ..scene.edit import loaded
 from ..scene.load import SceneSource
 from ..system.atomic_files import write_atomic
 from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
@@ -148,7 +146,7 @@ def replay(
         Write the result bag; without it, ``output_sha256`` of the summary is None, and all else is the same.
     causes : bool
         Compare with twins of booms that have a fault, and name the one that explains the readings; see
-        `boom_twin.health.fault_twins`. It takes about ten times as long.
+        `boom_twin.health.fault_twins`. It takes about five times as long.
 
     Returns
     -------
@@ -189,17 +187,16 @@ def replay_into(
     other_boom, refused = OtherBoom(), RefusedStrokes(given.scene, given.kept.source)
     samples = SessionSamples(session, given.topics, given.wanted, joints, options.window)
     with ExitStack() as stack:
-        twin, put = given.twin(), None
+        twin, put = given.twin(options.causes), None
         twin.warm_up()
         if options.with_bag:
             bag_of = result_bag(out / "bag", session.notes, given.topics, given.scene, given.settings)
             put = stack.enter_context(bag_of)
-        fault_twins = _fault_twins(twin) if options.causes else None
         bar = options.progress(given.expected) if options.progress else None
         began = time.perf_counter()
         stack.enter_context(quick_switches())
         items = stack.enter_context(closing(read_ahead(samples)))
-        for step in drive_blocks(twin, _followed(items, options.changes, fault_twins)):
+        for step in drive_blocks(twin, (item for item in items if options.changes or not isinstance(item, Change))):
             if bar is not None:
                 bar.update(1 if step is None else len(step[0].stamps))
             if step is None:
@@ -226,8 +223,6 @@ def replay_into(
             f"and stamps.{_explained(samples.oddities)}{refused.told}"
         )
     recording.close()
-    if fault_twins is not None and (named := fault_twins.judge()) is not None:
-        recording.add_alarm(named)
     if recording.totals.samples == 1 < recording.refused:
         raise BagError(
             f"{session.path}: of {1 + recording.refused} stroke samples only the first could be used ({_told(twin)})."
@@ -266,32 +261,6 @@ def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) 
         else:
             residuals += list(each.residuals.values[each.residuals.streams == code, :joints])
     return block.values[block.streams == code, :joints], residuals
-
-
-def _fault_twins(twin: Twin) -> FaultTwins:
-    """Return twins as `twin` of all that may be wrong with its boom."""
-
-    def make(hypothesis: Hypothesis) -> Twin:
-        settings = twin.settings.tuned(hypothesis.load(*twin.settings.load))
-        boom = hypothesis.scene, settings, twin.mounts
-        return type(twin)(*boom, reads=twin.reads, absent=twin.absent, doubted=hypothesis.doubted)
-
-    return FaultTwins(loaded(twin.scene, *twin.settings.load), make)
-
-
-def _followed(
-    samples: Iterable[SampleBlock | Change | None], with_changes: bool, twins: FaultTwins | None
-) -> Iterator[SampleBlock | Change | None]:
-    """Yield the samples, and the changes if they are wanted; fault twins take them first."""
-    for each in samples:
-        if isinstance(each, Change):
-            if not with_changes:
-                continue
-            if twins is not None:
-                twins.change(each)
-        elif each is not None and twins is not None:
-            twins.take(each)
-        yield each
 
 
 def _explained(counts: Counter[str]) -> str:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..config.settings import Settings
 from ..errors import BoomTwinError, SolverError
 from ..health.baseline import Baseline
+from ..health.causes import Hypothesis
+from ..health.fault_twins import FaultTwins, Follower
 from ..kernels.tables import SENTENCES
 from ..scene.load import SceneSource, as_scene
 from ..types import LIMIT, NANO, SECOND, Array, Change, Mount, Report, Sample, Stream, StrokeReading, channels_of
@@ -40,6 +44,8 @@ class SampleTaker:
         reads: StrokeReading = StrokeReading.LENGTH,
         absent: Collection[str] = (),
         doubted: Collection[str] = (),
+        causes: bool = False,
+        is_live: bool = False,
     ) -> None:
         self.reads, self.absent, scene = reads, frozenset(absent), as_scene(scene)
         self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
@@ -53,6 +59,9 @@ class SampleTaker:
         self.requests = Requests(self.settings)
         self._doubted = frozenset(doubted)
         self._judged = True  # health, with the present sample
+        self._fault_twins: FaultTwins | None = None
+        if causes and baseline is not None:
+            self._fault_twins = FaultTwins(self.scene, self._maker(), self.settings.name_odds, is_live)
         self._begin()
 
     def _begin(self) -> None:
@@ -66,6 +75,27 @@ class SampleTaker:
         self._lines = self._new_lines()
         self._zeros = SensorZeros(self._state, self._channels)
         self._recent = ResidualBuffer(self._state.recent, self._channels)
+
+    def _maker(self) -> Callable[[Hypothesis], Follower]:
+        """Return a function that makes twins of booms with faults, with the settings as they are now."""
+        kind: Any = type(self)
+        settings = self.settings
+
+        def make(each: Hypothesis) -> Follower:
+            boom = each.scene, settings.tuned(each.load(*settings.load)), self.mounts
+            twin: Follower = kind(*boom, reads=self.reads, absent=self.absent, doubted=each.doubted)
+            return twin
+
+        return make
+
+    def _failing(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return the measured channels and the strokes that health leaves out by now."""
+        assert self.judge is not None
+        return self.judge.suspected, self.judge.failing_strokes
+
+    def leave_out(self, masked: NDArray[np.bool_], strokes: NDArray[np.bool_]) -> None:
+        """Leave out measured channels (in the order of the streams), and strokes, from now on."""
+        self._boom.leave_out(masked, strokes)
 
     def _restart(self) -> None:
         """Forget all samples; see `boom_twin.twin.twin.Twin.reset`."""
@@ -84,6 +114,8 @@ class SampleTaker:
         """Use this model, which has the present load, in place of that of `before`."""
         self._boom, self.judge = model.boom, model.judge
         self._boom.doubt(self._doubted)
+        if self.judge is not None:
+            self.judge.fault_twins = self._fault_twins
         self.plan = self._boom.plan
         parts = self._boom, model.limits, self._state, self._channels, self.judge
         self._former = before  # let go of when the next model is made, which may be in a thread of its own

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from ..config.settings import Settings
 from ..errors import UsageError
 from ..health.monitor import warm_up
 from ..scene.kinematics import strokes_of_angles
-from ..types import Health, Report, Sample, Stream
+from ..types import SECOND, Array, Health, Report, Sample, Stream
 from .block_update import CAPACITY
 from .blocks import CODES, STREAMS, ReportBlock, SampleBlock
 from .loaded_model import LoadedModel
@@ -36,7 +38,11 @@ class Twin(SampleTaker):
     absent : collection of str
         Channels without a sensor, such as ``joint_3``: no reading of them is missed.
     doubted : collection of str
-        Channels of angle sensors and of the IMU whose zeros may drift by any amount.
+        Channels of angle sensors, of forces and of the IMU whose zeros may drift by any amount.
+    causes : bool
+        With a baseline, causes of faults are named, see `boom_twin.health.fault_twins`.
+    is_live : bool
+        True if no sample may wait for the name of a cause.
 
     Attributes
     ----------
@@ -127,6 +133,21 @@ class Twin(SampleTaker):
         """
         return self._model(settings)
 
+    def zeros(self, channels: Collection[str]) -> tuple[Array, Array]:
+        """Return what sensors of angles, IMU and forces are estimated to read too much, and the variances of that.
+
+        Parameters
+        ----------
+        channels : collection of str
+            Names such as ``joint_2``; the results are in the order IMU, angles, forces.
+
+        Returns
+        -------
+        values, variances : ndarray, shape (channels,)
+            m/s^2, rad, N, and their squares.
+        """
+        return self._boom.zeros(channels)
+
     def warm_up(self) -> None:
         """Compile every kernel, with a temporary twin of the same boom."""
         other = Twin(self.scene, self.settings, reads=self.reads)
@@ -162,12 +183,24 @@ class Twin(SampleTaker):
             channel. Nothing has changed then.
         """
         sample, self._judged = self._edge.checked(sample), judged
+        if self._fault_twins is not None:
+            self._fault_twins.reach(sample.stamp, self._failing)
         if self._run is None or (self.requests.due and sample.stream is Stream.STROKES):
-            return self._look_at(sample)
+            return self._told(sample, self._look_at(sample))
         reason = self._advance_one(sample)
         if reason == DONE:
-            return self._compiled.report(sample.stamp, (), judged)
-        return self._fail(sample, []) if reason == FAILED else self._look_at(sample)
+            return self._told(sample, self._compiled.report(sample.stamp, (), judged))
+        return self._told(sample, self._fail(sample, []) if reason == FAILED else self._look_at(sample))
+
+    def _told(self, sample: Sample, report: Report) -> Report:
+        """Return the report of a sample, after the fault twins are given both."""
+        if self._fault_twins is not None:
+            if report.change is not None:
+                self._fault_twins.change(report.change)
+            values = np.full((1, max(self._widths)), np.nan)
+            values[0, : len(sample.values)] = sample.values
+            self._fault_twins.take(SampleBlock(np.array([CODES[sample.stream]]), np.array([sample.stamp]), values))
+        return report
 
     @property
     def is_health_due(self) -> bool:
@@ -204,15 +237,23 @@ class Twin(SampleTaker):
         while row < size:
             if self._run is not None and self._edge.is_sure and not self.requests.due:
                 end = row + CAPACITY
+                if self._fault_twins is not None:  # they take a second before its verdict may be asked for
+                    self._fault_twins.reach(int(block.stamps[row]), self._failing)
+                    is_later = block.stamps[row:end] // SECOND != block.stamps[row] // SECOND
+                    end = row + int(is_later.argmax()) if is_later.any() else end
                 part = SampleBlock(block.streams[row:end], block.stamps[row:end], block.values[row:end])
                 reason, done = self._compiled.advance(self._run, part)
                 if done:
                     found += self._compiled.reports(part.stamps[:done])
+                    if self._fault_twins is not None:
+                        self._fault_twins.take(SampleBlock(part.streams[:done], part.stamps[:done], part.values[:done]))
                 row += done
                 if reason == DONE:
                     continue
                 sample = self._sample(block, row, channels)
-                found.append(self._fail(sample, []) if reason == FAILED else self._look_at(sample))
+                if self._fault_twins is not None:
+                    self._fault_twins.reach(sample.stamp, self._failing)
+                found.append(self._told(sample, self._fail(sample, []) if reason == FAILED else self._look_at(sample)))
             else:
                 found.append(self.update(self._sample(block, row, channels)))
             row += 1

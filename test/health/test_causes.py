@@ -83,8 +83,9 @@ class Follower:
         """Take a second of samples."""
         self.evidence += self._rate(int(block.stamps[0]) // SECOND)
 
-    def leave_out_as(self, _other):
+    def leave_out(self, masked, strokes):
         """Leave out nothing."""
+        assert not masked.any() and not strokes.any()
 
     @property
     def requests(self):
@@ -103,13 +104,14 @@ def spring_of(each):
 def test_a_fault_comes_and_goes():
     """A fault is named with its size from its onset on; the twins that lack it end the alarm where they gain."""
 
-    def made(each, _is_judged):
+    def made(each):
         lost = spring_of(each)
         return Follower(lambda second: -100.0 * (lost - (0.3 if 20 <= second < 60 else 0.0)) ** 2)
 
     twins, found = FaultTwins(load_scene(), made), []
     for second in range(120):
         stamps = np.array([second * SECOND, second * SECOND + SECOND // 2])
+        twins.reach(second * SECOND, lambda: (np.zeros(10, bool), np.zeros(4, bool)))
         twins.take(SampleBlock(np.zeros(2, np.int64), stamps, np.zeros((2, 4))))
         found += twins.news(second * SECOND)
     begun, ended = found
@@ -123,7 +125,7 @@ def test_a_recorded_load_is_the_load_of_all_twins():
     """A change of the load while recording reaches every twin, with what its hypothesis adds."""
     made = []
 
-    def make(each, _is_judged):
+    def make(each):
         made.append((each, Follower(lambda _: 0.0)))
         return made[-1][1]
 
