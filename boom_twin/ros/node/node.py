@@ -174,7 +174,8 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         settings, joints = current(self, Settings), len(scene.joints)
         topics = load_mapping(path_of(self, "mapping"), joints).of_joints(joint.range_deg for joint in scene.joints)
         mounts, baseline = topics.mounts(joints), baseline_of(self)
-        twin = Twin(scene, settings, mounts, baseline, reads=topics.stroke_reading, absent=topics.absent)
+        reads, absent, causes = topics.stroke_reading, topics.absent, self.get_parameter("causes").value
+        twin = Twin(scene, settings, mounts, baseline, reads, absent, causes=causes, is_live=True)
         self._log.info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
         import_module("scipy.special")  # of the first alarm and the first pause, whose samples would wait for it for 0.3 s

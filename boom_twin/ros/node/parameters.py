@@ -46,6 +46,7 @@ TABLE = (
     ParameterRow("scene", "", "path of the scene file; empty: the scene of the package", FIXED),
     ParameterRow("mapping", "", "path of the file of topics and sensors; empty: topics.yaml", AT_START),
     ParameterRow("health", True, "judge the rig's health: ~/health, ~/tip/uncertainty", FIXED),
+    ParameterRow("causes", True, "name causes of what health sees, by twins of booms that have a fault", FIXED),
     ParameterRow("baseline", "", "path of what is known of the rig while all is well; empty: the package's", FIXED),
     ParameterRow("frame_prefix", "", "put before the frame of all outputs, as robot_state_publisher does: front/", FIXED),
     ParameterRow("hardware_id", "", "of the boom, in every status of /diagnostics; empty: the node's name", AT_START),
