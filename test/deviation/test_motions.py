@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from deviation.motions import measured, rms, true_motion
 
-from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.config.settings import load_settings
+from boom_twin import Sample, Stream, Twin, load_scene, load_settings
 from boom_twin.errors import UsageError
 from boom_twin.health.baseline import load_baseline
 from boom_twin.offline.recording import Recording

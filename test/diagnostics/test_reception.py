@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
+from boom_twin import Stream
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
 from boom_twin.diagnostics.recorder_status import DiskState, TopicCount, recording_status
 from boom_twin.diagnostics.topic_status import Peers, Reception, ReceptionWatch, publishers_status
-from boom_twin.types import Stream
 
 
 def begun(judge: ComponentJudge, now: float = 0.0) -> ComponentJudge:

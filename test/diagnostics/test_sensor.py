@@ -7,13 +7,12 @@ from math import inf, isnan, nan
 import numpy as np
 import pytest
 
-from boom_twin.config.settings import Settings, Thresholds
+from boom_twin import Sample, Settings, Stream, load_scene
+from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level
 from boom_twin.diagnostics.sensor_status import SensorSpec, sensor_status, sensors_of
 from boom_twin.diagnostics.stream_stats import Channel, ChannelStats, StreamWatch
 from boom_twin.health.sensor_check import readings_of_frozen
-from boom_twin.scene import load_scene
-from boom_twin.types import Sample, Stream
 
 SECOND = 1_000_000_000
 NOISE = np.random.default_rng(0).normal(0.0, 1.0, 200)

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from drive_twin import drive_twin
 
-from boom_twin.config.settings import Settings, Thresholds
+from boom_twin import Report, Sample, Settings, Stream, load_scene
+from boom_twin.config.settings import Thresholds
 from boom_twin.deviation.estimate_row import WIDTH
 from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
 from boom_twin.diagnostics.model_status import stress_model, stress_status
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import estimate_of
-from boom_twin.types import Report, Residuals, Sample, Stream
+from boom_twin.types import Residuals
 
 NAMES = {stream: stream.value for stream in Stream}
 REQUIRED = {stream: stream in (Stream.STROKES, Stream.ANGLES) for stream in Stream}

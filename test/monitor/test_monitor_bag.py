@@ -13,13 +13,11 @@ from drive_twin import note_drives
 from monitor.conftest import GAP, read_all
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from boom_twin import statics
+from boom_twin import Settings, TimeWindow, load_scene, replay, statics
 from boom_twin.analysis.posture_modes import ModeList
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_session
 from boom_twin.bag.session_sheet import SessionSheet
-from boom_twin.bag.time_window import TimeWindow
-from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError, UsageError
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.messages.type_store import jazzy, new_message
@@ -28,8 +26,6 @@ from boom_twin.monitor.data.bag_feed import PUBLISHED_OUTPUT, bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
 from boom_twin.monitor.data.status import Severity, overall
 from boom_twin.monitor.protocol import state
-from boom_twin.offline.replay import replay
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.types import StrokeReading
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boom_twin import Stream
 from boom_twin.messages.report_encoder import encode_health
 from boom_twin.messages.topic_table import TYPES, Output, Topic, load_topics
 from boom_twin.messages.type_store import jazzy, new_message
@@ -27,7 +28,7 @@ from boom_twin.monitor.data.status import MAX_NODES
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.data.topic_rows import MAX_WAITING, PartsOfRows
 from boom_twin.monitor.protocol import dump, layout, state
-from boom_twin.types import Alarm, Health, Ranked, Stream
+from boom_twin.types import Alarm, Health, Ranked
 
 TOPICS = load_topics()
 EPOCH, STEP = 1_700_000_000 * 10**9, 5_000_000

@@ -18,7 +18,7 @@ from aiohttp import ClientSession, ClientWebSocketResponse, CookieJar, WSMsgType
 from aiohttp.test_utils import TestServer
 from monitor.test_monitor_lamps import ERROR, OK, status
 
-from boom_twin import statics
+from boom_twin import load_scene, statics
 from boom_twin.errors import BagError
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.access_control import AccessControl
@@ -28,7 +28,6 @@ from boom_twin.monitor.data.bag_feed import BagFeed
 from boom_twin.monitor.data.feed import Feed, SessionList, sessions_in
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.server import MAX_VIEWERS, Server
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 
 Talk = Callable[[ClientSession, str], Awaitable[None]]

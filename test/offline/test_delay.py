@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin import load_scene, replay
+from boom_twin import Stream, load_scene, replay
 from boom_twin.bag.reader import read_both, scan
 from boom_twin.bag.session_sheet import SessionSheet
 from boom_twin.bag.writer import SessionWriter
@@ -15,7 +15,7 @@ from boom_twin.messages.mapping import mapping_from
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import TYPES, load_topics
 from boom_twin.messages.type_store import fill_header, jazzy, new_message
-from boom_twin.types import NANO, SECOND, Stream
+from boom_twin.types import NANO, SECOND
 
 SESSION = Path(__file__).parents[2] / "bags" / "pump_session"
 FIRST = 1500

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin import load_scene, replay
+from boom_twin import Stream, load_scene, replay
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_session
 from boom_twin.bag.session_sheet import SessionSheet
@@ -16,7 +16,6 @@ from boom_twin.cli.main import main
 from boom_twin.errors import UsageError
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.messages.type_store import fill_header, new_message
-from boom_twin.types import Stream
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 JOINT_STATE = "sensor_msgs/msg/JointState"

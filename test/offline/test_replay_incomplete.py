@@ -14,11 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin import load_scene, replay
+from boom_twin import Settings, load_scene, replay
 from boom_twin.bag.reader import scan
 from boom_twin.bag.session_files import write_session
 from boom_twin.cli.main import main
-from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.offline.inputs import ReplayOptions

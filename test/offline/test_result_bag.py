@@ -12,9 +12,8 @@ import pytest
 from drive_twin import drive_twin
 from messages.random_reports import Told, boom, random_reports
 
-from boom_twin import Sample, Stream, load_scene
+from boom_twin import Report, Sample, Settings, Stream, load_scene
 from boom_twin.bag.writer import FILE_NAME, RESULT_CHUNK_SIZE, SessionWriter
-from boom_twin.config.settings import Settings
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.offline.threads import result_bag
@@ -22,7 +21,6 @@ from boom_twin.predictions import Prediction
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.schema import Clearance, Pin
 from boom_twin.twin.blocks import ReportBlock, report_block
-from boom_twin.types import Report
 
 
 def test_a_prediction_with_clearance_comes_through_whole() -> None:

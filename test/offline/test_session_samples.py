@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, IndexType, Writer
 
+from boom_twin import Sample, Stream
 from boom_twin.bag.reader import scan
 from boom_twin.bag.session_file import REMEDY
 from boom_twin.errors import BagError
@@ -20,7 +21,7 @@ from boom_twin.messages.topic_table import TYPES, Output, Topics, load_topics
 from boom_twin.messages.type_store import decode, jazzy
 from boom_twin.offline.session_samples import Changes, SessionSamples
 from boom_twin.twin.blocks import samples_in
-from boom_twin.types import Change, Sample, Stream
+from boom_twin.types import Change
 
 JOINTS = 3
 START = 1_700_000_000_000_000_000

@@ -12,14 +12,13 @@ import pytest
 from drive_twin import note_drives
 from offline.booms_apart import as_document, scene_text, session
 
-from boom_twin import load_scene, replay
+from boom_twin import Report, Sample, Settings, Stream, load_scene, replay
 from boom_twin.bag.reader import scan
 from boom_twin.bag.session_model import baseline_of, scene_of
 from boom_twin.bag.session_sheet import FILE_NAME, SessionSheet, kept, sha256
 from boom_twin.bag.writer import SessionWriter
 from boom_twin.cli.main import main
 from boom_twin.cli.output import warn_incomplete
-from boom_twin.config.settings import Settings
 from boom_twin.diagnostics.boom_mismatch import JUDGED_TIME, LARGEST_RESIDUAL, OtherBoom
 from boom_twin.errors import BagError
 from boom_twin.messages.sample_decoder import SampleDecoder
@@ -27,7 +26,7 @@ from boom_twin.messages.topic_table import load_topics
 from boom_twin.messages.type_store import fill_header, new_message
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.scene.load import DEFAULT_NAME, default_text
-from boom_twin.types import Report, Residuals, Sample, Stream
+from boom_twin.types import Residuals
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 FAULTY = "sections: []\n"

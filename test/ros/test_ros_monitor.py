@@ -19,13 +19,14 @@ from rcl_interfaces.msg import Log
 from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger
 
+from boom_twin import Stream
 from boom_twin.messages.report_encoder import encode_health
 from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.monitor.actions import AT_NODE, ViewerActions
 from boom_twin.monitor.data.status import Severity, overall
 from boom_twin.ros.monitor_feed import TopicFeed
 from boom_twin.ros.runtime import message_class, qos_profile
-from boom_twin.types import Alarm, Health, Ranked, Stream
+from boom_twin.types import Alarm, Health, Ranked
 
 TOPICS = load_topics()
 EPOCH = 1_700_000_000

@@ -24,7 +24,7 @@ from ros_rig import all_stored, published
 from rosbags.highlevel import AnyReader
 from ruamel.yaml import YAML
 
-from boom_twin import Settings, load_scene, load_settings, replay
+from boom_twin import Settings, Stream, load_scene, load_settings, replay
 from boom_twin.bag.reader import read_both, scan
 from boom_twin.bag.writer import SessionWriter
 from boom_twin.messages.report_encoder import decode_changes
@@ -34,7 +34,6 @@ from boom_twin.messages.type_store import jazzy
 from boom_twin.ros.bag.player import Player
 from boom_twin.ros.bag.recorder import COMPLETE
 from boom_twin.scene.load import default_text
-from boom_twin.types import Stream
 
 ROOT = Path(__file__).parents[2]
 PARAMETERS = ROOT / "msg_config" / "twin.yaml"

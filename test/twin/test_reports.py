@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, load_scene
+from boom_twin import Report, Sample, Scene, Stream, load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.schema import Scene
-from boom_twin.types import Report
 
 
 def reports(scene: Scene, count: int = 120) -> list[Report]:
