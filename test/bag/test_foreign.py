@@ -80,13 +80,6 @@ def test_types_are_known_by_their_other_names(bag: Path, tmp_path: Path, content
     assert content(scan(path)) == content(scan(bag))
 
 
-def test_topics_of_dds_are_told_as_that(bag: Path, tmp_path: Path) -> None:
-    path = write(tmp_path / "dds.mcap", [("rt" + topic, *rest) for topic, *rest in messages(bag)], NAMES["dds"])
-    with pytest.raises(BagError, match=r"names are those of DDS, not of ROS: give rt/cylinder_strokes .* in a mapping"):
-        read(scan(path), {"cylinder_strokes": JOINT_STATE})
-    assert len(list(read(scan(path), {"rt/cylinder_strokes": JOINT_STATE}))) == 40
-
-
 def test_what_is_of_another_type_or_encoding_is_passed_over(
     bag: Path, tmp_path: Path, content: Content, capsys: pytest.CaptureFixture[str]
 ) -> None:
