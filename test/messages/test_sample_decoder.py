@@ -105,16 +105,6 @@ def test_an_imu_gives_x_and_z(x: float, covariance: float, values: list[float] |
         np.testing.assert_array_equal(sample.values, values)
 
 
-def test_real_messages_of_rclpy_are_taken() -> None:
-    messages = pytest.importorskip("sensor_msgs.msg")
-    sample = SampleDecoder(2).put(Stream.ANGLES, 1, messages.JointState(name=["joint_2", "joint_1"], position=[0.2, 0.1]))
-    assert sample is not None and sample.values.tolist() == [0.1, 0.2]
-    force = messages.Imu()
-    force.linear_acceleration.x, force.linear_acceleration.z = 1.5, 9.5
-    sample = SampleDecoder(2).put(Stream.IMU, 1, force)
-    assert sample is not None and sample.values.tolist() == [1.5, 9.5]
-
-
 @pytest.mark.parametrize(("stamp", "name"), [(-1, "impossible stamp"), (2**31 * 10**9, "impossible stamp"), (0, "no stamp")])
 def test_impossible_stamps_give_no_sample(stamp: int, name: str) -> None:
     decoder = SampleDecoder(1)
