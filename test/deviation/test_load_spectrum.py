@@ -7,11 +7,7 @@ import pytest
 
 from boom_twin.deviation.load_spectrum import (
     LEAST,
-    LOBE,
-    LOWEST,
-    PADDED,
     TipLoadFinder,
-    _prominences,
     find_pulses,
     tip_load,
 )
@@ -96,17 +92,3 @@ def test_parts_give_what_the_whole_gives() -> None:
     assert whole.load.pulses.frequency == pytest.approx(0.31, rel=0.02)
     assert whole.load.pulses.height == pytest.approx(90.0, rel=0.1)
     assert len(parts._loads) < 80 * RATE + 1
-
-
-def test_a_peak_stands_out_by_as_much_as_its_neighbours_mean_says() -> None:
-    """Sums of the neighbourhood against the mean of what a mask leaves, side by side."""
-    span, random = 40.0, np.random.default_rng(3)
-    frequencies, power = np.arange(3200.0) / (PADDED * span), random.exponential(1.0, 3200)
-    places = np.flatnonzero(frequencies > LOWEST / span)[5:900:7]
-    found = _prominences(frequencies, power, places, span)
-    for place, ratio in zip(places.tolist(), found.tolist(), strict=True):
-        at, lobe = frequencies[place], LOBE / span
-        below = (frequencies > 0.5 * at) & (frequencies < at - lobe)
-        above = (frequencies > at + lobe) & (frequencies < max(2.0 * at - lobe, at + 3.0 * lobe))
-        level = max(power[side].mean() for side in (below, above) if side.any())
-        assert ratio == pytest.approx(power[place] / level, rel=1e-9)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import pickle
 
 import numpy as np
@@ -52,17 +51,3 @@ def test_a_report_can_be_sent_to_another_process(given: list[Report]) -> None:
 def test_later_samples_change_no_report() -> None:
     at_once = [repr(report) for report in map(drive_twin(load_scene()).update, plain())]
     assert [repr(report) for report in list(map(drive_twin(load_scene()).update, plain()))] == at_once
-
-
-def test_a_copy_of_a_twin_goes_on_by_itself() -> None:
-    samples = plain()
-    twin = drive_twin(load_scene())
-    whole = [repr(twin.update(sample)) for sample in samples]
-    twin = drive_twin(load_scene())
-    for sample in samples[:60]:
-        twin.update(sample)
-    other = copy.deepcopy(twin)
-    for sample in reversed(samples):
-        twin.update(sample)
-    del twin
-    assert [repr(other.update(sample)) for sample in samples[60:]] == whole[60:]
