@@ -14,7 +14,6 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import Log
 from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger
@@ -23,7 +22,7 @@ from boom_twin import Stream
 from boom_twin.messages.report_encoder import encode_health
 from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.monitor.actions import AT_NODE, ViewerActions
-from boom_twin.monitor.data.status import Severity, overall
+from boom_twin.monitor.data.status import Severity
 from boom_twin.ros.monitor_feed import TopicFeed
 from boom_twin.ros.runtime import message_class, qos_profile
 from boom_twin.types import Alarm, Health, Ranked
@@ -90,59 +89,6 @@ def pair(domain: None) -> Iterator[tuple[Any, Rig]]:
     yield feed, rig
     feed.close()
     rig.node.destroy_node()
-
-
-def test_rows_lamps_and_losses_come_from_the_topics(pair: tuple[Any, Rig]) -> None:
-    feed, rig = pair
-
-    def displacement(message: Any) -> None:
-        message.vector.x, message.vector.z = 0.5, -0.25
-
-    def measured(message: Any) -> None:
-        message.linear_acceleration.x, message.linear_acceleration.z = 1.0, 9.0
-
-    def residual(message: Any) -> None:
-        message.name = ["tip_imu_x", "tip_imu_z"]
-        message.position, message.velocity, message.effort = [0.25, -0.5], [1.0, -2.0], [0.25, 0.25]
-
-    def told(message: Any) -> None:
-        message.status = [DiagnosticStatus(name="boom_twin: model", level=DiagnosticStatus.ERROR, message="no pivot")]
-
-    rig.send(Output.TIP_DISPLACEMENT, 5_000_000, displacement)
-    until(feed, lambda: "displacement" in feed.store.tables)
-    assert feed.store.epoch == EPOCH * 10**9 + 5_000_000
-    assert feed.store.tables["displacement"].rows(0, 1)[1].tolist() == [[0.5, -0.25]]
-    for number, stamp in enumerate((10_000_000, 15_000_000), 1):
-        rig.send(Stream.IMU, stamp, measured)
-        rig.send(Output.RESIDUALS, stamp, residual)
-        until(feed, lambda number=number: "force" in feed.store.tables and feed.store.tables["force"].count == number)
-    times, values = feed.store.tables["force"].rows(0, 1)
-    assert times[0] == pytest.approx(0.005) and values.tolist() == [[1.0, 9.0, 0.75, 9.5, 0.25, 0.25]]
-
-    rig.send(Output.DIAGNOSTICS, 0, told)
-    until(feed, lambda: feed.store.statuses(0.0).nodes)
-    now = feed.now()
-    assert overall(feed.store.statuses(now).groups(now)) == (Severity.ERROR, "model: no pivot")
-    assert overall(feed.store.statuses(now).groups(now + 10.0))[0] == Severity.STALE
-
-    rig.send(Output.TIP_DISPLACEMENT, 20_000_000, lambda message: setattr(message.vector, "x", float("nan")))
-    rig.publishers[Output.SHAPE].publish(b"\x00\x01\x00\x00" + b"\xff" * 40)
-    lost = {TOPICS.outputs[role].absolute for role in (Output.TIP_DISPLACEMENT, Output.SHAPE)}
-    until(feed, lambda: {loss["topic"] for loss in feed.topic_rows.dropped.losses()} == lost)
-    rig.send(Output.TIP_DISPLACEMENT, 25_000_000, displacement)
-    until(feed, lambda: feed.store.tables["displacement"].count == 2)
-
-
-def test_an_event_is_published_with_the_stamp_of_the_newest_row_and_shown(pair: tuple[Any, Rig]) -> None:
-    feed, rig = pair
-    rig.send(Output.TIP_DISPLACEMENT, 30_000_000, lambda message: None)
-    until(feed, lambda: feed.store.newest > 0.024)
-    until(feed, lambda: rig.node.count_subscribers(TOPICS.events.absolute) == 2)
-    feed.publish("mark: hose moved")
-    until(feed, lambda: rig.events, rig)
-    event = rig.events[0]
-    assert (event.msg, event.stamp.sec, event.stamp.nanosec) == ("mark: hose moved", EPOCH, 30_000_000)
-    until(feed, lambda: any(alarm.name == "event" for alarm in feed.store.alarms.all))
 
 
 def test_alarms_come_from_their_topic_and_the_node_lets_go_of_what_ended_with_permission(pair: tuple[Any, Rig]) -> None:
