@@ -135,18 +135,6 @@ def test_replay_report_and_page(scene, bag, tmp_path, monkeypatch):
     assert table["residuals"] == {"title": "cylinder forces", "factor": 1.0, "unit": "N"}
 
 
-def test_names_signs_and_units_of_a_rig(scene, samples, bag, tmp_path):
-    mapped = [Sample(FORCES, each.stamp, -1e-3 * each.values) if each.stream is FORCES else each for each in samples]
-    write_samples(tmp_path / "rig", mapped, (Stream.STROKES, Stream.ANGLES, FORCES), {"origin": "synthetic, a test"})
-    mapping = tmp_path / "mapping.yaml"
-    rows = "\n".join(f"  {name}: {{unit: kN, sign: -1}}" for name in CHANNELS)
-    mapping.write_text(f"inputs: {{cylinder_strokes: {{reads: drive}}}}\nsensors:\n{rows}\n")
-    usual = replay(bag, scene, tmp_path / "usual", health=False)
-    found = replay(tmp_path / "rig", scene, tmp_path / "found", mapping=mapping, health=False)
-    expected = usual.recording.of(FORCES).values
-    assert found.recording.of(FORCES).values == pytest.approx(expected, abs=1e-6) and len(expected) == COUNT
-
-
 def test_forces_of_another_boom_are_refused(scene, samples, tmp_path):
     others = [Sample(FORCES, e.stamp, np.append(e.values, 0.0)) if e.stream is FORCES else e for e in samples[:300]]
     write_samples(tmp_path / "bag", others, (Stream.STROKES, Stream.ANGLES, FORCES), {"origin": "synthetic, a test"})

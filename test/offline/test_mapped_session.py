@@ -94,16 +94,6 @@ def test_a_recording_is_replayed_with_its_own_mapping(rig, usual, tmp_path):
     np.testing.assert_allclose(angles.values, expected.values[rows], atol=1e-9)
 
 
-def test_the_mapping_can_be_given_instead(rig, tmp_path, capsys):
-    (tmp_path / "own.yaml").write_text(MAPPING.replace("zero: 1200.0", "zero: 1201.0"))
-    arguments = ["replay", str(rig), "--out", str(tmp_path / "out"), "--no-pictures", "--mapping", str(tmp_path / "own.yaml")]
-    assert main(arguments) == 0
-    assert f"mapping            {tmp_path / 'own.yaml'}" in capsys.readouterr().out
-    moved = replay(rig, load_scene(), tmp_path / "as recorded").recording.predictions.one(0)
-    first = replay(rig, load_scene(), tmp_path / "again", mapping=tmp_path / "own.yaml").recording.predictions.one(0)
-    assert first.strokes[0] - moved.strokes[0] == pytest.approx(1e-3, abs=1e-9)
-
-
 def test_a_mapping_for_another_boom_is_refused(rig, tmp_path):
     (tmp_path / "own.yaml").write_text("sensors: {joint_7: {}}")
     with pytest.raises(UsageError, match="the scene has 4 joints"):

@@ -246,16 +246,3 @@ def strokes(rows: int) -> list[Entry]:
     """Messages that are laid out alike."""
     rig, topic = Rig(np.random.default_rng(1), odd=0.0), load_topics().inputs[Stream.STROKES]
     return [(log, topic.absolute, rig.message(topic.type, log, USUAL)) for log in range(START, START + STEP * rows, STEP)]
-
-
-def test_a_message_at_fault_is_told_before_a_chunk_that_comes_later(tmp_path: Path) -> None:
-    topics, entries = load_topics(), strokes(50)
-    log, name, data = entries[3]
-    entries[3] = (log, name, data[:-9])
-    write(tmp_path / "bag", [entries], FILES[:1], topics)
-    file = tmp_path / "bag" / "session_0.mcap"
-    whole = file.read_bytes()
-    last = whole.rindex(b"cylinder_1")
-    file.write_bytes(whole[:last] + b"cylinder_3" + whole[last + 10 :])
-    with pytest.raises(BagError, match=f"at log time {log} ns"):
-        list(SessionSamples(scan(tmp_path / "bag"), topics, [topics.inputs[Stream.STROKES].name], JOINTS))
