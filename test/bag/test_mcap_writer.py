@@ -12,7 +12,6 @@ from mcap.writer import CompressionType, Writer
 
 from boom_twin.bag.mcap_writer import McapWriter
 from boom_twin.messages.encoded_block import EncodedBlock, EncodedRows
-from boom_twin.messages.topic_table import Qos, Topic
 
 CHUNK = 2000
 Message = tuple[int, int, int, bytes]
@@ -98,15 +97,3 @@ def test_the_bytes_are_those_of_the_library(compression: CompressionType, size: 
     with BytesIO(expected) as file:
         found = [message for *_, message in make_reader(file, validate_crcs=True).iter_messages(log_time_order=False)]
     assert [(each.channel_id, each.log_time, each.sequence, each.data) for each in found] == messages
-
-
-TOPICS = {
-    name: Topic(
-        name=f"/topic_{name}",
-        type="std_msgs/msg/String",
-        qos=Qos(reliability="reliable", durability="volatile", depth=1),
-        unit="-",
-        meaning="a text",
-    )
-    for name in ("1", "2", "3")
-}

@@ -251,14 +251,3 @@ def test_the_truth_goes_with_the_window(tmp_path: Path) -> None:
     assert columns["t_s"][-1] == pytest.approx(4.995, abs=1e-3) and len(columns) == 79
     assert np.isfinite([columns["measured_cylinder_1_m"], columns["estimate_tip_x_m"]]).all()
     assert part.summary["tip_error_rms_m"] < 0.03  # the boom was moving, the model begins at rest; by another time decimetres
-
-
-def test_a_database_has_the_origin_of_the_sheet_beside_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = stored(moving(tmp_path / "mcap"), "db3 file", tmp_path)
-    (file.parent / "metadata.yaml").unlink()
-    assert "origin" not in scan(file).notes
-    (file.parent / "session.yaml").write_text("origin: synthetic, a test\n")
-    assert main(["info", str(file)]) == 0
-    assert "made by    synthetic, a test (synthetic)" in capsys.readouterr().out
-    (file.parent / "session.yaml").write_text("origin: [broken\n")
-    assert "origin" not in scan(file).notes

@@ -36,7 +36,6 @@ from boom_twin.cli.main import main as command_line
 from boom_twin.errors import BagError
 from boom_twin.scene.kinematics import strokes_of_posture
 
-COMMANDS = ("replay", "record")
 PATIENCE = 300.0
 STEP = 5_000_000
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -160,20 +159,15 @@ class Target:
             time.sleep(0.002)
 
     def _measure(self) -> tuple[float, float]:
-        """Seconds of a whole run, and of its part that writes; makes the reference."""
+        """Seconds of a whole run, and of its part that writes."""
         began = time.monotonic()
         run = Run(self.arguments(), self.place / "log")
         self._until(run)
         wrote = time.monotonic()
         run.finish()
         ended = time.monotonic()
-        self.reference = self.result()
         self.clear()
         return ended - began, ended - wrote
-
-    def result(self) -> object:
-        """What identifies the result."""
-        raise NotImplementedError
 
 
 class Replay(Target):
@@ -317,7 +311,7 @@ def main() -> int:
     """Run, print what was found."""
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=1000, help="kills in all (1000)")
-    parser.add_argument("--commands", default=",".join(COMMANDS), help=f"({','.join(COMMANDS)})")
+    parser.add_argument("--commands", default=",".join(KINDS), help=f"({','.join(KINDS)})")
     parser.add_argument("--seed", type=int, default=int(time.time()), help="(the time)")
     args = parser.parse_args()
     names = args.commands.split(",")

@@ -22,9 +22,6 @@ print(json.dumps([code, sorted(sys.modules)]))
 """
 
 
-BAG = Path(__file__).parents[2] / "bags" / "arch_session"
-
-
 def imported_by(*arguments: str) -> tuple[int, set[str]]:
     """Exit code of a command in a fresh process, and those of the slow modules that it has imported."""
     done = subprocess.run(
@@ -37,9 +34,6 @@ def imported_by(*arguments: str) -> tuple[int, set[str]]:
 @pytest.mark.parametrize("arguments", [["check"], ["check", "--json"], ["scene"], ["urdf"], ["--help"], ["statics", "--help"]])
 def test_what_does_not_step_needs_no_compiler(arguments: list[str]) -> None:
     assert imported_by(*arguments) == (0, set())
-
-
-COMMANDS = ["check", "statics", "simulate", "replay", "rig", "info", "recover", "play", "record", "urdf"]
 
 
 INTERRUPTED = """

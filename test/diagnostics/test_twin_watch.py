@@ -190,20 +190,3 @@ def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() ->
     assert status.values["section_1_at_0.60_m_sigma_MPa"] == pytest.approx(0.73, rel=0.02)
     rigid = scene.model_copy(update={"modes": 0})
     assert stress_model(rigid) is None
-
-
-def test_all_streams_of_a_twin_are_judged() -> None:
-    """Residuals of several streams, at once or when strokes come, the load, the bending stresses."""
-    scene, random = load_scene(), np.random.default_rng(3)
-    twin, rest = drive_twin(scene), strokes_of_posture(scene, "horizontal")
-    sensors = sensors_of(scene, Settings(), REQUIRED, [None] * 4)
-    watch = TwinWatch(sensors, NAMES, Thresholds(), lambda: 100.0, stress_model(scene))
-    for k in range(100):
-        stamp = 10**18 + k * 5_000_000
-        early = [Sample(stream, stamp + 1000, random.normal(size=4)) for stream in (Stream.ANGLES, Stream.FORCES)]
-        late = Sample(Stream.IMU, stamp, np.array([0.1, 9.8]))
-        for sample in (*early, Sample(Stream.STROKES, stamp, rest + random.normal(0.0, 2e-5, 4)), late):
-            watch.took(sample, twin.update(sample), 1e-4)
-    peers = {stream: Peers(f"/{stream.value}", ("/driver",)) for stream in Stream}
-    names = {status.name for status in all_pieces(watch.look({}, True, peers, [], 100.0))}
-    assert names >= {"residual joint_1", "residual tip_imu_z", "residual cylinder_force_4", "tip load", "bending"}, names

@@ -14,8 +14,6 @@ from boom_twin.messages.topic_table import TYPES
 from boom_twin.messages.type_store import decode
 from boom_twin.types import SENSORS
 
-CYLINDERS = [f"cylinder_{i}" for i in (3, 1, 4, 2)]
-
 
 class Wire:
     """Decoder that counts the messages that it decodes whole."""

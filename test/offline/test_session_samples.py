@@ -237,12 +237,3 @@ def test_a_message_that_cannot_be_decoded_is_told_as_the_first_one(tmp_path: Pat
     write(tmp_path / "bag", files, [FILES[random.integers(len(FILES))] for _ in range(2)], topics)
     expected = Expected(tmp_path / "bag", files, topics)
     compare(tmp_path / "bag", topics, expected)
-
-
-USUAL = {"names": ["cylinder_2", "cylinder_1"], "count": 2, "frame": "", "little": True, "effort": 0}
-
-
-def strokes(rows: int) -> list[Entry]:
-    """Messages that are laid out alike."""
-    rig, topic = Rig(np.random.default_rng(1), odd=0.0), load_topics().inputs[Stream.STROKES]
-    return [(log, topic.absolute, rig.message(topic.type, log, USUAL)) for log in range(START, START + STEP * rows, STEP)]

@@ -1,4 +1,4 @@
-"""The monitor's feed over DDS: rows, lamps and events, as publishers beside it send them."""
+"""Alarms over DDS in the monitor's feed: from their topic, and let go of by the node."""
 
 from __future__ import annotations
 
@@ -14,11 +14,9 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
-from rcl_interfaces.msg import Log
 from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger
 
-from boom_twin import Stream
 from boom_twin.messages.report_encoder import encode_health
 from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.monitor.actions import AT_NODE, ViewerActions
@@ -34,25 +32,20 @@ CAUSES = (Ranked("joint_3.sensor", 0.9, ()), Ranked("cylinder_3.k", 0.1, ()))
 ALARM = Alarm("joint_3", "residual", BEGIN, None, "joint_3.sensor", "joint_3.sensor jumped", CAUSES)
 
 
-UNHEARD = {Output.CHANGES, Output.ESTIMATE_TWIST, Output.ESTIMATE_MODES}
-"""Outputs that the page does not subscribe to."""
-
-
 class Rig:
-    """Publishers of what the node would publish, and a subscriber of events."""
+    """Publishers of what the node would tell of its health."""
 
     def __init__(self) -> None:
-        self.node, self.events = rclpy.create_node("beside"), []
-        wanted: dict[Any, Any] = {**TOPICS.outputs, Stream.IMU: TOPICS.inputs[Stream.IMU]}
-        self._kinds = {role: message_class(topic.type) for role, topic in wanted.items()}
+        self.node = rclpy.create_node("beside")
+        topics = {role: TOPICS.outputs[role] for role in (Output.HEALTH, Output.TIP_UNCERTAINTY)}
+        self._kinds = {role: message_class(topic.type) for role, topic in topics.items()}
         self.publishers = {
             role: self.node.create_publisher(self._kinds[role], topic.absolute, qos_profile(topic.qos))
-            for role, topic in wanted.items()
+            for role, topic in topics.items()
         }
-        self.node.create_subscription(Log, TOPICS.events.absolute, self.events.append, 10)
 
     def is_heard(self) -> bool:
-        return all(self.publishers[role].get_subscription_count() for role in set(self.publishers) - UNHEARD)
+        return all(publisher.get_subscription_count() for publisher in self.publishers.values())
 
     def send(self, role: Any, nanosec: int, fill: Callable[[Any], None]) -> None:
         message = self._kinds[role]()

@@ -8,8 +8,6 @@ import pytest
 
 from boom_twin.ros.node.receive_queue import ReceiveQueue
 
-MS = 1_000_000
-
 
 class Bus:
     """A queue with topics ``a`` (4 may wait) and ``b`` (100), and a clock that is set here."""

@@ -53,13 +53,6 @@ def test_an_inclined_base_is_in_the_reading(scene):
     assert is_turn(found[3] - prediction.tip_angle - 0.1)
 
 
-def test_deviations_add_up_towards_the_tip(scene):
-    _, _, encoders = readings(scene, [])
-    _, _, found = readings(scene, [None, "root", None, "head"])
-    assert found[[0, 2]] == pytest.approx(encoders[[0, 2]]) and np.all(found[[1, 3]] > encoders[[1, 3]])
-    assert found[3] < 2.0 * np.sqrt(np.sum(encoders**2))
-
-
 def test_an_inclinometer_at_the_tip_of_the_bundled_session(scene):
     """The rig's own angle of the last head, from an independent code, with the noise of the session's encoders."""
     truth = np.genfromtxt(ARCH / "truth.csv.gz", delimiter=",", names=True)

@@ -46,8 +46,3 @@ def given() -> list[Report]:
 def test_a_report_can_be_sent_to_another_process(given: list[Report]) -> None:
     for report in given[-40:]:
         assert repr(pickle.loads(pickle.dumps(report))) == repr(report)
-
-
-def test_later_samples_change_no_report() -> None:
-    at_once = [repr(report) for report in map(drive_twin(load_scene()).update, plain())]
-    assert [repr(report) for report in list(map(drive_twin(load_scene()).update, plain()))] == at_once

@@ -260,15 +260,6 @@ def test_measured_samples_without_a_prediction_are_counted(twin, still):
     assert partial.events == ("partial",) and np.isnan(partial.residuals[0].values[1])
 
 
-def test_shapes_come_10_times_a_second_in_spite_of_jitter(twin, still):
-    jitter = np.random.default_rng(0).uniform(-0.2, 0.2, 401)
-    reports = [twin.update(strokes(5 * k + 1 + late, still)) for k, late in enumerate(jitter)]
-    sent = [report.stamp for report in reports if report.prediction.shape is not None]
-    assert 20 <= len(sent) <= 22
-    assert np.min(np.diff(sent[1:])) > 94 * MS
-    assert reports[0].prediction.shape[-1] == pytest.approx(reports[0].prediction.tip_position, abs=1e-12)
-
-
 @pytest.mark.parametrize("absurd", [np.inf, -np.inf, 1e300, -1e8])
 def test_what_no_sensor_reads_is_taken_for_missing(scene, new, twin, still, absurd):
     clean = new(scene)
