@@ -35,10 +35,7 @@ SYSTEM = (
 )  # fmt: skip
 """Folders and files whose tests start processes; single ones elsewhere have the mark themselves."""
 
-USUAL = (
-    "monitor/test_monitor_browser.py::test_the_first_glance", "ros/test_ros_messages", "ros/test_ros_layouts",
-    "ros/test_ros_receive_queue",
-)  # fmt: skip
+USUAL = ("monitor/test_monitor_browser.py::test_the_first_glance", "ros/test_ros_messages", "ros/test_ros_layouts")
 """Run by `make test` all the same: one page in a browser, one round trip over DDS, and what starts no process."""
 
 

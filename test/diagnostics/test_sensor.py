@@ -7,11 +7,10 @@ from math import inf, isnan, nan
 import numpy as np
 import pytest
 
-from boom_twin import Sample, Stream
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level
 from boom_twin.diagnostics.sensor_status import SensorSpec, sensor_status
-from boom_twin.diagnostics.stream_stats import Channel, ChannelStats, StreamWatch
+from boom_twin.diagnostics.stream_stats import Channel, ChannelStats
 from boom_twin.health.sensor_check import readings_of_frozen
 
 SECOND = 1_000_000_000
@@ -45,23 +44,6 @@ def test_a_reading_that_does_not_change_is_counted_over_looks() -> None:
     counts = [channel.look(STAMPS + k * SECOND, values if k == 0 else np.ones(200), 0, 0.1).unchanged for k in range(3)]
     assert counts == [49, 249, 449]
     assert channel.look(STAMPS + 3 * SECOND, NOISE, 0, 0.1).unchanged == 0
-
-
-def test_a_stream_gives_each_channel_its_own_and_lags_tell_how_clocks_are_apart() -> None:
-    watch = StreamWatch(np.array([[-inf, inf], [-inf, 1.0]]))
-    for k in range(10):
-        watch.seen(SECOND + k * 10_000_000)
-        if k != 4:
-            watch.took(Sample(Stream.ANGLES, SECOND + k * 10_000_000, np.array([0.1 * k, nan if k > 6 else 2.0])))
-    first, second = watch.look(0.1)
-    assert (watch.count, first.missing, first.outside) == (10, pytest.approx(0.1), 0.0)
-    assert (second.missing, second.outside, second.unchanged) == (pytest.approx(0.4), pytest.approx(0.6), 5)
-    assert watch.age_of(second, 1e9) - watch.age_of(first, 1e9) == pytest.approx(0.03)
-    streams = [StreamWatch(np.array([[0.0, 1.0]]), lambda: 100.0) for _ in range(2)]
-    for stream, behind in zip(streams, (0, 70_000_000), strict=True):
-        stream.seen(SECOND - behind)
-        stream.look(0.1)
-    assert streams[1].lag - streams[0].lag == pytest.approx(0.07)
 
 
 SENSOR = SensorSpec("joint_1", "rad", -4.0, 4.0, 1.0, 0.1)

@@ -140,18 +140,6 @@ def test_strokes_that_give_no_prediction_are_an_error_with_what_is_wrong_with_th
     assert look(403).level == Level.OK
 
 
-def test_silence_is_urgent_and_strokes_that_come_back_are_no_error_while_the_model_waits(rig: Rig, monkeypatch: Any) -> None:
-    after(rig, 2)
-    rig.watch.is_urgent()
-    rig.now += 2.5
-    assert rig.watch.is_urgent() and not rig.watch.is_urgent()
-    found = rig.look()
-    assert (found["model"].level, found["model"].message) == (Level.WARN, "waiting for strokes")
-    assert (found["cylinder_strokes"].level, found["cylinder_strokes"].message) == (Level.STALE, "silent for 2.5 s")
-    monkeypatch.setattr(rig, "_report", lambda stream, stamp: Report(stamp, True, events=("leap",)))
-    assert rig.second((Stream.STROKES,))["model"].level == Level.OK
-
-
 def test_a_boom_outside_the_models_validity_is_a_warning_as_long_as_it_is(rig: Rig, monkeypatch: Any) -> None:
     def bent(stream: Stream, stamp: int) -> Report:
         return Report(stamp, True, prediction=object(), events=("deflected",))  # type: ignore[arg-type]

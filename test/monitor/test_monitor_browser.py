@@ -295,20 +295,10 @@ def test_shape_and_path_are_drawn_and_told_in_figures(page: Any, feed: Feed) -> 
         assert page.locator("#height").inner_text() == f"height {values[f'line_{last}_z_m']:.3f} m"
         assert f"{strongest / 1e3:.1f} kN" in page.locator("#forces").inner_text()
 
-    def no_line_through_a_label() -> None:
-        drawn = page.evaluate("() => { const s = twin.shape; s.draw(); return s.drawn }")
-        assert len(drawn["boxes"]) >= 4
-        along = np.linspace(0.0, 1.0, 500)
-        for left, top, right, bottom in drawn["boxes"]:
-            for (x0, y0), (x1, y1) in drawn["segments"]:
-                x, y = x0 + along * (x1 - x0), y0 + along * (y1 - y0)
-                assert not ((x > left) & (x < right) & (y > top) & (y < bottom)).any()
-
     for factor in (1, 10, 50):
         page.locator(f"#factors button[data-factor='{factor}']").click()
         eventually(partial(drawn, factor))
     eventually(told)
-    eventually(no_line_through_a_label)
     page.keyboard.press("6")
 
     def path() -> None:

@@ -60,15 +60,6 @@ def test_a_silent_node_is_stale_and_never_green() -> None:
     assert level == Severity.STALE and "no word from n" in reason
 
 
-def test_a_recorder_that_said_that_it_ended_is_not_missed() -> None:
-    """What it ended by stays to be seen; the twin beside it is as it is."""
-    for level, reason in ((OK, "ended"), (ERROR, "the disk is full")):
-        statuses = table(status("n: model"), now=10.0, before=table(status("r: recording", level, reason, ended=1)))
-        (lamp,) = statuses.groups(10.0)["recorder"]
-        assert (lamp.level, lamp.reason) == (Severity.ERROR if level == ERROR else Severity.OK, reason)
-        assert overall(statuses.groups(10.0))[0] == lamp.level
-
-
 def judge(alarms: AlarmList, time: float, *told: Alarm) -> None:
     alarms.judge(time, told, lambda stamp: stamp * 1e-9)
 

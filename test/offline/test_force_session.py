@@ -86,16 +86,6 @@ def test_residuals_zeros_and_diagnostics(scene, samples):
     assert twin.rezero("cylinder_force_2") == {"cylinder_force_2": pytest.approx(WRONG, abs=40.0)}
 
 
-def test_a_force_without_its_stamp_among_the_strokes_is_interpolated(scene, samples):
-    """Half way between two strokes it is compared with the middle of what was expected at both."""
-    twin = drive_twin(scene)
-    strokes = [sample for sample in samples if sample.stream is Stream.STROKES][:200]
-    before, after = [twin.update(sample).prediction for sample in strokes][-2:]
-    middle = Sample(FORCES, strokes[-2].stamp + 2_500_000, np.zeros(4))
-    (found,) = twin.update(middle).residuals
-    assert -found.values == pytest.approx(0.5 * (before.cylinder_forces + after.cylinder_forces), rel=1e-12)
-
-
 def test_a_stuck_or_silent_sensor_is_told_and_a_shaken_boom_is_not(scene, samples):
     """A load that the model does not know changes a force by far more than its noise, from one reading to the next."""
     known = set()

@@ -29,15 +29,6 @@ def reports(scene: Scene, count: int = 120) -> list[Report]:
     return found
 
 
-def plain() -> list[Sample]:
-    """Strokes and angles in turn."""
-    random, rest, found = np.random.default_rng(2), strokes_of_posture(load_scene(), "arch"), []
-    for k in range(50):
-        found.append(Sample(Stream.STROKES, 10**18 + k * 5_000_000, rest + random.normal(0.0, 2e-5, 4)))
-        found.append(Sample(Stream.ANGLES, 10**18 + k * 5_000_000, random.normal(size=4)))
-    return found
-
-
 @pytest.fixture(scope="module")
 def given() -> list[Report]:
     return reports(load_scene())

@@ -118,22 +118,6 @@ def test_a_second_source_is_refused_and_told(samples, clean, shift):
     assert all(np.array_equal(a, b) for a, b in zip(got, expected, strict=True))
 
 
-@pytest.mark.parametrize("apart", [1, 1000, 5 * MS])
-@pytest.mark.parametrize("off", [0.0, 0.05])
-def test_pairs_of_stray_stamps_do_not_confirm_one_another(samples, clean, apart, off):
-    """A second publisher, twice as fast, whose stamps lie anywhere, two by two in order; the first one is single."""
-    twin, reports, rng = copy.deepcopy(clean[1][700]), [], np.random.default_rng(1)
-    for k, s in enumerate(samples[700:1100]):
-        reports.append(twin.update(s))
-        stamp = s.stamp + int(rng.choice([-1, 1]) * 10.0 ** rng.uniform(9.5, 18.0))
-        twin.update(Sample(s.stream, stamp, s.values + off))
-        if k:
-            twin.update(Sample(s.stream, stamp + apart, s.values + off))
-    got = [report.prediction.tip_position for report in reports]
-    expected = [prediction.tip_position for prediction in clean[0][700:1100]]
-    assert all(np.array_equal(a, b) for a, b in zip(got, expected, strict=True))
-
-
 def test_a_caller_may_use_its_array_again(samples, scene):
     one, other, values, residuals = Twin(scene), Twin(scene), np.empty(4), []
     for s in samples[:20]:
