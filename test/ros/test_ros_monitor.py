@@ -86,9 +86,10 @@ def pair(domain: None) -> Iterator[tuple[Any, Rig]]:
 
 def test_alarms_come_from_their_topic_and_the_node_lets_go_of_what_ended_with_permission(pair: tuple[Any, Rig]) -> None:
     feed, rig = pair
+    rig.send(Output.TIP_UNCERTAINTY, 5_000_000, lambda message: setattr(message.vector, "z", 0.002))
+    until(feed, lambda: "uncertainty" in feed.store.tables)
     rig.send(Output.HEALTH, 60_000_000, partial(tell, None))
-    rig.send(Output.TIP_UNCERTAINTY, 60_000_000, lambda message: setattr(message.vector, "z", 0.002))
-    until(feed, lambda: "uncertainty" in feed.store.tables and judged(feed))
+    until(feed, lambda: judged(feed))
     assert feed.store.tables["uncertainty"].rows(0, 1)[1].tolist() == [[0.0, pytest.approx(0.002)]]
     alarm = judged(feed)
     assert (alarm.name, alarm.level, alarm.reason, alarm.end) == ("joint_3", Severity.ERROR, ALARM.told, None)
