@@ -25,7 +25,7 @@ help:
 	@echo "make study       error against run time, stability, what every part costs, play in pins: docs/study (20 minutes)"
 	@echo "make gate        hashes of sessions, commands and studies, speed as ratios; BEFORE=gate.json of an earlier run compares (5 minutes)"
 	@echo "make soak        the live node for an hour at 200 Hz and 10 minutes at 1 kHz, 10 of the live page, a hold of 24 simulated hours, a million steps with contact, 1000 kills"
-	@echo "make fuzz        broken and hostile scenes, sessions, messages and pages at random, 10 minutes: SECONDS=600 SEED=1"
+	@echo "make fuzz        broken and hostile scenes, sessions and messages at random, 10 minutes: SECONDS=600 SEED=1"
 	@echo "make session     make the bundled sessions anew on the virtual rig, into out/arch_session and out/pump_session"
 	@echo "make figures     make the pictures of the documentation anew"
 	@echo "make docs        the documentation as a site with the API reference, into out/site"

@@ -31,14 +31,11 @@ SYSTEM = (
     "batch/", "cli/test_isolation", "cli/test_start_up", "docs/test_examples",
     "extending/", "kernels/test_kernel_cache", "kernels/test_uncompiled", "monitor/test_monitor_browser",
     "monitor/test_monitor_connections", "monitor/test_monitor_recording", "offline/test_kills",
-    "ros/", "test_made_once", "twin/test_growth",
+    "ros/", "test_made_once",
 )  # fmt: skip
 """Folders and files whose tests start processes; single ones elsewhere have the mark themselves."""
 
-USUAL = (
-    "monitor/test_monitor_browser.py::test_the_first_glance", "ros/test_ros_messages", "ros/test_ros_layouts",
-    "ros/test_ros_receive_queue",
-)  # fmt: skip
+USUAL = ("monitor/test_monitor_browser.py::test_the_first_glance", "ros/test_ros_messages", "ros/test_ros_layouts")
 """Run by `make test` all the same: one page in a browser, one round trip over DDS, and what starts no process."""
 
 

@@ -125,14 +125,6 @@ def test_file_is_as_the_contract_says(bag: Path) -> None:
     assert (qos["reliability"], qos["durability"], qos["history"]) == ("best_effort", "volatile", "keep_last")
 
 
-def test_little_waits_in_memory(tmp_path: Path) -> None:
-    with SessionWriter(tmp_path / "bag", {"point": POINT}, compression=CompressionType.NONE) as bag:
-        for number in range(5000):
-            bag.write("point", number, new_message(POINT.type))
-        written = (tmp_path / "bag" / FILE_NAME).stat().st_size
-    assert written > 0.7 * (tmp_path / "bag" / FILE_NAME).stat().st_size
-
-
 def test_a_run_that_fails_leaves_no_bag_that_looks_whole(tmp_path: Path) -> None:
     """What was written can be saved."""
     with pytest.raises(ZeroDivisionError), SessionWriter(tmp_path / "bag", {"point": POINT}) as bag:
@@ -204,12 +196,3 @@ def test_messages_come_by_time_whatever_their_order_in_the_file(
     found = content(scan(rewritten(bag, backwards=True, **options)))
     assert [entry[1] for entry in found] == sorted(entry[1] for entry in found)
     assert sorted(found, key=str) == sorted(content(scan(bag)), key=str)
-
-
-def test_chunks_that_overlap_are_merged(tmp_path: Path) -> None:
-    with SessionWriter(tmp_path / "bag", {"point": POINT}, compression=CompressionType.NONE) as bag:
-        for time in np.random.default_rng(3).permutation(4000).tolist():
-            bag.write("point", time, new_message(POINT.type))
-    session = scan(tmp_path / "bag")
-    assert len(session.files[0].pieces) > 2
-    assert [time for _, time, _ in read(session, {"boom_twin/tip/position": POINT.type})] == list(range(4000))

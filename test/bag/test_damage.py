@@ -144,27 +144,6 @@ def test_nothing_there(tmp_path: Path, content: Content) -> None:
     assert "not an MCAP file" in refusal(tmp_path, content)
 
 
-def test_a_chunk_that_is_not_recognised_is_missed(bag: Path, rewritten: Callable[..., Path], content: Content) -> None:
-    """Without an index nothing but the statistics tells that a record of unknown kind was a chunk."""
-    path = rewritten(bag, index_types=IndexType.NONE)
-    whole = bytearray(path.read_bytes())
-    first_chunk = 8 + 9 + int.from_bytes(whole[9:17], "little")
-    assert whole[first_chunk] == Opcode.CHUNK
-    whole[first_chunk] = 0x80
-    path.write_bytes(whole)
-    assert "message counts differ" in refusal(path, content)
-
-
-def test_a_damaged_chunk_is_named_by_its_times(
-    bag: Path, rewritten: Callable[..., Path], arrays: dict[str, Any], content: Content
-) -> None:
-    path = rewritten(bag, chunk_size=1 << 20)
-    whole = path.read_bytes()
-    path.write_bytes(whole.replace(b"cylinder_2", b"cylinder_7", 1))
-    first, last = arrays["stamps_ns"][[0, -1]]
-    assert f"{path}: chunk with log times {first} to {last} ns: crc validation failed" in refusal(path, content)
-
-
 @pytest.mark.parametrize("data", [b"", b"\x00\x01\x00\x00\x05", b"\x00\x01\x00\x00" + bytes(500)])
 def test_a_message_that_cannot_be_decoded_is_named(tmp_path: Path, data: bytes) -> None:
     topic = load_topics().inputs[Stream.STROKES]

@@ -11,9 +11,8 @@ from typing import Any
 import pytest
 import zstandard
 from mcap.reader import make_reader
-from mcap.writer import CompressionType, IndexType, Writer
+from mcap.writer import Writer
 
-from boom_twin.bag import mcap_file
 from boom_twin.bag.reader import Session, read, scan
 from boom_twin.bag.writer import FILE_NAME
 from boom_twin.cli.main import main
@@ -80,13 +79,6 @@ def test_types_are_known_by_their_other_names(bag: Path, tmp_path: Path, content
     assert content(scan(path)) == content(scan(bag))
 
 
-def test_topics_of_dds_are_told_as_that(bag: Path, tmp_path: Path) -> None:
-    path = write(tmp_path / "dds.mcap", [("rt" + topic, *rest) for topic, *rest in messages(bag)], NAMES["dds"])
-    with pytest.raises(BagError, match=r"names are those of DDS, not of ROS: give rt/cylinder_strokes .* in a mapping"):
-        read(scan(path), {"cylinder_strokes": JOINT_STATE})
-    assert len(list(read(scan(path), {"rt/cylinder_strokes": JOINT_STATE}))) == 40
-
-
 def test_what_is_of_another_type_or_encoding_is_passed_over(
     bag: Path, tmp_path: Path, content: Content, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -117,28 +109,6 @@ def test_large_messages_of_other_topics_hold_up_nothing(
     assert main(["info", str(path)]) == main(["recover", str(path), "--out", str(tmp_path / "out")]) == 0
     assert scan(tmp_path / "out").find("/camera").count == 2 and content(scan(tmp_path / "out")) == content(scan(bag))
     assert "damaged" not in (said := capsys.readouterr()).out + said.err
-
-
-def test_chunks_without_a_wanted_topic_are_passed_over(bag: Path, tmp_path: Path, content: Content) -> None:
-    """One is damaged."""
-    entries = messages(bag)
-    picture = ("/camera", "sensor_msgs/msg/Image", "cdr", entries[30][3], b"picture" * 50_000)
-    path = write(tmp_path / "o.mcap", [*entries[:31], picture, *entries[31:]], chunk_size=100, compression=CompressionType.NONE)
-    path.write_bytes(path.read_bytes().replace(b"picture", b"pictura"))
-    assert content(scan(path)) == content(scan(bag))
-
-
-def test_memory_holds_one_piece_at_a_time(
-    bag: Path, tmp_path: Path, rewritten: Callable[..., Path], content: Content, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A chunk that memory cannot hold is refused; a file without chunks is read in runs of its messages."""
-    unindexed, whole = rewritten(bag, use_chunking=False, index_types=IndexType.NONE), content(scan(bag))
-    monkeypatch.setattr(mcap_file, "_RUN", 2000)
-    monkeypatch.setattr(mcap_file, "MOST_TOGETHER", 20)
-    assert content(scan(unindexed)) == whole
-    monkeypatch.setattr(mcap_file, "MOST_HELD", 10_000)
-    with pytest.raises(BagError, match=r"a chunk of \d+ bytes; at most 10000 .*`mcap compress --chunk-size"):
-        content(scan(write(tmp_path / "other.mcap", messages(bag), chunk_size=2**30)))
 
 
 @pytest.mark.parametrize(

@@ -196,14 +196,6 @@ def test_a_session_says_what_its_transducers_read(tmp_path: Path, write: Any, sh
     assert strokes_of(None, mapping_of(tmp_path)).reading is StrokeReading.LENGTH
 
 
-def test_a_recorded_mapping_says_it_too_and_nothing_else(tmp_path: Path) -> None:
-    bag = recorded(tmp_path / "bag", "inputs: {cylinder_strokes: {reads: drive}}")
-    assert strokes_of(bag, mapping_of(bag)).reading is StrokeReading.DRIVE
-    (tmp_path / FILE_NAME).write_text("strokes: lengths\n")
-    with pytest.raises(BagError, match=r"strokes: 'lengths': it must be length or drive\."):
-        strokes_of(tmp_path, mapping_of(tmp_path))
-
-
 @pytest.mark.parametrize("mapping", ["sensors: {joint_1: {sign: 2}}", "sensors: [", "a: b: c"])
 def test_a_recorded_mapping_that_cannot_be_used_is_told(tmp_path: Path, mapping: str) -> None:
     bag = recorded(tmp_path / "bag", mapping)

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from io import BytesIO
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
-from rosbags.highlevel import AnyReader
 
 from boom_twin.bag.mcap_writer import McapWriter
-from boom_twin.bag.writer import FILE_NAME, SessionWriter
 from boom_twin.messages.encoded_block import EncodedBlock, EncodedRows
-from boom_twin.messages.topic_table import Qos, Topic
 
 CHUNK = 2000
 Message = tuple[int, int, int, bytes]
@@ -102,44 +97,3 @@ def test_the_bytes_are_those_of_the_library(compression: CompressionType, size: 
     with BytesIO(expected) as file:
         found = [message for *_, message in make_reader(file, validate_crcs=True).iter_messages(log_time_order=False)]
     assert [(each.channel_id, each.log_time, each.sequence, each.data) for each in found] == messages
-
-
-def test_a_file_without_messages() -> None:
-    none = CompressionType.ZSTD
-    assert by_the_package([], none, set(), 0) == by_the_library([], none, set())
-
-
-TOPICS = {
-    name: Topic(
-        name=f"/topic_{name}",
-        type="std_msgs/msg/String",
-        qos=Qos(reliability="reliable", durability="volatile", depth=1),
-        unit="-",
-        meaning="a text",
-    )
-    for name in ("1", "2", "3")
-}
-
-
-def test_a_bag_in_blocks(tmp_path: Path) -> None:
-    """Counts, numbers of messages, spans and metadata too; the other libraries read it."""
-    messages = random_messages(5) * 4
-    with SessionWriter(tmp_path / "one", TOPICS, {"origin": "synthetic"}) as one:
-        for channel, time, _, data in messages:
-            one.write_encoded(str(channel), time, data)
-    with SessionWriter(tmp_path / "other", TOPICS, {"origin": "synthetic"}) as other:
-        for first in range(0, len(messages), 700):
-            other.write_block(block_of(messages[first : first + 700]))
-        other.write_block(EncodedBlock(np.empty(0, np.int64), []))
-    for name in (FILE_NAME, "metadata.yaml"):
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
-    counts = Counter(f"/topic_{channel}" for channel, *_ in messages)
-    with (tmp_path / "other" / FILE_NAME).open("rb") as file:
-        summary = make_reader(file).get_summary()
-        assert summary is not None and summary.statistics is not None and summary.statistics.chunk_count > 2
-        found = list(make_reader(file).iter_messages(["/topic_2"], log_time_order=False))
-    numbers = [message.sequence for *_, message in found]
-    assert numbers == list(range(1, counts["/topic_2"] + 1))
-    with AnyReader([tmp_path / "other"]) as reader:
-        assert {connection.topic: connection.msgcount for connection in reader.connections} == counts
-        assert sorted(bytes(data) for _, _, data in reader.messages()) == sorted(data for *_, data in messages)

@@ -23,7 +23,7 @@ from boom_twin.offline.ground_truth import load_truth
 from boom_twin.report.compare import side_of
 from boom_twin.report.quantities import FILE_NAME as QUANTITIES
 from boom_twin.report.quantities import read
-from boom_twin.system.received_files import holds_file, open_received
+from boom_twin.system.received_files import open_received
 
 MCAP, METADATA, SHEET, SUMMARY = "session_0.mcap", "metadata.yaml", "session.yaml", "summary.json"
 LINK = "a symbolic link"
@@ -104,15 +104,6 @@ def test_what_the_user_names_may_be_a_link(bag: Path, tmp_path: Path) -> None:
     assert main(["info", str(tmp_path / "linked")]) == main(["info", str(tmp_path / "linked.mcap")]) == 0
     shutil.copy(bag / MCAP, tmp_path / "received.mcap")
     assert mapping_of(tmp_path / "received.mcap").source == mapping_of(bag).source
-
-
-def test_a_file_is_opened_and_nothing_is_nothing(tmp_path: Path) -> None:
-    (tmp_path / "a").write_bytes(b"abc")
-    with open_received(tmp_path / "a") as file:
-        assert file.read() == b"abc"
-    assert holds_file(tmp_path / "a") and not holds_file(tmp_path / "b") and not holds_file(tmp_path / "a" / "b")
-    with pytest.raises(FileNotFoundError):
-        open_received(tmp_path / "b")
 
 
 def test_a_file_that_is_exchanged_for_a_link_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

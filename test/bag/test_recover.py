@@ -9,15 +9,12 @@ import struct
 from collections import Counter
 from collections.abc import Callable
 from io import BytesIO
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from fuzz.mcap_files import joined, records
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
@@ -94,24 +91,6 @@ def test_the_bundled_session_cut_and_with_flipped_bits(real: tuple[bytes, list[R
     outcome, out = rescue(tmp_path, bytes(data[:kept]))
     check(outcome, out, real[1])
     assert outcome.saved.total() > len(real[1]) * (kept / len(data) - 7 / 60)
-
-
-@pytest.mark.slow
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
-@given(st.data())
-def test_the_bundled_session_many_times(
-    real: tuple[bytes, list[Row]], tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
-) -> None:
-    whole = bytearray(real[0])
-    for place, bit in data.draw(st.lists(st.tuples(st.integers(0, len(whole) - 1), st.integers(0, 7)), max_size=20)):
-        whole[place] ^= 1 << bit
-    kept = data.draw(st.integers(60_000, len(whole)))
-    try:
-        outcome, out = rescue(tmp_path_factory.mktemp("rescue"), bytes(whole[:kept]))
-    except BagError as error:
-        assert "nothing can be saved" in str(error)
-    else:
-        check(outcome, out, real[1])
 
 
 CHUNKED = {
@@ -283,20 +262,6 @@ def test_a_chunk_that_is_there_again_is_saved_once(
         shutil.rmtree(out)
         assert main(["recover", str(tmp_path / "damaged.mcap"), "--out", str(out), *options]) == 0
         assert told in capsys.readouterr().out
-
-
-def test_a_chunk_over_which_another_was_copied_is_told_as_lost(
-    bag: Path, tmp_path: Path, rewritten: Callable[..., Path]
-) -> None:
-    path = rewritten(bag)
-    whole, found = rows(path), records(path.read_bytes())
-    first, second = next(
-        (one, other) for one, other in combinations(chunks_of(found), 2) if len(found[one][1]) == len(found[other][1])
-    )
-    found[second] = found[first]
-    outcome, out = rescue(tmp_path, joined(found))
-    assert outcome.copies > 0 and outcome.lost is not None and sum(outcome.lost.values()) == outcome.copies
-    check(outcome, out, whole)
 
 
 @pytest.mark.parametrize("size", [300, 100_000])

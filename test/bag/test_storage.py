@@ -10,7 +10,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from threading import Event
 
@@ -22,7 +21,7 @@ from rosbags.highlevel import AnyReader
 from boom_twin import Stream
 from boom_twin.bag import async_writer as module
 from boom_twin.bag.async_writer import FileSplit, Storage
-from boom_twin.bag.metadata import Recorded, read_metadata
+from boom_twin.bag.metadata import read_metadata
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.recovery.recover import recover
 from boom_twin.bag.writer import BagWriter, recorded
@@ -79,55 +78,6 @@ def test_metadata_is_there_after_each_split_and_a_lost_rest_is_noticed(tmp_path:
         scan(tmp_path / "bag")
     assert recover(tmp_path / "bag", tmp_path / "out").saved.total() == 2
     assert numbers(tmp_path / "out") == [1, 2]
-
-
-def test_many_files_do_not_hold_up_the_recorder(tmp_path: Path) -> None:
-    """The list of all files is not written with every one of them; it is whole at the end."""
-    bag, synced = BagWriter(tmp_path / "bag"), []
-    bag.sync = synced.append
-    (key,) = bag.add(recorded(TOPIC))
-    for number in range(200):
-        bag.write(key, number, message(number))
-        bag.split()
-    bag.close()
-    assert len(synced) < 300 and len(read_metadata(tmp_path / "bag" / "metadata.yaml").files) == 201
-
-
-def test_the_last_file_that_can_be_listed_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_FILES", 3)
-    told: list[str] = []
-    fill(Storage(BagWriter(tmp_path / "bag"), FileSplit(duration=0.5), told.append), 500)
-    assert len(read_metadata(tmp_path / "bag" / "metadata.yaml").files) == 3
-    assert numbers(tmp_path / "bag") == list(range(500))
-    assert len(told) == 1 and "session_2.mcap: is the last file of 3" in told[0]
-
-
-def test_blank_pictures_are_read_again(tmp_path: Path) -> None:
-    """Zeros pack better than 1000 to 1, as bombs do; readers allow that for 64 MiB in a file."""
-    count, size = 25, 4_000_000
-    storage = Storage(BagWriter(tmp_path / "bag"), FileSplit(), pytest.fail)
-    keys = [storage.add(replace(recorded(TOPIC), topic=name)) for name in ("/strokes", "/picture")]
-    for number in range(count):
-        storage.put(keys[0], number * STEP, message(number), number * STEP, number)
-        storage.put(keys[1], number * STEP, bytes(size), number * STEP, number)
-    assert storage.close() == [count, count]
-    session = scan(tmp_path / "bag")
-    assert {topic.name: topic.count for topic in session.topics} == {"/strokes": count, "/picture": count}
-    stamps = [msg.header.stamp.sec for _, _, msg in read(session, {"/strokes": TOPIC.type})]
-    assert stamps == list(range(count))
-    assert recover(tmp_path / "bag", tmp_path / "out").saved == {"/strokes": count, "/picture": count}
-
-
-def test_a_topic_may_come_late(tmp_path: Path) -> None:
-    storage = Storage(BagWriter(tmp_path / "bag"), FileSplit(), pytest.fail)
-    first = storage.add(recorded(TOPIC))
-    storage.put(first, 1, message(1), 1, 1)
-    other = storage.add(Recorded("/late", "pkg/msg/Late", b"int32 value\n"))
-    storage.put(other, 2, b"\0\1\0\0\7\0\0\0", 2, 1)
-    assert storage.close() == [1, 1]
-    with AnyReader([tmp_path / "bag"]) as reader:
-        late = [reader.deserialize(data, c.msgtype) for c, _, data in reader.messages() if c.topic == "/late"]
-    assert [msg.value for msg in late] == [7]  # type: ignore[attr-defined]
 
 
 FULL = """

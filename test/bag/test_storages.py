@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import sqlite3
-import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -175,28 +174,6 @@ def test_rows_of_one_time_with_other_columns_are_one_row(tmp_path: Path) -> None
     assert [topic.count for topic in scan(tmp_path / "s.csv").topics] == [3000, 3000]
 
 
-def test_a_csv_takes_as_little_memory_as_one_stretch_of_it(tmp_path: Path) -> None:
-    """So days of data may come as CSV."""
-    file = tmp_path / "s.csv"
-    for rows in (10, 40_000):  # the first scan imports what both need
-        lines = (f"{5 + 0.005 * k:.3f},0.{k % 997:03d},0.1\n" for k in range(rows))
-        file.write_text("t_s,stroke_1_m,joint_1_rad\n" + "".join(lines))
-        if rows == 10:
-            scan(file)
-    tracemalloc.start()
-    session = scan(file)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 12e6, "all rows at once take more"
-    assert [topic.count for topic in session.topics] == [40_000, 40_000]
-    assert (session.start, session.end) == (5_000_000_000, 204_995_000_000)
-    lines = file.read_text().splitlines()
-    lines[9000] = "x" + lines[9000]
-    file.write_text("\n".join(lines))
-    with pytest.raises(BagError, match="line 9001: t_s = 'x"):
-        scan(file)
-
-
 @pytest.mark.parametrize("kind", ["db3 file", "ros1"])
 @pytest.mark.parametrize("damage", ["empty", "cut", "noise"])
 def test_damage_is_one_error_that_names_the_file(bag: Path, tmp_path: Path, content: Content, kind: str, damage: str) -> None:
@@ -274,14 +251,3 @@ def test_the_truth_goes_with_the_window(tmp_path: Path) -> None:
     assert columns["t_s"][-1] == pytest.approx(4.995, abs=1e-3) and len(columns) == 79
     assert np.isfinite([columns["measured_cylinder_1_m"], columns["estimate_tip_x_m"]]).all()
     assert part.summary["tip_error_rms_m"] < 0.03  # the boom was moving, the model begins at rest; by another time decimetres
-
-
-def test_a_database_has_the_origin_of_the_sheet_beside_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = stored(moving(tmp_path / "mcap"), "db3 file", tmp_path)
-    (file.parent / "metadata.yaml").unlink()
-    assert "origin" not in scan(file).notes
-    (file.parent / "session.yaml").write_text("origin: synthetic, a test\n")
-    assert main(["info", str(file)]) == 0
-    assert "made by    synthetic, a test (synthetic)" in capsys.readouterr().out
-    (file.parent / "session.yaml").write_text("origin: [broken\n")
-    assert "origin" not in scan(file).notes

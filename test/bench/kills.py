@@ -1,4 +1,4 @@
-"""SIGKILL at random moments: ``python test/bench/kills.py [--count 1000] [--commands replay,rig]``; also run by make soak.
+"""SIGKILL at random moments: ``python test/bench/kills.py [--count 1000] [--commands replay,record]``; also run by make soak.
 
 Real commands on short sessions, each killed once; half of the moments are drawn
 over the whole run, half over the time in which it writes. After every kill: no recording has changed, an earlier result is
@@ -36,7 +36,6 @@ from boom_twin.cli.main import main as command_line
 from boom_twin.errors import BagError
 from boom_twin.scene.kinematics import strokes_of_posture
 
-COMMANDS = ("replay", "rig", "calibrate", "record")
 PATIENCE = 300.0
 STEP = 5_000_000
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -160,20 +159,15 @@ class Target:
             time.sleep(0.002)
 
     def _measure(self) -> tuple[float, float]:
-        """Seconds of a whole run, and of its part that writes; makes the reference."""
+        """Seconds of a whole run, and of its part that writes."""
         began = time.monotonic()
         run = Run(self.arguments(), self.place / "log")
         self._until(run)
         wrote = time.monotonic()
         run.finish()
         ended = time.monotonic()
-        self.reference = self.result()
         self.clear()
         return ended - began, ended - wrote
-
-    def result(self) -> object:
-        """What identifies the result."""
-        raise NotImplementedError
 
 
 class Replay(Target):
@@ -217,69 +211,6 @@ class Replay(Target):
             code, words = said("info", unfinished / "bag")
             require("incomplete" in words, f"info takes an unfinished replay for whole: {words}")
         return "earlier result, and an unfinished one that says so"
-
-
-class Rig(Target):
-    """A synthetic session: whole or not there."""
-
-    def arguments(self) -> list[str]:
-        return ["rig", str(self.scene), "--out", str(self.out), "--random", "up", "--duration", "1.5"]
-
-    def result(self) -> object:
-        return sums(self.out)
-
-    def check(self, hit: str) -> str:
-        if self.out.exists():
-            extra = {"manifest.json", "unfinished.json"}
-            found = {name: digest for name, digest in sums(self.out).items() if name not in extra}
-            require(found == self.reference and not incompleteness(self.out), "OUT is not whole")
-            return "new session"
-        unfinished = self.sign()
-        if unfinished.exists() and (unfinished / "session_0.mcap").exists() and not (unfinished / "manifest.json").exists():
-            _, words = said("info", unfinished)
-            require("incomplete" in words, f"info takes an unfinished session for whole: {words}")
-            return "an unfinished session that says so"
-        return "nothing, or a mark"
-
-    def clear(self) -> None:
-        shutil.rmtree(self.out, ignore_errors=True)
-        if (self.sign() / "manifest.json").exists():  # whole, which the next run would keep
-            shutil.rmtree(self.sign())
-
-
-class Calibrate(Target):
-    """A scene file that is replaced: the old one or the new one."""
-
-    def prepare(self) -> None:
-        command = ["rig", str(self.scene), "--out", str(self.sources / "bag"), "--random", "up", "--duration", "24"]
-        Run(command, self.place / "log").finish()
-        (self.sources / "drives.yaml").write_text("inputs:\n  cylinder_strokes: {reads: drive}\n")  # what the fit knows
-        self.out = self.place / "new.yaml"
-
-    def arguments(self) -> list[str]:
-        names = ["--parameters", "cylinder_1.k", "--zeros", "none", "--date", "2026-01-02", "--no-pictures", "--force"]
-        names += ["--mapping", str(self.sources / "drives.yaml")]
-        return ["calibrate", str(self.sources / "bag"), "--scene", str(self.scene), "--out", str(self.out), *names]
-
-    def sign(self) -> Path:
-        return self.place / "log"  # it writes at the very end only
-
-    def result(self) -> object:
-        return self.out.read_bytes()
-
-    def clear(self) -> None:
-        for draft in self.place.glob(".*.draft"):
-            draft.unlink()
-        if self.dice.random() < 0.5:
-            self.out.write_bytes(b"# an earlier one\n")
-        else:
-            self.out.unlink(missing_ok=True)
-        self._earlier = self.out.read_bytes() if self.out.exists() else None
-
-    def check(self, hit: str) -> str:
-        found = self.out.read_bytes() if self.out.exists() else None
-        require(found in (self._earlier, self.reference), "the scene is not whole")
-        return "new scene" if found == self.reference else "as before"
 
 
 class Record(Target):
@@ -330,7 +261,7 @@ class Record(Target):
             shutil.rmtree(folder, ignore_errors=True)
 
 
-KINDS: dict[str, type[Target]] = {"replay": Replay, "rig": Rig, "calibrate": Calibrate, "record": Record}
+KINDS: dict[str, type[Target]] = {"replay": Replay, "record": Record}
 
 
 @contextlib.contextmanager
@@ -380,7 +311,7 @@ def main() -> int:
     """Run, print what was found."""
     parser = ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=1000, help="kills in all (1000)")
-    parser.add_argument("--commands", default=",".join(COMMANDS), help=f"({','.join(COMMANDS)})")
+    parser.add_argument("--commands", default=",".join(KINDS), help=f"({','.join(KINDS)})")
     parser.add_argument("--seed", type=int, default=int(time.time()), help="(the time)")
     args = parser.parse_args()
     names = args.commands.split(",")

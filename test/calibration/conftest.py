@@ -9,8 +9,7 @@ pytest.importorskip("exudyn")
 from calibration.sessions import Made, cut_to, made, off
 from made_once import MadeOnce
 
-from boom_twin import load_scene
-from boom_twin.scene.schema import Scene
+from boom_twin import Scene, load_scene
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,6 @@ import pytest
 
 from boom_twin import load_scene
 from boom_twin.bag.session_files import write_session
-from boom_twin.bag.session_sheet import SessionSheet
 from boom_twin.calibration import Choice, calibrate
 from boom_twin.errors import BagError, UsageError
 from boom_twin.scene.kinematics import strokes_of_posture
@@ -22,12 +21,6 @@ def test_an_unknown_parameter(short, two_sections, tmp_path):
         calibrate([bag], two_sections, Choice(names=("cylinder_3.k",)))
     with pytest.raises(UsageError, match="named 2 times"):
         calibrate([bag], two_sections, Choice(names=("cylinder_1.k", "cylinder_1.k")))
-
-
-def test_a_session_without_strokes(short, two_sections, tmp_path):
-    bag = short.write(tmp_path / "bag", 0, cut=slice(0, 0))
-    with pytest.raises(BagError, match=r"no usable value of cylinder_1|cylinder_strokes has no messages|no messages"):
-        calibrate([bag], two_sections)
 
 
 def test_a_session_that_is_too_short(short, two_sections, tmp_path):
@@ -62,13 +55,6 @@ def test_a_session_that_never_rests(two_sections, tmp_path):
     write_session(tmp_path / "bag", stamps, strokes, np.zeros_like(strokes), None, {})
     with pytest.raises(BagError, match=r"the boom rests for 0\.0 s"):
         calibrate([tmp_path / "bag"], two_sections)
-
-
-def test_sessions_with_different_mappings(short, two_sections, tmp_path):
-    bags = [short.write(tmp_path / name, 0) for name in ("a", "b")]
-    SessionSheet("test", mapping="sensors: {joint_1: {zero: 0.1}}").write(bags[1])
-    with pytest.raises(UsageError, match=r"another mapping than .*--mapping"):
-        calibrate(bags, two_sections)
 
 
 def test_sessions_of_lengths_and_of_drives(short, two_sections, tmp_path):

@@ -39,25 +39,6 @@ def judge(found, joints):
     assert 0.9 < found.misfit < 1.15
 
 
-@pytest.fixture(scope="module")
-def two_sessions(wrong_boom, tmp_path_factory):
-    """60 s to be fitted, and 60 s with other noise to be held out."""
-    folder = tmp_path_factory.mktemp("sessions")
-    return [wrong_boom.write(folder / f"s{seed}", seed, ENCODERS) for seed in (5, 6)]
-
-
-@pytest.mark.slow
-def test_stiffness_payload_and_encoders_when_transducers_are_right(wrong_boom, two_sessions):
-    found = calibrate(two_sessions, load_scene(), Choice(load="payload", zeros="angles"))
-    wrong = errors(found, wrong_boom.truth, ENCODERS)
-    for i, bound in enumerate((0.02, 0.02, 0.02, 0.05), start=1):
-        assert abs(wrong[f"cylinder_{i}.k"]) < bound * parameter(wrong_boom.truth, f"cylinder_{i}.k")
-        assert abs(wrong[f"joint_{i}.zero"]) < np.radians(0.01)
-    assert abs(wrong["tip.payload"]) < 2.0
-    assert share_covered(found, wrong_boom.truth, ENCODERS, 2.0) == 1.0
-    judge(found, 4)
-
-
 @pytest.mark.slow
 def test_everything_at_once_keeps_to_its_intervals(wrong_boom, tmp_path):
     bags = [wrong_boom.write(tmp_path / f"s{seed}", seed, ENCODERS) for seed in (5, 6)]

@@ -92,14 +92,6 @@ def test_check_of_a_bad_scene_exits_with_1_and_says_why(tmp_path: Path, capsys: 
     assert "No such file" in capsys.readouterr().err
 
 
-def test_scene_prints_the_file_as_it_stands_and_it_can_be_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["scene"]) == 0
-    path = tmp_path / "mine.yaml"
-    path.write_text(capsys.readouterr().out, encoding="utf-8")
-    assert path.read_text(encoding="utf-8") == default_text()
-    assert main(["check", str(path)]) == 0
-
-
 @pytest.mark.parametrize("argv", [[], ["nonsense"], ["check", "--nonsense"], ["check", "a", "b"], ["scene", "extra"]])
 def test_wrong_usage_exits_with_2(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:

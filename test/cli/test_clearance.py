@@ -57,9 +57,3 @@ def test_simulate_tells_lost_contacts_and_draws_orbits(
     assert main([*given, "--orbits", str(picture)]) == 1
     assert "orbits.png: is there already, and is not written over" in capsys.readouterr().err
     assert picture.read_bytes() == b"mine"
-
-
-def test_orbits_need_a_pin(drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    given = ["simulate", "--posture", "arch", "--drive", str(drive), "--out", str(tmp_path / "out.csv")]
-    assert main([*given, "--orbits", str(tmp_path / "orbits.png")]) == 1
-    assert "no pin with clearance" in capsys.readouterr().err

@@ -123,15 +123,6 @@ def test_answers_make_a_scene_and_are_kept(monkeypatch: pytest.MonkeyPatch, caps
     assert load_scene("again.yaml") == scene
 
 
-def test_answers_that_end_too_early_write_nothing(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], folder: Path
-) -> None:
-    monkeypatch.setattr(sys, "stdin", io.StringIO("Small boom\n0, 0\n"))
-    assert main(["init", "--out", "boom.yaml"]) == 1
-    assert "the answers end at `base.cylinder_pin" in capsys.readouterr().err
-    assert list(folder.iterdir()) == []
-
-
 COLUMNS = {
     "length": 8.3, "beam_start": 1.32, "beam_end": 7.8, "height": 0.56, "width": 0.42, "wall": 0.008, "rod_pin_x": 1.32,
     "rod_pin_y": -0.264, "kind": "A", "range_deg_low": -5, "range_deg_high": 85, "bore": 0.18, "rod": 0.125,

@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 import time
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -16,7 +15,6 @@ from health.recorded import written
 from hostile import Trap
 
 import boom_twin
-from boom_twin.monitor.actions import RecorderProcess
 
 PACKAGE = Path(boom_twin.__file__).parent
 BUNDLED = PACKAGE.parent / "bags" / "arch_session"
@@ -56,57 +54,6 @@ def test_the_page_of_a_session_runs_nothing_of_the_folder(trap: Trap, tmp_path: 
             time.sleep(0.1)
         process.terminate()
     assert trap.sprung() == "" and "open http" in log.read_text(), log.read_text()
-
-
-def test_a_recorder_of_the_page_runs_nothing_of_the_folder(trap: Trap, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path / "received")
-    (tmp_path / "taken").write_text("")  # it ends at once: it cannot make its folder there
-    recording = RecorderProcess(tmp_path / "taken")
-    recording.start()
-    assert recording._process is not None and recording._process.wait(240.0) == 1
-    assert trap.sprung() == ""
-
-
-def told_by(child_of: str, code: str, folder: Path, variables: dict[str, str]) -> str:
-    """What a parent says whose program is `code`."""
-    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"} | variables
-    program = f"{code}\nimport subprocess\nfrom boom_twin.system.child_process import python_command\n" + child_of
-    return subprocess.check_output([sys.executable, "-P", "-c", program], cwd=folder, env=environment, text=True, timeout=100)
-
-
-VERSION = "print(subprocess.run(python_command('boom_twin.cli.main', '--version'), capture_output=True, text=True).stdout)"
-
-
-@pytest.mark.parametrize("way", ["PYTHONPATH", "sys.path", "relative sys.path", "zip"])
-def test_a_child_has_its_parents_package(trap: Trap, tmp_path: Path, way: str) -> None:
-    """However the parent came by it, and not the one that is installed."""
-    there = tmp_path / "elsewhere"
-    shutil.copytree(PACKAGE, there / "boom_twin", ignore=shutil.ignore_patterns("__pycache__"))
-    (there / "boom_twin" / "__init__.py").write_text('__version__ = "the parents own"\n')
-    if way == "zip":
-        with zipfile.ZipFile(tmp_path / "package.zip", "w") as archive:
-            for path in (there / "boom_twin").rglob("*.py"):
-                archive.write(path, path.relative_to(there))
-    places = {"sys.path": str(there), "relative sys.path": "../elsewhere", "zip": str(tmp_path / "package.zip")}
-    code = f"import sys; sys.path.insert(0, {places[way]!r})" if way in places else ""
-    variables = {"PYTHONPATH": str(there)} if way == "PYTHONPATH" else {}
-    assert "the parents own" in told_by(VERSION, code, tmp_path / "received", variables)
-    assert trap.sprung() == ""
-
-
-def test_a_childs_path_is_its_parents(tmp_path: Path) -> None:
-    """Neither the working directory nor the folder that the package is in is on it; what PYTHONPATH names is."""
-    package = tmp_path / "elsewhere" / "boom_twin"
-    package.mkdir(parents=True)
-    (package / "system").mkdir()
-    for name in ("__init__.py", "system/__init__.py", "system/child_process.py"):
-        shutil.copy(PACKAGE / name, package / name)
-    (package / "show.py").write_text("import json, sys\nprint(json.dumps(sys.path))\n")
-    code = f"import json, sys; plain = list(sys.path); sys.path.insert(0, {str(package.parent)!r})"
-    shown = "child = subprocess.check_output(python_command('boom_twin.show'))\nprint(json.dumps([plain, json.loads(child)]))"
-    plain, child = json.loads(told_by(shown, code, tmp_path, {"PYTHONPATH": str(tmp_path / "named")}))
-    assert child == plain and str(tmp_path / "named") in child
-    assert not {"", str(tmp_path), str(package.parent)} & set(child)
 
 
 def test_settings_of_numba_in_the_folder_are_refused(tmp_path: Path) -> None:

@@ -51,19 +51,6 @@ def test_lengths_are_those_of_the_boom_at_rest(load: tuple[str, ...], capsys: Ca
     assert "lengths = 2 values: the scene has 4 cylinders" in capsys.readouterr().err
 
 
-def test_steady_state_of_pump_and_of_its_rows(capsys: Capture, tmp_path: Path) -> None:
-    out, rows = tmp_path / "out", tmp_path / "load.csv"
-    found = answer(capsys, "--posture", "arch", "--pump", "0.43:130", "--out", str(out))
-    columns = table(out / "steady_state.csv")
-    assert np.ptp(columns["tip_y_m"]) == pytest.approx(found["tip_peak_to_peak_m"][1])
-    assert (out / "steady_state.png").is_file()
-    force = np.column_stack([columns[name] for name in ("t_s", "fx_N", "fy_N")])
-    force = np.vstack([force, [1.0 / 0.43, *force[0, 1:]]])
-    np.savetxt(rows, force, delimiter=",", header="t_s,fx_N,fy_N", comments="")
-    again = answer(capsys, "--posture", "arch", "--load", str(rows))
-    assert again["tip_swing_m"] == pytest.approx(found["tip_swing_m"], rel=1e-5)
-
-
 def test_map_on_a_way(capsys: Capture, tmp_path: Path) -> None:
     out = tmp_path / "out"
     given = ["--map", "horizontal,arch", "--steps", "2", "--pump", "0.4:50", "--rates", "0.28:0.42:15", "--out", str(out)]
@@ -74,11 +61,6 @@ def test_map_on_a_way(capsys: Capture, tmp_path: Path) -> None:
     assert list(table(out / "resonance_map.csv")) == ["rate_Hz", *(f"swing_m_{name}" for name in found["postures"])]
     assert main(["response", *given]) == 0  # an earlier response is replaced
     assert "harmonic" in capsys.readouterr().out
-
-
-def test_a_swing_out_of_proportion_is_told(capsys: Capture) -> None:
-    assert main(["response", "--posture", "horizontal", "--pump", "0.99:500"]) == 0
-    assert "no boom answers in proportion" in capsys.readouterr().err
 
 
 def test_worn_pins_answer_unless_they_rub(capsys: Capture, tmp_path: Path) -> None:
@@ -121,13 +103,6 @@ def test_refused(capsys: Capture, given: list[str], told: str) -> None:
     assert told in line and first.startswith("scene: default scene")
 
 
-@pytest.mark.parametrize("given", [[], ["--posture", "arch", "--map", "all"], ["--posture", "arch", "--pump", "fast"]])
-def test_usage(capsys: Capture, given: list[str]) -> None:
-    with pytest.raises(SystemExit) as stopped:
-        main(["response", *given])
-    assert stopped.value.code == 2
-
-
 def test_without_damping_no_amplitude_is_made_up_at_a_resonance(capsys: Capture, tmp_path: Path) -> None:
     spec = booms.document()
     for joint in spec["joints"]:
@@ -140,17 +115,3 @@ def test_without_damping_no_amplitude_is_made_up_at_a_resonance(capsys: Capture,
     assert len(found["frequency_Hz"]) == 5 and len(found["natural_frequencies_Hz"]) == 2
     assert max(found["tip_y_m_amplitude"]) < 1e-2
     assert "nothing damps the resonances at 1.06" in found["warnings"][0]
-
-
-def test_a_boom_that_does_not_give_has_no_rates_to_avoid(capsys: Capture, tmp_path: Path) -> None:
-    """Its swings of 1e-14 m are rounding."""
-    spec = booms.document()
-    for joint in spec["joints"]:
-        for key in ("k", "d"):
-            joint["cylinder"].pop(key)
-    for section in spec["sections"]:
-        for key in ("beam", "A", "I", "beta", "head", "rho_A", "rho_I"):
-            section.pop(key)
-    (tmp_path / "rigid.yaml").write_text(json.dumps(spec))
-    found = answer(capsys, str(tmp_path / "rigid.yaml"), "--map", "arch", "--pump", "0.4:100", "--rates", "0.2:0.6:9")
-    assert max(found["swing_m"][0]) < 1e-9 and found["avoid_posture"] == []

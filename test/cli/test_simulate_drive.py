@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin import load_scene, simulate
+from boom_twin import load_scene
 from boom_twin.cli.main import main
-from boom_twin.errors import BoomTwinError
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.pump_pulses import ease
 
@@ -47,22 +46,6 @@ def test_a_drive_likely_meant_otherwise_is_told_and_followed(
     given = ["--drive", drive, "--out", str(tmp_path / "out.csv"), "--no-error-estimate", "--dt", "0.01"]
     assert main(["simulate", *given]) == 0
     assert (f"warning: {drive}: {told}" if told else "") in (err := capsys.readouterr().err) and (told or "warning" not in err)
-
-
-def test_a_stroke_out_of_reach_is_told_with_its_row() -> None:
-    with pytest.raises(BoomTwinError, match=r"stroke_2 = 0\.5 m in row 3 of the drive: cylinder 2 travels 0 to 0\.42 m"):
-        simulate(None, [0.0, 0.1, 0.2], [[0.63, 0.16, 0.23, 0.18]] * 2 + [[0.63, 0.5, 0.23, 0.18]])
-
-
-def test_numerical_damping_is_an_option(tmp_path: Path) -> None:
-    drive, tables = drive_file(tmp_path / "drive.csv", TIMES[:20], jumped(0.002)), []
-    for rho in ([], ["--rho", "0.8"], ["--rho", "0.1"]):
-        out = tmp_path / f"out{len(tables)}.csv"
-        assert main(["simulate", "--drive", drive, "--out", str(out), "--no-error-estimate", *rho]) == 0
-        tables.append(out.read_text())
-    assert tables[0] == tables[1] != tables[2]
-    with pytest.raises(SystemExit):
-        main(["simulate", "--drive", drive, "--out", str(tmp_path / "out.csv"), "--rho", "1.1"])
 
 
 def columns(path: Path) -> dict[str, np.ndarray]:

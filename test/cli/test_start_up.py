@@ -22,9 +22,6 @@ print(json.dumps([code, sorted(sys.modules)]))
 """
 
 
-BAG = Path(__file__).parents[2] / "bags" / "arch_session"
-
-
 def imported_by(*arguments: str) -> tuple[int, set[str]]:
     """Exit code of a command in a fresh process, and those of the slow modules that it has imported."""
     done = subprocess.run(
@@ -37,35 +34,6 @@ def imported_by(*arguments: str) -> tuple[int, set[str]]:
 @pytest.mark.parametrize("arguments", [["check"], ["check", "--json"], ["scene"], ["urdf"], ["--help"], ["statics", "--help"]])
 def test_what_does_not_step_needs_no_compiler(arguments: list[str]) -> None:
     assert imported_by(*arguments) == (0, set())
-
-
-COMMANDS = ["check", "statics", "simulate", "replay", "rig", "info", "recover", "play", "record", "urdf"]
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_usage_errors_are_told_at_once(command: str) -> None:
-    code, slow = imported_by(command, "--no-such-option")
-    assert code == 2 and slow <= {"rosbags"}
-
-
-def test_what_is_compiled_is_loaded_without_the_compiler() -> None:
-    """To compile, numba imports SciPy's BLAS; what is cached is loaded without. The first call fills the cache."""
-    imported_by("statics", "--posture", "arch")
-    code, slow = imported_by("statics", "--posture", "arch")
-    assert code == 0 and slow == {"numba", "llvmlite", "scipy"}
-
-
-def test_bags_and_faulty_scenes_are_told_of_without_a_compiler(tmp_path: Path) -> None:
-    assert imported_by("info", str(BAG)) == (0, {"rosbags"})
-    path = tmp_path / "scene.yaml"
-    path.write_text("sections: []\n", encoding="utf-8")
-    assert imported_by("check", str(path)) == (1, set())
-
-
-def test_the_twin_loads_no_package_of_statistics() -> None:
-    code = "import json, sys, boom_twin.twin.twin; print(json.dumps(sorted(sys.modules)))"
-    modules = json.loads(subprocess.check_output([sys.executable, "-c", code], text=True, timeout=300))
-    assert not {"scipy.stats", "matplotlib", "rosbags", "numba"} & set(modules)
 
 
 INTERRUPTED = """

@@ -142,14 +142,6 @@ def test_simulate_starts_from_its_first_row(tmp_path: Path, capsys: pytest.Captu
     assert "posture arch has" in capsys.readouterr().err
 
 
-def test_a_refused_stroke_is_told_with_its_likely_unit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    session = drive(tmp_path / "in.csv", *(f"{0.01 * row:.2f},630,165,235,187" for row in range(30)))
-    assert main(["replay", session, "--out", str(tmp_path / "out"), "--no-pictures"]) == 1
-    told = capsys.readouterr().err
-    assert "first refused value: cylinder_1 = 630 m, its travel is 0 to 0.79 m. With the unit `mm` it would fit" in told
-    assert "replay: 100 %, 30 of 30 messages" in told
-
-
 def test_a_summary_as_json_is_flat_and_has_its_alarms() -> None:
     alarm = {"channel": "joint_2", "kind": "residual", "from_s": 4.0, "to_s": None, "cause": "cylinder_2.k", "ranked": []}
     found = flat({"samples": 3, "events": {"not followed": 2}, "alarms": [alarm, {**alarm, "channel": "joint_3"}]})

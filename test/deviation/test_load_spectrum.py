@@ -7,11 +7,6 @@ import pytest
 
 from boom_twin.deviation.load_spectrum import (
     LEAST,
-    LOBE,
-    LOWEST,
-    PADDED,
-    TipLoadFinder,
-    _prominences,
     find_pulses,
     tip_load,
 )
@@ -80,33 +75,3 @@ def test_a_small_load_is_none_and_what_was_never_measured_is_not_told() -> None:
     assert small is not None and small.text == "none above 20 N"
     assert tip_load(t, np.zeros((len(t), 2))) is None
     assert tip_load(t[:0], np.zeros((0, 2))) is None
-
-
-def test_parts_give_what_the_whole_gives() -> None:
-    t = times(300.0)
-    stamps = np.round(t * 1e9).astype(np.int64) + 1_700_000_000 * 10**9
-    loads = pulses(t, 0.31, 90.0) * (t > 100.0)[:, None] + np.random.default_rng(5).standard_normal((len(t), 2))
-    stamps[40_000:] += 5 * 10**9  # a gap
-    whole, parts = TipLoadFinder(), TipLoadFinder()
-    whole.add(stamps, loads)
-    for part in np.array_split(np.arange(len(t)), 23):
-        parts.add(stamps[part], loads[part])
-    assert whole.load is not None and whole.load.pulses is not None and parts.load is not None
-    assert parts.load.pulses == whole.load.pulses and parts.load.rms == pytest.approx(whole.load.rms, rel=1e-12)
-    assert whole.load.pulses.frequency == pytest.approx(0.31, rel=0.02)
-    assert whole.load.pulses.height == pytest.approx(90.0, rel=0.1)
-    assert len(parts._loads) < 80 * RATE + 1
-
-
-def test_a_peak_stands_out_by_as_much_as_its_neighbours_mean_says() -> None:
-    """Sums of the neighbourhood against the mean of what a mask leaves, side by side."""
-    span, random = 40.0, np.random.default_rng(3)
-    frequencies, power = np.arange(3200.0) / (PADDED * span), random.exponential(1.0, 3200)
-    places = np.flatnonzero(frequencies > LOWEST / span)[5:900:7]
-    found = _prominences(frequencies, power, places, span)
-    for place, ratio in zip(places.tolist(), found.tolist(), strict=True):
-        at, lobe = frequencies[place], LOBE / span
-        below = (frequencies > 0.5 * at) & (frequencies < at - lobe)
-        above = (frequencies > at + lobe) & (frequencies < max(2.0 * at - lobe, at + 3.0 * lobe))
-        level = max(power[side].mean() for side in (below, above) if side.any())
-        assert ratio == pytest.approx(power[place] / level, rel=1e-9)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from boom_twin import Sample, Stream, Twin, load_scene, statics
-from boom_twin.config.settings import Settings
+from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
 from boom_twin.deviation.kalman import DRIVE_TIME, FAST, SLOW, correct, make_transition
 from boom_twin.deviation.mixture import mix
 from boom_twin.deviation.predictor import BoomPredictor

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from deviation.motions import measured, rms, true_motion
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.config.settings import load_settings
-from boom_twin.errors import UsageError
 from boom_twin.health.baseline import load_baseline
 from boom_twin.offline.recording import Recording
 from boom_twin.twin.blocks import SampleBlock
@@ -43,13 +39,6 @@ def test_more_samples_a_second_are_better(name):
     assert (errors[1:] < 1.05 * errors[:-1]).all() and errors[-1] < 0.7 * errors[0]
 
 
-def test_one_by_one_is_as_in_blocks():
-    session = measured("stops", 100.0)
-    (_, predictions), twin = followed(session), Twin(load_scene())
-    reports = [twin.update(Sample(Stream.STROKES, *row)) for row in zip(session.stamps.tolist(), session.strokes, strict=True)]
-    assert predictions.tip_acceleration.tobytes() == np.array([r.prediction.tip_acceleration for r in reports]).tobytes()
-
-
 def test_the_angle_sensor_of_the_joint_replaces_a_transducer_that_sticks():
     """Cylinder 4 sticks at rest, is found when it moves, and the tip is right again a second after that."""
     session, twin, tips = measured("rests"), Twin(load_scene(), baseline=load_baseline(None)), {}
@@ -75,11 +64,3 @@ def test_no_sensor_is_accused_of_a_motion_in_haste(name, rate):
             if (health := twin.update(Sample(stream, stamp, values)).health) is not None:
                 alarms |= {(alarm.channel, alarm.kind) for alarm in health.alarms}
     assert not alarms
-
-
-@pytest.mark.parametrize("name", ["lag", "look_step", "stroke_agility"])
-def test_parameters_of_the_filter_before_are_refused_with_the_remedy(name, tmp_path: Path):
-    file = tmp_path / "twin.yaml"
-    file.write_text(f"/**:\n  ros__parameters:\n    {name}: 0.045\n")
-    with pytest.raises(UsageError, match=f"{name} = 0.045: .*leave it out"):
-        load_settings(file)

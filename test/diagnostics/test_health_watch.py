@@ -10,7 +10,7 @@ import pytest
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
 from boom_twin.diagnostics.model_status import HealthWatch, ResidualWindow
-from boom_twin.types import Alarm, Health, Ranked
+from boom_twin.types import Alarm, Health
 
 SECOND = 1_000_000_000
 BIAS = Alarm("joint_3", "bias", 15 * SECOND, None, "joint_3.sensor", "joint_3.sensor bias: +0.0035 rad")
@@ -80,16 +80,6 @@ def test_an_alarm_that_comes_and_goes_is_told_once_with_how_often() -> None:
     watch.acknowledge()
     watch.took(health(42, OPEN))
     assert "(ended; not acknowledged)" in status(watch).message
-
-
-def test_residuals_are_left_to_an_alarm_that_was_inferred_from_them() -> None:
-    """Not to that of a sensor which gives itself away: it explains no other channel."""
-    watch = HealthWatch()
-    watch.took(health(17, BIAS))
-    assert watch.explained == ""
-    inferred = replace(OPEN, ranked=(Ranked("cylinder_1.k", 0.6, ()), Ranked("joint_1.sensor", 0.4, ())))
-    watch.took(health(18, BIAS, inferred))
-    assert watch.explained == "judged by health: alarm of joint_1"
 
 
 LOAD = "a load at the tip moves the boom: pulses of 128 N at 0.430 Hz (+- 0.001)"

@@ -10,8 +10,7 @@ import pytest
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
 from boom_twin.diagnostics.recorder_status import DiskState, TopicCount, recording_status
-from boom_twin.diagnostics.topic_status import Peers, Reception, ReceptionWatch, publishers_status
-from boom_twin.types import Stream
+from boom_twin.diagnostics.topic_status import Reception, ReceptionWatch
 
 
 def begun(judge: ComponentJudge, now: float = 0.0) -> ComponentJudge:
@@ -48,20 +47,6 @@ def test_what_is_left_out_is_told_at_once_and_only_what_is_new() -> None:
     assert [status.values["shapes left_out"] for status in found] == [0, 7, 0, 0]
 
 
-def test_a_second_source_is_an_error_at_once_unless_streams_share_a_topic() -> None:
-    def judged(peers: dict[Stream, Peers]) -> Status:
-        return publishers_status(begun(ComponentJudge("publishers")), peers, dict.fromkeys(Stream, "12.500000000"))
-
-    one = {stream: Peers(f"/{stream.value}", ("/driver",)) for stream in Stream}
-    assert judged(one).level == judged(one | {Stream.IMU: Peers("/tip_imu", ())}).level == Level.OK
-    status = judged(one | {Stream.ANGLES: Peers("/joint_angles", ("/driver", "/other"))})
-    assert status.level == Level.ERROR and status.values["/joint_angles newest_stamp_s"] == "12.500000000"
-    assert "2 publishers of /joint_angles: /driver, /other" in status.message
-    for names, level in ((("/cylinders", "/encoders"), Level.OK), (("/cylinders", "/encoders", "/other"), Level.ERROR)):
-        shared = dict.fromkeys((Stream.STROKES, Stream.ANGLES), Peers("/joint_states", names))
-        assert judged(shared).level == level
-
-
 TOPICS = [TopicCount("/a", 500, 0, 0), TopicCount("/b", 30, 0, None)]
 
 
@@ -90,7 +75,3 @@ def test_what_is_told_of_a_recording(changes: dict[str, Any], level: Level, word
     status = recorded(**changes)
     assert (status.level, status.message) == (level, words)
     assert status.values.get("ended") == (1 if "end" in changes else None) and status.values["received /a"] == 500
-
-
-def test_counts_that_are_not_known_are_nan() -> None:
-    assert [recorded().values[f"never_arrived {name}"] for name in ("/a", "/b")] == [0, "nan"]

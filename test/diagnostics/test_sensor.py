@@ -7,13 +7,11 @@ from math import inf, isnan, nan
 import numpy as np
 import pytest
 
-from boom_twin.config.settings import Settings, Thresholds
+from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level
-from boom_twin.diagnostics.sensor_status import SensorSpec, sensor_status, sensors_of
-from boom_twin.diagnostics.stream_stats import Channel, ChannelStats, StreamWatch
+from boom_twin.diagnostics.sensor_status import SensorSpec, sensor_status
+from boom_twin.diagnostics.stream_stats import Channel, ChannelStats
 from boom_twin.health.sensor_check import readings_of_frozen
-from boom_twin.scene import load_scene
-from boom_twin.types import Sample, Stream
 
 SECOND = 1_000_000_000
 NOISE = np.random.default_rng(0).normal(0.0, 1.0, 200)
@@ -46,23 +44,6 @@ def test_a_reading_that_does_not_change_is_counted_over_looks() -> None:
     counts = [channel.look(STAMPS + k * SECOND, values if k == 0 else np.ones(200), 0, 0.1).unchanged for k in range(3)]
     assert counts == [49, 249, 449]
     assert channel.look(STAMPS + 3 * SECOND, NOISE, 0, 0.1).unchanged == 0
-
-
-def test_a_stream_gives_each_channel_its_own_and_lags_tell_how_clocks_are_apart() -> None:
-    watch = StreamWatch(np.array([[-inf, inf], [-inf, 1.0]]))
-    for k in range(10):
-        watch.seen(SECOND + k * 10_000_000)
-        if k != 4:
-            watch.took(Sample(Stream.ANGLES, SECOND + k * 10_000_000, np.array([0.1 * k, nan if k > 6 else 2.0])))
-    first, second = watch.look(0.1)
-    assert (watch.count, first.missing, first.outside) == (10, pytest.approx(0.1), 0.0)
-    assert (second.missing, second.outside, second.unchanged) == (pytest.approx(0.4), pytest.approx(0.6), 5)
-    assert watch.age_of(second, 1e9) - watch.age_of(first, 1e9) == pytest.approx(0.03)
-    streams = [StreamWatch(np.array([[0.0, 1.0]]), lambda: 100.0) for _ in range(2)]
-    for stream, behind in zip(streams, (0, 70_000_000), strict=True):
-        stream.seen(SECOND - behind)
-        stream.look(0.1)
-    assert streams[1].lag - streams[0].lag == pytest.approx(0.07)
 
 
 SENSOR = SensorSpec("joint_1", "rad", -4.0, 4.0, 1.0, 0.1)
@@ -98,15 +79,6 @@ def test_what_a_sensor_is_told_to_be(
     assert (status.level, status.message) == (level, words)
 
 
-def test_sensors_of_the_default_scene() -> None:
-    scene, settings = load_scene(), Settings()
-    sensors = sensors_of(scene, settings, dict.fromkeys(Stream, True), [None] * 4)
-    assert [sensor.name for sensor in sensors[Stream.STROKES]] == [f"cylinder_{i}" for i in (1, 2, 3, 4)]
-    assert sensors[Stream.STROKES][0].high == pytest.approx(scene.joints[0].cylinder.max_stroke, abs=2e-4)
-    assert np.degrees(sensors[Stream.ANGLES][1].low) == pytest.approx(scene.joints[1].range_deg[0] - 5.0, abs=0.1), "with sag"
-    assert [sensor.name for sensor in sensors[Stream.IMU]] == ["tip_imu_x", "tip_imu_z"]
-
-
 @pytest.mark.parametrize(("sigma", "resolution"), [(1.0, 0.25), (1.0, 0.5), (0.5, 1.0), (0.3, 1.0)])
 def test_live_sensors_are_rarely_taken_for_stuck(sigma: float, resolution: float) -> None:
     """False alarms of 4 million readings of a still sensor, in the middle of a step, where it repeats most."""
@@ -120,13 +92,3 @@ def test_live_sensors_are_rarely_taken_for_stuck(sigma: float, resolution: float
     assert 0.0 <= rate < alarm
     if sigma < resolution:  # one value is then by far the most frequent, and the bound is nearly reached
         assert rate > 0.2 * alarm
-
-
-def test_numbers_of_readings_that_are_stated() -> None:
-    settings, alarm = Settings(), Thresholds().frozen_false_alarm
-    assert readings_of_frozen(settings.stroke_sigma, settings.stroke_resolution, alarm) == 10.0
-    assert readings_of_frozen(settings.angle_sigma, settings.angle_resolution, alarm) == 14.0
-    assert readings_of_frozen(settings.imu_sigma, 0.0, alarm) == 2.0
-    assert readings_of_frozen(1.0, 7.0, 1e-9) == pytest.approx(4.4e4, rel=0.1)
-    assert readings_of_frozen(1.0, 10.0, 1e-9) > 3e7
-    assert readings_of_frozen(0.0, 0.1, 1e-9) == readings_of_frozen(1e-3, 1.0, 1e-9) == inf  # it cannot be told

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from drive_twin import drive_twin
 
-from boom_twin.config.settings import Settings, Thresholds
+from boom_twin import Report, Sample, Settings, Stream, load_scene
+from boom_twin.config.settings import Thresholds
 from boom_twin.deviation.estimate_row import WIDTH
 from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level, Status
 from boom_twin.diagnostics.model_status import stress_model, stress_status
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import estimate_of
-from boom_twin.types import Report, Residuals, Sample, Stream
+from boom_twin.types import Residuals
 
 NAMES = {stream: stream.value for stream in Stream}
 REQUIRED = {stream: stream in (Stream.STROKES, Stream.ANGLES) for stream in Stream}
@@ -104,14 +104,6 @@ def test_a_residual_that_grows_and_shrinks_again(rig: Rig) -> None:
     assert told[13].message.endswith("for 10 s") and told[-1].level == Level.OK
 
 
-def test_residuals_that_stop_are_stale(rig: Rig) -> None:
-    after(rig, 2)
-    for _ in range(12):
-        found = rig.second((Stream.STROKES,))
-    assert found["residual joint_1"].level == found["sensor joint_1"].level == found["joint_angles"].level == Level.STALE
-    assert found["model"].level == found["sensor cylinder_1"].level == Level.OK
-
-
 def test_a_failure_of_the_model_is_urgent_once(rig: Rig) -> None:
     after(rig, 2)
     rig.watch.is_urgent()
@@ -148,25 +140,6 @@ def test_strokes_that_give_no_prediction_are_an_error_with_what_is_wrong_with_th
     assert look(403).level == Level.OK
 
 
-def test_strokes_that_never_gave_a_prediction(rig: Rig, monkeypatch: Any) -> None:
-    monkeypatch.setattr(rig, "_report", lambda stream, stamp: Report(stamp, False, events=("empty",)))
-    assert rig.second((Stream.STROKES,))["model"].message == "waiting for strokes"
-    status = after(rig, 3)["model"]
-    assert status.level == Level.ERROR and status.message.startswith("no prediction for 4.0 s, though strokes come")
-
-
-def test_silence_is_urgent_and_strokes_that_come_back_are_no_error_while_the_model_waits(rig: Rig, monkeypatch: Any) -> None:
-    after(rig, 2)
-    rig.watch.is_urgent()
-    rig.now += 2.5
-    assert rig.watch.is_urgent() and not rig.watch.is_urgent()
-    found = rig.look()
-    assert (found["model"].level, found["model"].message) == (Level.WARN, "waiting for strokes")
-    assert (found["cylinder_strokes"].level, found["cylinder_strokes"].message) == (Level.STALE, "silent for 2.5 s")
-    monkeypatch.setattr(rig, "_report", lambda stream, stamp: Report(stamp, True, events=("leap",)))
-    assert rig.second((Stream.STROKES,))["model"].level == Level.OK
-
-
 def test_a_boom_outside_the_models_validity_is_a_warning_as_long_as_it_is(rig: Rig, monkeypatch: Any) -> None:
     def bent(stream: Stream, stamp: int) -> Report:
         return Report(stamp, True, prediction=object(), events=("deflected",))  # type: ignore[arg-type]
@@ -188,38 +161,6 @@ def test_a_model_that_is_too_slow_and_clocks_that_differ(rig: Rig) -> None:
     assert angles.values["clock_offset_s"] == pytest.approx(0.08) and angles.values["clock_offset_s_warn"] == 0.05
 
 
-def test_a_publisher_of_which_nothing_arrives(rig: Rig) -> None:
-    """As between two users of one machine: the ends match, and shared memory keeps them apart."""
-    rig.now += 2.5
-    for names, told in (
-        (("/driver",), "though a publisher is there. If it sends as another user"),
-        ((), "nothing received yet"),
-    ):
-        rig.peers[Stream.STROKES] = Peers("/strokes", names)
-        status = rig.look()["cylinder_strokes"]
-        assert status.level == Level.STALE and told in status.message
-    assert status.message == "nothing received yet"
-
-
-def test_other_ends(rig: Rig) -> None:
-    qos, kind = "/b: Best effort publisher and reliable subscription", "/b: std_msgs/msg/String, not sensor_msgs/msg/JointState"
-    for peers, count, level, told in (
-        (Peers("/strokes", ("/a", "/b"), (qos,)), 2, Level.WARN, f"incompatible QoS: {qos}"),
-        (Peers("/strokes", ("/a",), mistyped=(kind,)), 1, Level.WARN, f"another type of message: {kind}"),
-        (Peers("/strokes", ("/a",)), 1, Level.OK, "listened to"),
-    ):
-        rig.peers[Stream.STROKES] = peers
-        status = after(rig, 10)["cylinder_strokes"]
-        assert (status.level, status.values["publishers"]) == (level, count) and told in status.message
-
-
-def test_an_idle_node_tells_of_its_model_only(rig: Rig) -> None:
-    (status,) = all_pieces(rig.watch.look({}, False, {}, [], 0.0))
-    assert (status.level, status.message) == (Level.WARN, "not active")
-    (status,) = all_pieces(TwinWatch({}, {}, Thresholds()).look({}, False, {}, [], 0.0))
-    assert status.message == "not active"
-
-
 def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() -> None:
     scene, strokes = load_scene(), strokes_of_posture(load_scene(), "horizontal")
     prediction = drive_twin(scene).update(Sample(Stream.STROKES, 10**18, strokes)).prediction
@@ -237,34 +178,3 @@ def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() ->
     assert status.values["section_1_at_0.60_m_sigma_MPa"] == pytest.approx(0.73, rel=0.02)
     rigid = scene.model_copy(update={"modes": 0})
     assert stress_model(rigid) is None
-
-
-def test_the_load_at_the_tip_is_told_once_anything_was_measured() -> None:
-    rig = Rig()
-    assert "tip load" not in rig.second()
-    for row in range(8000):
-        stamp = 10**18 + row * 5_000_000
-        load = np.array([0.0, 120.0 * (row * 0.005 * 0.5 % 1.0 < 0.5) + 1.0])
-        estimate = replace(estimate_of(stamp, np.zeros(WIDTH)), load=load)
-        rig.watch.took(Sample(Stream.STROKES, stamp, np.zeros(4)), Report(stamp, True, estimate=estimate), 0.0)
-    status = rig.second()["tip load"]
-    assert status.level == Level.OK and status.message.startswith("pulses of 12")
-    assert status.values["frequency_Hz"] == pytest.approx(0.5, rel=0.02)
-    assert status.values["pulses_N"] == pytest.approx(120.0, rel=0.05)
-
-
-def test_all_streams_of_a_twin_are_judged() -> None:
-    """Residuals of several streams, at once or when strokes come, the load, the bending stresses."""
-    scene, random = load_scene(), np.random.default_rng(3)
-    twin, rest = drive_twin(scene), strokes_of_posture(scene, "horizontal")
-    sensors = sensors_of(scene, Settings(), REQUIRED, [None] * 4)
-    watch = TwinWatch(sensors, NAMES, Thresholds(), lambda: 100.0, stress_model(scene))
-    for k in range(100):
-        stamp = 10**18 + k * 5_000_000
-        early = [Sample(stream, stamp + 1000, random.normal(size=4)) for stream in (Stream.ANGLES, Stream.FORCES)]
-        late = Sample(Stream.IMU, stamp, np.array([0.1, 9.8]))
-        for sample in (*early, Sample(Stream.STROKES, stamp, rest + random.normal(0.0, 2e-5, 4)), late):
-            watch.took(sample, twin.update(sample), 1e-4)
-    peers = {stream: Peers(f"/{stream.value}", ("/driver",)) for stream in Stream}
-    names = {status.name for status in all_pieces(watch.look({}, True, peers, [], 100.0))}
-    assert names >= {"residual joint_1", "residual tip_imu_z", "residual cylinder_force_4", "tip load", "bending"}, names

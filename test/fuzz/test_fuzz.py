@@ -14,9 +14,7 @@ from .verdict import Kind
 
 CORPUS = Path(__file__).parent / "corpus"
 CASES = [
-    pytest.param(target, path, id=f"{target}-{path.stem}", marks=[pytest.mark.system] * (target == "page"))
-    for target in TARGETS
-    for path in sorted((CORPUS / target).iterdir())
+    pytest.param(target, path, id=f"{target}-{path.stem}") for target in TARGETS for path in sorted((CORPUS / target).iterdir())
 ]
 SECONDS = 40
 """The workers take some 20 more to start."""

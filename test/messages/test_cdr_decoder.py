@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from itertools import product
 from typing import Any
 
-import numpy as np
 import pytest
-from ros_messages import encoded, imu, joint_state
+from ros_messages import encoded, joint_state
 
 from boom_twin import Stream
 from boom_twin.messages.cdr_decoder import CdrDecoder
@@ -15,8 +13,6 @@ from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import TYPES
 from boom_twin.messages.type_store import decode
 from boom_twin.types import SENSORS
-
-CYLINDERS = [f"cylinder_{i}" for i in (3, 1, 4, 2)]
 
 
 class Wire:
@@ -40,31 +36,6 @@ class Wire:
         assert mine.oddities == theirs.oddities
         assert (ours and ours.values.tobytes()) == (other and other.values.tobytes())
         return msg
-
-
-@pytest.mark.parametrize(("stream", "read", "other"), [("STROKES", "position", "effort"), ("FORCES", "effort", "position")])
-def test_joint_states_of_every_layout(stream: str, read: str, other: str) -> None:
-    random, wire = np.random.default_rng(2), Wire(Stream[stream])
-    heads = list(product(("", "base_link", "x" * 7), ([], ["boom_é"], ["a", "bb", "ccc"])))
-    for (frame, more), count, others, k in product(heads, (0, 4, 9), (0, 3), range(3)):
-        arrays = {read: random.normal(size=count), other: np.arange(float(others))}
-        wire.check(encoded(joint_state(CYLINDERS + more, stamp=k, frame=frame, **arrays)))
-    assert wire.whole == len(heads), "each frame with each list of names is decoded once"
-
-
-def test_accelerations_of_every_frame() -> None:
-    wire = Wire(Stream.IMU)
-    for frame, (k, covariance) in product(("", "tip", "tip_link", "base_footprint"), enumerate((0.0, -1.0, 0.2))):
-        wire.check(encoded(imu(0.1 * k, -9.0, 10**18 + k, frame, covariance)))
-    assert wire.whole == 4
-
-
-def test_names_of_the_same_length_that_take_turns_are_remembered() -> None:
-    """As of joints in messages of their own."""
-    wire = Wire(Stream.ANGLES)
-    for names in (["joint_1", "joint_2"], ["joint_2", "joint_1"], ["joint_1", "joint_2"]):
-        wire.check(encoded(joint_state(names, [1.0, 2.0], 5)))
-    assert wire.whole == 2
 
 
 def test_a_message_that_is_not_whole_is_refused_and_the_next_one_read() -> None:

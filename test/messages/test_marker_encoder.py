@@ -90,13 +90,6 @@ def test_every_message_draws_the_boom_in_the_same_markers(predictions: list[Pred
     assert len(past) == 51 and {bool(force > 0.0) for force in predictions[0].cylinder_forces} == {True, False}
 
 
-def test_colours_saturate_and_survive_nan() -> None:
-    assert force_colour(1.0) == force_colour(5.0) and force_colour(-1.0) == force_colour(-np.inf)
-    assert force_colour(0.0)[:3] == (0.75, 0.75, 0.75)
-    assert all(0.0 <= value <= 1.0 for share in np.linspace(-2, 2, 41) for value in force_colour(share))
-    assert np.isfinite(force_colour(np.nan)).all()
-
-
 def test_the_trace_starts_anew_where_time_was_set_back(predictions: list[Prediction]) -> None:
     back = replace(predictions[-1], stamp=predictions[2].stamp)
     last = drawn([*predictions[:5], back])[-1]

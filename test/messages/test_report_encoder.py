@@ -6,15 +6,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pytest
 from ros_messages import decoded, encoded
 
 from boom_twin import Report, Settings, Stream, load_scene
 from boom_twin.deviation.estimate_row import COORDINATES, RATES, WIDTH
 from boom_twin.messages.report_encoder import ReportEncoder, decode_health
 from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.messages.topic_table import TYPES, Output
-from boom_twin.messages.type_store import jazzy, new_message
+from boom_twin.messages.topic_table import Output
 from boom_twin.predictions import Prediction
 from boom_twin.twin.blocks import estimate_of
 from boom_twin.types import Alarm, Health, Ranked, Residuals
@@ -191,56 +189,9 @@ def test_alarms_come_back_from_their_message_to_the_millisecond() -> None:
         assert decode_health(message) == found[1:]
 
 
-@pytest.mark.parametrize("type_name", sorted(set(TYPES.values())))
-def test_factory_makes_what_can_be_encoded(type_name: str) -> None:
-    data = encoded(new_message(type_name))
-    assert encoded(jazzy().deserialize_cdr(data, type_name)) == data
-    assert not any(data[4:].replace(b"\x01\x00\x00\x00\x00", b""))
-
-
-def test_factory_makes_a_new_message_each_time() -> None:
-    one, other = new_message("sensor_msgs/msg/Imu"), new_message("sensor_msgs/msg/Imu")
-    one.header.stamp.sec, one.orientation_covariance[0] = 5, -1.0
-    assert (other.header.stamp.sec, other.orientation_covariance[0]) == (0, 0.0)
-
-
 def test_the_bytes_are_those_of_rosbags() -> None:
     """Encoded anew by it, a message is the same to the byte: lengths, padding, order, byte order."""
     own = encoder()
     for number in range(60):
         for key, data in own.fill(replace(judged(ALARM), prediction=prediction(STAMP + 100_000_000 * number))):
             assert encoded(decoded(data, key)) == data, key
-
-
-def test_rclpy_reads_the_same_numbers() -> None:
-    serialization = pytest.importorskip("rclpy.serialization")
-    types = pytest.importorskip("boom_twin.ros.runtime")
-    for key, data in encoder().fill(judged(ALARM)):
-        assert_same(
-            decoded(data, key),
-            serialization.deserialize_message(data, types.message_class(TYPES[key])),
-            key.value,
-        )
-
-
-def assert_same(one: Any, other: Any, place: str) -> None:
-    """Field by field, with rosbags' message as the guide."""
-    if hasattr(one, "__dataclass_fields__"):
-        for name in one.__dataclass_fields__.keys() - {"__msgtype__"}:
-            assert_same(getattr(one, name), getattr(other, name), f"{place}.{name}")
-    elif isinstance(one, np.ndarray):
-        np.testing.assert_array_equal(one, np.asarray(other), err_msg=place)
-    elif isinstance(one, list):
-        assert len(one) == len(other), place
-        for left, right in zip(one, other, strict=True):
-            assert_same(left, right, place)
-    else:
-        assert one == (other[0] if isinstance(other, bytes) else other), place  # rclpy has a byte as bytes
-
-
-def test_only_what_is_wanted_is_encoded_and_as_ever() -> None:
-    given = replace(judged(ALARM), prediction=prediction(STAMP), residuals=report().residuals)
-    everything = dict(encoder().fill(given))
-    for wanted in everything:
-        assert encoder().fill(given, wanted.__eq__) == [(wanted, everything[wanted])]
-    assert encoder().fill(given, lambda output: False) == []

@@ -11,12 +11,12 @@ import pytest
 from drive_twin import drive_twin
 from ros_messages import decoded
 
-from boom_twin import Report, Sample, Scene, Settings, Stream, load_scene
+from boom_twin import Sample, Scene, Settings, Stream, load_scene
 from boom_twin.cli.main import main
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import Output
 from boom_twin.messages.urdf import urdf
-from boom_twin.scene.kinematics import PassiveJoints, skeleton, stroke_curve, strokes_of_posture
+from boom_twin.scene.kinematics import PassiveJoints, skeleton, stroke_curve
 from boom_twin.scene.load import examine_text, example_text
 
 # What urdf.xsd of urdfdom and the wiki's page say of the elements used here: attributes, children
@@ -166,24 +166,6 @@ def at(pose: np.ndarray, own: tuple[float, float], expected: Any) -> None:
     np.testing.assert_allclose(point[:3], [expected[0], 0.0, expected[1]], atol=1e-8)
 
 
-def test_joint_states_drive_every_joint() -> None:
-    """A message that comes with a shape names each joint of the URDF that can move, and no other."""
-    scene = load_scene()
-    twin, encoder = drive_twin(scene), ReportEncoder(scene, Settings())
-    report: Report = twin.update(Sample(Stream.STROKES, 0, strokes_of_posture(scene, "arch")))
-    msg = decoded(dict(encoder.fill(report))[Output.JOINT_STATES], Output.JOINT_STATES)
-    robot = ElementTree.fromstring(urdf(scene))
-    assert set(msg.name) == {j.attrib["name"] for j in robot.findall("joint") if j.attrib["type"] != "fixed"}
-    positions = dict(zip(msg.name, msg.position.tolist(), strict=True))
-    poses = frames(robot, positions)
-    for i in (2, 3, 4):  # the rod of a deflected boom misses its pin by what the oil and the section give way
-        place = poses[f"link_l_{i}"] @ [scene.joints[i - 1].lL, 0.0, 0.0, 1.0]
-        np.testing.assert_allclose(place, poses[f"link_r_{i}"] @ [scene.joints[i - 1].lR, 0.0, 0.0, 1.0], atol=1e-9)
-    np.testing.assert_array_equal(poses["imu_link"], poses["tip"])
-    rod = bones_of(scene, positions).joints[0].rod_pin
-    assert np.hypot(*(poses["cylinder_1_rod"][[0, 2], 3] - rod)) < 5e-3
-
-
 @pytest.mark.parametrize("name", ["default", "one", "shuffled"])
 def test_the_joints_lead_to_the_tip_that_is_predicted(name: str) -> None:
     """Position and pitch of the frame ``tip`` by the rules of URDF, while the boom moves; apart from that of straight ones."""
@@ -203,10 +185,6 @@ def test_the_joints_lead_to_the_tip_that_is_predicted(name: str) -> None:
         np.testing.assert_allclose(poses["tip"][:3, 0], along, atol=1e-9)
         apart.append(np.linalg.norm(poses["tip"][:3, 3] - poses["tip_rigid"][:3, 3]))
     assert max(apart) > 5e-4
-
-
-def bones_of(scene: Scene, positions: dict[str, float]) -> Any:
-    return skeleton(scene, np.array([positions[f"joint_{i}"] for i in range(1, len(scene.joints) + 1)]))
 
 
 def test_the_command_prints_it(capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,16 +18,13 @@ import pytest
 from drive_twin import ARCH_DRIVES, note_drives
 from made_once import MadeOnce
 
+from boom_twin import Settings, Stream, load_scene, replay
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_session
-from boom_twin.config.settings import Settings
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.data.bag_feed import BagFeed, bag_feed
 from boom_twin.monitor.data.feed import Feed
-from boom_twin.offline.replay import replay
-from boom_twin.scene import load_scene
-from boom_twin.types import Stream
 
 SECONDS, WRONG_FROM, GAP = 40.0, 15.0, (30.0, 30.6)
 OFFSET = 0.02  # rad, by which joint 3's encoder is wrong from WRONG_FROM on

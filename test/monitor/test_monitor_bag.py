@@ -9,28 +9,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drive_twin import note_drives
 from monitor.conftest import GAP, read_all
-from rosbags.rosbag2 import StoragePlugin, Writer
 
-from boom_twin import statics
+from boom_twin import Settings, TimeWindow, load_scene, replay, statics
 from boom_twin.analysis.posture_modes import ModeList
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_session
 from boom_twin.bag.session_sheet import SessionSheet
-from boom_twin.bag.time_window import TimeWindow
-from boom_twin.config.settings import Settings
 from boom_twin.errors import BagError, UsageError
 from boom_twin.messages.topic_table import TYPES, Output, load_topics
-from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.monitor.data.analyst import ResponseList
-from boom_twin.monitor.data.bag_feed import PUBLISHED_OUTPUT, bag_feed
+from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
 from boom_twin.monitor.data.status import Severity, overall
 from boom_twin.monitor.protocol import state
-from boom_twin.offline.replay import replay
-from boom_twin.scene import load_scene
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.types import StrokeReading
 
 ALL = 10**6
@@ -77,16 +69,6 @@ def test_rows_are_those_of_the_replay(feed: Feed, replayed: Path) -> None:
     values = tables["estimate"].rows(0, ALL)[1]
     assert len(values) == len(expected) > 0.99 * len(position)
     assert values == pytest.approx(np.array(expected), rel=1e-5, abs=1e-6)
-
-
-def test_without_an_estimate_there_is_no_table_of_it(tmp_path: Path) -> None:
-    """A session of drives alone: what is published as estimate is the prediction."""
-    strokes = np.tile(strokes_of_posture(load_scene(), "arch"), (100, 1))
-    stamps = 10**18 + 5_000_000 * np.arange(100)
-    write_session(tmp_path / "strokes", stamps, strokes, np.full((100, 4), np.nan), None, {})
-    note_drives(tmp_path / "strokes")
-    feed = read_all(bag_feed(tmp_path / "strokes", load_scene(), Settings()))
-    assert feed.store.tables["displacement"].count == 100 and "estimate" not in feed.store.tables
 
 
 @pytest.mark.slow
@@ -177,24 +159,3 @@ def test_a_session_without_anything_to_show_is_refused(faulty: Path, tmp_path: P
     stamps = 10**18 + 5_000_000 * np.arange(100)
     write_session(tmp_path / "far", stamps, np.full((100, 4), 50.0), np.zeros((100, 4)), np.zeros((100, 2)), {})
     assert "no stroke could be used" in read_all(bag_feed(tmp_path / "far", load_scene(), Settings())).trouble
-
-
-def test_a_malformed_message_of_a_session_is_dropped_and_told(tmp_path: Path) -> None:
-    """A result bag of a few rows; one of its joint_states has no effort."""
-    displacement, states = (load_topics().outputs[role] for role in (PUBLISHED_OUTPUT, Output.JOINT_STATES))
-    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        kinds = (displacement, states)
-        links = {topic: writer.add_connection(topic.absolute, topic.type, typestore=jazzy()) for topic in kinds}
-        for row in range(10):
-            stamp = 1_700_000_000 * 10**9 + row * 5_000_000
-            for topic, link in links.items():
-                message = new_message(topic.type)
-                message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
-                if topic is states:
-                    message.name, message.position = ["cylinder_1"], np.array([0.1])
-                    message.effort = np.array([] if row == 4 else [1.0])
-                writer.write(link, stamp, jazzy().serialize_cdr(message, topic.type))
-    feed = read_all(bag_feed(tmp_path / "bag", load_scene(), Settings()))
-    assert not feed.trouble and feed.store.tables["acceleration"].count == 10
-    told = {"topic": states.absolute, "count": 1, "reason": "1 names, but 1 of position, 0 of effort"}
-    assert feed.topic_rows.dropped.losses() == [told]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 import re
 import time
 from collections.abc import Iterator
@@ -19,7 +18,6 @@ from eventually import eventually
 from matplotlib.image import imread
 from monitor.conftest import MonitorProcess, monitoring
 
-from boom_twin import frequency_response
 from boom_twin.monitor.data.feed import Feed
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install .[test]")
@@ -151,33 +149,6 @@ def test_figures_table_and_picture_are_those_of_the_rows_that_are_shown(page: An
         top += height
 
 
-def test_every_chart_has_its_traces_bands_and_a_read_out(page: Any) -> None:
-    for name in ("displacement", "acceleration", "force", "residuals"):
-        chart = page.locator(f"#chart-{name}")
-        box = chart.locator(".u-over").bounding_box()
-        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-
-        def the_read_out(chart: Any = chart) -> None:
-            values = chart.locator(".u-series:not(.quiet):not(.u-off) .u-value").all_inner_texts()
-            assert all(math.isfinite(float(value)) for value in values) and len(values) >= 3
-            assert float(values[0]) == pytest.approx(sum(page.evaluate("twin.view.span")) / 2, abs=1.0)
-
-        eventually(the_read_out)
-    go(page, 12.0)
-
-    def estimate_in_its_band() -> None:
-        for name, first in (("displacement", 7), ("acceleration", 3)):
-            labels = page.locator(f"#chart-{name} .u-legend .u-label").all_inner_texts()
-            assert [label for label in labels if label.startswith("est.")] == ["est. forward", "est. up"]
-            data = page.evaluate("name => twin.charts(name).plot.data.map(column => column.filter(v => v != null))", name)
-            estimate, high, low = (np.array(data[first + i]) for i in (0, 2, 3))
-            assert len(estimate) > 100 and (high > estimate).all() and (low < estimate).all()
-
-    eventually(estimate_in_its_band)
-    page.keyboard.press("4")
-    page.locator("#load", has_text="load at the tip: none above 20 N").wait_for()
-
-
 ALARM_BAR = """moments => {
     const canvas = document.querySelector("#chart-acceleration canvas");
     const over = document.querySelector("#chart-acceleration .u-over");
@@ -247,33 +218,6 @@ def test_time_is_chosen_by_dragging_by_span_by_marks_and_by_playing(page: Any) -
     page.keyboard.press(" ")
     wait(page, "twin.timeline.isHeld && document.querySelector('#play').innerText === 'Play'")
     assert re.fullmatch(r"[\d.]+ of 40\.00 s", page.locator("#position").inner_text())
-
-
-def test_missing_rows_are_a_break_in_the_line_and_zero_has_no_minus(page: Any) -> None:
-    go(page, 35.0)
-    rows = "m.decimate(twin.connection.table('displacement'), [0, 1], 29, 32, 2000)"
-    broken = page.evaluate(f"import('/page/decimation.js').then(m => {rows})")
-    times, place = np.array(broken[0]), broken[1].index(None)
-    assert times[place - 1] == pytest.approx(30.0, abs=0.02) and times[place] == pytest.approx(30.6, abs=0.02)
-    values = "[[-0.003, 1], [-0.003, 2], [-0.06, 1], [0, 2]]"
-    shown = page.evaluate(f"import('/page/html_table.js').then(m => {values}.map(each => m.fixed(...each)))")
-    assert shown == ["0.0", "0.00", "-0.1", "0.00"]
-
-
-def test_a_finger_opens_tabs_and_chooses_a_span(browser: Any, monitor: MonitorProcess) -> None:
-    page = opened(browser, monitor, 1024, 768, has_touch=True)
-    for tab in ("spectrum", "shape", "traces"):
-        page.locator(f"#tabs button[data-tab='{tab}']").tap()
-        wait(page, f"getComputedStyle(document.getElementById('{tab}')).display !== 'none'")
-    box = page.locator("#charts .u-over").first.bounding_box()
-    devtools = page.context.new_cdp_session(page)
-    for kind, share in (("Start", 0.7), ("Move", 0.75), ("Move", 0.8), ("Move", 0.85), ("Move", 0.9), ("End", None)):
-        points = [] if share is None else [{"x": box["x"] + share * box["width"], "y": box["y"] + 20}]
-        devtools.send("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": points})
-    wait(page, "twin.view.zoom !== null")
-    low, high = page.evaluate("twin.view.zoom")
-    assert high - low == pytest.approx(0.2 * 30.0, rel=0.15)
-    page.context.close()
 
 
 SIZES = {(1280, 720): 0.62, (2560, 1440): 0.78, (1024, 768): 0.66, (834, 1112): 0.62, (390, 844): 0.3}
@@ -351,20 +295,10 @@ def test_shape_and_path_are_drawn_and_told_in_figures(page: Any, feed: Feed) -> 
         assert page.locator("#height").inner_text() == f"height {values[f'line_{last}_z_m']:.3f} m"
         assert f"{strongest / 1e3:.1f} kN" in page.locator("#forces").inner_text()
 
-    def no_line_through_a_label() -> None:
-        drawn = page.evaluate("() => { const s = twin.shape; s.draw(); return s.drawn }")
-        assert len(drawn["boxes"]) >= 4
-        along = np.linspace(0.0, 1.0, 500)
-        for left, top, right, bottom in drawn["boxes"]:
-            for (x0, y0), (x1, y1) in drawn["segments"]:
-                x, y = x0 + along * (x1 - x0), y0 + along * (y1 - y0)
-                assert not ((x > left) & (x < right) & (y > top) & (y < bottom)).any()
-
     for factor in (1, 10, 50):
         page.locator(f"#factors button[data-factor='{factor}']").click()
         eventually(partial(drawn, factor))
     eventually(told)
-    eventually(no_line_through_a_label)
     page.keyboard.press("6")
 
     def path() -> None:
@@ -372,52 +306,6 @@ def test_shape_and_path_are_drawn_and_told_in_figures(page: Any, feed: Feed) -> 
         assert re.search(r"now \d\.\d{3} m forward, -?\d\.\d{3} m up", page.locator("#way-words").inner_text())
 
     eventually(path)
-
-
-def test_dark_and_light_by_key_kept_over_a_reload(page: Any) -> None:
-    def themes() -> tuple[str, str]:
-        return page.evaluate("[document.documentElement.dataset.theme, getComputedStyle(document.body).backgroundColor]")
-
-    before = themes()
-    page.keyboard.press("t")
-    wait(page, f"document.documentElement.dataset.theme !== '{before[0]}'")
-    after = themes()
-    assert before[1] != after[1]
-    page.reload()
-    wait(page, f"document.documentElement.dataset.theme === '{after[0]}'")
-    wait(page, f"document.querySelector('#theme').innerText === '{'Light' if after[0] == 'dark' else 'Dark'}'")
-
-
-RESPONSE = "twin.response.chart.plot.data.map(row => Array.from(row))"
-ONE_AFTER_THE_OTHER = """async () => {
-    const now = twin.response.response, scaled = factor => ({ ...now, values: now.values.map(value => factor * value) });
-    twin.connection.emit("response", scaled(2));
-    for (let frame = 0; twin.response.isNew && frame < 300; frame++) await new Promise(requestAnimationFrame);
-    twin.connection.emit("response", scaled(3));
-    return now.values[0];
-}"""
-
-
-def test_the_response_in_this_posture_with_the_measured_spectrum_over_it(page: Any, feed: Feed) -> None:
-    page.keyboard.press("7")
-    wait(page, "twin.response.chart && twin.response.chart.plot.data.length === 7", 300_000)  # the first compiles
-    frequencies = np.array(page.evaluate(RESPONSE)[0])
-    response = frequency_response(None, frequencies, strokes=feed.strokes(FAULT), drive=2).tip_acceleration
-
-    def of_this_posture() -> None:
-        words = page.locator("#response-words").inner_text()
-        assert words.startswith("amplitude of the tip's acceleration") and "measured by the IMU, last 40 s" in words
-        _, *curves, measured = page.evaluate(RESPONSE)
-        assert np.array(curves[2]) == pytest.approx(1e-3 * np.linalg.norm(response, axis=1), rel=2e-2)
-        assert len(curves) == 5 and sum(value is not None for value in measured) > 300
-        labels = page.locator("#answers .u-label").all_inner_texts()
-        assert labels[1:3] == ["1 N at the tip, up", "1 mm of cylinder 1"] and "measured by the IMU" in labels[-1]
-        box = page.locator("#answers canvas").bounding_box()
-        assert box["height"] > 300 and box["width"] > 800
-
-    eventually(of_this_posture)
-    first = page.evaluate(ONE_AFTER_THE_OTHER)  # two within a frame of a held session: the second is drawn too
-    wait(page, f"Math.abs(twin.response.chart.plot.data[1][0] / {first} - 3) < 1e-5", 10_000)
 
 
 def test_the_page_says_that_the_monitor_is_gone_and_comes_back(browser: Any, replayed: Path, tmp_path: Path) -> None:

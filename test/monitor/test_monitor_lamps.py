@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isnan
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,7 +11,7 @@ import pytest
 from boom_twin.monitor.data.received_messages import DroppedMessages, MalformedError
 from boom_twin.monitor.data.status import MAX_ALARMS, SILENCE, AlarmList, Severity, StatusTable, overall
 from boom_twin.monitor.data.store import Store
-from boom_twin.monitor.protocol import dump, state
+from boom_twin.monitor.protocol import state
 from boom_twin.types import Alarm, Ranked
 
 OK, WARN, ERROR, STALE = range(4)
@@ -61,36 +60,6 @@ def test_a_silent_node_is_stale_and_never_green() -> None:
     assert level == Severity.STALE and "no word from n" in reason
 
 
-def test_a_recorder_that_said_that_it_ended_is_not_missed() -> None:
-    """What it ended by stays to be seen; the twin beside it is as it is."""
-    for level, reason in ((OK, "ended"), (ERROR, "the disk is full")):
-        statuses = table(status("n: model"), now=10.0, before=table(status("r: recording", level, reason, ended=1)))
-        (lamp,) = statuses.groups(10.0)["recorder"]
-        assert (lamp.level, lamp.reason) == (Severity.ERROR if level == ERROR else Severity.OK, reason)
-        assert overall(statuses.groups(10.0))[0] == lamp.level
-
-
-def test_the_quantity_nearest_to_its_limit_is_told() -> None:
-    values = {"gap_s": 0.02, "gap_s_warn": 0.1, "missing_share": 0.4, "missing_share_warn": 0.01, "missing_share_error": 0.5}
-    disk = {"disk_left_s": 60.0, "disk_left_s_warn": 1800.0, "lag_s": 0.5, "lag_s_warn": 2.0}  # little is bad
-    statuses = table(
-        status("n: sensor 1", WARN, since_s=30.0, **values),
-        status("n: sensor 2", ERROR, **values),
-        status("r: recording", WARN, **disk),
-        clock=42.0,
-    )
-    (first, second), (recorder,) = (statuses.groups(0.0)[group] for group in ("sensors", "recorder"))
-    assert (first.quantity, first.value, first.limit, first.age) == ("missing_share", 0.4, 0.01, 12.0)
-    assert (second.quantity, second.limit) == ("missing_share", 0.5) and isnan(second.age)
-    assert recorder.quantity == "disk_left_s"
-
-
-def test_what_is_not_known_is_null_in_json() -> None:
-    store = Store(10)
-    store.set_statuses(0.0, table(status("n: model", age_s="nan", age_s_stale=2.0)))
-    assert "NaN" not in dump(state(store, 0.0, float("inf")))
-
-
 def judge(alarms: AlarmList, time: float, *told: Alarm) -> None:
     alarms.judge(time, told, lambda stamp: stamp * 1e-9)
 
@@ -117,13 +86,6 @@ def test_a_judged_alarm_is_one_from_the_first_suspicion_to_its_end() -> None:
     assert [(each.begin, each.end) for each in alarms.all] == [(2.0, 5.5), (7.0, 8.0)]
     alarms.acknowledge_ended()
     assert all(each.is_acknowledged for each in alarms.all)
-
-
-def test_an_alarm_is_a_fault_without_a_word_from_the_twin() -> None:
-    store = Store(10)
-    judge(store.alarms, 3.0, Alarm("joint_3", "stuck", 2 * 10**9, None, "joint_3.sensor", "stuck"))
-    found = state(store, 3.0, 3.0)
-    assert (found["level"], found["reason"]) == ("ERROR", "joint_3: stuck")
 
 
 def test_all_is_not_well_where_messages_were_dropped() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 import random
 import tracemalloc
 from collections.abc import Callable
@@ -15,19 +14,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boom_twin import Stream
 from boom_twin.messages.report_encoder import encode_health
 from boom_twin.messages.topic_table import TYPES, Output, Topic, load_topics
 from boom_twin.messages.type_store import jazzy, new_message
-from boom_twin.monitor import connections as log
 from boom_twin.monitor.data.analyst import Analyst
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.received_messages import LONGEST_REASON
-from boom_twin.monitor.data.spectrum import spectrogram, spectrum
 from boom_twin.monitor.data.status import MAX_NODES
 from boom_twin.monitor.data.store import Store
-from boom_twin.monitor.data.topic_rows import MAX_WAITING, PartsOfRows
 from boom_twin.monitor.protocol import dump, layout, state
-from boom_twin.types import Alarm, Health, Ranked, Stream
+from boom_twin.types import Alarm, Health, Ranked
 
 TOPICS = load_topics()
 EPOCH, STEP = 1_700_000_000 * 10**9, 5_000_000
@@ -290,15 +287,6 @@ def test_a_burst_of_stamps_costs_no_memory(name: str) -> None:
     assert len(times) <= CAPACITY and np.all(np.diff(times) >= 0.0)
 
 
-@pytest.mark.parametrize("step", [0.0, 1e-9, 1e-6])
-def test_rows_that_stand_close_are_brought_to_a_bounded_number_of_points(step: float) -> None:
-    times = np.concatenate([np.arange(5000) * step, 8.0 + np.arange(100) * 0.005])
-    values = np.sin(40.0 * times)[:, None]
-    found = spectrum(times, values)
-    assert found is not None and np.isfinite(found.densities).all() and len(found.frequencies) <= len(times)
-    assert spectrogram(times, values, np.array([8.4])).shape[0] == 1
-
-
 def test_nodes_without_end_do_not_fill_the_board_and_the_twin_stays() -> None:
     bench = Bench()
     bench.go_on(0, 1)
@@ -324,29 +312,3 @@ def test_no_scene_is_opened_that_a_message_names(tmp_path: Path, monkeypatch: py
     monkeypatch.undo()
     bench.send(Output.DIAGNOSTICS, statuses("boom_twin: model", scene="default scene"))
     assert bench.feed.scene() is not None
-
-
-def test_what_was_dropped_is_logged_at_a_limited_rate(capfd: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    handlers, clock = logging.getLogger().handlers[:], [0.0]
-    logging.getLogger().handlers.clear()
-    monkeypatch.setattr(log.time, "monotonic", lambda: clock[0])
-    try:
-        log.write_log()
-        bench = Bench()
-        for _ in range(1000):
-            bench.send(Output.RESIDUALS, joint_state(["\x1b[2J"]), EPOCH)
-        clock[0] = log.LOG_PERIOD
-        bench.send(Output.RESIDUALS, joint_state(["\x1b[2J"]), EPOCH)
-    finally:
-        logging.getLogger().handlers[:] = handlers
-    lines = capfd.readouterr().err.splitlines()
-    most = log.MAX_LOG_LINES
-    assert len(lines) == most + 1 and f"({1000 - most} lines before this were left out)" in lines[-1]
-    assert "dropped message 1001 of /boom_twin/residuals" in lines[-1] and "\x1b" not in "".join(lines)
-
-
-def test_parts_that_wait_for_others_are_bounded() -> None:
-    parts = PartsOfRows(("measured", "residual"))
-    for stamp in range(0, 6000, 2):
-        assert parts.put("measured", stamp, [1.0]) is None and parts.put("residual", stamp + 1, [0.1]) is None
-    assert len(parts.waiting) == MAX_WAITING + 1 and parts.put("residual", 5998, [0.2]) == [[1.0], [0.2]]

@@ -5,10 +5,9 @@ from __future__ import annotations
 import asyncio
 import json
 import struct
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable
 from functools import partial
 from pathlib import Path
-from threading import Event
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -18,18 +17,14 @@ from aiohttp import ClientSession, ClientWebSocketResponse, CookieJar, WSMsgType
 from aiohttp.test_utils import TestServer
 from monitor.test_monitor_lamps import ERROR, OK, status
 
-from boom_twin import statics
+from boom_twin import load_scene
 from boom_twin.errors import BagError
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.access_control import AccessControl
 from boom_twin.monitor.actions import ViewerActions
-from boom_twin.monitor.data.analyst import PREDICTION, SIGNALS
-from boom_twin.monitor.data.bag_feed import BagFeed
 from boom_twin.monitor.data.feed import Feed, SessionList, sessions_in
 from boom_twin.monitor.data.store import Store
-from boom_twin.monitor.server import MAX_VIEWERS, Server
-from boom_twin.scene import load_scene
-from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin.monitor.server import Server
 
 Talk = Callable[[ClientSession, str], Awaitable[None]]
 
@@ -132,35 +127,6 @@ async def test_a_viewer_gets_layout_state_history_and_what_comes(feed: Made, ses
 
 
 @served()
-async def test_a_response_comes_once_as_long_as_the_posture_is_the_same(feed: Made, session: ClientSession, url: str) -> None:
-    """Before it comes why there is none, until the strokes are known."""
-    async with connect(session, url) as socket:
-        assert await until(socket, "loads") == {"kind": "loads", "names": [], "trouble": "the strokes are not known yet"}
-        strokes = strokes_of_posture(load_scene(), "arch")
-        feed.store.append("shape", [f"stroke_{i + 1}" for i in range(4)], 10**18 + 10**10, strokes)
-        loads = await until(socket, "loads")
-        assert loads["trouble"] == "" and loads["names"][1:] == [f"1 mm of cylinder {i}" for i in range(1, 5)]
-        assert (await until(socket, "response"))["head"] == (4, 0, 5, 400)
-        feed.store.append("shape", [f"stroke_{i + 1}" for i in range(4)], 10**18 + 2 * 10**10, strokes + 0.05)
-        assert (await until(socket, "response"))["head"] == (4, 0, 5, 400)
-
-
-@served()
-async def test_the_spectrogram_comes_from_before_the_page_was_opened_and_then_once(
-    feed: Made, session: ClientSession, url: str
-) -> None:
-    feed.rows(100)
-    async with connect(session, url) as socket:
-        past = await until(socket, "past")
-        assert past["times"].tolist() == [10.0] and SIGNALS[past["head"][1]] is PREDICTION  # there is no IMU
-        feed.rows(900)
-        assert (await until(socket, "past"))["times"].tolist() == [12.0, 14.0]
-        feed.store.clear()
-        feed.rows(2500)
-        assert (await until(socket, "past"))["times"].tolist() == [10.0, 12.0]
-
-
-@served()
 async def test_one_that_does_not_read_loses_rows_but_never_a_lamp(feed: Made, session: ClientSession, url: str) -> None:
     async with connect(session, url) as socket:
         await until(socket, "rows")
@@ -180,39 +146,12 @@ async def test_one_that_does_not_read_loses_rows_but_never_a_lamp(feed: Made, se
         assert rows["head"][3] < 2000
 
 
-GARBAGE = ("", "{", "[]", "null", "x" * 5000, b"\0", "[" * 4000)
-REQUESTS = ('{"do": "format"}', '{"do": "seek", "value": 1}', '{"do": "acknowledge"}')
-
-
-@served(permitted=("acknowledge",))
-async def test_garbage_is_shown_out_and_the_others_stay(feed: Made, session: ClientSession, url: str) -> None:
-    async with connect(session, url) as good:
-        for garbage in (*GARBAGE, *REQUESTS):
-            async with connect(session, url) as bad:
-                await (bad.send_bytes(garbage) if isinstance(garbage, bytes) else bad.send_str(garbage))
-                assert await closed(bad) in (1008, 1009), garbage
-            await until(good, "state")
-
-
 @served(permitted=("mark",))
 async def test_a_flood_of_requests_is_shown_out(feed: Made, session: ClientSession, url: str) -> None:
     async with connect(session, url) as socket:
         for _ in range(200):
             await socket.send_str('{"do": "mark", "note": "x"}')
         assert await closed(socket) == 1008 and len(feed.published) <= 50
-
-
-@served()
-async def test_a_thousand_connections_harm_nobody(feed: Made, session: ClientSession, url: str) -> None:
-    async with connect(session, url) as good:
-        opened = await asyncio.gather(*(connect(session, url) for _ in range(1000)), return_exceptions=True)
-        sockets = [each for each in opened if isinstance(each, ClientWebSocketResponse)]
-        refused = [each for each in opened if isinstance(each, WSServerHandshakeError)]
-        assert len(sockets) == MAX_VIEWERS - 1 and {each.status for each in refused} == {503}
-        await until(good, "state")
-        await asyncio.gather(*(each.close() for each in sockets))
-        async with connect(session, url) as another:
-            await until(another, "state")
 
 
 @served()
@@ -299,77 +238,6 @@ async def test_a_recorded_session_is_steered_by_each_viewer_alone(feed: Made, se
         assert rows["times"][-1] == pytest.approx(2.0)
         await other.send_json({"do": "speed", "value": 10.0})
         assert (await until(other, "state", lambda state: state["position"] == 9.0))["is_held"]
-
-
-def shaken(feed: Made, frequency: float) -> None:
-    """Let an IMU feel a sine where the prediction has none."""
-    columns = [f"{kind}_{axis}_m_s2" for kind in ("measured", "predicted", "sigma") for axis in "xz"]
-    for row in range(4000):
-        felt = np.sin(2.0 * np.pi * frequency * 0.005 * row)
-        feed.store.append("force", columns, 10**18 + row * 5_000_000, (felt, felt, 0.0, 0.0, 0.05, 0.05))
-    feed.rows(2000)
-
-
-def lines_of(feed: Made) -> dict[str, Any]:
-    found: list[dict[str, Any]] = []
-
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            found.append(await until(socket, "lines"))
-            assert (await until(socket, "density"))["head"][2] == 2
-
-    serve(feed, talk)
-    return found[0]
-
-
-def test_the_spectrum_is_of_what_was_measured_and_names_no_mode_of_a_boom_that_moved() -> None:
-    feed, rest = Made(), statics(None, "arch")
-    lines = lines_of(feed)
-    assert lines["source"] == "predicted" and lines["natural"] == []  # the strokes are not known
-    shaken(feed, float(rest.frequencies[1]))
-    columns = [f"stroke_{i + 1}_m" for i in range(4)]
-    arch, moved = rest.strokes.tolist(), [*rest.strokes[:3].tolist(), float(rest.strokes[3]) + 0.03]
-    for row in range(20):
-        feed.store.append("shape", columns, 10**18 + row * 10**9, arch)
-    known = lines_of(feed)
-    assert known["source"] == "measured by the IMU" and known["axes"] == ["along the last section", "across it"]
-    assert known["peaks"][0]["frequency"] == pytest.approx(rest.frequencies[1], abs=0.05)
-    assert known["moved"] == 0.0 and known["peaks"][0]["mode"] == 2 and abs(known["peaks"][0]["deviation"]) < 0.02
-    feed.store.append("shape", columns, 10**18 + 19_500_000_000, moved)
-    feed.rows(20)
-    lines = lines_of(feed)
-    assert lines["moved"] == pytest.approx(0.03, rel=1e-3)
-    assert lines["peaks"][0]["mode"] is None and lines["peaks"][0]["deviation"] is None
-
-
-def test_a_session_that_is_being_read_gives_way_to_the_one_chosen(tmp_path: Path) -> None:
-    """It was shown on under the name of the other: what reads it cannot be closed from another thread meanwhile."""
-    inside, ever = Event(), Event()
-
-    def steps() -> Iterator[None]:
-        while True:
-            inside.set()
-            ever.wait(0.05)
-            inside.clear()
-            yield
-
-    def opened(path: Path) -> Feed:
-        if path.name == "b":
-            inside.wait()
-        feed = BagFeed(path.name, Store(100, keeps_statuses=True), load_topics(), load_scene(), 10.0)
-        feed.begin(steps())  # type: ignore[arg-type]
-        return feed
-
-    async def talk(session: ClientSession, url: str) -> None:
-        async with connect(session, url) as socket:
-            await socket.send_json({"do": "session", "value": 1})
-            await closed(socket)
-        async with connect(session, url) as socket:
-            hello = await until(socket, "hello")
-            assert (hello["title"], hello["session"]) == ("b", 1)
-
-    sessions = SessionList([tmp_path / "a", tmp_path / "b"], opened)
-    asyncio.run(_serve(server_of(sessions), talk))
 
 
 def server_of(sessions: SessionList) -> Server:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drive_twin import ARCH_DRIVES, drive_twin
+from drive_twin import ARCH_DRIVES
 
 from boom_twin import Settings, Stream, Twin, load_scene, replay
 from boom_twin.bag.reader import read, scan
@@ -17,9 +17,6 @@ from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.messages.type_store import jazzy
-from boom_twin.offline.ground_truth import TipErrors, load_truth
-from boom_twin.offline.recording import Recording
-from boom_twin.twin.blocks import SampleBlock
 from boom_twin.types import StrokeReading
 
 SESSIONS = {"length": Path(__file__).parents[2] / "bags" / "arch_session", "drive": ARCH_DRIVES}
@@ -62,19 +59,6 @@ def test_residuals_are_what_is_expected(first):
     assert np.all(np.abs(summary["joint_residual_normalised_mean"]) < 0.3)
     sigmas = recording.of(Stream.ANGLES).sigmas
     assert np.all(sigmas >= SENSOR) and (np.all(sigmas <= 2 * SENSOR) or not is_length)
-
-
-def test_true_strokes_leave_the_lag_of_the_estimator_alone():
-    truth = np.genfromtxt(ARCH_DRIVES / "truth.csv.gz", delimiter=",", names=True)
-    strokes = np.column_stack([truth[f"stroke_{i}_m"] for i in range(1, 5)])
-    stamps = np.round(truth["t_s"] * 1e9).astype(np.int64)
-    driven = drive_twin(load_scene())
-    errors = TipErrors(load_truth(ARCH_DRIVES))
-    recording = Recording(4, errors=errors)
-    for part in driven.update_block(SampleBlock(np.zeros(len(stamps), np.int64), stamps, strokes)):
-        recording.add(part)
-    recording.close()
-    assert errors.rms["tip_acceleration_error_rms_m_s2"] < 0.10
 
 
 def test_summary_is_on_disk_and_complete(first):

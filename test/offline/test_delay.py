@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-import pytest
-
-from boom_twin import load_scene, replay
+from boom_twin import Stream, load_scene, replay
 from boom_twin.bag.reader import read_both, scan
 from boom_twin.bag.session_sheet import SessionSheet
 from boom_twin.bag.writer import SessionWriter
-from boom_twin.messages.mapping import mapping_from
-from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
+from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import TYPES, load_topics
-from boom_twin.messages.type_store import fill_header, jazzy, new_message
-from boom_twin.types import NANO, SECOND, Stream
+from boom_twin.messages.type_store import fill_header, jazzy
+from boom_twin.types import SECOND
 
 SESSION = Path(__file__).parents[2] / "bags" / "pump_session"
 FIRST = 1500
@@ -48,16 +44,3 @@ def test_a_delay_that_is_mapped_leaves_no_trace(tmp_path: Path) -> None:
     found = replay(late, scene, tmp_path / "mapped_out").summary
     assert found["mapping"].endswith("session.yaml, mapping")
     assert found["output_sha256"] == digests[0]
-
-
-@pytest.mark.parametrize("delay", [0.5, -0.5])
-def test_stamps_at_the_edge_of_time_stay_refused(delay: float) -> None:
-    decoder = SampleDecoder(2, mapping_from({"inputs": {"joint_angles": {"delay": delay}}}, "test"))
-    msg = new_message(TYPES[Stream.ANGLES])
-    msg.name, msg.position = ["joint_1", "joint_2"], np.array([0.1, 0.2])
-    assert decoder.put(Stream.ANGLES, 0, msg) is None
-    sample = decoder.put(Stream.ANGLES, 10**9, msg)
-    assert sample is not None and sample.stamp * NANO == pytest.approx(1.0 - delay)
-    assert (decoder.put(Stream.ANGLES, 10**8, msg) is None) == (delay > 0.0)
-    assert decoder.put(Stream.STROKES, 10**8, msg) is None  # other names: nothing of the strokes is shifted
-    assert decoder.delays[Stream.STROKES] == 0 and decoder.oddities["no stamp"] == 1

@@ -86,16 +86,6 @@ def test_residuals_zeros_and_diagnostics(scene, samples):
     assert twin.rezero("cylinder_force_2") == {"cylinder_force_2": pytest.approx(WRONG, abs=40.0)}
 
 
-def test_a_force_without_its_stamp_among_the_strokes_is_interpolated(scene, samples):
-    """Half way between two strokes it is compared with the middle of what was expected at both."""
-    twin = drive_twin(scene)
-    strokes = [sample for sample in samples if sample.stream is Stream.STROKES][:200]
-    before, after = [twin.update(sample).prediction for sample in strokes][-2:]
-    middle = Sample(FORCES, strokes[-2].stamp + 2_500_000, np.zeros(4))
-    (found,) = twin.update(middle).residuals
-    assert -found.values == pytest.approx(0.5 * (before.cylinder_forces + after.cylinder_forces), rel=1e-12)
-
-
 def test_a_stuck_or_silent_sensor_is_told_and_a_shaken_boom_is_not(scene, samples):
     """A load that the model does not know changes a force by far more than its noise, from one reading to the next."""
     known = set()
@@ -133,18 +123,6 @@ def test_replay_report_and_page(scene, bag, tmp_path, monkeypatch):
     (table,) = (each for each in layout(feed.store)["tables"] if each["name"] == FORCES.value)
     assert table["columns"] == tuple(f"{name}_{end}" for end in ("N", "normalised") for name in CHANNELS)
     assert table["residuals"] == {"title": "cylinder forces", "factor": 1.0, "unit": "N"}
-
-
-def test_names_signs_and_units_of_a_rig(scene, samples, bag, tmp_path):
-    mapped = [Sample(FORCES, each.stamp, -1e-3 * each.values) if each.stream is FORCES else each for each in samples]
-    write_samples(tmp_path / "rig", mapped, (Stream.STROKES, Stream.ANGLES, FORCES), {"origin": "synthetic, a test"})
-    mapping = tmp_path / "mapping.yaml"
-    rows = "\n".join(f"  {name}: {{unit: kN, sign: -1}}" for name in CHANNELS)
-    mapping.write_text(f"inputs: {{cylinder_strokes: {{reads: drive}}}}\nsensors:\n{rows}\n")
-    usual = replay(bag, scene, tmp_path / "usual", health=False)
-    found = replay(tmp_path / "rig", scene, tmp_path / "found", mapping=mapping, health=False)
-    expected = usual.recording.of(FORCES).values
-    assert found.recording.of(FORCES).values == pytest.approx(expected, abs=1e-6) and len(expected) == COUNT
 
 
 def test_forces_of_another_boom_are_refused(scene, samples, tmp_path):

@@ -59,17 +59,6 @@ def test_the_figures_are_those_of_the_whole(both: tuple) -> None:
     assert [each.value for each in found] == pytest.approx([each.value for each in wanted], rel=1e-6)
 
 
-def test_the_history_is_that_of_the_whole(both: tuple) -> None:
-    (_, whole, _), (_, parts, _), _ = both
-    for name in ("stamps_s", "tip_position", "moments", "residual_values"):
-        assert np.array_equal(getattr(parts.history, name), getattr(whole.history, name), equal_nan=True), name
-    assert len(parts.history.shapes) == len(whole.history.shapes)
-    for name, found in parts.history.distributions.residuals.items():
-        wanted = whole.history.distributions.residuals[name]
-        assert np.array_equal(found.counts, wanted.counts)
-        assert (found.mean, found.deviation) == pytest.approx((wanted.mean, wanted.deviation), rel=1e-9)
-
-
 def blocks(seconds: float) -> list[ReportBlock]:
     """What a twin says of the first seconds of the bundled session's true strokes, and angles."""
     truth = np.genfromtxt(ARCH_DRIVES / "truth.csv.gz", delimiter=",", names=True)[: round(200 * seconds)]

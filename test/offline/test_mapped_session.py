@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin import load_scene, replay
+from boom_twin import Stream, load_scene, replay
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_session
 from boom_twin.bag.session_sheet import SessionSheet
@@ -16,7 +16,6 @@ from boom_twin.cli.main import main
 from boom_twin.errors import UsageError
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.messages.type_store import fill_header, new_message
-from boom_twin.types import Stream
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 JOINT_STATE = "sensor_msgs/msg/JointState"
@@ -93,16 +92,6 @@ def test_a_recording_is_replayed_with_its_own_mapping(rig, usual, tmp_path):
     rows = np.searchsorted(expected.stamps, angles.stamps)
     assert expected.stamps[rows].tolist() == angles.stamps.tolist()
     np.testing.assert_allclose(angles.values, expected.values[rows], atol=1e-9)
-
-
-def test_the_mapping_can_be_given_instead(rig, tmp_path, capsys):
-    (tmp_path / "own.yaml").write_text(MAPPING.replace("zero: 1200.0", "zero: 1201.0"))
-    arguments = ["replay", str(rig), "--out", str(tmp_path / "out"), "--no-pictures", "--mapping", str(tmp_path / "own.yaml")]
-    assert main(arguments) == 0
-    assert f"mapping            {tmp_path / 'own.yaml'}" in capsys.readouterr().out
-    moved = replay(rig, load_scene(), tmp_path / "as recorded").recording.predictions.one(0)
-    first = replay(rig, load_scene(), tmp_path / "again", mapping=tmp_path / "own.yaml").recording.predictions.one(0)
-    assert first.strokes[0] - moved.strokes[0] == pytest.approx(1e-3, abs=1e-9)
 
 
 def test_a_mapping_for_another_boom_is_refused(rig, tmp_path):

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from boom_twin import replay
-from boom_twin.bag.time_window import TimeWindow
+from boom_twin import TimeWindow, replay
 from boom_twin.cli.main import main
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from drive_twin import drive_twin
 
-from boom_twin import Stream, load_scene
+from boom_twin import Sample, Stream, load_scene
 from boom_twin.bag.session_files import write_session
 from boom_twin.cli.main import main
 from boom_twin.offline import recording
@@ -19,7 +19,6 @@ from boom_twin.offline.recording import Recording, Stretch
 from boom_twin.offline.sample_table import SampleTable, columns_of, predicted_columns, table_file
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import block_of
-from boom_twin.types import Sample
 
 START, STEP = 1_700_000_000_000_000_000, 5_000_000
 REFERENCE = Path(__file__).parents[1] / "data" / "reference" / "arch_move.csv.gz"

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, IndexType, Writer
 
+from boom_twin import Sample, Stream
 from boom_twin.bag.reader import scan
 from boom_twin.bag.session_file import REMEDY
 from boom_twin.errors import BagError
@@ -20,7 +21,7 @@ from boom_twin.messages.topic_table import TYPES, Output, Topics, load_topics
 from boom_twin.messages.type_store import decode, jazzy
 from boom_twin.offline.session_samples import Changes, SessionSamples
 from boom_twin.twin.blocks import samples_in
-from boom_twin.types import Change, Sample, Stream
+from boom_twin.types import Change
 
 JOINTS = 3
 START = 1_700_000_000_000_000_000
@@ -236,25 +237,3 @@ def test_a_message_that_cannot_be_decoded_is_told_as_the_first_one(tmp_path: Pat
     write(tmp_path / "bag", files, [FILES[random.integers(len(FILES))] for _ in range(2)], topics)
     expected = Expected(tmp_path / "bag", files, topics)
     compare(tmp_path / "bag", topics, expected)
-
-
-USUAL = {"names": ["cylinder_2", "cylinder_1"], "count": 2, "frame": "", "little": True, "effort": 0}
-
-
-def strokes(rows: int) -> list[Entry]:
-    """Messages that are laid out alike."""
-    rig, topic = Rig(np.random.default_rng(1), odd=0.0), load_topics().inputs[Stream.STROKES]
-    return [(log, topic.absolute, rig.message(topic.type, log, USUAL)) for log in range(START, START + STEP * rows, STEP)]
-
-
-def test_a_message_at_fault_is_told_before_a_chunk_that_comes_later(tmp_path: Path) -> None:
-    topics, entries = load_topics(), strokes(50)
-    log, name, data = entries[3]
-    entries[3] = (log, name, data[:-9])
-    write(tmp_path / "bag", [entries], FILES[:1], topics)
-    file = tmp_path / "bag" / "session_0.mcap"
-    whole = file.read_bytes()
-    last = whole.rindex(b"cylinder_1")
-    file.write_bytes(whole[:last] + b"cylinder_3" + whole[last + 10 :])
-    with pytest.raises(BagError, match=f"at log time {log} ns"):
-        list(SessionSamples(scan(tmp_path / "bag"), topics, [topics.inputs[Stream.STROKES].name], JOINTS))

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from boom_twin import Settings
 from boom_twin.bag.session_model import settings_of
 from boom_twin.bag.session_sheet import FILE_NAME, SessionSheet
 from boom_twin.cli.output import open_session_settings
-from boom_twin.config.settings import Settings, Thresholds, load_thresholds
+from boom_twin.config.settings import Thresholds, load_thresholds
 from boom_twin.errors import BagError, UsageError
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"

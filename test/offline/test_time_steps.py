@@ -16,7 +16,6 @@ from mcap.reader import make_reader
 from mcap.writer import IndexType, Writer
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.analysis.even_times import spacing, unbroken
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import sensor_message
 from boom_twin.bag.writer import SessionWriter
@@ -24,7 +23,6 @@ from boom_twin.cli.main import main
 from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.messages.type_store import jazzy
-from boom_twin.plots.session_distributions import density
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 SECOND, START, ROWS = 10**9, 1_700_000_000 * 10**9, 1600
@@ -149,23 +147,6 @@ def test_a_replay_tells_of_a_clock_that_was_set_back(tmp_path: Path, capsys: pyt
     logs = [sample.stamp - 3 * SECOND * (row >= 1200) for row, sample in enumerate(found)]
     assert replayed(recorded(tmp_path / "bag.mcap", found, logs))["samples"] == 800
     assert "warning: bag.mcap: log times step back 1 time, by 2.995 s in all" in capsys.readouterr().err
-
-
-def test_log_times_of_another_year_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = samples(rows=100)
-    path = recorded(tmp_path / "bag.mcap", found, [sample.stamp - START + 12 * SECOND for sample in found])
-    assert main(["info", str(path)]) == 0
-    assert "Log times are on average 1699999988.000 s before the stamps of /cylinder_strokes." in capsys.readouterr().out
-
-
-def test_a_spectrum_is_that_of_the_parts_between_breaks() -> None:
-    times = np.arange(4000) * 0.005
-    broken = np.where(np.arange(4000) < 2000, times, times + 1e9)
-    assert unbroken(broken) == [slice(0, 2000), slice(2000, 4000)]
-    assert unbroken(np.array([5.0, 5.1, 3.0, 3.1])) == [slice(0, 2), slice(2, 4)]
-    close = np.concatenate([np.arange(500) * 1e-9, [0.9]])
-    assert spacing(times) == pytest.approx(0.005) and 0.9 / spacing(close) <= 1000
-    assert len(density(close, np.cos(close)).frequencies) <= 1000
 
 
 def test_samples_that_wait_for_the_first_strokes_are_dropped_when_their_stamps_come_again() -> None:

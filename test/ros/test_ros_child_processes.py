@@ -52,11 +52,3 @@ def test_the_page_of_the_node(spawn: Callable[..., Any], trap: Trap, loud: None,
     node.wait_for("open http")
     assert node.stop() == 0 and trap.sprung() == "", node.said()
     assert not (tmp_path / "overwritten").exists()
-
-
-@pytest.mark.slow
-def test_the_demonstration(spawn: Callable[..., Any], trap: Trap, demo_path: None, loud: None, tmp_path: Path) -> None:
-    demo = spawn("start", "demo.demo", "--bag", "bag", "--duration", "1", "--out", "out")
-    assert demo.end() == 0 and trap.sprung() == "", demo.said()
-    assert (tmp_path / "received" / "out" / "recorded" / "metadata.yaml").is_file()
-    assert not (tmp_path / "overwritten").exists()

@@ -16,12 +16,10 @@ pytest.importorskip("rclpy")
 
 import rclpy
 from demo import isolation as module
-from demo.isolation import Isolation, isolated
+from demo.isolation import Isolation
 from eventually import eventually
 from ros_rig import spin_until
 from sensor_msgs.msg import JointState
-
-from boom_twin.errors import BoomTwinError
 
 TOPIC = "cylinder_strokes"
 RIG = f"""
@@ -57,53 +55,6 @@ def rig_in(domain: int, log: Path) -> Iterator[None]:
 
 def _says(log: Path, word: str) -> None:
     assert word in log.read_text()
-
-
-@pytest.fixture
-def unguarded(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody is looked for: for tests in which nobody comes before, or rclpy runs."""
-    monkeypatch.setattr(module, "refuse_foreign", lambda topics: None)
-
-
-def test_no_two_runs_share_a_domain_and_the_environment_is_put_back(
-    isolation: Isolation, unguarded: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert int(os.environ["ROS_DOMAIN_ID"]) == isolation.domain > 101
-    assert os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
-    monkeypatch.setenv("ROS_STATIC_PEERS", "192.0.2.1")
-    before = dict(os.environ)
-    with isolated() as one, isolated() as other, isolated() as third:
-        assert "ROS_STATIC_PEERS" not in os.environ
-        assert len({one.domain, other.domain, third.domain}) == 3
-        assert min(one.domain, other.domain, third.domain) > 101
-        with pytest.raises(BoomTwinError, match=f"domain {one.domain} is claimed by another"), isolated(one.domain):
-            pass
-    with isolated(one.domain) as again:
-        assert again.domain == one.domain
-    assert dict(os.environ) == before
-
-
-def test_a_claim_lasts_as_long_as_a_child_that_holds_it(unguarded: None) -> None:
-    with isolated() as claim:
-        wait = [sys.executable, "-c", "import sys; sys.stdin.read()"]
-        child = subprocess.Popen(wait, stdin=subprocess.PIPE, pass_fds=(claim.lock,))
-    with pytest.raises(BoomTwinError, match="claimed by another"), isolated(claim.domain):
-        pass
-    child.communicate()
-    with isolated(claim.domain):
-        pass
-
-
-@pytest.mark.parametrize("handed_out", ["32768\t60999", "1024\t65535", "garbage"])
-def test_domains_whose_ports_nobody_else_gets_come_first(
-    handed_out: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "range").write_text(handed_out)
-    monkeypatch.setattr(module, "HANDED_OUT", tmp_path / "range")
-    domains = module._preferred()
-    assert sorted(domains) == list(range(102, 233))
-    if handed_out.startswith("32768"):
-        assert sorted(domains[:18]) == list(range(215, 233))
 
 
 def test_a_rig_in_the_same_domain_neither_feeds_nor_is_fed(isolation: Isolation, domain: None, tmp_path: Path) -> None:

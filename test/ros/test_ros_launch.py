@@ -20,11 +20,11 @@ from eventually import eventually
 pytest.importorskip("rclpy")
 
 import boom_twin
+from boom_twin import Stream
 from boom_twin.bag.reader import scan
 from boom_twin.bag.session_model import mapping_of, scene_of
 from boom_twin.messages.topic_table import Output
 from boom_twin.scene.load import default_text
-from boom_twin.types import Stream
 
 LAUNCH = Path(boom_twin.__file__).parent / "launch"
 PYTHON = os.environ.get("LAUNCH_PYTHON", sys.executable)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -109,33 +107,3 @@ def test_signals_end_the_node_in_order_at_any_time(
         assert "stopping" in node.said()
     else:
         assert "Traceback" not in node.said() and "FATAL" not in node.said()
-
-
-IN_EXEC = """
-import sys
-from boom_twin.ros.startup import StopSignal
-stop = StopSignal()
-print("begun", flush=True)
-try:
-    exec("while True: pass")
-except KeyboardInterrupt:
-    sys.exit(0)
-"""
-"""Dataclasses are made in one while modules are imported; Python would end the process as killed by SIGINT."""
-STUCK = """
-import hashlib, sys
-from boom_twin import Twin
-Twin.warm_up = lambda self: print("begun", flush=True) or hashlib.pbkdf2_hmac("sha256", b"", b"", 2 * 10**9)
-from boom_twin.ros.node.main import main
-sys.exit(main([]))
-"""
-"""A node whose preparation is one call into C that takes minutes, as compiling a large kernel takes seconds."""
-
-
-@pytest.mark.parametrize(("program", "told"), [(IN_EXEC, ""), (STUCK, "stopped in the midst of its work")])
-def test_work_that_takes_long_is_ended(isolation: Any, program: str, told: str) -> None:
-    child = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert child.stdout is not None and child.stdout.readline() == "begun\n"
-    child.send_signal(signal.SIGTERM)
-    _, errors = child.communicate(timeout=200.0)
-    assert child.returncode == 0 and told in errors and "Traceback" not in errors

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from math import inf
 
 import pytest
 
@@ -12,13 +10,10 @@ pytest.importorskip("rclpy")
 
 from ros_rig import Rig
 
-from boom_twin import Report
 from boom_twin.diagnostics.levels import Level, Status
 from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.ros.diagnostics_publisher import DiagnosticsPublisher
 from boom_twin.ros.node.diagnostics import ClockCheck
-from boom_twin.ros.node.services import StartLog
-from boom_twin.types import Change
 
 HOSTILE = "/rig\x1b[2J\n[INFO] [boom_twin]: all is well\u202e\x9b31m"
 ESCAPED = r"/rig\x1b[2J\n[INFO] [boom_twin]: all is well\u202e\x9b31m"
@@ -60,17 +55,6 @@ def test_states_with_foreign_names_are_escaped_and_those_that_come_and_go_do_not
     assert shown(Level.ERROR, Level.OK, Level.WARN) == ["2", "0"]
     now[0] += 600.0
     assert shown(Level.WARN) == ["1"]
-
-
-def test_a_change_to_what_was_so_before_is_not_an_empty_line() -> None:
-    lines = Lines()
-    log = StartLog(lines)  # type: ignore[arg-type]
-    start = Change(10**18, True, {"payload": 40.0}, {})
-    again = replace(start, stamp=10**18 + 5_000_000, from_rest=False)
-    for change in (start, again, replace(again, settings={"payload": 41.0})):
-        log._told = -inf
-        log.tell(Report(change.stamp, True, events=()), change)
-    assert lines == ["at 1000000000.000000000: started from rest (first strokes)", "at 1000000000.005000000: payload 41"]
 
 
 def test_another_clock_is_told_if_it_lasts() -> None:

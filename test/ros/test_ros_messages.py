@@ -13,9 +13,10 @@ from rclpy.serialization import serialize_message
 from ros_rig import joint_state
 from sensor_msgs.msg import Imu
 
+from boom_twin import Stream
 from boom_twin.messages.topic_table import TYPES
 from boom_twin.messages.type_store import PADDING, decode, jazzy
-from boom_twin.types import SECOND, Stream
+from boom_twin.types import SECOND
 
 NAN, INF = float("nan"), float("inf")
 NAMES = [f"cylinder_{i}" for i in (1, 2, 3, 4)]

@@ -1,4 +1,4 @@
-"""The monitor's feed over DDS: rows, lamps and events, as publishers beside it send them."""
+"""Alarms over DDS in the monitor's feed: from their topic, and let go of by the node."""
 
 from __future__ import annotations
 
@@ -14,18 +14,16 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
-from diagnostic_msgs.msg import DiagnosticStatus
-from rcl_interfaces.msg import Log
 from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger
 
 from boom_twin.messages.report_encoder import encode_health
 from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.monitor.actions import AT_NODE, ViewerActions
-from boom_twin.monitor.data.status import Severity, overall
+from boom_twin.monitor.data.status import Severity
 from boom_twin.ros.monitor_feed import TopicFeed
 from boom_twin.ros.runtime import message_class, qos_profile
-from boom_twin.types import Alarm, Health, Ranked, Stream
+from boom_twin.types import Alarm, Health, Ranked
 
 TOPICS = load_topics()
 EPOCH = 1_700_000_000
@@ -34,25 +32,20 @@ CAUSES = (Ranked("joint_3.sensor", 0.9, ()), Ranked("cylinder_3.k", 0.1, ()))
 ALARM = Alarm("joint_3", "residual", BEGIN, None, "joint_3.sensor", "joint_3.sensor jumped", CAUSES)
 
 
-UNHEARD = {Output.CHANGES, Output.ESTIMATE_TWIST, Output.ESTIMATE_MODES}
-"""Outputs that the page does not subscribe to."""
-
-
 class Rig:
-    """Publishers of what the node would publish, and a subscriber of events."""
+    """Publishers of what the node would tell of its health."""
 
     def __init__(self) -> None:
-        self.node, self.events = rclpy.create_node("beside"), []
-        wanted: dict[Any, Any] = {**TOPICS.outputs, Stream.IMU: TOPICS.inputs[Stream.IMU]}
-        self._kinds = {role: message_class(topic.type) for role, topic in wanted.items()}
+        self.node = rclpy.create_node("beside")
+        topics = {role: TOPICS.outputs[role] for role in (Output.HEALTH, Output.TIP_UNCERTAINTY)}
+        self._kinds = {role: message_class(topic.type) for role, topic in topics.items()}
         self.publishers = {
             role: self.node.create_publisher(self._kinds[role], topic.absolute, qos_profile(topic.qos))
-            for role, topic in wanted.items()
+            for role, topic in topics.items()
         }
-        self.node.create_subscription(Log, TOPICS.events.absolute, self.events.append, 10)
 
     def is_heard(self) -> bool:
-        return all(self.publishers[role].get_subscription_count() for role in set(self.publishers) - UNHEARD)
+        return all(publisher.get_subscription_count() for publisher in self.publishers.values())
 
     def send(self, role: Any, nanosec: int, fill: Callable[[Any], None]) -> None:
         message = self._kinds[role]()
@@ -91,64 +84,12 @@ def pair(domain: None) -> Iterator[tuple[Any, Rig]]:
     rig.node.destroy_node()
 
 
-def test_rows_lamps_and_losses_come_from_the_topics(pair: tuple[Any, Rig]) -> None:
-    feed, rig = pair
-
-    def displacement(message: Any) -> None:
-        message.vector.x, message.vector.z = 0.5, -0.25
-
-    def measured(message: Any) -> None:
-        message.linear_acceleration.x, message.linear_acceleration.z = 1.0, 9.0
-
-    def residual(message: Any) -> None:
-        message.name = ["tip_imu_x", "tip_imu_z"]
-        message.position, message.velocity, message.effort = [0.25, -0.5], [1.0, -2.0], [0.25, 0.25]
-
-    def told(message: Any) -> None:
-        message.status = [DiagnosticStatus(name="boom_twin: model", level=DiagnosticStatus.ERROR, message="no pivot")]
-
-    rig.send(Output.TIP_DISPLACEMENT, 5_000_000, displacement)
-    until(feed, lambda: "displacement" in feed.store.tables)
-    assert feed.store.epoch == EPOCH * 10**9 + 5_000_000
-    assert feed.store.tables["displacement"].rows(0, 1)[1].tolist() == [[0.5, -0.25]]
-    for number, stamp in enumerate((10_000_000, 15_000_000), 1):
-        rig.send(Stream.IMU, stamp, measured)
-        rig.send(Output.RESIDUALS, stamp, residual)
-        until(feed, lambda number=number: "force" in feed.store.tables and feed.store.tables["force"].count == number)
-    times, values = feed.store.tables["force"].rows(0, 1)
-    assert times[0] == pytest.approx(0.005) and values.tolist() == [[1.0, 9.0, 0.75, 9.5, 0.25, 0.25]]
-
-    rig.send(Output.DIAGNOSTICS, 0, told)
-    until(feed, lambda: feed.store.statuses(0.0).nodes)
-    now = feed.now()
-    assert overall(feed.store.statuses(now).groups(now)) == (Severity.ERROR, "model: no pivot")
-    assert overall(feed.store.statuses(now).groups(now + 10.0))[0] == Severity.STALE
-
-    rig.send(Output.TIP_DISPLACEMENT, 20_000_000, lambda message: setattr(message.vector, "x", float("nan")))
-    rig.publishers[Output.SHAPE].publish(b"\x00\x01\x00\x00" + b"\xff" * 40)
-    lost = {TOPICS.outputs[role].absolute for role in (Output.TIP_DISPLACEMENT, Output.SHAPE)}
-    until(feed, lambda: {loss["topic"] for loss in feed.topic_rows.dropped.losses()} == lost)
-    rig.send(Output.TIP_DISPLACEMENT, 25_000_000, displacement)
-    until(feed, lambda: feed.store.tables["displacement"].count == 2)
-
-
-def test_an_event_is_published_with_the_stamp_of_the_newest_row_and_shown(pair: tuple[Any, Rig]) -> None:
-    feed, rig = pair
-    rig.send(Output.TIP_DISPLACEMENT, 30_000_000, lambda message: None)
-    until(feed, lambda: feed.store.newest > 0.024)
-    until(feed, lambda: rig.node.count_subscribers(TOPICS.events.absolute) == 2)
-    feed.publish("mark: hose moved")
-    until(feed, lambda: rig.events, rig)
-    event = rig.events[0]
-    assert (event.msg, event.stamp.sec, event.stamp.nanosec) == ("mark: hose moved", EPOCH, 30_000_000)
-    until(feed, lambda: any(alarm.name == "event" for alarm in feed.store.alarms.all))
-
-
 def test_alarms_come_from_their_topic_and_the_node_lets_go_of_what_ended_with_permission(pair: tuple[Any, Rig]) -> None:
     feed, rig = pair
+    rig.send(Output.TIP_UNCERTAINTY, 5_000_000, lambda message: setattr(message.vector, "z", 0.002))
+    until(feed, lambda: "uncertainty" in feed.store.tables)
     rig.send(Output.HEALTH, 60_000_000, partial(tell, None))
-    rig.send(Output.TIP_UNCERTAINTY, 60_000_000, lambda message: setattr(message.vector, "z", 0.002))
-    until(feed, lambda: "uncertainty" in feed.store.tables and judged(feed))
+    until(feed, lambda: judged(feed))
     assert feed.store.tables["uncertainty"].rows(0, 1)[1].tolist() == [[0.0, pytest.approx(0.002)]]
     alarm = judged(feed)
     assert (alarm.name, alarm.level, alarm.reason, alarm.end) == ("joint_3", Severity.ERROR, ALARM.told, None)

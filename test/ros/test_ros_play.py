@@ -78,19 +78,6 @@ def test_what_is_overdue_is_not_sent_in_a_flood(domain: None, bag: Path) -> None
     assert all(at - awake >= (offset - late[0][0]) / CATCH_UP - 1e-6 for offset, at in late)
 
 
-def test_a_held_play_keeps_the_clock_and_its_pace(listener: Any, bag: Path) -> None:
-    ticks, player = hear_clock(listener), Player(scan(bag), ["/tip_imu"], 50.0)
-    spin_until(listener, lambda: player._clock.get_subscription_count() == 1)  # type: ignore[union-attr]
-    holding = iter([False] * 5 + [True] * 20 + [False] * 10_000)
-    began = time.monotonic()
-    for _ in player.play(duration=1.0, is_held=lambda: next(holding)):
-        rclpy.spin_once(listener, timeout_sec=0.0)
-    assert time.monotonic() - began > 1.35 and player.sent == {"/tip_imu": 200}
-    spin_until(listener, lambda: ticks[-1] - ticks[0] >= 0.9 * SECOND)
-    assert ticks == sorted(ticks) and len(ticks) > len(set(ticks))  # while it is held its time is told again
-    player.close()
-
-
 def test_it_ends_only_when_reliable_listeners_have_everything(
     spawn: Callable[..., Any], listener: Any, reliable_bag: Path, mapping: Path, tmp_path: Path
 ) -> None:

@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 from boom_twin.bag.session_sheet import incompleteness
-from boom_twin.errors import BagError, UsageError
-from boom_twin.system.atomic_files import check_target, write_atomic
+from boom_twin.errors import BagError
+from boom_twin.system.atomic_files import write_atomic
 from boom_twin.system.result_folder import RECOVER, REPLAY, RIG, ResultKind, result_folder
 
 FILES = ("summary.json", "quantities.json", "bag/session_0.mcap")
@@ -212,15 +212,6 @@ def test_a_session_that_could_not_be_put_in_place_is_not_thrown_away(tmp_path: P
     assert (tmp_path / "saved" / "session_0.mcap").read_text() == "saved" and not incompleteness(tmp_path / "saved")
 
 
-def test_a_result_that_was_write_protected_is_kept(tmp_path: Path) -> None:
-    build(tmp_path / "out")
-    (tmp_path / "out").chmod(0o555)
-    with pytest.raises(BagError, match="out: is write-protected"):
-        build(tmp_path / "out")
-    (tmp_path / "out").chmod(0o755)
-    build(tmp_path / "out")
-
-
 @pytest.mark.parametrize("place", ["out", "out.unfinished", "out.replaced"])
 def test_a_file_that_a_source_links_to_is_not_removed(tmp_path: Path, place: str) -> None:
     """Also in what an earlier run left beside the result."""
@@ -231,13 +222,6 @@ def test_a_file_that_a_source_links_to_is_not_removed(tmp_path: Path, place: str
     with pytest.raises(BagError, match=rf"{place}: its summary\.json is .*session_0\.mcap"):
         build(tmp_path / "out", sources=(tmp_path / "source",))
     assert (tmp_path / "source" / "session_0.mcap").exists()
-
-
-def test_a_session_keeps_no_manifest_and_is_not_replaced(tmp_path: Path) -> None:
-    build(tmp_path / "out", RIG, name="session_0.mcap")
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["session_0.mcap"]
-    with pytest.raises(BagError, match=r"out: holds session_0\.mcap"):
-        build(tmp_path / "out", RIG, name="session_0.mcap")
 
 
 def test_a_file_is_the_old_one_or_the_new_one(tmp_path: Path) -> None:
@@ -256,41 +240,3 @@ def test_a_file_is_the_old_one_or_the_new_one(tmp_path: Path) -> None:
     assert path.read_text() == "new" and path.stat().st_mode & 0o777 == 0o640 and (tmp_path / "link").is_symlink()
     write_atomic(Path("/dev/null"), "anything")
     assert not Path("/dev/null").is_file() and {each.name for each in tmp_path.iterdir()} == {"scene.yaml", "link"}
-
-
-@pytest.mark.parametrize(
-    "names", [("session_0.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz"), ("bag_0.mcap.zstd", "metadata.yaml")]
-)
-def test_files_of_recordings_and_links_to_them_are_no_targets(tmp_path: Path, names: tuple[str, ...]) -> None:
-    (tmp_path / "bag").mkdir()
-    for name in names:
-        (tmp_path / "bag" / name).write_text("")
-    for number, path in enumerate((tmp_path / "bag").iterdir()):
-        link = tmp_path / f"results_{number}.csv"  # its own name tells nothing: the file that it leads to would be replaced
-        link.symlink_to(path)
-        for target in (path, link):
-            with pytest.raises(UsageError, match="file of a recording"):
-                check_target(target, [])
-
-
-def test_only_an_earlier_result_that_is_not_read_is_a_target(tmp_path: Path) -> None:
-    path, scene = tmp_path / "out.csv", tmp_path / "scene.yaml"
-    path.write_text("t_s,my own notes\n")
-    with pytest.raises(UsageError, match=r"out\.csv: is there already, and is no earlier result"):
-        check_target(path, [], b"t_s,stroke_1_m,")
-    path.write_text("t_s,stroke_1_m,joint_1_rad\n0,1,2\n")
-    check_target(path, [], b"t_s,stroke_1_m,")
-    scene.write_text("")
-    os.link(scene, tmp_path / "same.yaml")
-    for read in (scene, tmp_path / "same.yaml"):
-        with pytest.raises(UsageError, match="this file is read"):
-            check_target(read, [scene])
-    check_target(tmp_path / "metadata.yaml", [scene])
-
-
-def test_a_full_disk_is_told_with_the_folder_and_a_remedy(tmp_path: Path) -> None:
-    """Whatever writes in it: the system names no file."""
-    told = rf"^{tmp_path / 'out'}: cannot be written \(No space left on device\)\. Make room on the disk"
-    with pytest.raises(BagError, match=told), result_folder(tmp_path / "out", REPLAY, []), Path("/dev/full").open("w") as file:
-        file.write("x")
-    assert list(tmp_path.iterdir()) == []

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from drive_twin import drive_twin
 
-from boom_twin import Report, Sample, Settings, Stream, load_scene
+from boom_twin import Report, Sample, Stream, load_scene
 from boom_twin.errors import UsageError
 from boom_twin.scene.edit import loaded
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
@@ -68,31 +68,6 @@ def test_a_load_starts_the_loaded_boom_from_rest(strokes: Any) -> None:
     assert back.prediction.tip_position.tobytes() == first.prediction.tip_position.tobytes()
 
 
-def test_another_load_starts_from_rest_even_where_the_first_twin_had_it_before(strokes: Any) -> None:
-    twin, other = drive_twin(load_scene(), Settings(payload=40.0)), drive_twin(load_scene())
-    for each in (twin, other):
-        each.update(stroke(0, strokes))
-    twin.requests.tune({"gap": 0.2})
-    change = twin.update(stroke(1, strokes)).change
-    assert change is not None and not change.from_rest
-    other.requests.repeat(change)
-    report = other.update(stroke(1, strokes))
-    assert report.change is not None and report.change.from_rest and report.events == ("load", "limits")
-
-
-def test_limits_hold_at_once_and_do_not_disturb(strokes: Any) -> None:
-    twin, quiet = drive_twin(load_scene()), drive_twin(load_scene())
-    for each in (twin, quiet):
-        each.update(stroke(0, strokes))
-    twin.requests.tune({"gap": 0.02})
-    report, other = twin.update(stroke(1, strokes)), quiet.update(stroke(1, strokes))
-    assert report.events == ("limits",) and report.change is not None and not report.change.from_rest
-    assert report.prediction is not None and other.prediction is not None
-    assert report.prediction.joints.tobytes() == other.prediction.joints.tobytes()
-    assert twin.update(stroke(8, strokes)).events == ("leap",) and quiet.update(stroke(8, strokes)).events == ()
-    assert twin.update(stroke(9, strokes)).earlier[0].events == ("gap",) and quiet.update(stroke(9, strokes)).events == ()
-
-
 @pytest.mark.parametrize("live", [{"gap": 0.0}, {"payload": -2.0}, {"line_fill": np.nan}, {"imu_sigma": 2.0}, {"x": 1.0}])
 def test_what_cannot_be_asked_is_refused_with_its_name(live: dict[str, float], strokes: Any) -> None:
     twin = drive_twin(load_scene())
@@ -139,15 +114,6 @@ def test_the_zero_of_a_stroke_is_the_one_that_its_angle_tells(strokes: Any) -> N
         twin.update(stroke(k, strokes + offset))
         report = twin.update(angle(k, angles))
     assert np.abs(report.residuals[0].values).max() < 1e-4
-
-
-def test_no_zero_without_residuals(strokes: Any) -> None:
-    twin = drive_twin(load_scene())
-    with pytest.raises(UsageError, match="nothing is predicted yet"):
-        twin.rezero("joint_1")
-    twin.update(stroke(0, strokes))
-    with pytest.raises(UsageError, match="tip_imu_x: 0 residuals"):
-        twin.rezero("tip_imu")
 
 
 def test_a_second_twin_repeats_it_bit_for_bit(strokes: Any, joints: Any) -> None:

@@ -99,15 +99,6 @@ def test_health_judged_after_a_sample_was_told_is_the_same() -> None:
     assert apart == whole
 
 
-def test_a_judgement_that_was_not_asked_for_still_guards_the_next_sample() -> None:
-    """What is believed of a sensor never depends on who asks."""
-    judged, neglected = (drive_twin(load_scene(), baseline=load_baseline()) for _ in range(2))
-    for one, other in zip(drive(judged, spoilt_samples(4.0)), drive(neglected, spoilt_samples(4.0), judged=False), strict=True):
-        if one.report.estimate is not None:
-            assert other.report.estimate is not None
-            assert one.report.estimate.tip.tobytes() == other.report.estimate.tip.tobytes()
-
-
 def test_what_health_finds_changes_the_estimate_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Predictions, residuals and alarms are the same to the bit where no sensor is left out and no noise is allowed for.
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from drive_twin import drive_twin
 
-from boom_twin import Report, Sample, Stream, Twin, load_scene
-from boom_twin.config.settings import Settings
+from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
 from boom_twin.health.baseline import load_baseline
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.topic_table import Output

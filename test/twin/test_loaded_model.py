@@ -10,7 +10,6 @@ import pytest
 from drive_twin import drive_twin
 
 from boom_twin import Report, Sample, Stream, Twin, load_scene
-from boom_twin.errors import UsageError
 from boom_twin.health.baseline import load_baseline
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin import loaded_model
@@ -77,16 +76,3 @@ def test_what_is_asked_while_a_model_is_made_counts_too_and_all_takes_effect_at_
         preparation.take_in()
         twin.update(rows.pop(0)) if twin.requests.due else None
     assert twin.settings.gap == 0.3 and makers[0] == "MainThread" and set(makers[1:]) == {"model"}
-
-
-def test_limits_need_no_model_and_what_cannot_be_is_refused_at_once(makers: list[str]) -> None:
-    twin = drive_twin(load_scene())
-    preparation = ModelPreparation(twin)
-    preparation.tune({"gap": 0.3})
-    assert twin.requests.due and makers == ["MainThread"]
-    with pytest.raises(UsageError, match="payload"):
-        preparation.tune({"payload": -2.0})
-    preparation.tune({"payload": 10.0})
-    preparation.close()
-    preparation.take_in()
-    assert twin.requests.settings.payload == -1.0

@@ -53,27 +53,6 @@ def test_an_inclined_base_is_in_the_reading(scene):
     assert is_turn(found[3] - prediction.tip_angle - 0.1)
 
 
-def test_whole_turns_do_not_matter(scene):
-    twin = drive_twin(scene, Settings(), ["root", "head", None, None])
-    twin.update(Sample(Stream.STROKES, MS, strokes_of_posture(scene, "arch")))
-    values, turns = np.array([0.5, -0.2, 0.1, 0.1]), np.array([TURN, -2 * TURN, TURN, 0.0])
-    one = twin.update(Sample(Stream.ANGLES, MS, values)).residuals[0].values
-    other = twin.update(Sample(Stream.ANGLES, MS + 1, values)).residuals
-    assert other == ()  # after the newest stroke: waits
-    turned = drive_twin(scene, Settings(), ["root", "head", None, None])
-    turned.update(Sample(Stream.STROKES, MS, strokes_of_posture(scene, "arch")))
-    again = turned.update(Sample(Stream.ANGLES, MS, values + turns)).residuals[0].values
-    assert np.abs(one[:2]).max() <= np.pi
-    assert again == pytest.approx(one + turns * [0.0, 0.0, 1.0, 1.0], abs=1e-12)
-
-
-def test_deviations_add_up_towards_the_tip(scene):
-    _, _, encoders = readings(scene, [])
-    _, _, found = readings(scene, [None, "root", None, "head"])
-    assert found[[0, 2]] == pytest.approx(encoders[[0, 2]]) and np.all(found[[1, 3]] > encoders[[1, 3]])
-    assert found[3] < 2.0 * np.sqrt(np.sum(encoders**2))
-
-
 def test_an_inclinometer_at_the_tip_of_the_bundled_session(scene):
     """The rig's own angle of the last head, from an independent code, with the noise of the session's encoders."""
     truth = np.genfromtxt(ARCH / "truth.csv.gz", delimiter=",", names=True)
@@ -90,14 +69,3 @@ def test_an_inclinometer_at_the_tip_of_the_bundled_session(scene):
         found += [residuals.normalised[3] for residuals in twin.update(Sample(Stream.ANGLES, stamp, angles)).residuals]
     assert len(found) == rows
     assert abs(np.mean(found)) < 0.3 and 0.6 < np.std(found) < 1.15
-
-
-def test_a_sensor_that_is_not_there_is_no_event(scene):
-    """Its value is missing in every sample: neither partial nor left out, and the others have their residuals."""
-    strokes, values = strokes_of_posture(scene, "arch"), np.array([1.0, -0.7, np.nan, -0.9])
-    for absent, events in (((), {"partial"}), (("joint_3",), set())):
-        twin = drive_twin(scene, absent=absent)
-        reports = [twin.update(Sample(Stream.STROKES, k * 5 * MS, strokes)) for k in range(1, 4)]
-        reports += [twin.update(Sample(Stream.ANGLES, k * 5 * MS, values)) for k in range(1, 4)]
-        assert all(report.accepted for report in reports) and set(twin.counts) == events
-        assert np.isfinite(reports[-1].residuals[0].values).tolist() == [True, True, False, True]

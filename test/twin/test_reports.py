@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import copy
 import pickle
 
 import numpy as np
 import pytest
 from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, load_scene
+from boom_twin import Report, Sample, Scene, Stream, load_scene
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.schema import Scene
-from boom_twin.types import Report
 
 
 def reports(scene: Scene, count: int = 120) -> list[Report]:
@@ -32,15 +29,6 @@ def reports(scene: Scene, count: int = 120) -> list[Report]:
     return found
 
 
-def plain() -> list[Sample]:
-    """Strokes and angles in turn."""
-    random, rest, found = np.random.default_rng(2), strokes_of_posture(load_scene(), "arch"), []
-    for k in range(50):
-        found.append(Sample(Stream.STROKES, 10**18 + k * 5_000_000, rest + random.normal(0.0, 2e-5, 4)))
-        found.append(Sample(Stream.ANGLES, 10**18 + k * 5_000_000, random.normal(size=4)))
-    return found
-
-
 @pytest.fixture(scope="module")
 def given() -> list[Report]:
     return reports(load_scene())
@@ -49,22 +37,3 @@ def given() -> list[Report]:
 def test_a_report_can_be_sent_to_another_process(given: list[Report]) -> None:
     for report in given[-40:]:
         assert repr(pickle.loads(pickle.dumps(report))) == repr(report)
-
-
-def test_later_samples_change_no_report() -> None:
-    at_once = [repr(report) for report in map(drive_twin(load_scene()).update, plain())]
-    assert [repr(report) for report in list(map(drive_twin(load_scene()).update, plain()))] == at_once
-
-
-def test_a_copy_of_a_twin_goes_on_by_itself() -> None:
-    samples = plain()
-    twin = drive_twin(load_scene())
-    whole = [repr(twin.update(sample)) for sample in samples]
-    twin = drive_twin(load_scene())
-    for sample in samples[:60]:
-        twin.update(sample)
-    other = copy.deepcopy(twin)
-    for sample in reversed(samples):
-        twin.update(sample)
-    del twin
-    assert [repr(other.update(sample)) for sample in samples[60:]] == whole[60:]

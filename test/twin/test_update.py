@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.config.settings import Settings
+from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
 from boom_twin.health.baseline import load_baseline
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import ReportBlock, SampleBlock, block_of
-from boom_twin.types import Report
 
 MS, N = 1_000_000, 4
 START = 1_700_000_000_000 * MS
