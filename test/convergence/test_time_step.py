@@ -7,8 +7,7 @@ import pytest
 from convergence import motions
 from oracle import segments
 
-from boom_twin.analysis.simulate import simulate
-from boom_twin.scene import load_scene
+from boom_twin import load_scene, simulate
 from boom_twin.scene.kinematics import posture_angles
 
 DURATION, SAMPLES, TRAVEL = 1.6, 40, (0.05, -0.02, 0.03, 0.02)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from oracle import booms
 
+from boom_twin import load_scene
 from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
 from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.methods import Method, integrate_with
@@ -17,7 +18,6 @@ from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.kept_tangent import GAIN, SHARE_LEAD
 from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from boom_twin.kernels.transfer.time_step import run
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 CONVERGED = Method(tolerance=1e-12)

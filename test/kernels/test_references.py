@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from boom_twin import load_scene
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.deviation.posture import Posture
 from boom_twin.deviation.states import Filters
 from boom_twin.kernels.jit import HeldFields, _kind, by_reference, hold, kernel
 from boom_twin.kernels.tables import Condensed, State, Tables, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
-from boom_twin.scene import load_scene
 from boom_twin.twin.state import Limits, Ring, TwinState, UpdateOutput
 
 

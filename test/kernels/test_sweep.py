@@ -10,6 +10,7 @@ from kernels.dense import Dense, riccati_pass
 from oracle import booms
 from oracle.clearance.scenes import RODS, with_pins
 
+from boom_twin import load_scene
 from boom_twin.analysis.equilibrium import set_undeformed, settle
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.integrators import GENERALISED_ALPHA, REST, A, X, prepare
@@ -18,7 +19,6 @@ from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.matrix_product import new_product
 from boom_twin.kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from boom_twin.kernels.transfer.time_step import advance
-from boom_twin.scene import load_scene
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 SEEDS = [2, 3, 4, 8, 14, 18, 25]

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import Scene, statics
 from boom_twin.reduction.deviation import Response, answer, course_of
 from boom_twin.reduction.variants import KINDS, without
-from boom_twin.scene.schema import Scene
 
 SHORT = {"rise": 0.3, "duration": 0.6}
 BEAM_KEYS = ("A", "I")

@@ -7,7 +7,7 @@ import pytest
 from oracle import booms
 from oracle.clearance.scenes import PINS, RODS, with_pins
 
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import statics
 from boom_twin.analysis.methods import integrate_with
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.schema import IDEAL_BELOW

@@ -23,7 +23,7 @@ CUTS = {
 }
 WORKER = """
 from boom_twin.analysis.methods import integrate_with
-from boom_twin.scene import load_scene
+from boom_twin import load_scene
 from boom_twin.analysis.motions import motion_of
 from boom_twin.reduction.variants import KINDS, without
 scene = load_scene()

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from oracle import booms
 
+from boom_twin import statics
 from boom_twin.analysis import methods as stepping
-from boom_twin.analysis.equilibrium import statics
 from boom_twin.analysis.motions import motion_of
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.reduction.deviation import answer, course_of
