@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin import simulate, statics
+from boom_twin import statics
 from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.modal import damping_ratio, natural_modes
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
-from boom_twin.scene.oil_spring import stiffness
 
 OIL = {"bore": 0.1, "rod": 0.07, "bulk_modulus": 1.5e9, "cap_line": 1e-3, "rod_line": 8e-4}
 
@@ -48,19 +46,6 @@ def with_numbers(strokes):
     return booms.scene_of(spec)
 
 
-def test_stiffness_of_the_guide():
-    """Bore 100 mm, rod 70 mm, half of 0.64 m, a litre on each side: 36.9 kN/mm."""
-    cylinder = with_oil().joints[0].cylinder.model_copy(update={"max_stroke": 0.64})
-    oil = cylinder.oil.model_copy(update={"rod_line": 1e-3})
-    assert stiffness(cylinder.model_copy(update={"oil": oil}), 0.32) == pytest.approx(36.9e6, rel=2e-3)
-
-
-def test_no_oil_in_a_line_is_incompressible_at_its_end_only():
-    cylinder = with_oil().joints[0].cylinder
-    cylinder = cylinder.model_copy(update={"oil": cylinder.oil.model_copy(update={"cap_line": 0.0})})
-    assert stiffness(cylinder, 0.0) == math.inf and stiffness(cylinder, 0.1) < 1e9
-
-
 @pytest.mark.parametrize("posture", ["horizontal", "arch", "high", "low"])
 def test_rest_frequencies_and_damping_are_those_of_the_number(posture):
     scene = with_oil()
@@ -73,15 +58,3 @@ def test_rest_frequencies_and_damping_are_those_of_the_number(posture):
     booms_ = [rest_at(one, strokes, joint_angles_of_strokes(one, strokes)) for one in (scene, numbers)]
     damping = [[damping_ratio(boom[0], mode) for mode in natural_modes(*boom, 4)] for boom in booms_]
     assert damping[0] == pytest.approx(damping[1], rel=1e-6)
-
-
-def test_a_held_boom_swings_as_with_the_number_and_a_moved_one_does_not():
-    """The stiffness follows the stroke of the drive: alike to a small test move, apart after 0.3 m."""
-    scene = with_oil()
-    first = strokes_of_posture(scene, "arch")
-    numbers, times = with_numbers(first), np.linspace(0.0, 1.0, 101)
-    shape = np.clip(times / 0.8, 0.0, 1.0)[:, None] ** 3 * np.array([1.0, 0.0, 0.0, 0.0])
-    still, moved = (first + travel * shape for travel in (1e-6, -0.3))
-    tips = [[simulate(one, times, strokes, dt=2e-3).tip[:, :2] for one in (scene, numbers)] for strokes in (still, moved)]
-    apart = [np.linalg.norm(one - other, axis=1).max() for one, other in tips]
-    assert apart[0] < 1e-6 and apart[1] > 1e-3

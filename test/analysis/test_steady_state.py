@@ -91,13 +91,6 @@ def test_a_blow_between_two_instants_keeps_its_impulse():
     assert series == pytest.approx(even[:, 0], abs=1e-6), "rows uneven and even"
 
 
-@pytest.mark.slow  # a constant load says nearly as much in no time
-def test_a_long_pump_cycle_swings_by_its_static_share():
-    static = frequency_response(SCENE, np.zeros(1), posture="arch", tip_force=(0.0, 130.0)).tip.real
-    found = steady_state(SCENE, pump_load(SCENE, 0.001, 130.0), posture="arch")
-    assert found.swing > np.linalg.norm(static) and found.tip[len(found.tip) // 4] == pytest.approx(static[0], rel=1e-5)
-
-
 def test_pumps_push_up_on_an_inclined_base():
     inclined = SCENE.model_copy(update={"base": SCENE.base.model_copy(update={"inclination": 0.3})})
     peak = pump_load(inclined, 0.4, 130.0).forces.max(axis=0)

@@ -18,13 +18,8 @@ from boom_twin.kernels.elements.pin_contact import (
     APPROACH,
     CLOSED,
     COLUMNS,
-    FORCE,
     LAWS,
-    LEAST_GAP,
     SMOOTH,
-    approach,
-    contact_stiffness,
-    limited,
     restitution_of,
 )
 from boom_twin.validation.contact_law import HYSTERESIS, Contact
@@ -103,12 +98,6 @@ def test_the_exact_law_keeps_what_it_is_asked_for(e):
     assert restitution_of(ours.loss) == pytest.approx(e, abs=1e-9)
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("e", [0.95, 0.7, 0.4])
-def test_check_states_the_restitution_that_a_law_really_gives(law, e):
-    assert restitution_of(LAWS[law](e)) == pytest.approx(restitution(LAWS[law](e)), abs=1e-5)
-
-
 def test_nothing_pulls_and_the_elastic_force_rises_outwards():
     pin, memory = compiled()
     memory[APPROACH], memory[CLOSED] = 1e-3, 1.0
@@ -119,42 +108,6 @@ def test_nothing_pulls_and_the_elastic_force_rises_outwards():
     assert leaving.max() < 0.011 * still.max()
     assert np.diff(still).min() > 0.0  # so that a loaded pin rests in one place only
     assert still[offsets < 0.9e-4].max() < 5.0  # N: smoothing reaches no further
-
-
-def test_friction_opposes_the_slip_of_the_surfaces_and_is_no_more_than_its_share():
-    pin, memory = compiled(friction=0.2)
-    place = (1.3e-4, 0.0)
-    memory[FORCE] = force(pin, memory, place)[0]
-    for along, turning in ((0.05, 0.0), (-0.05, 0.0), (0.0, 3.0), (0.0, -3.0)):
-        found = force(pin, memory, place, (0.0, along), turning)
-        slip = along + pin.radius * turning
-        assert found[1] * slip > 0.0  # what holds the journal back has the sign of its slip
-        assert abs(found[1]) == pytest.approx(0.2 * memory[FORCE], rel=0.01)
-        assert found[5] == pytest.approx(pin.radius * found[1], rel=1e-4)
-    assert force(pin, memory, place)[1] == 0.0
-
-
-def test_stiffness_is_capped_where_the_clearance_vanishes():
-    softness = 2.0 * (1.0 - 0.3**2) / 2.06e11
-    assert contact_stiffness(0.03, 1e-4, softness) == pytest.approx(4.5e11, rel=0.02)
-    assert contact_stiffness(0.03, 1e-6, softness) == contact_stiffness(0.03, LEAST_GAP, softness)
-    assert contact_stiffness(0.03, 4.0 * LEAST_GAP, softness) < 0.51 * contact_stiffness(0.03, LEAST_GAP, softness)
-
-
-def test_an_increment_claims_little_beyond_the_wall():
-    pin, _ = compiled()
-    x, y = limited(pin, 0.0, 0.0, 3e-3, 4e-3)
-    assert np.hypot(x, y) < pin.gap + 20.0 * SMOOTH
-    assert [x, y] == pytest.approx(np.hypot(x, y) * np.array([0.6, 0.8]))
-    assert limited(pin, 5e-5, 0.0, 1e-5, 0.0) == (1e-5, 0.0)
-
-
-def test_the_speed_of_approach_is_frozen_while_they_touch():
-    _, memory = compiled()
-    assert approach(memory, 1.0, 0.0, 0.3, 9.0) == 0.3
-    assert approach(memory, 1.0, 0.0, -0.3, 0.0) == 1e-3
-    memory[CLOSED], memory[APPROACH] = 1.0, 0.02
-    assert approach(memory, 1.0, 0.0, 0.3, 0.0) == 0.02
 
 
 def test_a_ball_that_hardly_touches():

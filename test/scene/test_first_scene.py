@@ -13,7 +13,7 @@ import pytest
 
 from boom_twin import Scene, statics
 from boom_twin.errors import SceneError
-from boom_twin.scene.boom_table import BoomTable, read_table
+from boom_twin.scene.boom_table import read_table
 from boom_twin.scene.first_scene import first_scene
 from boom_twin.scene.kinematics import stroke_curve
 from boom_twin.scene.load import examine
@@ -176,21 +176,6 @@ def test_a_slip_in_the_table_is_warned_of_where_it_is(tmp_path: Path, old: str, 
     assert len(told) == 1 and words in told[0] and len(oddities) <= 4, [str(oddity) for oddity in oddities]
 
 
-def test_the_example_table_names_what_a_table_may_hold_of_the_whole_boom(tmp_path: Path) -> None:
-    written = set(re.findall(r"^(\w+):", EXAMPLE, re.MULTILINE))
-    assert written == set(BoomTable.model_fields) - {"postures"}
-    _, full, (heavy,) = scene_of(tmp_path, EXAMPLE.replace("line_fill: 0 kg/m", "line_fill: 29 kg/m"))
-    assert full.line_fill == 29.0 and heavy.path == "joints[1].bore", "surrogate pins: cylinder 2 is too small for a full line"
-    assert scene_of(tmp_path, EXAMPLE)[1].line_fill is None
-
-
-def test_what_follows_from_a_warned_pin_is_not_told_again_and_a_square_box_not_at_all(tmp_path: Path) -> None:
-    square = EXAMPLE.replace("height: 240 mm, width: 190 mm", "height: 210 mm, width: 210 mm")
-    assert scene_of(tmp_path, square)[2] == []
-    oddities = scene_of(tmp_path, EXAMPLE.replace("C: [-1738 mm, 544 mm]", "C: [-1738, 544]"))[2]
-    assert {oddity.path for oddity in oddities} == {"joints[1].C"}
-
-
 def test_a_spreadsheet_s_warnings_and_faults_name_its_cells(tmp_path: Path) -> None:
     rows = CSV.splitlines()
     spaced = "\n".join([rows[0], rows[1], ",,,", rows[2].replace("7100", "6550")])  # the empty row counts in the spreadsheet
@@ -206,15 +191,6 @@ def test_a_spreadsheet_s_warnings_and_faults_name_its_cells(tmp_path: Path) -> N
 def test_a_csv_table_that_is_none_is_refused(tmp_path: Path, header: str, row: str) -> None:
     with pytest.raises(SceneError, match=r"no such column|it is needed|no row under|not a readable CSV"):
         scene_of(tmp_path, f"{header}\n{row}\n", "table.csv")
-
-
-def test_a_pipe_in_the_first_row_alone_is_that_of_the_whole_boom_and_a_header_may_end_with_an_empty_cell(
-    tmp_path: Path,
-) -> None:
-    text, whole, _ = scene_of(tmp_path, CSV, "table.csv")
-    _, first, oddities = scene_of(tmp_path, CSV.replace(",,,,,25,\n", ",,,,,,\n"), "table.csv")
-    assert [section.rho_A for section in first.sections] == [section.rho_A for section in whole.sections] and not oddities
-    assert scene_of(tmp_path, CSV.replace("pipe,payload\n", "pipe,payload,\n"), "table.csv")[0] == text
 
 
 @pytest.mark.parametrize(

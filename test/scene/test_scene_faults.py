@@ -178,15 +178,6 @@ def test_joints_have_their_kinds_in_order_and_are_as_many_as_sections(bench: Any
     assert (fault.path, fault.value) == ("joints", 3) and "4 sections" in fault.bound
 
 
-def test_pins_of_links_may_sit_anywhere_on_rigid_sections(bench: Any) -> None:
-    def edit(values: Any) -> None:
-        values["modes"] = 0
-        values["sections"][0]["beam"] = [0.6, 3.8]
-        values["sections"][1]["beam"] = [0.05, 3.05]
-
-    assert bench.faults(edit) == ()
-
-
 def test_all_faults_are_reported_at_once(bench: Any) -> None:
     edits = [("material.E", "206e9"), ("sections[0].root.mass", -36), ("sections[1].rho_a", 41), ("sections[2].I", GONE)]
     edits += [("joints[1].lL", 5.0), ("joints[2].cylinder.k", GONE), ("joints[3].kind", "B9"), ("postures.low", [45, 0])]

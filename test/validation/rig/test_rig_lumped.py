@@ -34,22 +34,6 @@ def test_rests_where_the_reference_rests(posture):
     assert found["forces"] == pytest.approx(expected["cylinder_force_N"], rel=4e-3)
 
 
-def test_moves_as_with_bodies_on_fewer_constraints():
-    scene = load_scene()
-    first = strokes_of_posture(scene, "arch")
-    drive = Programme(tuple(first), (Move(0, 0.0, 0.6, first[0] + 0.02), Move(2, 0.0, 0.6, first[2] + 0.02)))
-    rows = {}
-    for lumped in (False, True):
-        resting = at_rest(scene, first, 4, nodally_exact=True, lumped=lumped)
-        rows[lumped], _ = move(resting, drive, 1.0, 5e-3, 5e-3)
-        assert constraints(resting) == (17 if lumped else 58)
-    away = np.hypot(*(rows[True][name] - rows[False][name] for name in ("tip_x_m", "tip_y_m")))
-    assert np.sqrt(np.mean(away**2)) < 2e-4
-    assert np.ptp(rows[False]["tip_y_m"]) > 0.1
-    pairs = [[rows[lumped][name] for name in ("tip_ax_m_s2", "tip_ay_m_s2")] for lumped in (True, False)]
-    assert np.linalg.norm(np.subtract(*pairs)) < 0.02 * np.linalg.norm(pairs[1])
-
-
 @pytest.mark.parametrize(
     ("elements", "lumped", "scheme", "most_mm", "most_acceleration"),
     [(4, True, Scheme(kept=1, tolerance=3e-4), 0.3, 0.013), (8, False, Scheme(kept=0, tolerance=1e-3), 0.12, 0.004)],

@@ -50,14 +50,6 @@ def test_transducers_read_lengths_with_the_oil_compressed(motion):
     assert np.abs(extension).min() > 1e-5
 
 
-def test_stamps_do_not_depend_on_noise_but_on_the_seed(motion):
-    scene, rows = motion
-    noisy, clean = observe(scene, MOVE, rows, Sensors(), 1), observe(scene, MOVE, rows, noise_free(), 1)
-    assert np.array_equal(noisy.stamps, clean.stamps)
-    assert not np.array_equal(noisy.joints, clean.joints)
-    assert not np.array_equal(observe(scene, MOVE, rows, Sensors(), 2).stamps, clean.stamps)
-
-
 def test_truth_file_repeats_and_reads_back(motion, tmp_path):
     scene, rows = motion
     session = observe(scene, MOVE, rows, Sensors(), seed=1)
