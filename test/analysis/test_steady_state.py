@@ -13,7 +13,6 @@ from boom_twin.analysis.steady_state import (
     INSTANTS,
     PeriodicLoad,
     load_of_rows,
-    polygon_series,
     pump_load,
     steady_state,
 )
@@ -78,17 +77,6 @@ def test_a_fast_part_of_a_long_load_is_not_taken_for_a_slow_one():
     expected = frequency_response(SCENE, np.array([rate]), posture="arch", tip_force=(0.0, 100.0 * straight)).tip[0]
     assert found.harmonics[round(300.0 * rate) - 1] == pytest.approx(np.linalg.norm(expected), rel=1e-9)
     assert np.ptp(found.tip, axis=0) == pytest.approx(2.0 * np.abs(expected), rel=5e-3)
-
-
-def test_a_blow_between_two_instants_keeps_its_impulse():
-    """100 N s within 1 ms, rows uneven in time."""
-    times, push = np.array([0.0, 3.0, 3.0005, 3.001, 10.0]), np.array([0.0, 0.0, 2e5, 0.0, 0.0])
-    load = load_of_rows(times, np.outer(push, [0.0, 1.0]))
-    assert load.forces.mean(axis=0) == pytest.approx([0.0, 10.0], abs=1e-9)
-    series = polygon_series(times, push[:, None], 400)[:, 0]
-    assert abs(series[1:20]) == pytest.approx(10.0, rel=1e-4), "of a blow all harmonics are alike"
-    even = polygon_series(np.linspace(0.0, 10.0, 20_001), np.interp(np.linspace(0.0, 10.0, 20_001), times, push)[:, None], 400)
-    assert series == pytest.approx(even[:, 0], abs=1e-6), "rows uneven and even"
 
 
 def test_pumps_push_up_on_an_inclined_base():

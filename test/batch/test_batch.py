@@ -11,7 +11,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from concurrent.futures import CancelledError
 from contextlib import suppress
 from pathlib import Path
 
@@ -25,7 +24,6 @@ pytest.importorskip("distributed")
 
 
 from boom_twin import load_scene, replay  # noqa: E402
-from boom_twin.batch import cluster  # noqa: E402
 from boom_twin.batch.session_task import SessionTask, row_of  # noqa: E402
 from boom_twin.calibration import calibrate  # noqa: E402
 from boom_twin.cli.main import main  # noqa: E402
@@ -217,52 +215,6 @@ def test_parameters_of_a_session_are_those_of_a_calibration(tmp_path: Path) -> N
         assert row[f"calibrated_{name}"] == each.value
         assert each.low < row[f"calibrated_{name}"] < each.high and row[f"calibrated_{name}_sigma"] > 0.0
     assert "calibration_reason" not in row and row["calibration_misfit"] == found.misfit
-
-
-def slept(own: SessionTask) -> dict[str, object]:
-    time.sleep(0.1)
-    return {"key": own.key, "status": "ok"}
-
-
-class LosingClient:
-    """A client whose tasks end, their rows still with a worker."""
-
-    dashboard_link = ""
-    status = "finished"
-
-    def __init__(self, error: Exception) -> None:
-        self._error = error
-
-    def submit(self, *_: object, **__: object) -> LosingClient:
-        return self
-
-    def nthreads(self) -> dict[str, int]:
-        return {"worker": 1}
-
-    def result(self) -> object:
-        raise self._error
-
-
-def test_a_row_that_is_lost_with_its_worker_costs_an_attempt_and_not_the_batch() -> None:
-    from distributed import KilledWorker
-
-    for error, reason in (
-        (KilledWorker("s0", None, 6), "the workers that had it were ended from outside"),
-        (CancelledError(), "Dask gave it up (finished)"),
-        (OSError("gone"), "OSError: gone"),
-    ):
-        (row,) = cluster.rows_of(cluster.on_dask(LosingClient(error), slept), [task(retries=2)])  # type: ignore[arg-type]
-        assert row["status"] == "failed" and row["attempts"] == 3 and row["reason"].startswith(reason)
-
-
-def test_what_fails_here_costs_its_own_row() -> None:
-    tasks = [task("good"), task("bad")]
-
-    def work(own: SessionTask) -> dict[str, object]:
-        return {"key": own.key} if own.key == "good" else {}[own.key]
-
-    rows = {row["key"]: row.get("reason") for row in cluster.rows_of(cluster.Workers(work, lambda: 2), tasks)}
-    assert rows == {"good": None, "bad": "KeyError: 'bad'"}
 
 
 def test_without_the_extra_one_line_tells_what_to_install(

@@ -52,23 +52,6 @@ def test_error_of_the_default_step(fine):
     assert found["acceleration"] < 2e-3 * np.sqrt(np.mean(fine[:, PARTS["acceleration"]] ** 2))
 
 
-def test_error_that_a_simulation_states_of_its_steps():
-    """It falls with the square of the step and is a bound that is not absurdly wide."""
-    scene = load_scene()
-    angles = posture_angles(scene, "arch")
-    closed = np.array([joint.cylinder.closed_length for joint in scene.joints])
-    drive = motions.smooth_drive(segments.Segments(scene, 0).lengths(angles), TRAVEL, 1.2)
-    times = np.linspace(0.0, DURATION, 1601)
-    strokes = drive(times[:, None])[0] - closed
-    runs = {}
-    for every in (1, 4, 8):
-        runs[every * 1e-3] = simulate(scene, times[::every], strokes[::every], every * 1e-3, angles)
-    ratio = runs[8e-3].step_error / runs[4e-3].step_error
-    assert ratio == pytest.approx(4.0, rel=0.2)
-    true = np.abs(runs[8e-3].tip[:, :2] - runs[1e-3].tip[::8, :2]).max()
-    assert true < runs[8e-3].step_error < 30.0 * true
-
-
 def test_steps_end_on_the_rows_whatever_their_spacing():
     """Rows at uneven times: the same as the rows of a run at even times, to the error of the steps and of PCHIP."""
     scene = load_scene()

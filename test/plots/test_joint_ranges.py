@@ -28,13 +28,6 @@ def test_it_is_drawn_for_any_number_of_joints(tmp_path: Path, count: int) -> Non
     assert ((image.max(axis=2) - image.min(axis=2)) > 0.3).mean() > 0.005, "nothing coloured was drawn"
 
 
-def test_links_that_do_not_meet_everywhere_are_drawn_where_they_do(tmp_path: Path) -> None:
-    scene = load_scene()
-    wide = scene.joints[1].model_copy(update={"lL": 0.55})
-    other = scene.model_copy(update={"joints": (scene.joints[0], wide, *scene.joints[2:])})
-    assert pixels(joint_ranges_picture(tmp_path / "pins.png", other, "boom")).std() > 0.05
-
-
 def test_the_command_writes_it_and_nothing_over_the_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, scene = tmp_path / "pins.png", tmp_path / "boom.yaml"
     main(["scene"])

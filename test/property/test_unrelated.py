@@ -11,7 +11,6 @@ from oracle import booms
 from boom_twin import statics
 from boom_twin.analysis import methods as stepping
 from boom_twin.analysis.motions import motion_of
-from boom_twin.compiler.compile import compile_scene
 from boom_twin.reduction.deviation import answer, course_of
 
 STEPS, STEP = 400, 1e-3
@@ -116,24 +115,6 @@ def test_no_bit_changes(name):
 def test_all_that_is_zero_at_once_changes_no_bit():
     absent, zero = (edited(both(*(PAIRS[name][k] for name in ZEROS))) for k in (0, 1))
     assert_same_motion((absent, None), (zero, None))
-
-
-def with_unused_rows(plan, other):
-    """`plan` with the tables of beams, links and cylinder parts of another boom, to which no operation points."""
-    tables, full = plan.tables, other.tables
-    assert len(tables.beams) == len(tables.links) == len(tables.parts) == 0
-    names = ("beams", "psi", "weights", "stiffness", "point_mass", "point_rotary", "links", "parts")
-    return replace(plan, tables=tables._replace(**{name: getattr(full, name) for name in names}))
-
-
-def empty_and_unused():
-    """A rigid boom with massless links and cylinders: with empty tables, and with tables full of rows not in use."""
-    scene = edited(both(RIGID, without("joints", "mL", "mR"), without("cylinder", "barrel", "rod", "d")))
-    return (scene, None), (scene, with_unused_rows(compile_scene(scene), compile_scene(edited(both()))))
-
-
-def test_rows_that_are_not_in_use_change_no_bit():
-    assert_same_motion(*empty_and_unused())
 
 
 def stepped(motion, scene, plan):

@@ -16,14 +16,6 @@ def test_resting_offset_inverts_the_force(smoothing, force):
     assert contact.force(contact.resting_offset(force), 0j, 0.0) == pytest.approx(-force, rel=1e-6)
 
 
-def test_smoothing_fades_away_from_the_rim():
-    sharp, smooth = Contact(STEEL, 0.1, 1e-4), Contact(STEEL, 0.1, 1e-4, smoothing=1e-6)
-    assert smooth.penetration(0.0) == 0.5e-6
-    assert smooth.penetration(3e-5) == pytest.approx(3e-5, rel=1e-3)
-    assert 0.0 < smooth.penetration(-1e-4) < 3e-9
-    assert sharp.penetration(-1e-9) == 0.0
-
-
 @pytest.mark.parametrize("smoothing", [0.0, 1e-6])
 def test_damping_takes_and_never_pulls(smoothing):
     contact = Contact(STEEL, HYSTERESIS["flores"](0.5), 1e-4, smoothing=smoothing)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from oracle import booms, segments
 from oracle.clearance import rigid
-from oracle.clearance.free_play import lengthening, loaded_lever, tip_shift
 from reference.worn_pin import geometry
 from reference.worn_pin.motion import freed
 
@@ -51,36 +50,3 @@ def test_nothing_accelerates_at_rest(posture, index, smoothing):
     accelerations = np.array(boom.rates((drive, 0.0), state, 0.0)[3:])
     assert boom.part.at(rest.phi).inertia * accelerations[0] == pytest.approx(0.0, abs=0.05)
     assert boom.cylinder.rod_mass * accelerations[1:] == pytest.approx([0.0, 0.0], abs=0.5)
-
-
-@pytest.mark.parametrize("posture, index", CASES)
-@pytest.mark.parametrize("clearance", [1e-4, 2e-5])
-def test_tip_shift_is_lever_times_clearance_and_penetration(posture, index, clearance):
-    """Within 2 % by the geometric lever, within 0.1 % by the loaded one."""
-    document = booms.document()
-    headings = np.radians(document["postures"][posture])
-    drive, contact = geometry.cylinder_length(document, headings, index), pin(index, clearance)
-    ideal = freed(document, headings, index, None)
-    rest = ideal.rest(drive, headings[index])
-    shift = freed(document, headings, index, contact).rest(drive, headings[index]).tip - rest.tip
-    sagged = np.concatenate([headings[:index], headings[index:] + rest.phi - headings[index]])
-    assert abs(tip_shift(document, sagged, index, contact, rest.force) - shift) < 0.02 * abs(shift)
-    barrel, rod = geometry.pins(document, sagged, index)
-    play = lengthening(contact, rest.force, rod - barrel)
-    assert np.sign(play) == np.sign(rest.tension) and abs(play) > 0.9 * clearance
-    assert abs(loaded_lever(ideal, drive, headings[index]) * play - shift) < 1e-3 * abs(shift)
-
-
-@pytest.mark.parametrize("index", range(4))
-def test_reversed_load_moves_the_tip_by_the_free_play(index):
-    """Weight up instead of down, a twentieth of it: twice the clearance and both penetrations through the lever."""
-    headings, shifts, depths = np.zeros(4), [], []
-    document, contact = booms.document(), pin(index, 1e-4)
-    drive = geometry.cylinder_length(document, headings, index)
-    for weight in (-0.05, 0.05):
-        document["gravity"] = [0.0, 9.81 * weight]
-        with_play, ideal = (freed(document, headings, index, c).rest(drive, headings[index]) for c in (contact, None))
-        shifts.append(with_play.tip - ideal.tip)
-        depths.append(abs(with_play.offset) - contact.clearance)
-    lever = abs(geometry.levers(document, headings)[index])
-    assert abs(shifts[1] - shifts[0]) == pytest.approx(lever * (2.0 * contact.clearance + sum(depths)), rel=5e-3)

@@ -9,7 +9,7 @@ from oracle.oscillation import mean_frequency
 pytest.importorskip("exudyn")
 
 from boom_twin import Scene
-from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.validation.rig import Move, Programme, simulate
 
 
@@ -56,19 +56,3 @@ def test_first_frequency_of_a_cantilever(cantilever):
     closed_form = (1.87510407 / 4.0) ** 2 * np.sqrt(2.06e11 * 1.0e-5 / 20.0) / (2 * np.pi)
     free = slice(100, None)
     assert mean_frequency(rows["t_s"][free], rows["tip_y_m"][free]) == pytest.approx(closed_form, rel=5e-3)
-
-
-def test_rigid_boom_on_incompressible_cylinders_follows_the_geometry(document):
-    for joint in document["joints"]:
-        for part in ("k", "d", "barrel", "rod"):
-            joint["cylinder"].pop(part)
-    scene = Scene.model_validate(document | {"modes": 0})
-    strokes = strokes_of_posture(scene, "arch")
-    move = Programme(tuple(strokes), (Move(0, 0.05, 0.4, 0.66), Move(2, 0.05, 0.4, 0.22), Move(3, 0.1, 0.4, 0.2)))
-    rows = simulate(scene, move, 0.5, step=1e-3)
-    for row in (0, 250, 500):
-        angles = joint_angles_of_strokes(scene, move(rows["t_s"][row : row + 1])[0][0])
-        assert [rows[f"joint_{i}_rad"][row] for i in range(1, 5)] == pytest.approx(angles, abs=1e-7)
-    for i in range(1, 5):  # at rest first, so the equilibrium's force is that of the motion
-        force = rows[f"cylinder_force_{i}_N"]
-        assert force[0] == pytest.approx(force[1:50].mean(), rel=1e-4)

@@ -27,21 +27,4 @@ def test_each_quantity_has_its_bounds(name):
         assert failed.word == "fails" and failed.silent
 
 
-@pytest.mark.parametrize(
-    ("facts", "word", "silent", "symptom"),
-    [
-        (Facts("the equations did not converge"), "fails", False, "the equations did not converge"),
-        (replace(GOOD, error=0.5, doubt="the step is coarse"), "fails", False, "(it says: the step is coarse)"),
-        (Facts("no equilibrium", solvable=False), "refuses", False, ""),
-        (Facts("ok", solvable=False), "fails", True, ""),
-        (replace(GOOD, error=np.inf), "fails", True, ""),
-        (replace(GOOD, drift=np.nan), "holds", False, ""),
-        (replace(GOOD, error=0.02, growth=50.0), "fails", True, "vibration grows 50-fold"),
-    ],
-)
-def test_a_failure_is_silent_unless_the_solver_says_so(facts, word, silent, symptom):
-    found = facts.verdict
-    assert (found.word, found.silent) == (word, silent) and symptom in found.symptom
-
-
 # -- facts ------------------------------------------------------------------------------------------------------------
