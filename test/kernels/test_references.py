@@ -46,11 +46,6 @@ def total(fields):
     return found
 
 
-@kernel
-def other(fields):
-    return fields.nothing
-
-
 def fields(flag=True):
     return Fields(flag, Pair(0.5, 3), Inside(np.array([1.0, 10.0])), np.arange(6.0).reshape(3, 2))
 

@@ -1,4 +1,4 @@
-"""Textbook formulas: end deflection and frequencies of a cantilever, and a rigid section swinging on its oil spring."""
+"""Textbook formulas: frequencies of a cantilever, and a rigid section swinging on its oil spring."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from oracle import booms
 from boom_twin import statics
 
 ROOTS = np.array([1.87510407, 4.69409113, 7.85475744])
-LENGTH, RIGIDITY, DENSITY, GRAVITY = 3.0, 2.06e11 * 2.0e-5, 40.0, 9.81
+LENGTH, DENSITY, GRAVITY = 3.0, 40.0, 9.81
 
 
 def cantilever(modes=8, incompressible=True, **changes):

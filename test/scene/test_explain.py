@@ -37,20 +37,6 @@ def test_masses_and_strokes_of_the_default_scene(bench: Any) -> None:
     assert list(left_out(loaded)) == ["base.inclination", "clearance"]
 
 
-def test_unknowns_follow_modes_kinds_and_axial_coordinates(bench: Any) -> None:
-    found = account(bench)
-    assert [section.unknowns for section in found.sections] == [8, 8, 8, 4]
-    assert [joint.unknowns for joint in found.joints] == [2, 6, 6, 6]
-    assert found.unknowns == 48 and account(bench, modes=0).unknowns == 20
-    assert explain(load_scene(bench.edited(lambda v: put(v, "sections[3].modes", 5)))).unknowns == 50
-    stiff = account(bench, axial=False, geometric=False)
-    assert stiff.unknowns == 48 - 7 and {"sections[*].axial", "sections[*].geometric"} <= set(left_out(stiff))
-    one = explain(load_scene(bench.edited(lambda v: put(v, "sections[3].axial", False))))
-    assert [section.axial for section in one.sections] == [1, 1, 1, 0] and "sections[3].axial" in left_out(one)
-    (fault,) = bench.faults(lambda v: v.update(axial="maybe"))
-    assert fault.path == "axial" and "true or false is needed, not text" in fault.bound
-
-
 def test_what_is_not_named_is_listed(bench: Any) -> None:
     def edit(values: Any) -> None:
         put(values, "sections[3]", {"length": 3.1, "root": {"mass": 80, "com": [1.5, 0], "inertia": 60}})

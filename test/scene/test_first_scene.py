@@ -140,21 +140,11 @@ def test_warnings_name_the_table_s_keys_and_lines(tmp_path: Path) -> None:
 SLIPS = [
     ("wall: 8 mm", "wall: 8 cm", "sections[0].wall", "with walls of 8"),
     ("bore: 200 mm, rod: 120 mm", "bore: 100 mm, rod: 60 mm", "joints[1].bore", "not radii"),
-    ("payload: 60 kg", "payload: 0.06", "payload", "tonnes?"),
     ("height: 450 mm, width: 340 mm", "height: 340 mm, width: 450 mm", "sections[1].height", "bends 1.53 times as much"),
     ("width: 340 mm", "width: 34 mm", "sections[1].width", "expected at least 0.135 m"),
-    ("wall: 6 mm", "wall: 0.6 mm", "sections[1].wall", "with walls of 0.62 mm"),
-    ("length: 7600 mm", "length: 7600 cm", "sections[1].beam", "a rigid head of 68.9 m"),
     ("pipe: 25 kg/m", "pipe: 190 kg/m", "pipe", "sections[2].rho_A"),
-    ("line_fill: 0 kg/m", "line_fill: 2400", "line_fill", "whole load"),
     ("1.4 GPa", "1400 bar", "bulk_modulus", "14000 bar"),
-    ("damping_ratio: 0.01", "damping_ratio: 0.1", "damping_ratio", "damp"),
-    ("rod_pin: [1320 mm, -264 mm]", "rod_pin: [132 mm, -26.4 mm]", "joints[0].bore", "MPa"),
-    ("[990 mm, -2750 mm]", "[-2750 mm, 990 mm]", "joints[0].range_deg", "next to a dead centre"),
-    ("R: [845 mm, 237 mm]", "R: [845 mm, -237 mm]", "joints[2].range_deg", "next to a dead centre"),
     ("range_deg: [-165, 10], bore: 200", "range_deg: [-16.5, 1], bore: 200", "joints[1].range_deg", "turns by 17.5 deg"),
-    ("rod: 120 mm", "rod: 12 mm", "joints[1].rod", "in a bore of 0.2 m"),
-    ("bore: 90 mm, rod: 55 mm", "bore: 200 mm, rod: 120 mm", "joints[3].bore", "MPa"),
     (
         "bore: 180 mm, rod: 125 mm",
         "bore: 180 mm, rod: 125 mm, cap_line: 0.5 ml",
@@ -163,7 +153,6 @@ SLIPS = [
     ),
     ("rod: 125 mm", "rod: 125 mm, max_stroke: 4.5 m", "joints[0].max_stroke", "not the open length"),
     ("-2750 mm]}", "-2750 mm], inclination: 3 rad}", "base.inclination", "degrees?"),
-    ("mL: 35 kg", "mL: 35000 kg", "joints[1].mL", "not grams"),
 ]
 """A newcomer's slips in the table: what is there, what was written, where and with which words it is told; all load."""
 

@@ -44,38 +44,26 @@ SLIPS = [
     ("joints[0].cylinder.k", 40e3, "kN/m?", "4e+07"),
     ("joints[0].cylinder.k", 4e8, "a bore of 0.26 m", "at most 0.165 m"),
     ("joints[1].cylinder.k", 3e6, "gives way by", "2 % of its stroke"),
-    ("joints[2].cylinder.k", 2e10, "expected from 1e6 to 1e9"),
     ("joints[0].cylinder.d", 120.0, "would damp a mode of"),
-    ("sections[0].beta", 1.0, "would damp a mode of"),
     ("sections[2].beta", 0.02, "2 zeta / omega"),
     ("sections[0].I", 0.00036, "sqrt(I/A)", "expected"),
-    ("sections[1].I", 2e-06, "walls of"),
-    ("sections[0].A -> sections[0].I", 0.00049, "sqrt(I/A)"),
     ("sections[1].height -> sections[1].I", 17.2, "for a box 17.2 m high"),
-    ("sections[0].height -> sections[0].I", 0.1, "0.1 m high"),
     ("sections[0].rho_A", 5.2, "rho A"),
-    ("sections[2].rho_A", 20.0, "expected 23.6 to"),
-    ("sections[1].rho_A", 160.0, "one metre"),
     ("sections[0].rho_I", 7850.0, "rho I"),
     ("sections[1].head.com", [-0.12, 0.0], "INBOARD"),
     ("sections[0].root.com", [1.3, 0.0], "inside the root"),
     ("sections[0].head.inertia", 222.0, "OWN centre"),
     ("sections[0].root.mass", 0.036, "not tonnes"),
-    ("sections[1].head.mass", 13000.0, "not grams"),
-    ("joints[1].mL", 4000.0, "not grams"),
     ("joints[1].mL", 40.0, "25.8 kg", "not N"),
     ("joints[1].cylinder.barrel.mass -> joints[1].cylinder.barrel.inertia", 0.016, "gyration"),
     ("joints[2].cylinder.rod.com", 1.0, "rod pin"),
     ("sections[0].beam", [0.6, 3.0], "length of the beam, then x1 = 3.6"),
     ("gravity", [0.5, -9.797], "-y", "base.inclination"),
     ("base.inclination", 0.25, "0.2 rad"),
-    ("material.E", 2.06e10, "expected 6.28e+10"),
     ("material.E", 7e10, "1.7e+11 to 2.3e+11", "density of steel"),
-    ("material.rho -> material.E", 77.0, "with a density of 77"),
     ("line_fill", 400.0, "whole load"),
     ("joints[1].cylinder.max_stroke", 1.13, "not the open length"),
     ("tip -> tip.payload", {"payload": 40000.0}, "half of what the boom weighs"),
-    ("sections[3].I", 4.5e-07, "expected"),
 ]  # fmt: skip
 
 
@@ -141,20 +129,6 @@ def test_a_range_that_ends_next_to_a_dead_centre_warns_and_the_suggested_one_kee
 def first_number(remedy: str) -> float:
     """Return the lower end of the range that a remedy suggests."""
     return float(remedy.partition("[")[2].partition(",")[0])
-
-
-def test_one_warning_tells_all_that_is_wrong_with_a_range_and_its_remedy_mends_it(bench: Any) -> None:
-    def edit(values: Any, low: float) -> None:
-        values["postures"] = {"straight": [0, 0, 0, 0]}
-        values["joints"][1].update(range_deg=[low, 10], lL=0.5)
-        values["joints"][1]["cylinder"].update(closed_length=0.7, max_stroke=0.6)
-
-    (oddity,) = bench.oddities(lambda values: edit(values, -179))
-    assert oddity.path == "joints[1].range_deg"
-    assert all(words in oddity.bound for words in ("do not meet at", "turns back at"))
-    low = first_number(oddity.remedy)
-    assert bench.oddities(lambda values: edit(values, low)) == []
-    assert len(bench.oddities(lambda values: edit(values, low - 2))) == 1
 
 
 PASSING = {

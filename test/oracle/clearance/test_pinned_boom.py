@@ -1,4 +1,4 @@
-"""Motion of a boom part on a cylinder with play: limits, energy, solvers."""
+"""Motion of a boom part on a cylinder with play: limits, energy."""
 
 from __future__ import annotations
 
