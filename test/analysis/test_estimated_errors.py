@@ -1,4 +1,4 @@
-"""What `simulate` and the studies' integrator say of their own errors, each with its bound."""
+"""Errors that `simulate` states of its own steps and rows, each with its bound."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cosine and sine of the kernels against NumPy's in long double, and arrays on a kernel's stack."""
+"""Cosine and sine of the kernels against NumPy's in long double."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kept tangents: a sweep of forces alone, and steps with a monitor of convergence against fully converged ones."""
+"""Kept tangents: steps with a monitor of convergence against fully converged ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Booms of up to 200 sections: cost in proportion to them, and results that a dense solve of the same step confirms."""
+"""Booms of up to 200 sections: a dense solve of the same step confirms the results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The force of a pin in its bush: restitution of every law, tangents, convexity, friction, what a pin remembers."""
+"""The force of a pin in its bush: restitution of every law, tangents, convexity, friction, memory."""
 
 from __future__ import annotations
 

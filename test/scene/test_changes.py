@@ -1,4 +1,4 @@
-"""Scenes from paths, dicts and changes; parameters by name; single values in a text; short texts of results."""
+"""Scenes from paths, dicts and changes; parameters by name."""
 
 from __future__ import annotations
 

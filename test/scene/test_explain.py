@@ -1,4 +1,4 @@
-"""The bookkeeping of the model: masses, coordinates, splits, reach, and what is left out."""
+"""The bookkeeping of the model: masses, strokes, and what is left out."""
 
 from __future__ import annotations
 

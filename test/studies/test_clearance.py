@@ -1,4 +1,4 @@
-"""The study of play in the pins: its scenes, its drive, its measures, its files."""
+"""The study of play in the pins: the independent model agrees."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The study of the papers: matrices, boundary zeros, low speed, postures with clearance, and its page."""
+"""The study of the papers: matrices, boundary zeros, low speed, postures with clearance."""
 
 from __future__ import annotations
 

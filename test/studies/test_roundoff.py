@@ -1,4 +1,4 @@
-"""Round-off: the witness, digits lost by the two ways of combining elements, the error over ever smaller steps."""
+"""Round-off: digits lost by the two ways of combining elements, and the error over ever smaller steps."""
 
 from __future__ import annotations
 

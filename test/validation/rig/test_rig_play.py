@@ -1,4 +1,4 @@
-"""A rod pin with play in Exudyn: against the geometry, against the twin at rest and in a move, and let go by its load."""
+"""A rod pin with play in Exudyn: against the twin at rest and in a move, and let go by its load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Made-up booms of many sections: valid, and one boom in more and more pieces."""
+"""Made-up booms of many sections: they are valid scenes."""
 
 from __future__ import annotations
 
