@@ -53,7 +53,6 @@ COMMANDS = {  # small outputs of users' commands: what they print as JSON or tex
     "check": "check --json",
     "check --need": "check --need tip=2mm --json",
     "envelope": "envelope --json --out {out}",
-    "study clearance": "study clearance --quick --out {out}",
     "study error": "study error --quick --out {out}",
     "study stability": "study stability --quick --out {out}",
     "study parts": "study parts --quick --out {out}",

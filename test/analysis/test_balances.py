@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from oracle import booms
-from published import scenes
 from studies.clearance.scenes import treated, with_play
 from studies.stops import StopMotion, halt
 
-from boom_twin import load_scene, undeflected
+from boom_twin import load_scene
 from boom_twin.analysis.energy_balance import energy_balance
 from boom_twin.analysis.momentum_balance import Momenta, momentum_balance
 from boom_twin.analysis.motions import motion_of
@@ -47,39 +44,6 @@ def test_worn_pins_in_a_stop(treatment):
     assert energy.contact > 0.02
     assert energy.gap < (0.02 * energy.contact if treatment == "contact" else 1e-3 * energy.moved)
     assert momentum.linear_share < 2e-5 and momentum.angular_share < 2e-5
-
-
-def numerical_damping(frequency, step, rho):
-    """Damping ratio that generalised-alpha gives an undamped oscillator of `frequency` (Hz) in steps of `step` (s).
-
-    From the spectral radius R of its amplification matrix over (x, v, p): -ln R over the angle turned. About (omega h)^3.
-    """
-    am, af, w = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0), (2.0 * math.pi * frequency * step) ** 2
-    gamma = 0.5 + af - am
-    beta = 0.25 * (gamma + 0.5) ** 2
-    after = np.array([[1.0, 0.0, -beta], [0.0, 1.0, -gamma], [(1.0 - af) * w, 0.0, 1.0 - am]])  # of x', h v', h^2 p'
-    before = np.array([[1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma], [-af * w, 0.0, -am]])
-    own = np.linalg.eigvals(np.linalg.solve(after, before))
-    principal = own[int(np.argmax(np.abs(own.imag)))]
-    return float(-math.log(abs(principal)) / abs(np.angle(principal)))
-
-
-def test_an_undamped_boom_loses_what_generalised_alpha_takes():
-    """A rigid section swinging on its oil spring for 300 periods: what is lost is what the amplification matrix says."""
-    rod = scenes.rigid(1.0, 10.0, 0.5, 10.0 / 12.0) | {"rod_pin": (0.5, 0.0)}
-    cylinder, step, rho, span = {"k": 5e5, "closed_length": 9.0, "max_stroke": 2.0}, 1e-3, 0.6, 10.0
-    scene = scenes.scene([rod], [scenes.crank(cylinder)], gravity=(0.0, 0.0))
-    lever = 0.5 * 10.0 / math.hypot(0.5, 10.0)  # of the cylinder from (0, 10) to (0.5, 0) about the pivot
-    frequency = math.sqrt(5e5 * lever**2 / (10.0 / 3.0)) / (2.0 * math.pi)
-    first = np.array([math.hypot(0.5, 10.0) - 9.0])
-    start = undeflected(scene, first, np.array([0.05]), np.zeros(1))
-    swinging = course_of(scene, np.linspace(0.0, span, 3), np.tile(first, (3, 1)), rho=rho, start=start)
-    found, energy = energy_balance(swinging, step), 0.5 * 10.0 / 3.0 * 0.05**2
-    damping = numerical_damping(frequency, step, rho)
-    expected = energy * -math.expm1(-4.0 * math.pi * damping * frequency * span)
-    assert expected > 5e-3 * energy
-    assert found.left == pytest.approx(expected, rel=0.05)
-    assert found.share == pytest.approx(found.left / energy, rel=0.05)
 
 
 def test_the_base_bears_the_weight_of_a_boom_at_rest():

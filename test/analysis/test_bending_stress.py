@@ -9,16 +9,14 @@ import pytest
 from analysis.resting import at_rest
 from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, Twin, load_scene, statics
+from boom_twin import Sample, Stream, load_scene
 from boom_twin.analysis.bending_moments import increments_by_tip_force, moments_by_unknowns, stations
-from boom_twin.analysis.bending_stress import BOX, BendingStressModel, section_moduli
+from boom_twin.analysis.bending_stress import BendingStressModel
 from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import course_of
 from boom_twin.deviation.estimate_row import WIDTH
-from boom_twin.errors import UsageError
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import estimate_of
-from boom_twin.types import StrokeReading
 from boom_twin.validation.rig.exudyn import solve
 from boom_twin.validation.rig.exudyn.system import Boom, section_frames
 
@@ -116,25 +114,3 @@ def test_what_sensors_know_beyond_the_prediction_is_added_with_its_deviation():
     assert found.moments[0] - bare.moments[0] == pytest.approx(-100.0 * arm, rel=2e-2)
     assert found.moment_sigmas == pytest.approx(0.2 * np.abs(found.moments - bare.moments), rel=1e-9)
     assert found.stresses == pytest.approx(found.moments / model.moduli)
-
-
-def test_a_posture_that_is_read_as_lengths_is_that_of_its_drives():
-    rest, estimate = statics(SCENE, "horizontal"), replace(estimate_of(10**9, np.zeros(WIDTH)), load=np.ones(2))
-    by_load = []
-    for reads, strokes in ((StrokeReading.DRIVE, rest.strokes), (StrokeReading.LENGTH, rest.lengths)):
-        model = BendingStressModel(SCENE, reads=reads)
-        prediction = Twin(SCENE, reads=reads).update(Sample(Stream.STROKES, 10**9, strokes)).prediction
-        by_load.append(model.at(prediction, estimate).moments - prediction.moments)
-    assert by_load[1] == pytest.approx(by_load[0], abs=1e-3)
-    doubled = BendingStressModel(SCENE).influence(rest.lengths, rest.joints) @ estimate.load
-    assert np.abs(doubled - by_load[0]).max() > 0.05, "N m, of 1 N: lengths that are taken for drives"
-
-
-def test_the_modulus_is_the_scenes():
-    box = SCENE.sections[0]
-    assert section_moduli(SCENE)[0] == pytest.approx(2.0 * box.I / (BOX * np.sqrt(box.I / box.A)))
-    tall = SCENE.model_copy(update={"sections": (box.model_copy(update={"height": 0.4}), *SCENE.sections[1:])})
-    assert section_moduli(tall)[0] == pytest.approx(box.I / 0.2)
-    assert section_moduli(tall, np.full(4, 0.5))[0] == pytest.approx(box.I / 0.25)
-    with pytest.raises(UsageError, match="none of the scene is flexible"):
-        BendingStressModel(SCENE.model_copy(update={"modes": 0}))

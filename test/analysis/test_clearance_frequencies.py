@@ -11,9 +11,7 @@ from reference.worn_pin import geometry
 from reference.worn_pin.motion import freed
 
 from boom_twin import statics
-from boom_twin.analysis.methods import integrate_with
 from boom_twin.kernels.elements.pin_contact import SMOOTH
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.validation.contact_law import Contact, stiffness
 
 CLEARANCE, STEP = 1e-4, 1e-9
@@ -48,28 +46,6 @@ def test_frequencies_on_a_pin_in_contact_are_the_oracles(posture, index):
     assert linear.frequencies[0] == pytest.approx(expected[0], rel=5e-4)
 
 
-@pytest.mark.parametrize("treatment", ["contact", "spring-damper"])
-@pytest.mark.parametrize("index", range(4))
-def test_a_boom_on_a_worn_pin_swings_at_its_natural_frequency(index, treatment):
-    """After the drive has moved by 10 um; the error of the steps, (2 pi f h)^2/12, is 5e-5."""
-    scene = with_pins(undamped(index), [RODS[index]], CLEARANCE, treatment, law="hertz")
-    first, chosen = strokes_of_posture(scene, "horizontal"), 1e-5 * (np.arange(4) == index)
-
-    def drive(times):
-        x = np.clip(times / 0.02, 0.0, 1.0)[:, None]
-        shape, rate = x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 30.0 * x**2 * (1.0 - x) ** 2 / 0.02
-        return first + chosen * shape, chosen * rate
-
-    found = integrate_with(scene, drive, 4.0, 1e-3)
-    late, times = found.tip[100:, 1], found.times[100:]
-    late = late - late[900:].mean()
-    up = np.flatnonzero((late[:-1] < 0.0) & (late[1:] >= 0.0))
-    crossings = times[up] - late[up] * 1e-3 / (late[up + 1] - late[up])
-    frequency = (len(crossings) - 1) / (crossings[-1] - crossings[0])
-    assert found.pins[:, 0, 3].all()
-    assert frequency == pytest.approx(statics(scene, posture="horizontal", modes=1).frequencies[0], rel=1e-4)
-
-
 @pytest.mark.parametrize("pins", [RODS, PINS], ids=["rods", "all"])
 def test_frequencies_go_to_those_of_ideal_pins_as_contact_gets_stiff(pins):
     """Clearance of 1 um, rigid sections, and a steel that is stiffer in the pins alone: off by its power -2/3, then -1.
@@ -91,12 +67,3 @@ def test_frequencies_go_to_those_of_ideal_pins_as_contact_gets_stiff(pins):
     ratios = np.array(off[1:]) / off[:-1]
     assert np.all(ratios[0] < 0.1) and np.all(ratios[1:] < 0.05)
     assert np.all(off[-1] < 1e-6)
-
-
-def test_frequencies_of_the_default_boom_fall_with_the_clearance():
-    """Contact only adds compliance: every one of the lowest frequencies is below the ideal's, and within 2 % of it."""
-    document = booms.document()
-    ideal = statics(booms.scene_of(document), posture="arch").frequencies
-    for clearance in (1e-3, 1e-4, 1e-5, 1e-6):
-        share = statics(with_pins(document, RODS, clearance), posture="arch").frequencies / ideal
-        assert np.all(share < 1.0) and np.all(share > 0.98)

@@ -1,4 +1,4 @@
-"""What `simulate` and the studies' integrator say of their own errors, each with its bound."""
+"""Errors that `simulate` states of its own steps and rows, each with its bound."""
 
 from __future__ import annotations
 
@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 
 from boom_twin import load_scene, simulate
-from boom_twin.analysis.methods import Method, integrate_with
 from boom_twin.cli.main import main
 from boom_twin.scene.edit import with_rigid_cylinders
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.scene.schema import Clearance
-from boom_twin.validation.study.scene_changes import cylinders
-from boom_twin.validation.study.stability.setups import dead_stop, smooth
 
 SCENE = load_scene()
 ARCH, ANGLES = strokes_of_posture(SCENE, "arch"), posture_angles(SCENE, "arch")
@@ -116,30 +113,3 @@ def test_strokes_faster_than_a_cylinder_are_told(tmp_path: Path, capsys: pytest.
     assert main(["simulate", *given]) == 0
     said = capsys.readouterr().err
     assert "stroke_1 moves at 0.7 m/s" in said and "0.5 m/s (stroke_rate)" in said
-
-
-def test_errors_are_not_estimated_where_nobody_asks():
-    times = np.arange(0.0, 0.5, 0.05)
-    told, silent = (simulate(SCENE, times, strokes(times, stop(times)), estimate_errors=asked) for asked in (True, False))
-    assert told.row_errors and not silent.row_errors and not silent.step_errors
-    assert len(silent.doubts) < len(told.doubts) and np.array_equal(silent.tip, told.tip)
-
-
-@pytest.mark.parametrize("step", [2e-2, 4e-2])
-def test_the_estimate_is_near_the_error(step):
-    """The doubt names a share of the tip's path; the true one is within a factor of three."""
-    own = smooth(SCENE, None, 1.0, 0.4, 2.0, step)
-    coarse = integrate_with(SCENE, own.drive, 2.0, step, 1, angles=own.angles)
-    fine = integrate_with(SCENE, own.drive, 2.0, step / 20, 20, angles=own.angles)
-    path = np.linalg.norm(fine.tip - fine.tip[0], axis=1).max()
-    error = np.linalg.norm(coarse.tip - fine.tip, axis=1).max() / path
-    assert coarse.doubt.startswith("the step is coarse")
-    said = float(coarse.doubt.split("about ")[1].split("%")[0]) / 100
-    assert error / 3 < said < 3 * error
-
-
-def test_ringing_is_doubted():
-    stop = dead_stop(cylinders(SCENE, None))
-    found = integrate_with(stop.scene, stop.drive, 1.0, stop.step, 1, Method(parameter=1.0), angles=stop.angles)
-    calm = integrate_with(stop.scene, stop.drive, 1.0, stop.step, 1, angles=stop.angles)
-    assert "change sign from step to step" in found.doubt and calm.doubt == ""

@@ -14,7 +14,7 @@ from boom_twin import frequency_response, load_scene, simulate, statics
 from boom_twin.analysis.frequency_response import linearised_boom, with_all_shapes
 from boom_twin.analysis.modal import drive_at_rest
 from boom_twin.errors import UsageError
-from boom_twin.scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton, strokes_of_posture
+from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 BAND = np.geomspace(0.05, 30.0, 40)  # Hz
 FORCES = ([1.0, 0.0], [0.0, 1.0])
@@ -120,14 +120,6 @@ def test_worn_pins_in_contact_through_simulate(pins):
     assert apart_from(response.tip) < 3e-3 < apart_from(ideal.tip)
 
 
-def test_static_limit_on_worn_pins_is_that_of_statics():
-    scene = with_pins(booms.document(), PINS, 1e-4)
-    strokes, h = strokes_of_posture(scene, "arch"), 2e-6
-    above, below = (statics(scene, strokes=strokes + side * np.eye(4)[1], modes=0).tip for side in (h, -h))
-    found = frequency_response(scene, [0.0], strokes=strokes, drive=2).tip[0]
-    assert found == pytest.approx((above - below) / (2.0 * h), rel=1e-7)
-
-
 def test_pins_that_do_not_answer_in_proportion_are_refused():
     with pytest.raises(UsageError, match=r"friction = 0.1 in cylinder_1.rod: .* Set friction: 0"):
         frequency_response(with_pins(booms.document(), RODS, 1e-4, friction=0.1), BAND, posture="arch")
@@ -136,13 +128,6 @@ def test_pins_that_do_not_answer_in_proportion_are_refused():
     weightless = booms.document() | {"gravity": [0.0, 0.0]}
     with pytest.raises(UsageError, match=r"cylinder_1.rod bears no force here: .* Choose another posture"):
         frequency_response(with_pins(weightless, RODS, 1e-4), BAND, posture="arch")
-
-
-def test_a_scene_is_taken_as_everywhere():
-    """None, a file's keys or a `Scene`; strokes as a list or the name of a posture."""
-    expected = frequency_response(load_scene(), BAND, posture="arch").tip
-    assert np.array_equal(frequency_response(None, BAND.tolist(), "arch").tip, expected)
-    assert np.array_equal(frequency_response(booms.document(), BAND, posture="arch").tip, expected)
 
 
 def richardson(of, size):
@@ -211,32 +196,6 @@ def test_sine_sweep_through_simulate():
     ):
         expected = in_time(own, spectrum, within, count, len(times))
         assert np.sqrt(np.mean((seen - expected) ** 2)) < 0.01 * np.sqrt(np.mean(expected**2))
-
-
-def test_moments_are_those_of_the_tip_force_on_the_last_section():
-    """At low frequency the tip force bends the last section by force times arm."""
-    found = frequency_response(load_scene(), np.zeros(1), posture="horizontal")
-    mine = [i for i, station in enumerate(found.stations) if station.section == 3]
-    arms = load_scene().sections[3].length - np.array([found.stations[i].place for i in mine])
-    assert found.moments[0, mine].real == pytest.approx(arms, rel=0.02, abs=1e-3)
-
-
-def test_a_rigid_boom_follows_its_geometry():
-    """All rigid: a force moves nothing, a drive turns the joints as the geometry says, at every frequency."""
-    spec = booms.document() | {"modes": 0}
-    for joint in spec["joints"]:
-        joint["cylinder"] = {k: v for k, v in joint["cylinder"].items() if k not in ("k", "d")}
-    scene, frequencies = booms.scene_of(spec), np.array([0.0, 1.0, 30.0])
-    strokes, angles = strokes_of_posture(scene, "arch"), posture_angles(scene, "arch")
-    still = frequency_response(scene, frequencies, posture="arch")
-    assert np.abs(still.tip).max() < 1e-12 and still.moments.shape == (3, 0)
-
-    def tip(more):
-        turned = joint_angles_of_strokes(scene, strokes + more * np.eye(4)[2], near=angles)
-        return skeleton(scene, turned).pivots[-1]
-
-    driven = frequency_response(scene, frequencies, posture="arch", drive=3)
-    assert driven.tip == pytest.approx(np.tile(richardson(tip, 1e-2), (3, 1)), rel=1e-7)
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from published import scenes
-from studies.clearance.scenes import with_play
-from studies.stops import halt
 
 from boom_twin import load_scene, simulate, undeflected
 from boom_twin.analysis.initial_state import read_state, write_state
@@ -70,17 +68,6 @@ def test_a_run_goes_on_where_another_ended(cut, tmp_path):
     assert np.abs(tail.tip - whole.tip[cut:]).max() < 1e-6
     assert np.abs(tail.tip_acceleration - whole.tip_acceleration[cut:]).max() < 2e-3
     assert np.abs(tail.cylinder_forces - whole.cylinder_forces[cut:]).max() < 2.0
-
-
-def test_a_worn_boom_goes_on_too():
-    scene = with_play(SCENE)
-    stop = halt(scene, "arch", 0.05)
-    times = np.linspace(0.0, 1.2, 241)
-    strokes, _ = stop(times)
-    whole = simulate(scene, times, strokes, 1e-3, stop.angles, **QUIET)
-    head = simulate(scene, times[:161], strokes[:161], 1e-3, stop.angles, **QUIET)
-    tail = simulate(scene, times[160:], strokes[160:], 1e-3, start=head.end, **QUIET)
-    assert np.abs(tail.tip[:, :2] - whole.tip[160:, :2]).max() < 2e-5
 
 
 def test_coordinates_that_leave_a_loop_open_are_refused():

@@ -7,16 +7,11 @@ import pytest
 from oracle import booms
 
 from boom_twin import load_scene, simulate, statics
-from boom_twin.analysis.cylinder_drives import drives_as_read, drives_of
-from boom_twin.compiler.compile import compile_scene
 from boom_twin.errors import SolverError, UsageError
 from boom_twin.scene.edit import with_rigid_cylinders
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.oil_spring import stiffness
-from boom_twin.types import StrokeReading
 from boom_twin.validation.rig import Move, Programme
-
-READ = "strokes", "lengths", "cylinder_forces"
 
 OIL = {"bore": 0.1, "rod": 0.07, "bulk_modulus": 1.2e9, "cap_line": 1e-3, "rod_line": 8e-4}
 
@@ -70,16 +65,6 @@ def test_a_motion_of_drives_gives_the_lengths_that_give_these_drives(make):
     assert again.strokes == pytest.approx(drives, abs=1e-6), "a tenth of what 30 N compress of the softest oil"
 
 
-def test_coarse_rows_give_the_drives_of_forces_that_are_linear_between_them():
-    """A ramp of force: the extension of the oil spring lags by d / k."""
-
-    scene, times = load_scene(), np.array([0.0, 0.01, 0.05, 2.0])
-    k, d = (np.array([getattr(joint.cylinder, key) for joint in scene.joints]) for key in ("k", "d"))
-    lengths, forces = np.full((4, 4), 0.2), np.outer(times, [1e4, 2e4, -1e4, 1e3])
-    extension = (times[:, None] - d / k * (1.0 - np.exp(-times[:, None] * k / d))) * forces[-1] / times[-1] / k
-    assert lengths - drives_of(compile_scene(scene), times, lengths, forces) == pytest.approx(extension, rel=1e-9, abs=1e-15)
-
-
 @pytest.mark.parametrize(
     ("given", "told"),
     [
@@ -103,18 +88,6 @@ def test_oil_that_gives_more_than_there_is_has_no_drive():
     spec["joints"][1]["cylinder"]["oil"] = OIL | {"bore": 0.08, "cap_line": 1e-4, "bulk_modulus": 1e7}
     with pytest.raises(SolverError, match=r"no drives for cylinder forces of .* bulk_modulus"):
         statics(booms.scene_of(spec), lengths=[0.6, 0.1, 0.2, 0.1])
-
-
-@pytest.mark.parametrize("make", [load_scene, with_oil])
-def test_rows_of_a_session_have_the_drives_that_transducers_show(make):
-    scene = make()
-    plan, rests = compile_scene(scene), [statics(scene, name) for name in ("arch", "high")]
-    drives, lengths, forces = (np.array([getattr(each, key) for each in rests]) for key in READ)
-    assert drives_as_read(plan, lengths, forces, StrokeReading.LENGTH) == pytest.approx(drives, abs=1e-12)
-    assert np.array_equal(drives_as_read(plan, drives, forces, StrokeReading.DRIVE), drives)
-    forces[1, 2] = np.nan
-    found = drives_as_read(plan, lengths, forces, StrokeReading.LENGTH)
-    assert np.isnan(found[1, 2]) and np.isfinite(found).sum() == 7, "one that cannot be known costs no other"
 
 
 def test_a_motion_follows_strokes_or_lengths():

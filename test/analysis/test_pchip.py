@@ -20,8 +20,3 @@ def test_same_curve_as_scipy(rows: int, seed: int) -> None:
     curve = PchipInterpolator(x, y, axis=0)
     assert values == pytest.approx(curve(at), abs=1e-13)
     assert rates == pytest.approx(curve.derivative()(at), abs=1e-13 / np.diff(x).min())
-
-
-def test_a_drive_that_stands_still_stays() -> None:
-    values, rates = pchip(np.array([0.0, 1.0, 3.0]), np.full((3, 2), 0.7), np.linspace(0.0, 3.0, 7))
-    assert np.all(values == 0.7) and np.all(rates == 0.0)

@@ -64,8 +64,3 @@ def test_arch_move_joints_and_forces(move, moved):
     assert np.all(np.sqrt(np.mean((moved.joints - joints) ** 2, axis=0)) < 1e-5)  # asked: 1e-4 rad
     shares = np.sqrt(np.mean((moved.cylinder_forces - forces) ** 2, axis=0) / np.mean(forces**2, axis=0))
     assert np.all(shares < 2e-3)
-
-
-def test_arch_move_velocity_is_the_slope_of_position(moved):
-    slope = np.gradient(moved.tip, moved.times, axis=0)[1:-1]
-    assert moved.tip_velocity[1:-1] == pytest.approx(slope, abs=2e-3 * np.abs(slope).max())

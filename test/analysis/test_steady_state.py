@@ -13,7 +13,6 @@ from boom_twin.analysis.steady_state import (
     INSTANTS,
     PeriodicLoad,
     load_of_rows,
-    polygon_series,
     pump_load,
     steady_state,
 )
@@ -78,24 +77,6 @@ def test_a_fast_part_of_a_long_load_is_not_taken_for_a_slow_one():
     expected = frequency_response(SCENE, np.array([rate]), posture="arch", tip_force=(0.0, 100.0 * straight)).tip[0]
     assert found.harmonics[round(300.0 * rate) - 1] == pytest.approx(np.linalg.norm(expected), rel=1e-9)
     assert np.ptp(found.tip, axis=0) == pytest.approx(2.0 * np.abs(expected), rel=5e-3)
-
-
-def test_a_blow_between_two_instants_keeps_its_impulse():
-    """100 N s within 1 ms, rows uneven in time."""
-    times, push = np.array([0.0, 3.0, 3.0005, 3.001, 10.0]), np.array([0.0, 0.0, 2e5, 0.0, 0.0])
-    load = load_of_rows(times, np.outer(push, [0.0, 1.0]))
-    assert load.forces.mean(axis=0) == pytest.approx([0.0, 10.0], abs=1e-9)
-    series = polygon_series(times, push[:, None], 400)[:, 0]
-    assert abs(series[1:20]) == pytest.approx(10.0, rel=1e-4), "of a blow all harmonics are alike"
-    even = polygon_series(np.linspace(0.0, 10.0, 20_001), np.interp(np.linspace(0.0, 10.0, 20_001), times, push)[:, None], 400)
-    assert series == pytest.approx(even[:, 0], abs=1e-6), "rows uneven and even"
-
-
-@pytest.mark.slow  # a constant load says nearly as much in no time
-def test_a_long_pump_cycle_swings_by_its_static_share():
-    static = frequency_response(SCENE, np.zeros(1), posture="arch", tip_force=(0.0, 130.0)).tip.real
-    found = steady_state(SCENE, pump_load(SCENE, 0.001, 130.0), posture="arch")
-    assert found.swing > np.linalg.norm(static) and found.tip[len(found.tip) // 4] == pytest.approx(static[0], rel=1e-5)
 
 
 def test_pumps_push_up_on_an_inclined_base():

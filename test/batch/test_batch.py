@@ -11,7 +11,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from concurrent.futures import CancelledError
 from contextlib import suppress
 from pathlib import Path
 
@@ -23,11 +22,8 @@ from page_outline import outline
 psutil, parquet = pytest.importorskip("psutil"), pytest.importorskip("pyarrow.parquet")
 pytest.importorskip("distributed")
 
-from distributed import Client, LocalCluster  # noqa: E402
 
 from boom_twin import load_scene, replay  # noqa: E402
-from boom_twin.batch import cluster  # noqa: E402
-from boom_twin.batch.results import write_table  # noqa: E402
 from boom_twin.batch.session_task import SessionTask, row_of  # noqa: E402
 from boom_twin.calibration import calibrate  # noqa: E402
 from boom_twin.cli.main import main  # noqa: E402
@@ -221,70 +217,9 @@ def test_parameters_of_a_session_are_those_of_a_calibration(tmp_path: Path) -> N
     assert "calibration_reason" not in row and row["calibration_misfit"] == found.misfit
 
 
-def test_no_task_waits_at_a_worker_whose_end_would_count_against_it() -> None:
-    tasks = [task(str(k)) for k in range(9)]
-    with Client(LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None)) as client:
-        most = 0
-        for row in cluster.rows_of(cluster.on_dask(client, slept), tasks):
-            assert row["status"] == "ok"
-            most = max(most, sum(len(keys) for keys in client.processing().values()))
-    assert 0 < most <= 2
-
-
-def slept(own: SessionTask) -> dict[str, object]:
-    time.sleep(0.1)
-    return {"key": own.key, "status": "ok"}
-
-
-class LosingClient:
-    """A client whose tasks end, their rows still with a worker."""
-
-    dashboard_link = ""
-    status = "finished"
-
-    def __init__(self, error: Exception) -> None:
-        self._error = error
-
-    def submit(self, *_: object, **__: object) -> LosingClient:
-        return self
-
-    def nthreads(self) -> dict[str, int]:
-        return {"worker": 1}
-
-    def result(self) -> object:
-        raise self._error
-
-
-def test_a_row_that_is_lost_with_its_worker_costs_an_attempt_and_not_the_batch() -> None:
-    from distributed import KilledWorker
-
-    for error, reason in (
-        (KilledWorker("s0", None, 6), "the workers that had it were ended from outside"),
-        (CancelledError(), "Dask gave it up (finished)"),
-        (OSError("gone"), "OSError: gone"),
-    ):
-        (row,) = cluster.rows_of(cluster.on_dask(LosingClient(error), slept), [task(retries=2)])  # type: ignore[arg-type]
-        assert row["status"] == "failed" and row["attempts"] == 3 and row["reason"].startswith(reason)
-
-
-def test_what_fails_here_costs_its_own_row() -> None:
-    tasks = [task("good"), task("bad")]
-
-    def work(own: SessionTask) -> dict[str, object]:
-        return {"key": own.key} if own.key == "good" else {}[own.key]
-
-    rows = {row["key"]: row.get("reason") for row in cluster.rows_of(cluster.Workers(work, lambda: 2), tasks)}
-    assert rows == {"good": None, "bad": "KeyError: 'bad'"}
-
-
 def test_without_the_extra_one_line_tells_what_to_install(
     sessions: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     assert main(["batch", str(sessions / "s0"), "--out", str(tmp_path / "out")]) == 1
     assert 'pip install "boom_twin[batch]"' in capsys.readouterr().err
-
-
-def test_a_path_that_is_not_utf_8_is_in_the_table_with_its_bytes_as_escapes(tmp_path: Path) -> None:
-    write_table(tmp_path / "t.parquet", [{"path": "b\udcfcg", "status": "ok", "key": "1"}])
-    assert parquet.read_table(tmp_path / "t.parquet").column("path").to_pylist() == ["b\\udcfcg"]

@@ -5,39 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from convergence import motions
-from oracle import booms, segments
+from oracle import booms
 
-from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
-from boom_twin.analysis.energy_balance import Energies
-from boom_twin.analysis.equilibrium import settle
-from boom_twin.compiler.compile import compile_scene
-from boom_twin.kernels.integrators import GENERALISED_ALPHA, prepare
-from boom_twin.kernels.transfer.time_step import LONGEST_INCREMENT, advance
+from boom_twin.analysis.energy_balance import energy_balance
+from boom_twin.analysis.simulate import course_of
+from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
 
 
-def balance(scene, posture, travel, step, rho=0.8, duration=0.8):
-    """Largest gap of the balance (J) at any step, and the largest work (J) and dissipation (J)."""
-    plan = compile_scene(scene)
-    state, work = plan.state(), plan.work()
-    angles = np.diff(np.radians(scene.postures[posture]), prepend=0.0)
-    drive = motions.smooth_drive(segments.Segments(scene, 0).lengths(angles), travel, 0.5)
-    settle(plan, state, work, drive(0.0)[0] - plan.closed_lengths, angles)
-    energies, scheme = Energies(plan), prepare(GENERALISED_ALPHA, rho, step, work.weights)
-    start = energies.total(state)
-    powers, gaps, done, lost = [(0.0, 0.0)], [], 0.0, 0.0
-    for k in range(1, round(duration / step) + 1):
-        length, rate, _ = drive(k * step)
-        status, _, _ = advance(
-            plan.tables, state, work, scheme, length, rate, STEP_TOLERANCE, PASSES, LONGEST_INCREMENT, None, False
-        )
-        assert status == 0
-        powers.append((energies.drive_power(state), energies.damping_power(state)))
-        done += 0.5 * step * (powers[-1][0] + powers[-2][0])
-        lost += 0.5 * step * (powers[-1][1] + powers[-2][1])
-        gaps.append(energies.total(state) - start - done + lost)
-    return np.abs(gaps).max(), abs(done), lost
+def balance(scene, posture, travel, step):
+    """Balance of energy of a smooth move with steps of `step` s."""
+    angles, times = posture_angles(scene, posture), np.linspace(0.0, 0.8, 201)
+    drive = motions.smooth_drive(strokes_of_posture(scene, posture), travel, 0.5)
+    return energy_balance(course_of(scene, times, drive(times[:, None])[0], angles=angles), step)
 
 
 def damped():
@@ -62,9 +43,8 @@ def mixed():
 
 @pytest.mark.parametrize("boom", [damped, undamped, mixed])
 def test_balance_closes_with_the_square_of_the_step(boom):
-    table = np.array([balance(*boom(), step) for step in STEPS])
-    gaps, done, lost = table.T
-    slope = np.polyfit(np.log(STEPS), np.log(gaps), 1)[0]
-    assert slope > 1.8
-    assert gaps[-1] < 1e-3 * done[-1]
-    assert (lost[-1] > 10.0 * gaps[-1]) == (boom is not undamped)
+    found = [balance(*boom(), step) for step in STEPS]
+    gaps = np.array([own.gap for own in found])
+    assert np.polyfit(np.log(STEPS), np.log(gaps), 1)[0] > 1.8
+    assert gaps[-1] < 1e-3 * abs(found[-1].work)
+    assert (found[-1].damping > 10.0 * gaps[-1]) == (boom is not undamped)

@@ -1,4 +1,4 @@
-"""Cosine and sine of the kernels against NumPy's in long double, and arrays on a kernel's stack."""
+"""Cosine and sine of the kernels against NumPy's in long double."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from boom_twin.kernels.jit import StackArray, kernel
+from boom_twin.kernels.jit import kernel
 from boom_twin.kernels.plane_algebra import FAR, QUARTER, cosine_and_sine, cosines
 
 LONGEST = 2.3e-16  # of a result up to 1: one unit in its last place
-SQUARES = StackArray(2, 3)
 
 
 @kernel
@@ -25,16 +24,6 @@ def small_turns(angles, found):
     cosines(angles, angles.shape[0], found)
 
 
-@kernel
-def squares_of(x, found):
-    room = SQUARES(x)
-    for j in range(3):
-        room[0, j], room[1, j] = x[j], x[j] * x[j]
-    for i in range(2):
-        for j in range(3):
-            found[i, j] = room[i, 2 - j]
-
-
 def exact(angles):
     wide = angles.astype(np.longdouble)
     return np.array([np.cos(wide), np.sin(wide)])
@@ -43,13 +32,6 @@ def exact(angles):
 @pytest.mark.parametrize("reach", [1e-9, QUARTER, math.pi, 100.0, FAR])
 def test_cosine_and_sine_are_right_to_their_last_place(reach):
     angles = np.concatenate([np.random.default_rng(0).uniform(-reach, reach, 5000), [0.0, reach, -reach]])
-    found = np.empty((2, len(angles)))
-    turns(angles, found)
-    assert np.abs(found - exact(angles)).max() < LONGEST
-
-
-def test_cosine_and_sine_at_multiples_of_a_quarter_turn():
-    angles = np.arange(-40, 41) * (0.5 * math.pi)
     found = np.empty((2, len(angles)))
     turns(angles, found)
     assert np.abs(found - exact(angles)).max() < LONGEST
@@ -69,11 +51,3 @@ def test_cosines_of_a_part_small_and_large(largest):
     assert np.abs(found - exact(angles)).max() < LONGEST
     small_turns(np.append(angles[:4], math.nan), found)
     assert np.isnan(found[:, 4]).all() and np.isfinite(found[:, :4]).all()
-
-
-@pytest.mark.parametrize("number", [float, complex])
-def test_an_array_on_the_stack_holds_what_is_written(number):
-    x, found = np.array([2.0, 3.0, 5.0], number), np.empty((2, 3), number)
-    squares_of(x, found)
-    assert np.array_equal(found, [[5, 3, 2], [25, 9, 4]])
-    assert SQUARES(x).shape == (2, 3) and SQUARES(x).dtype == x.dtype

@@ -7,13 +7,9 @@ import pytest
 
 from boom_twin.kernels.integrators import (
     GENERALISED_ALPHA,
-    HAT,
     HOUBOLT,
     NEWMARK,
-    OFFSET,
-    OLD,
     PARK,
-    REST,
     WILSON,
     A,
     P,
@@ -88,23 +84,6 @@ def test_motion_that_a_scheme_reproduces(family):
     assert history[[X, V, A], 0] == pytest.approx([x(h), v(h), -2.2], abs=1e-12)
     if depth == 8:
         assert history[:4, 0] == pytest.approx([x(-h), v(-h), x(0), v(0)], abs=1e-12)
-
-
-def test_newmark_is_generalised_alpha_without_averaging():
-    newmark, alpha = scheme_of(NEWMARK, 0.5, 0.03), scheme_of(GENERALISED_ALPHA, 1.0, 0.03)
-    assert newmark.rate == pytest.approx(alpha.rate)
-    assert newmark.weights[HAT, OLD:].sum() == pytest.approx(alpha.weights[HAT, OLD:].sum())
-
-
-def test_rest_leaves_positions_without_motion():
-    for depth in (4, 8):
-        s = prepare(REST, 0.0, 0.0, new_weights(depth))
-        history = np.random.default_rng(0).normal(size=(depth, 3))
-        assert not s.weights[[HAT, OFFSET]].any() and s.gain == s.rate == s.reach == 0.0
-        new = stepped(s, history, np.array([1.0, 2.0, 3.0]))
-        assert np.array_equal(history[X], new)
-        assert not history[[V, P, A]].any()
-        assert depth == 4 or (np.array_equal(history[0], new) and np.array_equal(history[2], new))
 
 
 def oscillator(family, parameter, step, omega=6.0, zeta=0.05, duration=1.0):

@@ -85,23 +85,6 @@ def test_a_loaded_kernel_can_be_called_by_one_that_is_compiled(tmp_path: Path) -
     assert told(run(tmp_path / "cache", after=CALLER)).splitlines() == ["(4.0, 4.0) loaded 2", "11.0"]
 
 
-def test_a_loaded_kernel_calls_one_that_must_be_compiled_anew(tmp_path: Path) -> None:
-    """Machine code refers to that of the kernels it calls by a name that is the same in every process."""
-    run(tmp_path / "cache", after=CALLER)
-    (folder,) = (tmp_path / "cache").iterdir()
-    for path in folder.glob("*.add-*"):
-        path.unlink()
-    after = CALLER + "print(sum(add_three.dispatcher._cache_hits.values()))"
-    assert told(run(tmp_path / "cache", after=after)).splitlines() == ["(4.0, 4.0) loaded 0", "11.0", "1"]
-
-
-def test_a_kernel_is_loaded_with_those_that_it_calls(tmp_path: Path) -> None:
-    """Here `add` of a complex number, which Python has not called."""
-    after = CALLER.replace("1.0, 2.0, 3.0", "1j, 2.0, 3.0") + "print(sum(add_three.dispatcher._cache_hits.values()))"
-    for loaded in (0, 1):
-        assert told(run(tmp_path / "cache", after=after)).splitlines()[1:] == ["(7+4j)", str(loaded)]
-
-
 def harmed(path: Path, harm: str) -> None:
     """Do something to a file that `write_checked` wrote."""
     data = path.read_bytes()
@@ -193,13 +176,6 @@ def test_a_place_that_cannot_be_used_is_told_and_the_model_runs(tmp_path: Path) 
     assert told(done) == "(4.0, 4.0) loaded 0" and "Not a directory" in done.stderr
     assert "relative path" in str(fault_of(Path("somewhere")))
     assert not Path("somewhere").exists()
-
-
-def test_relative_places_of_caches_are_not_taken_from_the_working_directory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
-    for value in ("", "cache"):
-        monkeypatch.setenv("XDG_CACHE_HOME", value)
-        assert cache_folder().parent == Path.home() / ".cache" / "boom_twin"
 
 
 def test_all_kernels_are_in_the_sources_that_are_hashed() -> None:

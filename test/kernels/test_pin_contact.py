@@ -1,15 +1,14 @@
-"""The force of a pin in its bush: restitution of every law, tangents, convexity, friction, what a pin remembers."""
+"""The force of a pin in its bush: restitution of every law, tangents, convexity, friction, memory."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from kernels.journal import Journal, bearing, memory, row
+from kernels.journal import bearing, memory, row
 from oracle import booms
 from oracle.clearance import drop
 from oracle.clearance.drop import restitution
 from oracle.clearance.scenes import RODS, with_pins
-from reference.worn_pin.impacts import follow
 from scipy.integrate import solve_ivp
 
 from boom_twin.compiler.compile import compile_scene
@@ -18,13 +17,8 @@ from boom_twin.kernels.elements.pin_contact import (
     APPROACH,
     CLOSED,
     COLUMNS,
-    FORCE,
     LAWS,
-    LEAST_GAP,
     SMOOTH,
-    approach,
-    contact_stiffness,
-    limited,
     restitution_of,
 )
 from boom_twin.validation.contact_law import HYSTERESIS, Contact
@@ -36,20 +30,6 @@ PUBLISHED = [
     *(("flores", e, kept) for e, kept in ((0.9, 0.894), (0.8, 0.789), (0.5, 0.470))),
 ]
 MASS = 20.0  # kg
-
-
-def rebound(pin, mass, speed):
-    """Speed after over speed before an impact of a ball (kg, m/s) without weight; the bush is so wide that it is a plane."""
-    pin.gap = 1.0
-    journal, height = Journal(pin), 100.0 * contact.SMOOTH
-    deepest = (mass * speed**2 / pin.stiffness) ** (1.0 / (pin.exponent + 1.0))
-    times = np.array([0.0, 20.0 * (deepest + height) / speed])
-    found = follow(
-        lambda time, state, entry: [state[1], journal.force(complex(pin.gap + state[0]), complex(state[1]), entry).real / mass],
-        lambda time, state: (state[0] + contact.NEAR, state[1]), [-height, speed], times, 1e-9,
-        1e-9 * np.array([deepest, speed]), method="DOP853",
-    )  # fmt: skip
-    return -found.states[-1, 1] / speed
 
 
 def compiled(law="lankarani-nikravesh", restitution=0.9, friction=0.0):
@@ -103,12 +83,6 @@ def test_the_exact_law_keeps_what_it_is_asked_for(e):
     assert restitution_of(ours.loss) == pytest.approx(e, abs=1e-9)
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("e", [0.95, 0.7, 0.4])
-def test_check_states_the_restitution_that_a_law_really_gives(law, e):
-    assert restitution_of(LAWS[law](e)) == pytest.approx(restitution(LAWS[law](e)), abs=1e-5)
-
-
 def test_nothing_pulls_and_the_elastic_force_rises_outwards():
     pin, memory = compiled()
     memory[APPROACH], memory[CLOSED] = 1e-3, 1.0
@@ -119,56 +93,6 @@ def test_nothing_pulls_and_the_elastic_force_rises_outwards():
     assert leaving.max() < 0.011 * still.max()
     assert np.diff(still).min() > 0.0  # so that a loaded pin rests in one place only
     assert still[offsets < 0.9e-4].max() < 5.0  # N: smoothing reaches no further
-
-
-def test_friction_opposes_the_slip_of_the_surfaces_and_is_no_more_than_its_share():
-    pin, memory = compiled(friction=0.2)
-    place = (1.3e-4, 0.0)
-    memory[FORCE] = force(pin, memory, place)[0]
-    for along, turning in ((0.05, 0.0), (-0.05, 0.0), (0.0, 3.0), (0.0, -3.0)):
-        found = force(pin, memory, place, (0.0, along), turning)
-        slip = along + pin.radius * turning
-        assert found[1] * slip > 0.0  # what holds the journal back has the sign of its slip
-        assert abs(found[1]) == pytest.approx(0.2 * memory[FORCE], rel=0.01)
-        assert found[5] == pytest.approx(pin.radius * found[1], rel=1e-4)
-    assert force(pin, memory, place)[1] == 0.0
-
-
-def test_stiffness_is_capped_where_the_clearance_vanishes():
-    softness = 2.0 * (1.0 - 0.3**2) / 2.06e11
-    assert contact_stiffness(0.03, 1e-4, softness) == pytest.approx(4.5e11, rel=0.02)
-    assert contact_stiffness(0.03, 1e-6, softness) == contact_stiffness(0.03, LEAST_GAP, softness)
-    assert contact_stiffness(0.03, 4.0 * LEAST_GAP, softness) < 0.51 * contact_stiffness(0.03, LEAST_GAP, softness)
-
-
-def test_an_increment_claims_little_beyond_the_wall():
-    pin, _ = compiled()
-    x, y = limited(pin, 0.0, 0.0, 3e-3, 4e-3)
-    assert np.hypot(x, y) < pin.gap + 20.0 * SMOOTH
-    assert [x, y] == pytest.approx(np.hypot(x, y) * np.array([0.6, 0.8]))
-    assert limited(pin, 5e-5, 0.0, 1e-5, 0.0) == (1e-5, 0.0)
-
-
-def test_the_speed_of_approach_is_frozen_while_they_touch():
-    _, memory = compiled()
-    assert approach(memory, 1.0, 0.0, 0.3, 9.0) == 0.3
-    assert approach(memory, 1.0, 0.0, -0.3, 0.0) == 1e-3
-    memory[CLOSED], memory[APPROACH] = 1.0, 0.02
-    assert approach(memory, 1.0, 0.0, 0.3, 0.0) == 0.02
-
-
-def test_a_ball_that_hardly_touches():
-    """Two smoothing lengths deep, 1 mJ: the tail of the smoothed gap slows it down before it counts as touching."""
-    pin = row()
-    assert rebound(pin, 20.0, 0.01) == pytest.approx(restitution(pin.loss), abs=0.03)
-
-
-@pytest.mark.parametrize("exponent", [1.2, 2.2])
-def test_restitution_for_other_exponents(exponent):
-    """With a stiffness for which the ball goes 20 um deep."""
-    pin, mass, speed = row("lankarani-nikravesh", 0.7, exponent=exponent), 20.0, 0.1
-    pin.stiffness = 0.5 * (exponent + 1.0) * mass * speed**2 / 2e-5 ** (exponent + 1.0)
-    assert rebound(pin, mass, speed) == pytest.approx(restitution(pin.loss), abs=WITHIN)
 
 
 def places(count=40):

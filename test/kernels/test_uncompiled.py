@@ -13,9 +13,9 @@ import pytest
 PROGRAM = """
 import json, sys
 import numpy as np
-from boom_twin.analysis.simulate import simulate
-from boom_twin.analysis.equilibrium import statics
-from boom_twin.scene import load_scene
+from boom_twin import simulate
+from boom_twin import statics
+from boom_twin import load_scene
 from boom_twin.scene.schema import Clearance, ContactLaw, Pin
 scene, count, pins = load_scene(), int(sys.argv[1]), sys.argv[2:]
 if pins:

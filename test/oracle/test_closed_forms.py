@@ -1,4 +1,4 @@
-"""Textbook formulas: end deflection and frequencies of a cantilever, and a rigid section swinging on its oil spring."""
+"""Textbook formulas: frequencies of a cantilever, and a rigid section swinging on its oil spring."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from oracle import booms
 from boom_twin import statics
 
 ROOTS = np.array([1.87510407, 4.69409113, 7.85475744])
-LENGTH, RIGIDITY, DENSITY, GRAVITY = 3.0, 2.06e11 * 2.0e-5, 40.0, 9.81
+LENGTH, DENSITY, GRAVITY = 3.0, 40.0, 9.81
 
 
 def cantilever(modes=8, incompressible=True, **changes):
@@ -23,16 +23,6 @@ def cantilever(modes=8, incompressible=True, **changes):
     spec |= {"sections": [beam | changes], "joints": [{"kind": "A", "range_deg": [-60, 60], "cylinder": cylinder}]}
     spec |= {"modes": modes, "gravity": [0.0, -GRAVITY], "postures": {"level": [0.0]}}
     return spec
-
-
-def test_own_weight_and_end_load():
-    payload = 50.0
-    spec = cantilever() | {"tip": {"payload": payload}, "gravity": [0.0, -1e-3 * GRAVITY]}
-    found = statics(booms.scene_of(spec), posture="level", modes=0)
-    weight, load = 1e-3 * GRAVITY * DENSITY, 1e-3 * GRAVITY * payload
-    sag = weight * LENGTH**4 / (8 * RIGIDITY) + load * LENGTH**3 / (3 * RIGIDITY)
-    assert found.tip_rigid[1] - found.tip[1] == pytest.approx(sag, rel=1e-7)
-    assert found.cylinder_forces[0] == pytest.approx(weight * LENGTH**2 / 2 + load * LENGTH, rel=1e-7)
 
 
 def test_oil_spring_alone():

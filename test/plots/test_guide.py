@@ -100,7 +100,7 @@ def without(*keys: str) -> str:
 
 
 def test_table_of_what_leaving_out_does(boom: Path) -> None:
-    from boom_twin.analysis.equilibrium import statics
+    from boom_twin import statics
 
     without_k, without_mass = without("k:", "d:"), without("barrel:", "rod:", "mL:", "mR:")
     scenes = {

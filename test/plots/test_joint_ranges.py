@@ -10,8 +10,6 @@ import pytest
 from boom_twin import load_scene
 from boom_twin.cli.main import main
 from boom_twin.plots.joint_ranges import joint_ranges_picture
-from boom_twin.plots.style import BLUE, ORANGE
-from boom_twin.scene.load import examine_text, example_text
 
 
 def pixels(path: Path) -> np.ndarray:
@@ -28,36 +26,6 @@ def test_it_is_drawn_for_any_number_of_joints(tmp_path: Path, count: int) -> Non
     image = pixels(joint_ranges_picture(tmp_path / "pins.png", scene.model_copy(update=update), "boom"))
     assert image.shape == (800 * (1 + count // 3), 900 * min(count + 1, 2) if count < 2 else 1800, 3)
     assert ((image.max(axis=2) - image.min(axis=2)) > 0.3).mean() > 0.005, "nothing coloured was drawn"
-
-
-def test_a_swapped_pin_changes_only_the_panels_of_its_joint(tmp_path: Path) -> None:
-    scene = load_scene()
-    joint = scene.joints[2]
-    assert joint.C is not None
-    swapped = joint.model_copy(update={"C": (joint.C[0], -joint.C[1])})
-    other = scene.model_copy(update={"joints": (*scene.joints[:2], swapped, scene.joints[3])})
-    first, second = (pixels(joint_ranges_picture(tmp_path / f"{i}.png", each, "boom")) for i, each in enumerate((scene, other)))
-    changed = np.abs(first - second).max(axis=2) > 0.2
-    below = changed[changed.shape[0] // 2 :, : changed.shape[1] // 3]
-    assert below.mean() > 0.01
-    assert changed[: changed.shape[0] // 2 - 40, changed.shape[1] // 3 :].mean() < 0.001
-
-
-def test_the_overview_shows_where_folded_sections_get(tmp_path: Path) -> None:
-    scene = examine_text(example_text("five_section_z_fold"), "scene")[0]
-    image = pixels(joint_ranges_picture(tmp_path / "pins.png", scene, "boom"))
-    left = image[60:760, :600]
-    for colour in (BLUE, ORANGE):
-        wanted = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
-        columns = (np.abs(left - wanted).max(axis=2) < 0.1)[:640].any(axis=0).sum()
-        assert columns > 130, f"{colour}: folded sections are not seen"
-
-
-def test_links_that_do_not_meet_everywhere_are_drawn_where_they_do(tmp_path: Path) -> None:
-    scene = load_scene()
-    wide = scene.joints[1].model_copy(update={"lL": 0.55})
-    other = scene.model_copy(update={"joints": (scene.joints[0], wide, *scene.joints[2:])})
-    assert pixels(joint_ranges_picture(tmp_path / "pins.png", other, "boom")).std() > 0.05
 
 
 def test_the_command_writes_it_and_nothing_over_the_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boom_twin.plots import AlarmSpan, EstimateTrace, History, ImuTrace, Truth, replay_pictures, tip
-from boom_twin.plots.residuals import residual_picture
+from boom_twin.plots import History, ImuTrace, Truth, replay_pictures, tip
 from boom_twin.plots.session_distributions import density
 from boom_twin.types import Array
 
@@ -107,32 +106,3 @@ def test_the_title_tells_the_error_against_the_truth(tmp_path: Path, figures_of:
     tip.tip_picture(tmp_path / "tip.png", "test", told, truth, "")
     titles = [axes.get_title(loc="left") for axes in figures[0].axes]
     assert titles[0].endswith("rms error: prediction 50 mm") and titles[1].endswith("rms error: prediction 0 m/s²")
-
-
-def test_the_estimate_has_its_lines_and_a_panel_of_the_load(tmp_path: Path) -> None:
-    told = replace(history(2, seconds=3.0), residual_names=(), shapes=[])  # just one picture
-    sigmas = [np.full_like(told.tip_displacement, each) for each in (0.002, 0.3, 20.0)]
-    load = 100.0 * np.sign(told.tip_displacement + 0.1)
-    values = told.tip_displacement + 0.02, told.tip_acceleration + 0.5, load
-    shown, wide = (
-        replace(told, load_text="none", estimate=EstimateTrace(*values, *(factor * each for each in sigmas)))
-        for factor in (1.0, 3.0)
-    )
-    late = np.where(np.arange(len(load))[:, None] < 100, np.nan, 1.0)
-    fed_late = replace(told, estimate=EstimateTrace(*(late * each for each in (*values, *sigmas))))
-    found = [pixels(replay_pictures(tmp_path / f"{i}", each)[0]) for i, each in enumerate((told, shown, wide, fed_late))]
-    assert [image.shape[0] for image in found] == [900, 1200, 1200, 1200]
-    assert (found[1] != found[2]).any(), "the band does not follow the deviations"
-    purple = np.abs(found[1] - np.array([0xAA, 0x44, 0x99]) / 255.0).max(axis=2) < 0.02
-    assert all(rows.any() for rows in np.array_split(purple[60:900], 3)), "a panel has no line of the estimate"
-
-
-def test_alarms_are_shaded_where_they_show(tmp_path: Path) -> None:
-    whole = history(2)
-    alarmed = replace(whole, alarms=[AlarmSpan("joint_2", 4.0, 8.0, "joint_2.sensor")])
-    for name, each in (("plain", whole), ("alarmed", alarmed)):
-        (tmp_path / name).mkdir()
-        residual_picture(tmp_path / name / "r.png", "test", each, "")
-    differ = np.abs(pixels(tmp_path / "plain" / "r.png") - pixels(tmp_path / "alarmed" / "r.png")).max(axis=2) > 0.02
-    rows = np.flatnonzero(differ.any(axis=1))
-    assert 0.3 * len(differ) < rows.min() < rows.max() < 0.7 * len(differ)  # the second of four panels

@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import booms, segments
 
-from boom_twin.analysis.equilibrium import statics
-from boom_twin.analysis.simulate import simulate
+from boom_twin import simulate, statics
 
 few = settings(max_examples=12, deadline=None, derandomize=True, database=None)
 SEEDS = st.integers(0, 400)

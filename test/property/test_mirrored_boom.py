@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from oracle import booms
 from ruamel.yaml import YAML
 
-from boom_twin.analysis.equilibrium import statics
-from boom_twin.analysis.simulate import simulate
+from boom_twin import simulate, statics
 from boom_twin.scene.kinematics import PassiveJoints, posture_angles, skeleton
 from boom_twin.scene.load import example_text
 

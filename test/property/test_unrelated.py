@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 from oracle import booms
 
-from boom_twin.analysis import methods as stepping
-from boom_twin.analysis.equilibrium import statics
+from boom_twin import statics
+from boom_twin.analysis.methods import integrate_with
 from boom_twin.analysis.motions import motion_of
-from boom_twin.compiler.compile import compile_scene
 from boom_twin.reduction.deviation import answer, course_of
 
-STEPS, STEP = 400, 1e-3
 PLAY_OF_0 = [{"at": at, "pin_radius": 0.02, "radial_clearance": 0.0} for at in ("cylinder_2.rod", "joint_3.link_L")]
 ZERO = {"mass": 0.0, "inertia": 0.0, "com": 0.3}
 
@@ -114,38 +112,10 @@ def test_no_bit_changes(name):
 
 
 def test_all_that_is_zero_at_once_changes_no_bit():
-    absent, zero = (edited(both(*(PAIRS[name][k] for name in ZEROS))) for k in (0, 1))
-    assert_same_motion((absent, None), (zero, None))
-
-
-def with_unused_rows(plan, other):
-    """`plan` with the tables of beams, links and cylinder parts of another boom, to which no operation points."""
-    tables, full = plan.tables, other.tables
-    assert len(tables.beams) == len(tables.links) == len(tables.parts) == 0
-    names = ("beams", "psi", "weights", "stiffness", "point_mass", "point_rotary", "links", "parts")
-    return replace(plan, tables=tables._replace(**{name: getattr(full, name) for name in names}))
-
-
-def empty_and_unused():
-    """A rigid boom with massless links and cylinders: with empty tables, and with tables full of rows not in use."""
-    scene = edited(both(RIGID, without("joints", "mL", "mR"), without("cylinder", "barrel", "rod", "d")))
-    return (scene, None), (scene, with_unused_rows(compile_scene(scene), compile_scene(edited(both()))))
-
-
-def test_rows_that_are_not_in_use_change_no_bit():
-    assert_same_motion(*empty_and_unused())
-
-
-def stepped(motion, scene, plan):
-    """A run of the boom `scene`, with `plan` instead of its own where one is given."""
-    with pytest.MonkeyPatch.context() as patch:
-        if plan is not None:
-            patch.setattr(stepping, "compile_scene", lambda *_: plan)
-        run = stepping.integrate_with(scene, motion, STEPS * STEP, STEP, every=STEPS, angles=motion.angles)
-    assert run.status == "ok"
-    return run
-
-
-def assert_same_motion(one, other):
-    same, again = (stepped(motion_of(edited(both())), *box) for box in (one, other))
-    assert np.array_equal(same.tip, again.tip) and np.array_equal(same.cylinder_forces, again.cylinder_forces)
+    move = motion_of(edited(both()))
+    absent, zero = (
+        integrate_with(edited(both(*(PAIRS[name][k] for name in ZEROS))), move, 0.4, 1e-3, every=400, angles=move.angles)
+        for k in (0, 1)
+    )
+    assert absent.status == zero.status == "ok"
+    assert np.array_equal(absent.tip, zero.tip) and np.array_equal(absent.cylinder_forces, zero.cylinder_forces)

@@ -7,7 +7,7 @@ import pytest
 from convergence import motions
 from oracle import booms, lagrange, segments
 from reference.segments.equations import Equations
-from reference.segments.geometry import Linkages, link_headings, pieces
+from reference.segments.geometry import pieces
 
 from boom_twin import load_scene
 
@@ -55,35 +55,3 @@ def test_accelerations_are_those_of_lagrange(scene, posture, fineness):
     assert placed.tip.value[0] == pytest.approx([boom.tip[0].v, boom.tip[1].v], abs=1e-12)
     assert placed.joints == pytest.approx([joint.v for joint in boom.joints], abs=1e-12)
     assert forces[equations.rigid] == pytest.approx(multipliers, rel=1e-9)
-
-
-def test_links_in_closed_form():
-    joints, h = load_scene().joints[1:], 1e-4
-    linkages, phi = Linkages(joints), np.array([-0.7, -0.9, -1.1])
-    here, ahead, behind = (linkages.angles(phi + d) for d in (0.0, h, -h))
-    for side in range(2):
-        expected = [link_headings(joint, angle)[side] for joint, angle in zip(joints, phi, strict=True)]
-        assert np.angle(np.exp(1j * (here[side].value - expected))) == pytest.approx(0.0, abs=1e-12)
-        first = (ahead[side].value - behind[side].value) / (2 * h)
-        second = (ahead[side].first - behind[side].first) / (2 * h)
-        assert here[side].first == pytest.approx(first, rel=1e-6)
-        assert here[side].second == pytest.approx(second, rel=1e-6)
-
-
-def test_jacobian_is_that_of_the_stiff_forces():
-    """Against differences of the accelerations: what is left out is small beside what is kept."""
-    scene = load_scene()
-    angles = np.diff(np.radians(scene.postures["arch"]), prepend=0.0)
-    lengths = segments.Segments(scene, 0).lengths(angles)
-    drive = motions.smooth_drive(lengths, np.zeros(4), 0.3)
-    equations = Equations(scene, drive, 1)
-    own = kept(scene, 1)
-    q = segments.equilibrium(segments.Segments(scene, 1), lengths, angles)[0][own]
-    n, v, h = len(q), np.zeros(own.sum()), 1e-7
-    columns = [
-        (equations.accelerations(0.0, q + h * e, v)[0] - equations.accelerations(0.0, q - h * e, v)[0]) / (2 * h)
-        for e in np.eye(n)
-    ]
-    expected, found = np.array(columns).T, equations.state_jacobian(q, v)
-    assert np.linalg.norm(found[n:, :n] - expected) < 0.02 * np.linalg.norm(expected)
-    assert np.array_equal(found[:n], np.hstack([np.zeros((n, n)), np.eye(n)]))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from boom_twin.cli.main import main
-from boom_twin.report.compare import ComparedSession, as_text, flat, rows_of
+from boom_twin.report.compare import ComparedSession, rows_of
 from boom_twin.report.quantities import Quantity
 
 ONE = ComparedSession(
@@ -28,16 +28,6 @@ def test_what_is_no_chance_and_what_nobody_can_say() -> None:
         assert row.is_significant is differs
     assert (y.difference, y.sigma, y.is_significant) == (2.0, None, None)
     assert (only.a, only.b, only.difference) == (2.0, None, None)
-
-
-def test_in_words_and_flat() -> None:
-    rows = rows_of(ONE, other(1.6))
-    text = "\n".join(as_text(ONE, other(1.6), rows))
-    assert "alarms of A, one: none" in text and "joint_1, 0.00 s to the end: bias" in text
-    assert next(line for line in text.splitlines() if line.startswith("x ")).endswith("differs")
-    found = flat(ONE, other(1.6), rows)
-    assert found["same_scene"] and found["difference"] == [pytest.approx(0.6), 2.0, None]
-    assert not any(isinstance(value, dict) for value in found.values())
 
 
 def test_a_session_and_a_replay_of_it_are_the_same(

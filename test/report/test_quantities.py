@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from boom_twin import load_scene
 from boom_twin.errors import BagError
-from boom_twin.report.quantities import FREQUENCY_ERROR, BatchMeans, PathLength, Quantity, digest, read, write
-from boom_twin.report.vibration import still
+from boom_twin.report.quantities import FREQUENCY_ERROR, BatchMeans, PathLength, read
 
 
 def test_batch_means_are_as_sure_as_they_say() -> None:
@@ -33,21 +30,6 @@ def test_the_way_of_a_stroke() -> None:
     moved.add(way + random.normal(0.0, 2e-5, len(way)))
     still_ones.add(np.full(100, 0.3) + random.normal(0.0, 2e-5, 100))
     assert moved.length == (pytest.approx(0.8, abs=3e-4), 3) and still_ones.length == (0.0, 0)
-
-
-def test_standing_still() -> None:
-    times = np.arange(0.0, 20.0, 0.005)
-    moved = 0.2 * np.clip((times - 6.0) / 4.0, 0.0, 1.0)
-    strokes = np.stack([np.full_like(times, 0.3), 0.1 + moved], axis=1)
-    spans = still(times, strokes)
-    assert np.ravel(spans) == pytest.approx([0.0, 5.9, 10.1, 19.995], abs=0.02)
-    assert still(times[:1], strokes[:1]) == []
-
-
-def test_there_and_back(tmp_path: Path) -> None:
-    scene, found = load_scene(), [Quantity("a", 1.5, None, "m"), Quantity("b", -2.0, 0.25, "rad")]
-    assert json.loads(write(tmp_path, scene, found).read_text())["quantities"][1]["sigma"] == 0.25
-    assert read(tmp_path) == (digest(scene), found)
 
 
 @pytest.mark.parametrize("text", [None, "{", "[]", '{"scene_sha256": "1"}', '{"scene_sha256": "1", "quantities": [{"x": 1}]}'])

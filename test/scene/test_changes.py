@@ -1,4 +1,4 @@
-"""Scenes from paths, dicts and changes; parameters by name; single values in a text; short texts of results."""
+"""Scenes from paths, dicts and changes; parameters by name."""
 
 from __future__ import annotations
 
@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from drive_twin import drive_twin
-from ruamel.yaml import YAML
 from scene.editing import DEFAULT
 
 from boom_twin import load_scene, simulate, statics
-from boom_twin.config.yaml_text import with_value
 from boom_twin.errors import SceneError, UsageError
 from boom_twin.scene.edit import parameter, parameter_names, with_parameters
 from boom_twin.scene.load import default_text
@@ -64,16 +62,6 @@ def test_a_parameter_that_is_set_is_read_and_nothing_else_changes(name: str) -> 
         assert parameter(other, same) == parameter(SCENE, same)
 
 
-def test_section_masses_are_all_that_the_cylinders_carry_beside_links_and_themselves() -> None:
-    joints = [joint.model_copy(update={"mL": None, "mR": None}) for joint in SCENE.joints]
-    cylinders = [joint.cylinder.model_copy(update={"barrel": None, "rod": None}) for joint in joints]
-    joints = [joint.model_copy(update={"cylinder": each}) for joint, each in zip(joints, cylinders, strict=True)]
-    bare = SCENE.model_copy(update={"joints": tuple(joints)})
-    heavy = with_parameters(bare, {f"section_{i}.mass": 1.001 * parameter(bare, f"section_{i}.mass") for i in (1, 2, 3, 4)})
-    light, loaded = statics(bare, posture="horizontal"), statics(heavy, posture="horizontal")
-    assert loaded.cylinder_forces == pytest.approx(1.001 * light.cylinder_forces, rel=1e-4)
-
-
 def test_unknown_parameters_and_values_that_no_scene_may_have_are_refused() -> None:
     for name in ("cylinder_9.k", "cylinder_1.EI", "section_0.EI", "payload"):
         with pytest.raises(UsageError, match=r"no such parameter.*tip\.payload"):
@@ -82,60 +70,3 @@ def test_unknown_parameters_and_values_that_no_scene_may_have_are_refused() -> N
     for name, value in wrong.items():
         with pytest.raises(UsageError, match="must be finite"):
             with_parameters(SCENE, {name: value})
-
-
-def test_texts_of_results_are_short_and_say_what_matters() -> None:
-    rest = statics(None, "arch")
-    assert "\n" not in repr(rest) and len(repr(rest)) < 300 and "frequencies 1.06" in repr(rest) and str(rest) == repr(rest)
-    table = rest._repr_html_()
-    assert table.startswith("<table>") and "<th>tip</th><td>8.188, -0.4401 m</td>" in table
-    assert repr(SCENE).startswith("Scene(sections 4, 3.86, 3.3, 3.2, 3.1 m") and len(repr(drive_twin())) < 400
-    assert "arch<" not in SCENE.with_(description="<b>arch</b>")._repr_html_()
-
-
-TEXT = """# head
-tip: {payload: 1.0}   # kg
-empty: {}
-nothing:
-description: |
-  two lines
-  of text
-# between
-sensors:
-  joint_1: {zero: 0.1, unit: deg}  # mine
-  joint_2:
-    unit: deg   # own
-joints:
-  - {k: 1.0e+6}
-"""
-
-
-@pytest.mark.parametrize(
-    ("place", "value"),
-    [
-        (("tip", "payload"), 15.25),
-        (("empty", "a", "b"), 1.5),
-        (("nothing", "a"), 2),
-        (("description",), "three\nlines\nof text"),
-        (("description",), "one: line # not a comment"),
-        (("sensors", "joint_1", "zero"), -2.5e-5),
-        (("sensors", "joint_2", "zero"), 4.0e-3),
-        (("sensors", "joint_3", "zero"), 1.0),
-        (("joints", 0, "k"), 4.39047e7),
-        (("new",), {"payload": 2.0}),
-    ],
-)
-def test_a_value_of_a_text_is_changed_and_all_else_stays(place: tuple[str | int, ...], value: Any) -> None:
-    load = YAML(typ="safe", pure=True).load
-    expected, text = load(TEXT), with_value(TEXT, place, value)
-    block = expected
-    for step in place[:-1]:
-        if isinstance(block, dict) and block.get(step) is None:
-            block[step] = {}
-        block = block[step]
-    block[place[-1]] = value
-    assert load(text) == expected
-    assert all(comment in text for comment in ("# head", "# kg", "# between", "# mine", "# own"))
-    without = with_value(text, ("sensors", "joint_1", "zero"), None)
-    assert load(without)["sensors"]["joint_1"] == {"unit": "deg"} and "# mine" in without
-    assert with_value(TEXT, ("tip", "absent"), None) == TEXT

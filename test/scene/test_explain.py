@@ -1,4 +1,4 @@
-"""The bookkeeping of the model: masses, coordinates, splits, reach, and what is left out."""
+"""The bookkeeping of the model: masses, strokes, and what is left out."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import pytest
 from scene.editing import GONE, put
 
 from boom_twin import load_scene
-from boom_twin.scene.segmentation import flexible_parts, splits
 from boom_twin.scene.summary import Account, explain
 
 
@@ -36,41 +35,6 @@ def test_masses_and_strokes_of_the_default_scene(bench: Any) -> None:
     loaded = account(bench, line_fill=10.0, tip={"payload": 40.0})
     assert loaded.mass == pytest.approx(found.mass + 134.6 + 40.0)
     assert list(left_out(loaded)) == ["base.inclination", "clearance"]
-
-
-def test_beams_are_split_where_a_cylinder_pin_sits_on_them(bench: Any) -> None:
-    scene = load_scene()
-    assert [[round(split.x, 9) for split in splits(scene, i)] for i in range(4)] == [[3.044], [2.002], [1.9], []]
-    assert flexible_parts(scene, 0) == ((0.6, 3.044), (3.044, 3.6)) and splits(scene, 1)[0].pin == "barrel pin C of cylinder 3"
-    scene = load_scene(bench.edited(lambda v: put(v, "sections[0].beam", [0.3, 3.6])))
-    assert [split.pin for split in splits(scene, 0)] == ["rod pin of cylinder 1", "barrel pin C of cylinder 2"]
-    assert flexible_parts(scene, 0) == ((0.3, 0.6), (0.6, 3.044), (3.044, 3.6))
-
-
-@pytest.mark.filterwarnings("ignore::boom_twin.errors.SceneWarning")
-def test_two_pins_at_one_place_make_one_split(bench: Any) -> None:
-    def edit(values: Any) -> None:
-        values["sections"][0].update(beam=[0.3, 3.6], rod_pin=[3.044, -0.12])
-        values["base"]["cylinder_pin"], values["postures"] = [2.6, -1.9], {}
-        put(values, "joints[0].range_deg", [0, 10])
-        values["joints"][0]["cylinder"].update(closed_length=1.5, max_stroke=1.0)
-
-    scene = load_scene(bench.edited(edit))
-    assert len(splits(scene, 0)) == 2 and len(flexible_parts(scene, 0)) == 2
-
-
-def test_unknowns_follow_modes_kinds_and_axial_coordinates(bench: Any) -> None:
-    found = account(bench)
-    assert [section.unknowns for section in found.sections] == [8, 8, 8, 4]
-    assert [joint.unknowns for joint in found.joints] == [2, 6, 6, 6]
-    assert found.unknowns == 48 and account(bench, modes=0).unknowns == 20
-    assert explain(load_scene(bench.edited(lambda v: put(v, "sections[3].modes", 5)))).unknowns == 50
-    stiff = account(bench, axial=False, geometric=False)
-    assert stiff.unknowns == 48 - 7 and {"sections[*].axial", "sections[*].geometric"} <= set(left_out(stiff))
-    one = explain(load_scene(bench.edited(lambda v: put(v, "sections[3].axial", False))))
-    assert [section.axial for section in one.sections] == [1, 1, 1, 0] and "sections[3].axial" in left_out(one)
-    (fault,) = bench.faults(lambda v: v.update(axial="maybe"))
-    assert fault.path == "axial" and "true or false is needed, not text" in fault.bound
 
 
 def test_what_is_not_named_is_listed(bench: Any) -> None:

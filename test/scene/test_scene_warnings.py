@@ -5,15 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from scene.editing import OIL, example, put
 
 from boom_twin import load_scene
 from boom_twin.cli.main import main
 from boom_twin.errors import SceneError
-from boom_twin.scene.checks.linkages import passes_of
-from boom_twin.scene.kinematics import skeleton
 from boom_twin.scene.load import clearance_text, default_text, example_names, example_text, with_end_mark
 from boom_twin.scene.summary import explain
 
@@ -47,38 +44,26 @@ SLIPS = [
     ("joints[0].cylinder.k", 40e3, "kN/m?", "4e+07"),
     ("joints[0].cylinder.k", 4e8, "a bore of 0.26 m", "at most 0.165 m"),
     ("joints[1].cylinder.k", 3e6, "gives way by", "2 % of its stroke"),
-    ("joints[2].cylinder.k", 2e10, "expected from 1e6 to 1e9"),
     ("joints[0].cylinder.d", 120.0, "would damp a mode of"),
-    ("sections[0].beta", 1.0, "would damp a mode of"),
     ("sections[2].beta", 0.02, "2 zeta / omega"),
     ("sections[0].I", 0.00036, "sqrt(I/A)", "expected"),
-    ("sections[1].I", 2e-06, "walls of"),
-    ("sections[0].A -> sections[0].I", 0.00049, "sqrt(I/A)"),
     ("sections[1].height -> sections[1].I", 17.2, "for a box 17.2 m high"),
-    ("sections[0].height -> sections[0].I", 0.1, "0.1 m high"),
     ("sections[0].rho_A", 5.2, "rho A"),
-    ("sections[2].rho_A", 20.0, "expected 23.6 to"),
-    ("sections[1].rho_A", 160.0, "one metre"),
     ("sections[0].rho_I", 7850.0, "rho I"),
     ("sections[1].head.com", [-0.12, 0.0], "INBOARD"),
     ("sections[0].root.com", [1.3, 0.0], "inside the root"),
     ("sections[0].head.inertia", 222.0, "OWN centre"),
     ("sections[0].root.mass", 0.036, "not tonnes"),
-    ("sections[1].head.mass", 13000.0, "not grams"),
-    ("joints[1].mL", 4000.0, "not grams"),
     ("joints[1].mL", 40.0, "25.8 kg", "not N"),
     ("joints[1].cylinder.barrel.mass -> joints[1].cylinder.barrel.inertia", 0.016, "gyration"),
     ("joints[2].cylinder.rod.com", 1.0, "rod pin"),
     ("sections[0].beam", [0.6, 3.0], "length of the beam, then x1 = 3.6"),
     ("gravity", [0.5, -9.797], "-y", "base.inclination"),
     ("base.inclination", 0.25, "0.2 rad"),
-    ("material.E", 2.06e10, "expected 6.28e+10"),
     ("material.E", 7e10, "1.7e+11 to 2.3e+11", "density of steel"),
-    ("material.rho -> material.E", 77.0, "with a density of 77"),
     ("line_fill", 400.0, "whole load"),
     ("joints[1].cylinder.max_stroke", 1.13, "not the open length"),
     ("tip -> tip.payload", {"payload": 40000.0}, "half of what the boom weighs"),
-    ("sections[3].I", 4.5e-07, "expected"),
 ]  # fmt: skip
 
 
@@ -100,21 +85,6 @@ def test_an_odd_value_loads_and_is_warned_of_at_its_key(bench: Any, row: tuple[A
     assert row not in SLIPS or len(oddities) <= 2, [str(oddity) for oddity in oddities]
 
 
-OIL_SLIPS = {
-    "rod": (0.07, "not one as a radius"),
-    "cap_line": (0.5, "twice what the chamber takes"),
-    "rod_line": (500.0, "litres?"),
-}
-
-
-@pytest.mark.parametrize("key", OIL_SLIPS)
-def test_slips_in_the_oil_are_warned_of(bench: Any, key: str) -> None:
-    (value, told), values = OIL_SLIPS[key], example("five_section_z_fold")
-    values["joints"][1]["cylinder"]["oil"][key] = value
-    (found,) = bench.oddities_of(values)
-    assert found.path == f"joints[1].cylinder.oil.{key}" and told in str(found)
-
-
 @pytest.mark.parametrize(("law", "given"), [("lankarani-nikravesh", "0.725"), ("flores", "0.470")])
 def test_a_clearance_that_is_wide_and_a_law_that_does_not_keep_its_restitution_are_warned_of(
     bench: Any, law: str, given: str
@@ -128,17 +98,6 @@ def test_a_clearance_that_is_wide_and_a_law_that_does_not_keep_its_restitution_a
     assert wide.path == "clearance.pins[0].radial_clearance" and "more than a tenth of pin_radius" in wide.bound
     block["contact"]["law"], pin["radial_clearance"] = "hunt-crossley-exact", 1e-4
     assert bench.oddities(lambda values: values.update(clearance=block)) == []
-
-
-def test_a_stroke_that_turns_back_warns(bench: Any) -> None:
-    def edit(values: Any) -> None:
-        put(values, "joints[0].range_deg", [-90, 85])
-        values["joints"][0]["cylinder"].update(closed_length=0.7, max_stroke=1.2)
-
-    (oddity,) = bench.oddities(edit)
-    assert oddity.path == "joints[0].range_deg"
-    assert "turns back at -58.9 deg" in oddity.bound and "two angles" in oddity.bound
-    assert "Narrow range_deg to [-51, 85], which keeps a quarter of the largest lever" in oddity.remedy
 
 
 LINKS = {"lL": 0.2, "lR": 0.0808}
@@ -170,20 +129,6 @@ def test_a_range_that_ends_next_to_a_dead_centre_warns_and_the_suggested_one_kee
 def first_number(remedy: str) -> float:
     """Return the lower end of the range that a remedy suggests."""
     return float(remedy.partition("[")[2].partition(",")[0])
-
-
-def test_one_warning_tells_all_that_is_wrong_with_a_range_and_its_remedy_mends_it(bench: Any) -> None:
-    def edit(values: Any, low: float) -> None:
-        values["postures"] = {"straight": [0, 0, 0, 0]}
-        values["joints"][1].update(range_deg=[low, 10], lL=0.5)
-        values["joints"][1]["cylinder"].update(closed_length=0.7, max_stroke=0.6)
-
-    (oddity,) = bench.oddities(lambda values: edit(values, -179))
-    assert oddity.path == "joints[1].range_deg"
-    assert all(words in oddity.bound for words in ("do not meet at", "turns back at"))
-    low = first_number(oddity.remedy)
-    assert bench.oddities(lambda values: edit(values, low)) == []
-    assert len(bench.oddities(lambda values: edit(values, low - 2))) == 1
 
 
 PASSING = {
@@ -232,28 +177,6 @@ def test_pins_that_come_too_close_are_warned_of_with_the_range_that_keeps_them_a
     assert bench.oddities_of(values) == []
 
 
-def test_a_rod_is_as_far_from_the_pins_as_the_skeleton_says(bench: Any) -> None:
-    scene = load_scene(example("five_section_z_fold"))
-    joint = scene.joints[2]
-    assert joint.cylinder.oil is not None
-    phi = np.radians([-5.0, 60.0, 178.0])
-    passed = {each.pin: each for each in passes_of(scene, 2, joint.cylinder, joint.cylinder.oil, phi)}
-    for k, angle in enumerate(phi):
-        pins = skeleton(scene, np.array([0.0, 0.0, angle, 0.0, 0.0])).joints[2]
-        stations = pins.barrel_pin + np.linspace(0.0, 1.0, 20001)[:, None] * (pins.rod_pin - pins.barrel_pin)
-        for name, pin in (("the pivot", pins.pivot), ("D", pins.d), ("E", pins.e), ("Q", pins.q)):
-            assert passed[name].distance[k] == pytest.approx(np.hypot(*(stations - pin).T).min(), abs=1e-6)
-
-
-def test_a_joint_range_in_radians_warns(bench: Any) -> None:
-    def edit(values: Any) -> None:
-        values["postures"] = {}
-        values["joints"][0]["range_deg"] = [-0.09, 1.48]
-
-    (oddity,) = bench.oddities(edit)
-    assert oddity.path == "joints[0].range_deg" and "radians?" in oddity.bound and "84.8" in oddity.remedy
-
-
 def test_a_scene_in_millimetres_warns_at_its_lengths(bench: Any) -> None:
     lengths = ("length", "beam", "rod_pin", "C", "D", "E", "R", "lL", "lR", "closed_length", "max_stroke", "com")
 
@@ -272,24 +195,12 @@ def test_a_scene_in_millimetres_warns_at_its_lengths(bench: Any) -> None:
     assert "joints[1].cylinder.closed_length" in paths and "joints[1].E" not in paths
 
 
-def test_a_weightless_rigid_section_warns(bench: Any) -> None:
-    rigid = {"length": 3.1, "root": {"mass": 0, "com": [1.5, 0], "inertia": 0}}
-    (oddity,) = bench.oddities(lambda values: put(values, "sections[3]", rigid))
-    assert oddity.path == "sections[3].root.mass" and "weighs nothing" in oddity.bound
-
-
 def test_c_measured_from_the_wrong_pivot_is_pointed_out(bench: Any) -> None:
     with pytest.raises(SceneError, match="check the pins") as caught:
         load_scene(bench.edited(lambda values: put(values, "joints[1].C", [3.044, 0.18])))
     assert [fault.path for fault in caught.value.faults] == ["joints[1].cylinder.closed_length"]
     (oddity,) = [oddity for oddity in caught.value.oddities if oddity.path == "joints[1].C"]
     assert "OUTBOARD" in oddity.remedy and "warning: line" in str(caught.value)
-
-
-def test_oddities_come_in_the_order_of_the_file(bench: Any) -> None:
-    edits = [("sections[1].A", 39.0), ("material.E", 206.0), ("gravity", [0, -1.62])]
-    lines = [oddity.line for oddity in bench.oddities(lambda values: [put(values, *each) for each in edits])]
-    assert len(lines) == 3 and lines == sorted(lines)
 
 
 @pytest.mark.parametrize("path", ["modes", "sections[1].modes"])
@@ -326,15 +237,3 @@ def test_strict_makes_warnings_errors(bench: Any, capsys: pytest.CaptureFixture[
     assert main(["check", path, "--strict", "--picture", str(picture)]) == 1 and picture.is_file()
     out, err = capsys.readouterr()
     assert out == "" and "1 fault" in err and "joints[0].cylinder.k = 40000.0" in err
-
-
-@pytest.mark.parametrize("size", [1e-300, 1e-30, 1e30])
-def test_absurd_values_are_told_of_without_an_accident(bench: Any, size: float) -> None:
-    def edit(values: Any) -> None:
-        values["material"].update(E=size, rho=size)
-        for section in values["sections"]:
-            section.update(A=size, I=size, rho_A=size, rho_I=size, beta=size, height=size)
-        for joint in values["joints"]:
-            joint["cylinder"].update(k=size, d=size)
-
-    assert bench.oddities(edit)

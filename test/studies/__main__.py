@@ -17,6 +17,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", required=True, type=Path, help="folder; files of this study in it are replaced")
     parser.add_argument("--quick", action="store_true", help="few cases on a short motion")
     args = parser.parse_args(argv)
+    args.out.mkdir(parents=True, exist_ok=True)
     write = import_module(f"studies.{args.kind}.report").write
     for path in write(load_scene(), args.out, args.quick):
         print(path)

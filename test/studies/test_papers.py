@@ -1,19 +1,15 @@
-"""The study of the papers: matrices, boundary zeros, low speed, postures with clearance, and its page."""
+"""The study of the papers: matrices, boundary zeros, low speed, postures with clearance."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from studies.clearance.scenes import with_play
 from studies.papers import low_speed
 from studies.papers.boundary_zeros import bisect, equilibrium, frequencies
 from studies.papers.postures import compare, run_own, run_peer
 from studies.papers.sweep_matrices import boundary_solution, chain_of, difference
 
 from boom_twin import Scene, load_scene, statics
-from boom_twin.analysis.methods import integrate_with
 from boom_twin.analysis.motions import motion_of
 from boom_twin.errors import UsageError
 
@@ -34,13 +30,6 @@ def test_assembled_matrices_are_those_of_the_sweep(scene: Scene, step: float) ->
         assert one.matrix @ np.append(one.inlet, 1.0) == pytest.approx(np.append(one.outlet, 1.0), rel=1e-6, abs=1e-3)
 
 
-def test_the_difference_of_matrices_sees_a_wrong_entry() -> None:
-    own, swept = chain_of(SCENE, 0.05, 2e-2)
-    wrong = own[1].matrix.copy()
-    wrong[2, 2] *= 1.0 + 1e-6
-    assert difference(wrong, swept[1]) > 1e-9
-
-
 def test_their_product_solves_the_boundary_problem_until_digits_are_lost() -> None:
     errors = []
     for step in (0.1, 1e-3):
@@ -49,11 +38,6 @@ def test_their_product_solves_the_boundary_problem_until_digits_are_lost() -> No
         errors.append(float(np.abs(found[4:] / own[0].inlet[4:] - 1.0).max()))
     assert errors[0] < 1e-9
     assert errors[1] > 10.0 * errors[0]
-
-
-def test_clearance_has_no_such_matrices() -> None:
-    with pytest.raises(UsageError, match="with ideal pins"):
-        chain_of(with_play(SCENE), 0.02, 1e-2)
 
 
 def test_bisection_finds_what_newton_finds():
@@ -72,12 +56,6 @@ def test_leaving_velocity_terms_out_errs_with_the_square_of_the_speed() -> None:
     slopes = np.log(speeds[1, 1:] / speeds[0, 1:]) / np.log(speeds[1, 0] / speeds[0, 0])
     assert slopes == pytest.approx([2.0, 2.0], abs=0.15)
     assert 5e-4 < speeds[1, 1] < 2e-3  # m
-
-
-def test_with_them_it_is_the_motion_of_the_sweep() -> None:
-    move = replace(motion_of(SCENE), duration=0.3)
-    swept = integrate_with(SCENE, move, 0.3, 2e-3, angles=move.angles)
-    assert np.abs(low_speed.tip_of_move(SCENE, move, 2e-3)[:, :2] - swept.tip).max() < 1e-9
 
 
 def test_four_worn_pins_in_a_stop_are_those_of_the_independent_code():

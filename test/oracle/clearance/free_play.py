@@ -27,13 +27,3 @@ def tip_shift(document, headings, index, contact, force):
     """
     barrel, rod = pins(document, headings, index)
     return levers(document, headings)[index] * lengthening(contact, force, rod - barrel)
-
-
-def loaded_lever(ideal, drive, phi, step=1e-5):
-    """How the resting tip moves per metre of the drive (complex), of a `PinnedBoom` with an ideal pin.
-
-    Play acts as a longer drive does. The geometric lever is this one's limit for a stiff oil spring: the loads' own
-    stiffness, T l'' + V'' against k l'^2, makes up the difference.
-    """
-    tips = [ideal.rest(drive + side, phi).tip for side in (-step, step)]
-    return (tips[1] - tips[0]) / (2.0 * step)

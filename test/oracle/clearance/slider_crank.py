@@ -73,20 +73,3 @@ def demonstration(law="lankarani-nikravesh", restitution=0.9, clearance=0.5e-3, 
     """The slider-crank of Flores and others: crank 50 mm, rod 120 mm, bush of 10 mm radius, steel."""
     contact = Contact(stiffness(0.010 - clearance, clearance, 207e9, 0.3), HYSTERESIS[law](restitution), clearance)
     return SliderCrank(contact, 0.05, 0.12, rpm * pi / 30.0, 0.21, 2.5e-4, 0.14)
-
-
-def phases(motion, since=0.0):
-    """Seconds in impact, following and free flight after `since`, and the number of impacts.
-
-    An episode of contact with one maximum of the penetration is an impact; with several the pin follows the bush.
-    """
-    late = [episode for episode in motion.episodes if episode.end > since]
-    lasting = {True: 0.0, False: 0.0}
-    for episode in late:
-        lasting[episode.peaks <= 1] += episode.end - max(episode.start, since)
-    return {
-        "impact": lasting[True],
-        "following": lasting[False],
-        "free flight": motion.times[-1] - since - lasting[True] - lasting[False],
-        "impacts": sum(episode.peaks <= 1 for episode in late),
-    }

@@ -28,8 +28,6 @@ class Episode:
         Approach speed at the touch, m/s.
     exit : float
         Speed of separation at the release, m/s; nan where the motion ends in contact.
-    peaks : int
-        Maxima of the penetration. One is an impact; several mean that the pin follows the bush.
     depth : float
         Greatest penetration, m.
     """
@@ -38,7 +36,6 @@ class Episode:
     end: float
     entry: float
     exit: float
-    peaks: int
     depth: float
 
 
@@ -151,6 +148,6 @@ def _episodes(pieces: Sequence[Piece], gap: Gap) -> list[Episode]:
         left, released = gap(found.t[-1], found.y[:, -1]), found.status == 1
         if released or found is pieces[-1][0]:
             depth, speed = max([*tops, left[0]]), -left[1] if released else np.nan
-            episodes.append(Episode(begun, found.t[-1], entry, speed, len(tops), depth))
+            episodes.append(Episode(begun, found.t[-1], entry, speed, depth))
             begun, tops = None, []
     return episodes

@@ -57,10 +57,9 @@ class ErrorCurve:
 
 @dataclass(frozen=True)
 class Convergence:
-    """All lines, how far both references of the one pin are apart (`MEASURES`), and how long the motions last (s)."""
+    """All lines, and how long the motions last (s)."""
 
     lines: tuple[ErrorCurve, ...]
-    apart: np.ndarray
     span: float
 
 
@@ -72,22 +71,21 @@ def convergence(scene: Scene, quick: bool = False) -> Convergence:
     lines = [_own("all rods' pins, elastic boom", full, _stopped(full, None), span, steps, finest)[0]]
     index = _free(scene)
     if index is None:
-        return Convergence(tuple(lines), np.full(3, np.nan), span)
+        return Convergence(tuple(lines), span)
     one = one_pin(full, index)
     drive = _stopped(one, index)
-    line, own, tracks = _own("one pin, rigid boom", one, drive, span, steps, finest)
+    line, tracks = _own("one pin, rigid boom", one, drive, span, steps, finest)
     tolerances = QUICK_TOLERANCES if quick else TOLERANCES
     independent = peer(one, index, drive, span, QUICK_TIGHTEST if quick else TIGHTEST)[0]
     runs = [peer(one, index, drive, span, tolerance) for tolerance in tolerances]
     lines += [
-        line,
         ErrorCurve(line.case, "boom_twin", "independent", steps, errors(tracks, independent), line.seconds),
         ErrorCurve(
             line.case, "SciPy", "independent", tolerances, errors([track for track, _ in runs], independent),
             tuple(seconds for _, seconds in runs),
         ),
     ]  # fmt: skip
-    return Convergence(tuple(lines), errors([own], independent)[0], span)
+    return Convergence(tuple(lines), span)
 
 
 def _stopped(scene: Scene, only: int | None) -> StopMotion:
@@ -97,11 +95,11 @@ def _stopped(scene: Scene, only: int | None) -> StopMotion:
 
 def _own(
     case: str, scene: Scene, drive: StopMotion, span: float, steps: tuple[float, ...], finest: float
-) -> tuple[ErrorCurve, MotionRows, list[MotionRows]]:
+) -> tuple[ErrorCurve, list[MotionRows]]:
     runs = [_fastest(scene, drive, span, step) for step in (*steps, finest)]
     tracks = [_track(run) for run in runs]
     found = errors(tracks[:-1], tracks[-1])
-    return ErrorCurve(case, "boom_twin", "own", steps, found, tuple(run.seconds for run in runs[:-1])), tracks[-1], tracks[:-1]
+    return ErrorCurve(case, "boom_twin", "own", steps, found, tuple(run.seconds for run in runs[:-1])), tracks[:-1]
 
 
 def _fastest(scene: Scene, drive: StopMotion, span: float, step: float) -> MethodRun:

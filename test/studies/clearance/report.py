@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from boom_twin import Scene
 from boom_twin.scene.schema import IDEAL_BELOW
 from boom_twin.system.atomic_files import write_atomic
-from boom_twin.validation.study.report import page, table, write_json
+from boom_twin.validation.study.report import page, table
 
 from . import convergence as near
 from .convergence import MEASURES, Convergence, convergence
@@ -43,7 +41,7 @@ def report(scene: Scene, swings: list[Swing], shifts: list[Shift], found: Conver
     parts = [
         "# Play in the pins",
         f"{len(block.pins)} pins have a radial clearance of {sizes} um. Contact law: {block.contact.law}, restitution "
-        f"{block.contact.restitution:g}. `make study` writes all numbers.",
+        f"{block.contact.restitution:g}.",
         *_stops(swings), *_rests(shifts), *_convergence(found), *_costs(costs),
         "Limits: one motion per posture.",
     ]  # fmt: skip
@@ -111,47 +109,22 @@ NOTE = "surrogate parameters; computed, not measured on a rig"
 SHOWN = 3.0  # s after the stop
 
 
-@dataclass(frozen=True)
-class Study:
-    """All that is reported."""
-
-    swings: list[Swing]
-    shifts: list[Shift]
-    convergence: Convergence
-    costs: list[Cost]
-
-
 def write(scene: Scene, out: Path, quick: bool = False) -> list[Path]:
-    """Measure, and write ``clearance.json``, ``clearance.md`` and pictures into `out`; returns their paths.
+    """Measure, and write ``clearance.md`` and pictures into `out`; returns their paths.
 
     The pins are those of the scene, or else the package's. Stops and rests are in all postures of the scene.
     """
     scene, postures = with_play(scene), tuple(scene.postures)
-    found = Study(
+    stops, rests = (
         swings(scene, postures, QUICK_HOLD if quick else HOLD),
         shifts(scene, postures, QUICK_COUNT if quick else COUNT),
-        convergence(scene, quick),
-        costs(scene, quick),
     )
-    paths = [out / f"clearance{part}" for part in (".json", ".md", ".png", "_static.png", "_convergence.png")]
-    write_json(paths[0], as_json(found))
-    text = report(scene, found.swings, found.shifts, found.convergence, found.costs)
-    write_atomic(paths[1], text)
-    traces = [Trace(own.posture, own.model, own.times, own.height, own.acceleration) for own in found.swings]
-    swing_picture(paths[2], "The tip after a stop: ideal pins, contact, linearised pins", NOTE, traces, SHOWN)
-    sinking = [RestOffsetCurve(own.posture, own.pin, own.clearances, own.shifts) for own in found.shifts]
-    sinking_picture(paths[3], "The resting tip with play in the pin of one rod", NOTE, sinking, IDEAL_BELOW)
-    convergence_picture(paths[4], "Motions with play: error against run time", NOTE, found.convergence)
+    found = convergence(scene, quick)
+    paths = [out / f"clearance{part}" for part in (".md", ".png", "_static.png", "_convergence.png")]
+    write_atomic(paths[0], report(scene, stops, rests, found, costs(scene, quick)))
+    traces = [Trace(own.posture, own.model, own.times, own.height, own.acceleration) for own in stops]
+    swing_picture(paths[1], "The tip after a stop: ideal pins, contact, linearised pins", NOTE, traces, SHOWN)
+    sinking = [RestOffsetCurve(own.posture, own.pin, own.clearances, own.shifts) for own in rests]
+    sinking_picture(paths[2], "The resting tip with play in the pin of one rod", NOTE, sinking, IDEAL_BELOW)
+    convergence_picture(paths[3], "Motions with play: error against run time", NOTE, found)
     return paths
-
-
-def as_json(found: Study) -> dict[str, Any]:
-    """All numbers but the traces, SI units."""
-    traces = ("times", "height", "acceleration")
-    return {
-        "stops": [{key: value for key, value in asdict(own).items() if key not in traces} for own in found.swings],
-        "rests": [asdict(own) | {"jump": own.jump, "ratios": own.ratios} for own in found.shifts],
-        "convergence": {"span_s": found.convergence.span, "lines": [asdict(line) for line in found.convergence.lines]},
-        "references_differ": dict(zip(MEASURES, found.convergence.apart, strict=True)),
-        "costs": [asdict(own) for own in found.costs],
-    }

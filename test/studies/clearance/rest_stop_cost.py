@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from reference.worn_pin import geometry
 from studies.stops import StopMotion, halt
 
 from boom_twin import Scene, statics
@@ -33,9 +32,7 @@ class Shift:
     clearances: np.ndarray  # (k,), m
     shifts: np.ndarray  # (k,), m, distance of the tips
     penetrations: np.ndarray  # (k,), m, how far the journal presses into the bush
-    force: float  # N, of the pin at the last clearance
-    lever: float  # the tip's way for the cylinder's, of the rigid boom's geometry
-    loaded: float  # the same of the loaded elastic boom with ideal pins
+    loaded: float  # the tip's way for the cylinder's, of the loaded elastic boom with ideal pins
 
     @property
     def jump(self) -> float:
@@ -50,25 +47,23 @@ class Shift:
 
 def shifts(scene: Scene, postures: tuple[str, ...], count: int = COUNT) -> list[Shift]:
     """Every cylinder in every posture."""
-    document, contact = scene.model_dump(exclude_none=True), treated(scene, "contact")
-    found = []
+    contact, found = treated(scene, "contact"), []
     for posture in postures:
-        tip, joints = _rest(ideal(scene), posture)[:2]
-        levers = np.abs(geometry.levers(document, np.cumsum(joints)))
-        for i, lever in enumerate(levers.tolist()):
-            found.append(_shift(contact, posture, i, (lever, _loaded(ideal(scene), posture, i)), tip, count))
+        tip = _rest(ideal(scene), posture)[0]
+        for i in range(len(scene.joints)):
+            found.append(_shift(contact, posture, i, _loaded(ideal(scene), posture, i), tip, count))
     return found
 
 
-def _shift(scene: Scene, posture: str, index: int, levers: tuple[float, float], tip: np.ndarray, count: int) -> Shift:
+def _shift(scene: Scene, posture: str, index: int, loaded: float, tip: np.ndarray, count: int) -> Shift:
     clearances = np.geomspace(WIDEST, IDEAL_BELOW, count)
     clearances[-1] = IDEAL_BELOW
     name = f"cylinder_{index + 1}.rod"
     rests = [_rest(with_pins(scene, [pin_like(scene, name, float(c))]), posture) for c in clearances]
-    pins = np.array([pin[0] for _, _, pin in rests])
+    pins = np.array([pin[0] for _, pin in rests])
     return Shift(
-        posture, name, clearances, np.array([np.hypot(*(own - tip)) for own, _, _ in rests]),
-        np.hypot(pins[:, 0], pins[:, 1]) - clearances, float(pins[-1, 2]), *levers,
+        posture, name, clearances, np.array([np.hypot(*(own - tip)) for own, _ in rests]),
+        np.hypot(pins[:, 0], pins[:, 1]) - clearances, loaded,
     )  # fmt: skip
 
 
@@ -78,11 +73,11 @@ def _loaded(scene: Scene, posture: str, index: int) -> float:
     return float(np.hypot(*(ways[1] - ways[0])) / (2.0 * NUDGE))
 
 
-def _rest(scene: Scene, posture: str, more: float | np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Tip (2,) in m, joint angles (n,) in rad, pins (k, 4) as in `compiler.plan`."""
+def _rest(scene: Scene, posture: str, more: float | np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Tip (2,) in m, pins (k, 4) as in `compiler.plan`."""
     plan, state, _ = rest_at(scene, strokes_of_posture(scene, posture) + more, posture_angles(scene, posture))
     found = taken_apart(plan, first_row(plan, state))
-    return found.tip[0, :2], found.joints, found.pins
+    return found.tip[0, :2], found.pins
 
 
 STEP = 1e-3  # s
@@ -102,7 +97,6 @@ class Swing:
     acceleration: np.ndarray  # (m,), m/s^2, vertical
     rest: float  # m, height at rest at the end
     peak: float  # m, largest distance from that rest after the stop
-    rms: float  # m, root mean square of that distance
     effective: float  # m/s^2, root mean square of the vertical acceleration after the stop
 
 
@@ -132,7 +126,7 @@ def _swing(posture: str, model: str, moved: MethodRun, drive: StopMotion, rest: 
     off = height[after] - (rest if model != "spring-damper" else float(np.mean(height[after])))
     peak = float(np.abs(off).max())
     effective = float(np.sqrt(np.mean(acceleration[after] ** 2)))
-    return Swing(posture, model, times, height, acceleration, rest, peak, float(np.sqrt(np.mean(off**2))), effective)
+    return Swing(posture, model, times, height, acceleration, rest, peak, effective)
 
 
 GENTLE, QUICK_GENTLE = 2.0, 0.2  # s

@@ -16,7 +16,7 @@ from boom_twin.analysis.motions import motion_of
 from boom_twin.compiler.compile import BasisName, compile_scene
 from boom_twin.scene.kinematics import posture_angles, skeleton, strokes_of_posture
 from boom_twin.system.atomic_files import write_atomic
-from boom_twin.validation.study.report import page, table, write_json
+from boom_twin.validation.study.report import page, table
 
 from .boundary_zeros import BoundaryZero, equilibrium, frequencies
 from .low_speed import error_by_speed
@@ -37,7 +37,6 @@ class MatrixCheck:
     """One step size: difference from the sweep by substructure; error of the base force by the product."""
 
     step: float
-    names: tuple[str, ...]
     differences: tuple[float, ...]
     base_error: float
 
@@ -90,7 +89,7 @@ def _matrices(scene: Scene, step: float) -> MatrixCheck:
     first = boundary_solution(own)
     right = own[0].inlet
     error = float(np.abs(first[4:] - right[4:]).max() / np.abs(right[4:]).max())
-    return MatrixCheck(step, tuple(one.name for one in own), differences, error)
+    return MatrixCheck(step, differences, error)
 
 
 def _bases(scene: Scene, posture: str) -> BasisRow:
@@ -123,17 +122,16 @@ def _let_go(scene: Scene, posture: str) -> tuple[LetGoTrace, ...]:
 
 
 def write(scene: Scene, out: Path, quick: bool = False) -> list[Path]:
-    """Measure, and write ``papers.json``, ``papers.md`` and two pictures into the folder `out`; returns their paths.
+    """Measure, and write ``papers.md`` and two pictures into the folder `out`; returns their paths.
 
     `quick`: only the first posture, and few speeds.
     """
     found = measure(scene, list(scene.postures)[: 1 if quick else None], quick)
-    paths = [out / name for name in ("papers.json", "papers.md", "papers_postures.png", "papers_low_speed.png")]
-    write_json(paths[0], _numbers(found))
-    write_atomic(paths[1], as_markdown(found))
-    posture_picture(paths[2], "A stop in the papers' postures", NOTE, "Exudyn", [*_traces(found.stops)])
+    paths = [out / name for name in ("papers.md", "papers_postures.png", "papers_low_speed.png")]
+    write_atomic(paths[0], as_markdown(found))
+    posture_picture(paths[1], "A stop in the papers' postures", NOTE, "Exudyn", [*_traces(found.stops)])
     low_speed_picture(
-        paths[3], "Let go from the undeflected posture; the low-speed form", NOTE, found.speeds[:, 0], found.speeds[:, 1],
+        paths[2], "Let go from the undeflected posture; the low-speed form", NOTE, found.speeds[:, 0], found.speeds[:, 1],
         list(found.let_go),
     )  # fmt: skip
     return paths
@@ -145,30 +143,6 @@ def _traces(stops: Sequence[Comparison]) -> list[StopTrace]:
         return StopTrace(run.posture, run.pins, program, run.times, rise, run.acceleration[:, 1], 1e-3 * run.forces[:, 0])
 
     return [trace(run, program) for stop in stops for run, program in ((stop.own, "own"), (stop.peer, "peer"))]
-
-
-def _numbers(found: PapersStudy) -> dict[str, object]:
-    """All numbers but the traces, SI."""
-    return {
-        "matrices": found.matrices,
-        "zeros": found.zeros,
-        "frequencies_bisected_Hz": found.bisected,
-        "bases": found.bases,
-        "low_speed": {"tip_m_s": found.speeds[:, 0], "error_max_m": found.speeds[:, 1], "error_rms_m": found.speeds[:, 2]},
-        "stops": [
-            {
-                "posture": s.own.posture,
-                "pins": s.own.pins,
-                "until_s": s.flight,
-                "tip_rms_m": s.tip,
-                "tip_rms_throughout_m": s.tip_throughout,
-                "forces": s.forces,
-                "acceleration": s.acceleration,
-                "penetration": s.penetration,
-            }
-            for s in found.stops
-        ],
-    }
 
 
 def slope(found: PapersStudy) -> float:

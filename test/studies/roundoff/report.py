@@ -15,7 +15,7 @@ from boom_twin.analysis.simulate import RHO
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.validation.study import scene_changes as made
 from boom_twin.validation.study.long_booms import long_boom, seven_sections
-from boom_twin.validation.study.report import page, table, write_json
+from boom_twin.validation.study.report import page, table
 from boom_twin.validation.study.stability.cases import short
 from boom_twin.validation.study.stability.setups import smooth
 
@@ -126,16 +126,15 @@ def _rows(scene: Scene, step: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def write(scene: Scene, out: Path, quick: bool = False) -> list[Path]:
-    """Measure, and write ``roundoff.json``, ``roundoff.md`` and ``roundoff.png`` into `out`; returns their paths."""
+    """Measure, and write ``roundoff.md`` and ``roundoff.png`` into `out`; returns their paths."""
     lost, turned = losses(scene, quick), turn_up(scene, tuple(step for step in TURN_UP_STEPS if step >= FINE or not quick))
-    paths = [out / f"roundoff.{kind}" for kind in ("json", "md", "png")]
-    write_json(paths[0], {"losses": lost, "turn_up": turned})
-    write_atomic(paths[1], text(lost, turned))
+    paths = [out / f"roundoff.{kind}" for kind in ("md", "png")]
+    write_atomic(paths[0], text(lost, turned))
     chain = [loss for loss in lost if loss.group == "sections"]
     shown = {"Riccati": "riccati", "plain product": "plain", "LU of the whole system": "dense"}
     digits_lost = {name: np.array([digits(getattr(loss.step, key)) for loss in chain]) for name, key in shown.items()}
     counts = np.array([loss.value for loss in chain])
-    roundoff_picture(paths[2], "Round-off", turned.steps, turned.errors, TARGET, counts, digits_lost)
+    roundoff_picture(paths[1], "Round-off", turned.steps, turned.errors, TARGET, counts, digits_lost)
     return paths
 
 

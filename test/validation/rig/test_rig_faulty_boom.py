@@ -13,7 +13,7 @@ from boom_twin import Scene, load_scene
 from boom_twin.errors import UsageError
 from boom_twin.scene.edit import parameter, parameter_names
 from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.validation.rig import Move, Programme, Sensors, at_rest, move, record, simulate, statics
+from boom_twin.validation.rig import Move, Programme, Sensors, record, simulate, statics
 from boom_twin.validation.rig.faults import parse
 from boom_twin.validation.rig.faulty_boom import changes, with_faults, wrong_by
 
@@ -22,14 +22,6 @@ def ratios(changed: Scene, scene: Scene) -> dict[str, float]:
     """New over old of every parameter that has a name and is not 0."""
     names = [name for name in parameter_names(scene) if parameter(scene, name)]
     return {name: parameter(changed, name) / parameter(scene, name) for name in names}
-
-
-@pytest.mark.parametrize("text", ["cylinder_2.k:softer:0.3", "section_3.EI:softer:0.2"])
-def test_softer_by_its_share(text):
-    scene, fault = load_scene(), parse(text)
-    changed = ratios(with_faults(scene, [fault]), scene)
-    assert changed.pop(fault.cause) == pytest.approx(1.0 - fault.size)
-    assert set(changed.values()) == {1.0}
 
 
 def test_faults_add_to_what_is_there(cantilever):
@@ -63,36 +55,6 @@ def test_changes_over_a_time_to_the_equilibrium_of_the_changed_boom_and_back(tex
     for first, last, expected in ((5.0, 7.0, faulty), (11.5, 13.0, healthy)):
         found = tip[(times > first) & (times < last)].mean(axis=0)
         assert np.hypot(*(found - expected)) < 0.03 * moved, (first, moved)
-
-
-def test_a_fault_that_ends_is_there_at_first():
-    scene, fault = load_scene(), parse("cylinder_2.k:softer:0.4@0..4")
-    start, ((other, share),) = changes(scene, [fault, parse("tip.payload:more:5")])
-    assert start == with_faults(scene, [fault, parse("tip.payload:more:5")])
-    assert parameter(other, "cylinder_2.k") == parameter(scene, "cylinder_2.k") and other.tip.payload == 5.0
-    assert share(np.array([0.0, 3.9, 4.0, 9.0])).tolist() == [0.0, 0.0, 1.0, 1.0]
-
-
-def test_a_boom_that_was_loaded_and_changed_moves_as_before():
-    """A boom at rest may be moved from there any number of times."""
-    scene, fault = load_scene(), parse("cylinder_2.k:softer:0.4@0.1+0.1")
-    start, changing = changes(scene, [fault])
-    strokes = strokes_of_posture(scene, "arch")
-    programme, resting = Programme(tuple(strokes), (Move(0, 0.1, 0.3, strokes[0] + 0.01),)), at_rest(start, strokes, 4)
-    plain, _ = move(resting, programme, 0.5, 5e-3, 5e-3)
-    push = {"load": lambda times: np.outer(np.minimum(times, 1.0), [0.0, 1000.0]), "changes": changing}
-    changed, _ = move(resting, programme, 0.5, 5e-3, 5e-3, **push)
-    again, _ = move(resting, programme, 0.5, 5e-3, 5e-3)
-    assert again["tip_y_m"] == pytest.approx(plain["tip_y_m"], abs=1e-7)
-    assert np.abs(changed["tip_y_m"] - plain["tip_y_m"]).max() > 1e-3
-
-
-def test_a_lumped_boom_does_not_change(one_rigid):
-    scene = Scene.model_validate(one_rigid)
-    start, changing = changes(scene, [parse("cylinder_1.k:softer:0.4@1")])
-    resting = at_rest(start, np.array([0.5]), 4, lumped=True)
-    with pytest.raises(UsageError, match="lumped boom cannot change"):
-        move(resting, Programme((0.5,), ()), 0.1, 1e-3, 1e-3, changes=changing)
 
 
 def test_stamps_and_noise_do_not_see_the_fault(one_rigid):

@@ -75,18 +75,6 @@ def test_spikes_and_dropouts_come_as_often_as_they_say(healthy):
     assert np.isnan(spoilt(healthy, "joint_1.sensor:dropout:1")[1]).all()
 
 
-def test_late_angles_keep_their_values(healthy):
-    session, _, _ = spoilt(healthy, "joint_angles.delay:late:0.03")
-    late = session.angle_stamps - healthy.stamps
-    assert np.array_equal(late, np.where(healthy.truth["t"] >= ONSET, 30_000_000, 0))
-    assert all(np.array_equal(getattr(session, name), getattr(healthy, name)) for name in ARRAYS[:-1])
-    samples = samples_of(*(getattr(session, name) for name in ARRAYS))
-    stamps = [sample.stamp for sample in samples]
-    assert stamps == sorted(stamps) and len(samples) == 6000
-    angles = [sample.stamp for sample in samples if sample.stream is Stream.ANGLES]
-    assert angles == session.angle_stamps.tolist()
-
-
 def test_faults_come_on_over_their_ramp_and_go(healthy):
     times = healthy.truth["t"]
     share = np.interp(times, [2.0, 4.0, 6.0, 8.0], [0.0, 1.0, 1.0, 0.0])

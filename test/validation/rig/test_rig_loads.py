@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin import Scene, load_scene, statics
+from boom_twin import load_scene, statics
 from boom_twin.errors import UsageError
 from boom_twin.scene.edit import with_parameters
 from boom_twin.scene.kinematics import strokes_of_posture
@@ -115,29 +115,3 @@ def test_a_constant_load_is_borne_as_a_payload_is():
     assert np.hypot(*moved) > 0.02 and np.abs(more).max() > 5000.0
     assert tip[held].mean(axis=0) - tip[0] == pytest.approx(moved, abs=0.01 * np.hypot(*moved))
     assert forces[held].mean(axis=0) - forces[0] == pytest.approx(more, abs=0.01 * np.abs(more).max())
-
-
-def test_moments_about_the_pivot_balance(one_rigid):
-    """One rigid section under a load of both directions: by hand, from the true cylinder force and posture."""
-    scene, load = Scene.model_validate(one_rigid), np.array([250.0, -400.0])
-    rows = simulate(scene, Programme((0.5,), ()), 1.0, 1e-3, 1e-3, load=lambda times: np.outer(ease(times / 0.2), load))
-    angle = rows["joint_1_rad"]
-    tip = 3.0 * np.column_stack([np.cos(angle), np.sin(angle)])
-    c, s = np.cos(angle), np.sin(angle)
-
-    def place(x, y):
-        return np.column_stack([c * x - s * y, s * x + c * y])
-
-    def moment(at, force):
-        return at[:, 0] * force[:, 1] - at[:, 1] * force[:, 0]
-
-    pivot, pin, centre = np.array(scene.base.pivot), place(*one_rigid["sections"][0]["rod_pin"]), place(1.4, 0.1)
-    axis = np.array(scene.base.cylinder_pin) - pivot - pin
-    pull = rows["cylinder_force_1_N"][:, None] * axis / np.linalg.norm(axis, axis=1)[:, None]
-    push = np.outer(ease(rows["t_s"] / 0.2), load)
-    weight = np.tile([0.0, -40.0 * 9.81], (len(angle), 1))
-    inertia = 30.0 + 40.0 * (1.4**2 + 0.1**2)
-    total = moment(pin, pull) + moment(tip, push) + moment(centre, weight)
-    assert rows["tip_x_m"] - pivot[0] == pytest.approx(tip[:, 0], abs=1e-9)
-    assert total == pytest.approx(inertia * rows["tip_angular_acceleration_rad_s2"], abs=2.0)
-    assert np.abs(moment(tip, push)).max() > 1000.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -15,39 +14,8 @@ from boom_twin.errors import UsageError
 from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.schema import Clearance, Pin
 from boom_twin.validation.rig import Move, Programme, Scheme, at_rest, move
-from boom_twin.validation.rig.exudyn.probes import read
 
 REFERENCE = Path(__file__).parents[2] / "data" / "reference"
-
-
-def constraints(resting) -> int:
-    return len(resting.boom.system.systemData.GetAECoordinates())
-
-
-@pytest.mark.parametrize("posture", ["horizontal", "arch"])
-def test_rests_where_the_reference_rests(posture):
-    expected = json.loads((REFERENCE / "statics.json").read_text())[posture]
-    resting = at_rest(load_scene(), np.array(expected["stroke_m"]), 6, nodally_exact=True, lumped=True)
-    found = {name: values[-1] for name, values in read(resting.boom, resting.probes, at_rest=True).items()}
-    assert found["tip"] == pytest.approx(expected["tip_m"], abs=1.5e-4)
-    assert found["joints"] == pytest.approx(expected["joint_rad"], abs=2e-5)
-    assert found["forces"] == pytest.approx(expected["cylinder_force_N"], rel=4e-3)
-
-
-def test_moves_as_with_bodies_on_fewer_constraints():
-    scene = load_scene()
-    first = strokes_of_posture(scene, "arch")
-    drive = Programme(tuple(first), (Move(0, 0.0, 0.6, first[0] + 0.02), Move(2, 0.0, 0.6, first[2] + 0.02)))
-    rows = {}
-    for lumped in (False, True):
-        resting = at_rest(scene, first, 4, nodally_exact=True, lumped=lumped)
-        rows[lumped], _ = move(resting, drive, 1.0, 5e-3, 5e-3)
-        assert constraints(resting) == (17 if lumped else 58)
-    away = np.hypot(*(rows[True][name] - rows[False][name] for name in ("tip_x_m", "tip_y_m")))
-    assert np.sqrt(np.mean(away**2)) < 2e-4
-    assert np.ptp(rows[False]["tip_y_m"]) > 0.1
-    pairs = [[rows[lumped][name] for name in ("tip_ax_m_s2", "tip_ay_m_s2")] for lumped in (True, False)]
-    assert np.linalg.norm(np.subtract(*pairs)) < 0.02 * np.linalg.norm(pairs[1])
 
 
 @pytest.mark.parametrize(

@@ -9,18 +9,7 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin.validation.rig.sensors import Sensors, read, sampling_stamps, specific_force
-
-START = 1_700_000_000_000_000_000
-
-
-def test_stamps_lie_within_the_jitter_of_the_grid():
-    stamps = sampling_stamps(Sensors(), 20.0, START, np.random.default_rng(3))
-    off = (stamps - START) * 1e-9 - (np.arange(4000) + 0.5) / 200.0
-    assert stamps.dtype == np.int64
-    assert np.abs(off).max() <= 2e-4 + 1e-9
-    assert off.std() == pytest.approx(2e-4 / math.sqrt(3), rel=0.05)
-    assert abs(off.mean()) < 1e-5
+from boom_twin.validation.rig.sensors import read, specific_force
 
 
 @pytest.mark.parametrize(

@@ -23,19 +23,6 @@ def motion(one_rigid):
     return scene, simulate(scene, MOVE, 1.0, step=1e-3)
 
 
-def test_noise_free_session_is_the_truth(motion):
-    scene, rows = motion
-    session = observe(scene, MOVE, rows, noise_free(), seed=1)
-    assert session.joints.shape == (200, 1)
-    assert np.array_equal(session.joints, session.truth["joints"])
-    assert session.truth["drives"] == pytest.approx(MOVE((session.stamps - EPOCH) * 1e-9)[0], abs=1e-12)
-    assert np.array_equal(session.strokes, session.truth["strokes"])
-    angle = session.truth["joints"][:, 0]
-    assert session.truth["tip"] == pytest.approx(3.0 * np.column_stack([np.cos(angle), np.sin(angle)]), abs=1e-8)
-    resting = session.imu[session.truth["t"] < 0.2]
-    assert np.hypot(*resting.T) == pytest.approx(9.81, abs=1e-3)
-
-
 def test_transducers_read_lengths_with_the_oil_compressed(motion):
     """The closed form of the slider crank, and the law of the oil spring and its damper."""
     scene, rows = motion
@@ -48,14 +35,6 @@ def test_transducers_read_lengths_with_the_oil_compressed(motion):
     damping = (cylinder.d or 0.0) * np.gradient(extension[:, 0], session.truth["t"])[:, None]
     assert cylinder.k * extension + damping == pytest.approx(session.truth["forces"], abs=2.0)
     assert np.abs(extension).min() > 1e-5
-
-
-def test_stamps_do_not_depend_on_noise_but_on_the_seed(motion):
-    scene, rows = motion
-    noisy, clean = observe(scene, MOVE, rows, Sensors(), 1), observe(scene, MOVE, rows, noise_free(), 1)
-    assert np.array_equal(noisy.stamps, clean.stamps)
-    assert not np.array_equal(noisy.joints, clean.joints)
-    assert not np.array_equal(observe(scene, MOVE, rows, Sensors(), 2).stamps, clean.stamps)
 
 
 def test_truth_file_repeats_and_reads_back(motion, tmp_path):

@@ -70,21 +70,6 @@ def test_comments_and_layout_stay() -> None:
     assert changes(blocks, after) == ["-  mL: 4.0", "-  mR: 3.0"] and "# heavy" in after
 
 
-def test_a_key_that_is_there_gets_its_new_value_in_place() -> None:
-    text = default_text().replace("beta: 1.0e-3,", "beta: 1.0e-3, modes: 3,", 1)
-    after = rewritten(text, scene_of(text), [Edit(("sections", 0, "modes"), 1)])
-    assert after == text.replace("modes: 3", "modes: 1")
-
-
-def test_blocks_that_share_their_text_are_written_anew() -> None:
-    text = default_text().replace("barrel: {mass: 22.0", "barrel: &b {mass: 22.0", 1)
-    text = text.replace("barrel: {mass: 16.0, inertia: 0.7, com: 0.25}", "barrel: *b")
-    scene = scene_of(text)
-    for place in (("joints", 0, "cylinder", "barrel"), ("joints", 1, "cylinder", "barrel")):
-        after = scene_of(rewritten(text, scene, [Edit(place, None)]))
-        assert after.model_dump() == edited(scene, [Edit(place, None)]).model_dump()
-
-
 @pytest.mark.parametrize("one_of_a_kind", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_every_variant_of_the_default_scene_is_a_scene(tmp_path: Path, one_of_a_kind: bool) -> None:
     scene, text, path = load_scene(), default_text(), tmp_path / "variant.yaml"

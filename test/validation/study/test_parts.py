@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from studies.clearance.scenes import with_play
 
 from boom_twin import Scene, statics
 from boom_twin.reduction import deviation
-from boom_twin.reduction.variants import KINDS, Variant, variants, without
-from boom_twin.scene.edit import Edit
+from boom_twin.reduction.variants import variants
 from boom_twin.validation.study import parts
 
 
@@ -42,39 +39,6 @@ def test_its_numbers_are_those_of_the_edited_scene(found: parts.PartsStudy, two_
     off = [np.linalg.norm(statics(two_sections, posture=n).tip - statics(hard, posture=n).tip) for n in ("arch", "low")]
     assert part.deviation.rest == pytest.approx(max(off), rel=1e-6)
     assert part.unknowns == found.unknowns
-
-
-def test_what_leaves_more_out_has_less_unknowns(found: parts.PartsStudy) -> None:
-    unknowns = {part.variant.name: part.unknowns for part in found.parts}
-    assert unknowns["all sections rigid"] < unknowns["all sections with modes: 1"] < unknowns["all sections with modes: 2"]
-    assert unknowns["all sections with modes: 2"] < found.unknowns < unknowns["all sections with modes: 4"]
-
-
-def test_a_part_that_is_not_there_cannot_be_left_out(two_sections: Scene) -> None:
-    for kind in KINDS:
-        variant = without(two_sections, kind, [0, 1])
-        assert variant is not None
-        assert without(variant.of(two_sections), kind, [0, 1]) is None
-
-
-def test_pins_with_play_can_be_made_ideal(two_sections: Scene) -> None:
-    worn = with_play(two_sections)
-    made = next(variant for variant in variants(worn) if variant.kind == "clearance")
-    assert made.of(worn) == two_sections and str(made.edits[0]) == "remove clearance"
-    assert all(variant.kind != "clearance" for variant in variants(two_sections))
-
-
-def test_a_model_that_fails_has_a_status_and_no_numbers(two_sections: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
-    course = deviation.course_of(two_sections)
-    good = deviation.answer(two_sections, course, deviation.FREQUENCIES)
-    answers = iter([good, replace(good, status="a sentence", frequencies=np.zeros(0))])
-    monkeypatch.setattr(parts, "variants", lambda _: (Variant("without all", "test", (Edit(("modes",), 1),)),))
-    monkeypatch.setattr(parts, "answer", lambda *_: next(answers))
-    result = parts.measure(two_sections, deviation.course_of(two_sections), rounds=1)
-    failed = next(part for part in result.parts if part.variant.name == "without all")
-    assert failed.status == "a sentence" and np.isinf(failed.deviation.worst)
-    row = next(line for line in parts.as_markdown(result).splitlines() if "without all" in line)
-    assert "a sentence" in row and "nan" not in row and "inf" not in row
 
 
 def test_the_files(found: parts.PartsStudy, two_sections: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

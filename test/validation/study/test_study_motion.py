@@ -9,7 +9,6 @@ from oracle.conftest import random_scene
 
 from boom_twin import load_scene
 from boom_twin.analysis.motions import TURN, motion_of
-from boom_twin.errors import UsageError
 from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 
@@ -22,11 +21,6 @@ def test_default_boom_moves_as_in_the_documentation():
     assert strokes[1] - strokes[0] == pytest.approx([0.025, 0.0, 0.015, 0.0])
     assert strokes[3] - strokes[0] == pytest.approx([0.05, 0.0, 0.03, 0.0])
     assert not rates[[0, 2, 3]].any()
-
-
-def test_changed_modes_change_no_motion():
-    scene = load_scene()
-    assert np.array_equal(motion_of(scene.model_copy(update={"modes": 6})).travel, motion_of(scene).travel)
 
 
 SCENES = [*(booms.random_boom(seed) for seed in range(10)), *(random_scene(seed) for seed in range(10))]
@@ -45,14 +39,3 @@ def test_motion_stays_inside(scene):
     assert np.all(np.abs(turned[motion.travel == 0.0]) < 1e-7)
     halvings = np.log2(TURN / np.abs(turned[moved]))
     assert halvings == pytest.approx(np.round(halvings), abs=1e-4) and np.all(halvings < 3.5)
-
-
-def test_rates_are_the_derivative_of_strokes():
-    motion, times, h = motion_of(load_scene()), np.linspace(0.01, 2.0, 37), 1e-5
-    (ahead, _), (behind, _) = motion(times + h), motion(times - h)
-    assert (ahead - behind) / (2 * h) == pytest.approx(motion(times)[1], abs=1e-8)
-
-
-def test_posture_that_is_not_there_is_refused():
-    with pytest.raises(UsageError, match="posture = 'nowhere'"):
-        motion_of(load_scene(), "nowhere")
