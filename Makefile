@@ -14,7 +14,7 @@ unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE _ROS_WHEELS_BOOTSTRAP_COM
 WORKERS ?= 3
 PARALLEL = -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
-.PHONY: help setup warm demo demo-live test lint test-system test-extra ament client study gate soak fuzz session figures docs clean
+.PHONY: help setup warm demo demo-live test lint test-system test-extra ament client study gate soak fuzz session figures measured docs clean
 
 help:
 	@echo "make demo        play two recorded sessions, a quiet one and one with pump and wind, through the live node, show what it predicted"
@@ -28,6 +28,7 @@ help:
 	@echo "make fuzz        broken and hostile scenes, sessions and messages at random, 10 minutes: SECONDS=600 SEED=1"
 	@echo "make session     make the bundled sessions anew on the virtual rig, into out/arch_session and out/pump_session"
 	@echo "make figures     make the pictures of the documentation anew"
+	@echo "make measured    docs/measured.md and the figures of README: quick ones anew, others as benches left them in out/bench (2 minutes)"
 	@echo "make docs        the documentation as a site with the API reference, into out/site"
 
 setup: $(READY)
@@ -118,6 +119,9 @@ session: $(READY)
 
 figures: $(READY)
 	$(BIN)/python docs/figures.py
+
+measured: warm
+	$(BIN)/python test/bench/measured.py --cold
 
 # The notice that is turned off tells of the theme's end of life (May 2027), hence the upper bounds in setup.py.
 docs: $(READY)

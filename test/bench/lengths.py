@@ -1,4 +1,4 @@
-"""Prediction and estimate from cylinder lengths against the virtual rig (synthetic): the table of docs/lengths.md.
+"""Prediction and estimate from cylinder lengths against the virtual rig (synthetic): rows of docs/measured.md.
 
     python test/bench/lengths.py --out out/lengths [--only NAME ..]
 
@@ -13,6 +13,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+from record import keep
 
 from boom_twin import replay
 from boom_twin.cli.main import main as boom_twin
@@ -75,11 +76,14 @@ def main() -> None:
         "| session | predicted: tip, mm | acceleration | estimated: tip, mm | acceleration | over stated: tip | acceleration |"
     )
     print("|---|---|---|---|---|---|---|")
+    found: dict[str, list[float]] = {}
     for name in arguments.only:
         folder = arguments.out / name.replace(" ", "_").replace(",", "").replace("%", "percent").replace("/", "_")
         if not folder.exists():
             boom_twin(["rig", "--out", str(folder), "--random", arguments.posture, "--duration", str(SECONDS), *CASES[name]])
-        print(f"| {name} | " + " | ".join(f"{value:.3g}" for value in row_of(folder)) + " |", flush=True)
+        found[name] = row_of(folder)
+        print(f"| {name} | " + " | ".join(f"{value:.3g}" for value in found[name]) + " |", flush=True)
+    keep("lengths", found)
 
 
 if __name__ == "__main__":

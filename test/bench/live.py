@@ -38,6 +38,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
+from record import keep
 from sensor_msgs.msg import Imu, JointState
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -260,9 +261,11 @@ def main() -> None:
     words = ["even"] * args.even + ["imu"] * args.imu
     with isolated():
         runs = [compared(args.rate, args.duration, words, rest) for _ in range(args.runs)]
-    for name in runs[0]:
+    medians = {name: statistics.median(each[name] for each in runs) for name in runs[0]}
+    keep(f"live_{args.rate:g}", medians)
+    for name, middle in medians.items():
         values = [each[name] for each in runs]
-        print(f"{name:26s} {statistics.median(values):10.3f}   ({', '.join(f'{value:.3f}' for value in values)})")
+        print(f"{name:26s} {middle:10.3f}   ({', '.join(f'{value:.3f}' for value in values)})")
     print(f"load of the machine, 1 min {os.getloadavg()[0]:10.2f}")
 
 

@@ -20,6 +20,7 @@ from typing import Any
 
 from aiohttp import ClientSession, web
 from playwright.sync_api import sync_playwright
+from record import keep
 
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.access_control import AccessControl
@@ -105,13 +106,16 @@ def heap(page: Any) -> float:
 
 def one_page(page: Any, seconds: int) -> bool:
     """Frames, delay and memory of one page in four parts of that time; whether memory stays, and half the frames come."""
-    found, heaps = [], []
+    found, heaps, words = [], [], []
     for _ in range(4):
         (frames,) = watch([page], max(seconds // 4, 5))
         found += frames
         heaps.append(heap(page))
-        words = page.locator("#connection").inner_text()
-        print(f"one page: {median(frames):.0f} frames/s median, {min(frames)} worst second; {words}; heap {heaps[-1]:.2f} MiB")
+        words.append(page.locator("#connection").inner_text())
+        print(
+            f"one page: {median(frames):.0f} frames/s median, {min(frames)} worst second; {words[-1]}; heap {heaps[-1]:.2f} MiB"
+        )
+    keep("monitor", {"seconds": seconds, "frames_per_s": median(found), "said": words, "heap_rise_MiB": heaps[-1] - heaps[0]})
     return median(found) >= 30 and heaps[-1] - heaps[0] <= LARGEST
 
 

@@ -22,6 +22,7 @@ from typing import TextIO
 
 import numpy as np
 from live import memory
+from record import keep
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -54,6 +55,7 @@ def main() -> int:
     due = {"tip/position": found.sent, "residuals": 2 * found.sent - 1}  # of strokes, but for the first, and of angles
     lost = {name: count - found.heard[name] for name, count in due.items()}
     print(f"{found.sent} samples sent; without prediction {lost['tip/position']}, without residuals {lost['residuals']}")
+    keep(f"soak_{args.rate:g}", {"seconds": len(rows), "sent": found.sent, "lost": sum(lost.values()), "rise_MB": rise})
     print(f"{len(found.log)} lines in the log, fewer than {LINES} wanted; the last:", *found.log[-5:], sep="\n")
     return 0 if rise <= LARGEST and not any(lost.values()) and len(found.log) < LINES else 1
 

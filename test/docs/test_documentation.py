@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import re
 from pathlib import Path
 
@@ -20,7 +21,6 @@ ADDS = "extending.md"
 FENCED = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 NOT_OF_NOW = ("CHANGELOG.md", ADDS)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
-NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e-?\d+)?")
 
 
 def text_of(name: str) -> str:
@@ -56,13 +56,32 @@ def test_every_page_stands_in_the_navigation() -> None:
     assert sorted(listed) == sorted([*written, "CHANGELOG.md", "CONTRIBUTING.md", "notation.md", "settings.md"])
 
 
-def test_readme_is_short_and_its_figures_stand_in_the_docs() -> None:
+def table_of(page: str) -> list[list[str]]:
+    """Of all tables of a text, the cells of each row but heads."""
+    rows = [line.strip("| ").split(" | ") for line in re.findall(r"^\|.*\|$", page, re.MULTILINE)]
+    return [row for row in rows if row[0] != "what" and not row[0].startswith("---")]
+
+
+def test_readme_is_short_and_its_figures_are_those_measured() -> None:
     readme = text_of("README.md")
     assert len(readme.splitlines()) <= 100
-    rows = [row.split("|")[2] for row in re.findall(r"^\|.*\|$", readme.partition("## What was measured")[2], re.MULTILINE)[2:]]
-    assert len(rows) >= 8
-    known = set(NUMBER.findall(text_of("docs/measured.md")))
-    assert {number for row in rows for number in NUMBER.findall(row)} <= known
+    measured = table_of(text_of("docs/measured.md"))
+    told = table_of(readme.partition("## What was measured")[2])
+    assert len(told) >= 8 and [row for row in told if row not in [each[:2] for each in measured]] == []
+
+
+def test_every_measured_row_says_how_and_when_and_is_kept() -> None:
+    kept = json.loads(text_of("docs/measured.json"))
+    rows = [row for section in kept["sections"] for row in section["rows"]]
+    wanted = [[row[name] for name in ("what", "value", "bound", "command")] for row in rows]
+    measured = table_of(text_of("docs/measured.md"))
+    assert [row[:4] for row in measured] == wanted
+    assert len({row[0] for row in measured}) == len(measured)
+    assert all(
+        value and command and re.fullmatch(r"this run|[\d-]{10}, [0-9a-f]{7,}\+?", when)
+        for _, value, _, command, when in measured
+    )
+    assert re.search(r"^Measured on [\d-]{10} .* at commit \w+", text_of("docs/measured.md"), re.MULTILINE)
 
 
 def test_every_command_is_told_and_every_told_command_is_one() -> None:

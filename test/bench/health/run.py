@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from argparse import ArgumentParser
 from collections import defaultdict
 from dataclasses import replace
@@ -22,7 +23,10 @@ from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # files repeat bit for bit
 
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
 import numpy as np
+from bench.record import keep
 
 from boom_twin import Twin, load_scene
 from boom_twin.bag.session_files import samples_of
@@ -47,6 +51,8 @@ FAULTS = (
     "cylinder_{i}.k:softer:0.3",
 )  # fmt: skip
 
+SENSOR_FAILS = (":stuck", ":noisy:5", ":spikes:0.03", ":spikes:0.02", ":dropout:1", "sensor:bias:0.02")
+"""Ends of faults that the readings of a sensor show by themselves."""
 NEED_FORCES = ("cylinder_force", "tip.payload")
 
 
@@ -96,6 +102,23 @@ def row_of(number: int) -> dict[str, Any]:
     return drawn | {"alarms": found}
 
 
+def onsets(row: dict[str, Any]) -> list[float]:
+    """Return when the alarms of a row began, s."""
+    return [since for _, _, since, *_ in row["alarms"]]
+
+
+def counts(rows: list[dict[str, Any]]) -> dict[str, int]:
+    """Return how many sessions are healthy and have an alarm, and in how many a sensor fails and is reported from then on."""
+    healthy = [row for row in rows if not row["words"]]
+    failing = [row for row in rows if row["words"].endswith(SENSOR_FAILS)]
+    return {
+        "healthy": len(healthy),
+        "healthy with an alarm": sum(bool(row["alarms"]) for row in healthy),
+        "failing": len(failing),
+        "failing reported": sum(max(onsets(row), default=0.0) >= ONSET - 0.2 for row in failing),
+    }
+
+
 def table(rows: list[dict[str, Any]]) -> None:
     """Print healthy sessions by kind, and faults: how many are told, after which median time, and other alarms before them."""
     groups: dict[str, list[dict[str, Any]]] = defaultdict(list)
@@ -103,7 +126,7 @@ def table(rows: list[dict[str, Any]]) -> None:
         groups[row["words"] or f"healthy, {row['kind']}"].append(row)
     for name, own in sorted(groups.items()):
         is_fault = not name.startswith("healthy")
-        times = [[since for _, _, since, *_ in row["alarms"]] for row in own]
+        times = [onsets(row) for row in own]
         before = sum(min(each, default=ONSET) < ONSET - 0.2 for each in times) if is_fault else sum(map(bool, times))
         delays = [min(after) - ONSET for each in times if (after := [t for t in each if t >= ONSET - 0.2])]
         told = f", told in {len(delays)}, after {np.median(delays):.1f} s (median)" if is_fault and delays else ""
@@ -128,7 +151,9 @@ def main() -> None:
     with args.out.open("a") as file:
         for number in range(args.first, args.first + args.count):
             if number not in done:
-                print(json.dumps(row_of(number)), file=file, flush=True)
+                rows.append(row_of(number))
+                print(json.dumps(rows[-1]), file=file, flush=True)
+    keep("health", counts(rows))
 
 
 if __name__ == "__main__":
