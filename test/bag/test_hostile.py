@@ -148,7 +148,7 @@ def test_too_many_messages_out_of_order_are_not_held(bag: Path, monkeypatch: pyt
 
 
 def test_a_truth_that_unpacks_without_end_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(truth, "LARGEST", 10_000)
+    monkeypatch.setattr(truth, "LARGEST_TRUTH", 10_000)
     (tmp_path / truth.FILE_NAME).write_bytes(gzip.compress(b"t_s\n" + b"0\n" * 100_000))
     with pytest.raises(BagError, match="more than 10000 bytes unpacked"):
         truth.load_truth(tmp_path)
