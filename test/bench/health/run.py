@@ -2,9 +2,11 @@
 
     python test/bench/health/run.py --out out/health/rows.jsonl --count 100 [--first 0]
     python test/bench/health/run.py --out out/health/rows.jsonl --table
+    python test/bench/health/run.py --out out/health/causes.jsonl --causes --count 100
 
 Two of three rigs are 2 % wrong. Half of the sessions are healthy, the others have one fault from 15 s on. A row of the file has
-what is true of a session and every alarm; rows that are there already are not made again.
+what is true of a session and every alarm; rows that are there already are not made again. With --causes the twin names causes,
+the scene has a payload of 30 kg, and the faults are those of `CAUSES`.
 
 Six elements a section, exact at their nodes, with steps of 5 ms at a tolerance of 1e-4 agree with 16 elements and 0.5 ms (20 s
 of random moves) within 8e-6 rad rms in every joint, 0.09 mm and 0.007 m/s^2 at the tip.
@@ -32,6 +34,7 @@ from boom_twin import Twin, load_scene
 from boom_twin.bag.session_files import samples_of
 from boom_twin.health.alarms import Alarms
 from boom_twin.health.baseline import load_baseline
+from boom_twin.scene.edit import with_parameters
 from boom_twin.twin.blocks import ReportBlock, block_of
 from boom_twin.types import NANO
 from boom_twin.validation.rig import Scheme, Sensors, at_rest, move, observe, random_programme
@@ -53,17 +56,28 @@ FAULTS = (
 
 SENSOR_FAILS = (":stuck", ":noisy:5", ":spikes:0.03", ":spikes:0.02", ":dropout:1", "sensor:bias:0.02")
 """Ends of faults that the readings of a sensor show by themselves."""
+CAUSES = (
+    "cylinder_{i}.k:softer:{share}", "cylinder_{i}.k:softer:{share}@15+4", "cylinder_{i}.k:softer:{share}@0",
+    "section_{i}.EI:softer:{share}", "section_{i}.EI:softer:{share}@0", "tip.payload:more:20", "tip.payload:less:20",
+    "joint_{i}.sensor:bias:0.0035", "joint_{i}.sensor:bias:0.0052@15+30", "cylinder_{i}.sensor:bias:0.0007",
+    "cylinder_{i}.sensor:bias:0.003@15+30", "cylinder_force_{i}.sensor:bias:10000@15+5", "joint_angles.delay:late:0.02@0",
+)  # fmt: skip
+"""Faults whose cause is named, from `ONSET` on where they say no other time; the share that is lost is drawn."""
 NEED_FORCES = ("cylinder_force", "tip.payload")
 
 
-def row_of(number: int) -> dict[str, Any]:
+def row_of(number: int, causes: bool = False) -> dict[str, Any]:
     """Make the session of a number, replay it, and return what is true of it with every alarm."""
     rng, scene = np.random.default_rng([number, 17]), load_scene()
+    if causes:
+        scene = with_parameters(scene, {"tip.payload": 30.0})
     kind, i = str(rng.choice(KINDS)), int(rng.integers(1, 5))
-    words = str(rng.choice(FAULTS)) if number % 2 else ""
-    named = words.format(i=i) + ("" if "@" in words else f"@{ONSET:g}") if words else ""
+    words = str(rng.choice(CAUSES if causes else FAULTS)) if number % 2 else ""
+    share = round(float(np.random.default_rng([number, 36]).uniform(0.2, 0.4)), 2)
+    named = words.format(i=i, share=share) + ("" if "@" in words else f"@{ONSET:g}") if words else ""
     sensors, posture = Sensors(float(rng.choice([50.0, 100.0, 200.0]))), str(rng.choice(sorted(scene.postures)))
-    rig, streams = int(rng.integers(3)), ("imu", "forces")[: 2 if words.startswith(NEED_FORCES) else int(rng.integers(3))]
+    has_all, rig = causes or words.startswith(NEED_FORCES), int(rng.integers(3))
+    streams = ("imu", "forces")[: 2 if has_all else int(rng.integers(3))]
     loads = []
     if kind in ("pump", "both"):
         loads.append(PumpLoad(float(rng.uniform(0.2, 0.6)), float(np.exp(rng.uniform(np.log(30.0), np.log(250.0)))), onset=2.0))
@@ -80,14 +94,22 @@ def row_of(number: int) -> dict[str, Any]:
     rows, _ = move(resting, programme, DURATION, STEP, STEP, SCHEME, load, changing)
     seen = spoil(observe(boom, programme, rows, sensors, number, load), faults, number)
     imu, forces = (getattr(seen, name) if name in streams else None for name in ("imu", "forces"))
-    twin, alarms, first = Twin(scene, baseline=load_baseline()), Alarms(), int(seen.stamps[0])
+    twin, alarms = Twin(scene, baseline=load_baseline(), causes=causes), Alarms()
+    first = int(seen.stamps[0])
     samples = samples_of(seen.stamps, seen.strokes, seen.joints, imu, seen.angle_stamps, forces)
     for report in twin.update_block(block_of(samples, len(scene.joints))):
         for health in report.health.values() if isinstance(report, ReportBlock) else [each.health for each in report.all]:
             if health is not None:
                 alarms.take(health)
     found = [
-        [each.channel, each.kind, (each.since - first) * NANO, each.until and (each.until - first) * NANO, each.told]
+        [
+            each.channel,
+            each.kind,
+            (each.since - first) * NANO,
+            each.until and (each.until - first) * NANO,
+            each.told,
+            each.cause,
+        ]
         for each in alarms.all
     ]
     drawn = {
@@ -119,6 +141,22 @@ def counts(rows: list[dict[str, Any]]) -> dict[str, int]:
     }
 
 
+def named_in(row: dict[str, Any]) -> tuple[set[str], bool]:
+    """Return the causes that the alarms of a row name, and whether the true one is among them.
+
+    A stroke transducer that is off is named as the sensors of its joint.
+    """
+    true, named = row["fault"].partition(":")[0], {cause for *_, cause in row["alarms"] if cause}
+    return named, bool(named & {true, true.replace("cylinder_", "joint_")})
+
+
+def causes_named(rows: list[dict[str, Any]]) -> dict[str, int]:
+    """Return how many healthy and faulty sessions there are, and in how many a cause is named, and the right one."""
+    healthy, faulty = ([named_in(row) for row in rows if bool(row["words"]) is each] for each in (False, True))
+    found = {"healthy": len(healthy), "healthy named": sum(bool(named) for named, _ in healthy), "faulty": len(faulty)}
+    return found | {"faulty named": sum(bool(named) for named, _ in faulty), "right": sum(right for _, right in faulty)}
+
+
 def table(rows: list[dict[str, Any]]) -> None:
     """Print healthy sessions by kind, and faults: how many are told, after which median time, and other alarms before them."""
     groups: dict[str, list[dict[str, Any]]] = defaultdict(list)
@@ -131,6 +169,11 @@ def table(rows: list[dict[str, Any]]) -> None:
         delays = [min(after) - ONSET for each in times if (after := [t for t in each if t >= ONSET - 0.2])]
         told = f", told in {len(delays)}, after {np.median(delays):.1f} s (median)" if is_fault and delays else ""
         told = told or (", told in 0" if is_fault else "")
+        found = [named_in(row) for row in own]
+        right = sum(is_right for _, is_right in found)
+        told += f", a cause named in {sum(bool(named) for named, _ in found)}" + (
+            f", the true one in {right}" if is_fault else ""
+        )
         print(f"{name}: {len(own)} sessions{told}, {'too early' if is_fault else 'with an alarm'} in {before}")
 
 
@@ -140,6 +183,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--count", type=int, default=100)
+    parser.add_argument("--causes", action="store_true")
     parser.add_argument("--table", action="store_true")
     args = parser.parse_args()
     rows = [json.loads(line) for line in args.out.read_text().splitlines()] if args.out.is_file() else []
@@ -151,9 +195,9 @@ def main() -> None:
     with args.out.open("a") as file:
         for number in range(args.first, args.first + args.count):
             if number not in done:
-                rows.append(row_of(number))
+                rows.append(row_of(number, args.causes))
                 print(json.dumps(rows[-1]), file=file, flush=True)
-    keep("health", counts(rows))
+    keep("causes" if args.causes else "health", causes_named(rows) if args.causes else counts(rows))
 
 
 if __name__ == "__main__":
