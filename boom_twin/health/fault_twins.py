@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream
-from .causes import MEMORY, TEMPER, Evidence, Fault, Hypothesis, Verdict, hypothesis, possible_faults, told
+from .causes import MEMORY, TEMPER, UNTOLD, Evidence, Fault, Hypothesis, Verdict, hypothesis, possible_faults, told
 
 Flags = NDArray[np.bool_]
 
@@ -200,9 +200,7 @@ class FaultTwins:
         if self._age <= SETTLING:
             return []
         if (fault := self._back_again()) is not None:
-            news = [replace(self._named.pop(fault), until=second.stamp)]
-            self._begin()
-            return news
+            return self._ended(fault, second.stamp)
         verdict = self._decision.take(second.stamp, grown[1:] - grown[0])
         return [] if verdict is None else self._name(verdict)
 
@@ -210,20 +208,22 @@ class FaultTwins:
         """Believe in a fault, or in the end of one; return its alarm."""
         fault = self._faults[verdict.place]
         if fault in self._named:
-            news = [replace(self._named.pop(fault), until=verdict.onset)]
-        elif fault.cause == "oil.k":
-            self._named[fault], news = Alarm("oil", "softer", verdict.onset, None, fault.cause, ""), []
-        else:
-            sized, spread = self._sized(fault, verdict.onset)
-            if abs(sized.size) < CERTAIN * spread:
-                self._decision = Evidence(self._faults, self._odds)
-                return []
-            ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
-            alarm = Alarm(fault.channel, fault.kind, verdict.onset, None, fault.cause, told(sized, spread), ranked)
-            self._named[sized] = alarm
-            news = [alarm]
+            return self._ended(fault, verdict.onset)
+        sized, spread = self._sized(fault, verdict.onset)
+        if abs(sized.size) < CERTAIN * spread:
+            self._decision = Evidence(self._faults, self._odds)
+            return []
+        ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
+        alarm = Alarm(fault.channel, fault.kind, verdict.onset, None, fault.cause, told(sized, spread), ranked)
+        self._named[sized] = alarm
         self._begin()
-        return news
+        return [] if fault.cause in UNTOLD else [alarm]
+
+    def _ended(self, fault: Fault, stamp: int) -> list[Alarm]:
+        """Believe that a named fault has ended at a stamp (ns); return its alarm."""
+        alarm = replace(self._named.pop(fault), until=stamp)
+        self._begin()
+        return [] if fault.cause in UNTOLD else [alarm]
 
     def _back_again(self) -> Fault | None:
         """Return a named fault of a sensor whose zero is nearly what it was before the onset."""
