@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream
-from .causes import MEMORY, TEMPER, UNTOLD, Evidence, Fault, Hypothesis, Verdict, hypothesis, possible_faults, told
+from .causes import MEMORY, TEMPER, Evidence, Fault, Hypothesis, Verdict, hypothesis, possible_faults, told
 
 Flags = NDArray[np.bool_]
 
@@ -217,13 +217,13 @@ class FaultTwins:
         alarm = Alarm(fault.channel, fault.kind, verdict.onset, None, fault.cause, told(sized, spread), ranked)
         self._named[sized] = alarm
         self._begin()
-        return [] if fault.cause in UNTOLD else [alarm]
+        return [alarm] if fault.is_told else []
 
     def _ended(self, fault: Fault, stamp: int) -> list[Alarm]:
         """Believe that a named fault has ended at a stamp (ns); return its alarm."""
         alarm = replace(self._named.pop(fault), until=stamp)
         self._begin()
-        return [] if fault.cause in UNTOLD else [alarm]
+        return [alarm] if fault.is_told else []
 
     def _back_again(self) -> Fault | None:
         """Return a named fault of a sensor whose zero is nearly what it was before the onset."""
