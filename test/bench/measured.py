@@ -20,7 +20,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
-from analysis.reference_errors import AT_REST, POSTURES, at_rest, moved
+from analysis.reference_errors import AT_REST, POSTURES, at_rest, moving
 from bench.lengths import rms
 from bench.record import FOLDER, ROOT, commit, git
 from bench.speed import SESSION, replays, step_times
@@ -70,7 +70,7 @@ def model() -> Values:
     """Compare the model with the reference numbers."""
     resting = [at_rest(posture) for posture in POSTURES]
     rest = {name: max(each[name] for each in resting) for name in AT_REST}
-    _, move = moved()
+    move = moving()
     return {
         "rest_tip": percent(rest["tip"]),
         "rest_forces": percent(rest["forces"]),
