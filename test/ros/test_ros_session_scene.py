@@ -105,6 +105,9 @@ def test_scene_baseline_and_names_are_those_of_the_node(
     summary = json.loads(capsys.readouterr().out)
     assert {name: summary[name] for name in texts} == {name: f"{sheet}, {name}" for name in texts}
     assert (summary["samples"], summary["dropped"]) == (ROWS, 0)
-    for key in (Output.TIP_POSITION, Output.RESIDUALS):
-        live = published(out, topics, key)
-        assert len(live) >= ROWS - 1 and live == published(tmp_path / "out" / "bag", topics, key)
+    live, again = (
+        [published(folder, topics, key) for key in (Output.TIP_POSITION, Output.RESIDUALS)]
+        for folder in (out, tmp_path / "out" / "bag")
+    )
+    assert len(live[1]) >= ROWS - 1 and live[1] == again[1]
+    assert live[0] and set(live[0]) <= set(again[0])  # a publisher of depth 1 may lose all but the newest of a burst
