@@ -40,8 +40,8 @@ The default scene with default modes, unless a row says otherwise. The independe
 beams, 16 and 32 elements a section. All sessions are synthetic and all parameters surrogates. Agreement says that the
 equations are solved rightly, not that a real boom behaves so.
 
-{run} `make measured` writes this page. Rows that take longer than minutes name the day and the commit of their last run. A
-test that is named holds its bound today. Run times depend on the machine: repeat them on yours.
+{run} `make measured` writes this page. Other rows name the day and the commit
+of their last record in the docs; the rows of live nodes and pages are of version 0.1. Named tests hold the bounds. Run times depend on the machine: repeat them on yours.
 """
 FOOT = """
 ## Where the numerics hold
