@@ -142,7 +142,7 @@ class Evidence:
         Posterior probability from which on a cause is named.
     """
 
-    def __init__(self, faults: Sequence[Fault], odds: float = 0.95) -> None:
+    def __init__(self, faults: Sequence[Fault], odds: float) -> None:
         self._odds = odds
         self._faults, none = tuple(faults), np.zeros(len(faults))
         self._comes = np.array([fault.is_load for fault in faults], bool)

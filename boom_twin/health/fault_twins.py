@@ -17,14 +17,12 @@ from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream
 from .causes import MEMORY, TEMPER, Evidence, Fault, Hypothesis, Verdict, hypothesis, possible_faults, told
-
-Flags = NDArray[np.bool_]
+from .sensor_check import Flags
 
 SIZES = 0.4, 0.7, 1.0, 1.4, 1.8  # times the size of a named fault, by which its true size is found
 CERTAIN = 3.0  # standard deviations of its size that a named fault has at least
@@ -79,11 +77,11 @@ class FaultTwins:
         True if nobody may wait for a verdict: on a busy processor it is given later than `DELAY`.
     """
 
-    def __init__(self, scene: Scene, make: Callable[[Hypothesis], Follower], odds: float = 0.95, is_live: bool = False) -> None:
+    def __init__(self, scene: Scene, make: Callable[[Hypothesis], Follower], odds: float, is_live: bool = False) -> None:
         self._scene, self._make, self._odds, self._is_live = scene, make, odds, is_live
         self._lasting: dict[str, Alarm] = {}
         self._pending: list[Any] = []
-        self._second: int | None = None
+        self._second = 0  # of the samples that are pending
         self._left_out: tuple[Flags, Flags] | None = None
         self._taken: dict[tuple[int, int], int] = {}  # stamp of the newest sample taken, by stream and channels
         self._worker = ThreadPoolExecutor(1, "fault twins")
@@ -99,10 +97,11 @@ class FaultTwins:
     def reach(self, stamp: int, left_out: Callable[[], tuple[Flags, Flags]]) -> None:
         """Note the stamp (ns) of the next sample; if a second ends there, ask for the channels that are left out by then."""
         second = stamp // SECOND
-        if self._second is not None and not self._second - 1 <= second <= self._second:
+        if self._pending and not self._second - 1 <= second <= self._second:
             self._left_out = left_out()
             self._close()
-        self._second = second if self._second is None else self._second
+        if not self._pending:
+            self._second = second
 
     def take(self, block: Any) -> None:
         """Take samples of one second, in the order in which the twin takes them."""
@@ -130,8 +129,8 @@ class FaultTwins:
             columns = zip(*((part.streams, part.stamps, part.values) for part in parts), strict=True)
             streams, stamps, values = map(np.concatenate, columns)
             block = parts[0]._replace(streams=streams, stamps=stamps, values=values)
-            self._hand_over(_Second((self._second or 0) * SECOND, block, self._left_out))
-        self._pending, self._second = [], None
+            self._hand_over(_Second(self._second * SECOND, block, self._left_out))
+        self._pending = []
 
     def _hand_over(self, second: _Second) -> None:
         self._results.append((second.stamp + SECOND + DELAY, self._worker.submit(self._follow, second)))
@@ -191,9 +190,7 @@ class FaultTwins:
             return []
         self._recent.append(second)
         for each, twin in zip(self._hypotheses, self._twins, strict=True):
-            if second.left_out is not None:
-                twin.leave_out(*second.left_out)
-            twin.update_block(_in_time(second.block, each))
+            _feed(twin, each, second)
         before, self._evidence = self._evidence, np.array([twin.evidence for twin in self._twins])
         grown = self._evidence - before
         self._age += 1
@@ -214,7 +211,8 @@ class FaultTwins:
             self._decision = Evidence(self._faults, self._odds)
             return []
         ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
-        alarm = Alarm(fault.channel, fault.kind, verdict.onset, None, fault.cause, told(sized, spread), ranked)
+        text = told(sized, spread) if fault.is_told else ""
+        alarm = Alarm(fault.channel, fault.kind, verdict.onset, None, fault.cause, text, ranked)
         self._named[sized] = alarm
         self._begin()
         return [alarm] if fault.is_told else []
@@ -277,10 +275,15 @@ class FaultTwins:
         each = hypothesis(self._scene, (*self._named, fault))
         twin = self._made(each)
         for second in self._recent:
-            if second.left_out is not None:
-                twin.leave_out(*second.left_out)
-            twin.update_block(_in_time(second.block, each))
+            _feed(twin, each, second)
             yield second.stamp, twin
+
+
+def _feed(twin: Follower, each: Hypothesis, second: _Second) -> None:
+    """Let the twin of a hypothesis take the samples of a second."""
+    if second.left_out is not None:
+        twin.leave_out(*second.left_out)
+    twin.update_block(_in_time(second.block, each))
 
 
 def _in_time(block: Any, each: Hypothesis) -> Any:

@@ -12,7 +12,7 @@ from ..health.monitor import warm_up
 from ..scene.kinematics import strokes_of_angles
 from ..types import SECOND, Array, Health, Report, Sample, Stream
 from .block_update import CAPACITY
-from .blocks import CODES, STREAMS, ReportBlock, SampleBlock
+from .blocks import CODES, STREAMS, ReportBlock, SampleBlock, block_of
 from .loaded_model import LoadedModel
 from .sample_taker import SampleTaker
 from .update import DONE, FAILED
@@ -197,9 +197,7 @@ class Twin(SampleTaker):
         if self._fault_twins is not None:
             if report.change is not None:
                 self._fault_twins.change(report.change)
-            values = np.full((1, max(self._widths)), np.nan)
-            values[0, : len(sample.values)] = sample.values
-            self._fault_twins.take(SampleBlock(np.array([CODES[sample.stream]]), np.array([sample.stamp]), values))
+            self._fault_twins.take(block_of([sample], self.plan.joints))
         return report
 
     @property
@@ -251,8 +249,6 @@ class Twin(SampleTaker):
                 if reason == DONE:
                     continue
                 sample = self._sample(block, row, channels)
-                if self._fault_twins is not None:
-                    self._fault_twins.reach(sample.stamp, self._failing)
                 found.append(self._told(sample, self._fail(sample, []) if reason == FAILED else self._look_at(sample)))
             else:
                 found.append(self.update(self._sample(block, row, channels)))

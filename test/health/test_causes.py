@@ -16,12 +16,13 @@ SPRING, SECTION, LOAD = (
     Fault("section_2.EI", "softer", 0.25),
     Fault("tip.payload", "more", 20.0),
 )
+ODDS = 0.95
 ENOUGH = HEAD_START + math.log(19.0) / TEMPER  # nats for odds of 0.95 to 0.05
 
 
 def verdict(faults, gains):
     """Return the first verdict on gains (seconds, faults), and the second in which it comes."""
-    evidence = Evidence(faults)
+    evidence = Evidence(faults, ODDS)
     for second, row in enumerate(gains):
         if (found := evidence.take(second * SECOND, np.array(row, float))) is not None:
             return found, second
@@ -108,7 +109,7 @@ def test_a_fault_comes_and_goes():
         lost = spring_of(each)
         return Follower(lambda second: -100.0 * (lost - (0.3 if 20 <= second < 60 else 0.0)) ** 2)
 
-    twins, found = FaultTwins(load_scene(), made), []
+    twins, found = FaultTwins(load_scene(), made, ODDS), []
     for second in range(120):
         stamps = np.array([second * SECOND, second * SECOND + SECOND // 2])
         twins.reach(second * SECOND, lambda: (np.zeros(10, bool), np.zeros(4, bool)))
@@ -129,7 +130,7 @@ def test_a_recorded_load_is_the_load_of_all_twins():
         made.append((each, Follower(lambda _: 0.0)))
         return made[-1][1]
 
-    twins = FaultTwins(load_scene(), make)
+    twins = FaultTwins(load_scene(), make, ODDS)
     twins.change(Change(0, False, {"payload": 30.0, "line_fill": -1.0, "tip_load_limit": 500.0}, {}))
     twins.news(10 * SECOND)  # waits for the thread
     for each, twin in made:
