@@ -9,9 +9,8 @@ from time import perf_counter
 from types import SimpleNamespace
 from typing import Any
 
-from ...bag.joint_names import refuse_other_names
-from ...bag.reader import Session, read, scan
-from ...bag.session_model import SessionScene, baseline_of, mapping_of, strokes_of
+from ...bag.reader import Session, read
+from ...bag.session_model import SessionScene
 from ...bag.time_window import WHOLE, TimeWindow
 from ...config.settings import Settings, Thresholds
 from ...diagnostics.boom_mismatch import OtherBoom
@@ -20,14 +19,12 @@ from ...diagnostics.sensor_status import sensors_of
 from ...diagnostics.topic_status import Peers
 from ...diagnostics.twin_status import TwinWatch, all_pieces
 from ...errors import BagError, BoomTwinError
-from ...health.baseline import Baseline
 from ...messages.report_encoder import ReportEncoder
 from ...messages.topic_table import NODE, Output, Topic, Topics
-from ...offline.inputs import scene_for
+from ...offline.inputs import ReplayInputs, ReplayOptions, replay_inputs
 from ...offline.session_samples import SessionSamples
 from ...scene.schema import Scene
 from ...twin.driver import Step, drive
-from ...twin.twin import Twin
 from ...types import NANO, Stream
 from .feed import Feed
 from .store import Store
@@ -94,23 +91,20 @@ def bag_feed(
     UsageError
         The mapping or the baseline cannot be used.
     """
-    session, usual, taken = scan(path), baseline_of(path, baseline).baseline, scene_for(path, scene)
-    scene = taken.scene
-    mapped = mapping_of(path, mapping, len(scene.joints), namespace)
-    topics = mapped.topics.of_joints(joint.range_deg for joint in scene.joints).reading(strokes_of(path, mapped).reading)
-    refuse_other_names(session, topics, len(scene.joints), taken.source)
+    options = ReplayOptions(mapping=mapping, baseline=baseline, window=window, namespace=namespace)
+    given = replay_inputs(path, scene, settings, options)
+    session, topics = given.session, given.topics.reading(given.strokes.reading)
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}
     is_published = topics.outputs[PUBLISHED_OUTPUT].absolute in counts
     length = (session.end - session.start) * NANO
     store = Store(max(counts.values(), default=1), keeps_statuses=True)
     if not is_published and topics.inputs[Stream.STROKES].absolute not in counts:
         raise BagError(f"{path}: nothing to show. It needs strokes, or outputs of the twin.")
-    feed = BagFeed(_title(session, is_published), store, topics, scene, length * window.share(length))
+    feed = BagFeed(_title(session, is_published), store, topics, given.scene, length * window.share(length))
     if is_published:
         feed.begin(_take_published(session, feed, topics, counts, window))
     else:
-        twin = _Twin(feed, topics, scene, settings, usual)
-        feed.begin(_take_predicted(session, feed, topics, counts, twin, window))
+        feed.begin(_take_predicted(feed, topics, given, _Twin(feed, topics, given)))
     return feed
 
 
@@ -137,28 +131,24 @@ def _take_published(
         yield
 
 
-def _take_predicted(
-    session: Session, feed: Feed, topics: Topics, counts: dict[str, int], twin: _Twin, window: TimeWindow
-) -> Generator[None]:
+def _take_predicted(feed: BagFeed, topics: Topics, given: ReplayInputs, twin: _Twin) -> Generator[None]:
     """Run a twin on the recorded inputs and store its predictions, one sample a step."""
-    wanted = [name for name in topics.heard if "/" + name.lstrip("/") in counts]
-    samples = SessionSamples(session, topics, wanted, twin.twin.plan.joints, window).samples()
+    samples = SessionSamples(given.session, topics, given.wanted, twin.twin.plan.joints, given.window).samples()
     for step in drive(twin.twin, samples):
         if step is not None:
             twin.took(step)
         yield
     twin.finish()
     if not feed.store.tables:
-        raise BagError(f"{session.path}: no stroke could be used; they need names cylinder_1 .. in m, or a mapping.")
+        raise BagError(f"{given.session.path}: no stroke could be used; they need names cylinder_1 .. in m, or a mapping.")
 
 
 class _Twin:
     """Twin that is run on a session and diagnosed as a live node diagnoses its own. Its time is that of the stamps."""
 
-    def __init__(self, feed: Feed, topics: Topics, scene: Scene, settings: Settings, usual: Baseline) -> None:
-        self._feed, self._time = feed, 0.0
-        mounts = topics.mounts(len(scene.joints))
-        self.twin = Twin(scene, settings, mounts, usual, reads=topics.stroke_reading, absent=topics.absent)
+    def __init__(self, feed: Feed, topics: Topics, given: ReplayInputs) -> None:
+        self._feed, self._time, self.twin = feed, 0.0, given.twin()
+        scene, settings, mounts = given.scene, given.settings, self.twin.mounts
         self._encoder = ReportEncoder(scene, settings)
         self._names = {key: topic.absolute for key, topic in topics.outputs.items() if topic.absolute in feed.topic_rows.names}
         required = {stream: topic.required for stream, topic in topics.inputs.items()}
