@@ -32,11 +32,6 @@ class PredictionRows(NamedTuple):
     measured: Array
     variances: Array
 
-    @classmethod
-    def room(cls, rows: int, joints: int) -> PredictionRows:
-        """Return arrays for so many rows, not filled."""
-        return cls(np.empty(rows, np.int64), *np.empty((2, rows, joints)))
-
 
 class MeasuredRows(NamedTuple):
     """Measured samples of one stream.

@@ -78,12 +78,6 @@ def fault_of(folder: Path) -> str | None:
     return None
 
 
-def is_kept(name: str) -> bool:
-    """Return True if compiled code of the kernel with this full name is kept on this computer, and may be used."""
-    folder = cache_folder()
-    return fault_of(folder) is None and any(folder.glob(f"{name}-*{SUFFIX}"))
-
-
 def _writers(state: os.stat_result, may_be_sticky: bool = False) -> str | None:
     """Return who but the user and root can write something, in words with the remedy; None if nobody."""
     if state.st_uid not in (os.getuid(), 0):

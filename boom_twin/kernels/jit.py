@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..errors import UsageError
-from .compiled_cache import SUFFIX, KernelCache, cache_folder, fault_of, is_kept
+from .compiled_cache import SUFFIX, KernelCache, cache_folder, fault_of
 
 Fields = TypeVar("Fields")
 
@@ -62,12 +62,6 @@ def _folder() -> Path | None:
     if not any(folder.glob(f"*{SUFFIX}")):
         logging.getLogger("boom_twin").warning(COMPILING, folder)
     return folder
-
-
-def could_be_kept(kernel: Kernel) -> bool:
-    """Return True if compiled code of `kernel` can be kept on this computer and is not there yet; the first use makes it."""
-    name = f"{kernel.py_func.__module__}.{kernel.py_func.__qualname__}"
-    return fault_of(cache_folder()) is None and not is_kept(name)
 
 
 @cache
