@@ -26,8 +26,10 @@ import boom_twin
 from boom_twin import replay
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_model import mapping_of
+from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.topic_table import TYPES, Output
 from boom_twin.ros.bag.recorder import COMPLETE
+from boom_twin.ros.runtime import message_class, qos_profile
 
 BOOMS = {"front": "0.0", "rear": "1.0"}
 """Their namespaces, and from when on the session is played to each, s."""
@@ -56,12 +58,19 @@ def recorded(
         for name in BOOMS
     }
     graph = rclpy.create_node("graph")
+    silent = [
+        graph.create_publisher(message_class(topic.type), f"/{name}{topic.absolute}", qos_profile(topic.qos))
+        for name in BOOMS
+        for topic in load_mapping(mapping).inputs.values()
+    ]
+    for recorder in recorders.values():  # it hears all of the node, which it may have found late, before anything is played
+        recorder.wait_for(COMPLETE)
+    for publisher in silent:
+        graph.destroy_publisher(publisher)
     players = [
         spawn(command, "play", str(reliable_bag), "--namespace", name, "--start", start, "--listeners", "2", "--wait", "120")
         for name, start in BOOMS.items()
     ]
-    for recorder in recorders.values():
-        recorder.wait_for(COMPLETE)
     assert [player.end() for player in players] == [0, 0], [player.said() for player in players]
     told = [player.said() for player in players]
     assert all("\r" not in said and said.count("playing") == 1 for said in told), told  # a bar is for terminals
