@@ -3,6 +3,7 @@ PYTHON ?= $(shell command -v python3.12 >/dev/null 2>&1 && python3.12 -c '' >/de
 VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+DEMO_READY := $(VENV)/.ready-demo
 COLCON := .venv-colcon
 COLCON_READY := $(COLCON)/.ready
 NODE := .node
@@ -33,14 +34,23 @@ help:
 
 setup: $(READY)
 
-$(READY): setup.py
+$(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(0 if (3, 11) <= sys.version_info[:2] <= (3, 13) else "boom_twin needs Python 3.11 to 3.13, this is " + sys.version.split()[0] + ". Set PYTHON=python3.12.")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers,monitor,docs,batch]"
+
+# What a demonstration needs; tests, studies and docs need more.
+$(DEMO_READY): setup.py | $(BIN)/python
+	@echo "installing what the twin, ROS 2 and the live page need into $(VENV): 53 packages, 700 MB, about a minute .." >&2
+	$(BIN)/python -m pip install --quiet --editable ".[ros,monitor]"
 	@touch $@
 
+$(READY): setup.py | $(DEMO_READY)
+	@echo "installing what tests, studies and docs need beside that into $(VENV): 210 packages, 1 GB, about two minutes .." >&2
+	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers,monitor,docs,batch]"
+	@touch $@ $(DEMO_READY)
+
 # Compiling the kernels is part of the set-up: about 40 s, kept in ~/.cache/boom_twin until a kernel changes.
-warm: $(READY)
+warm: $(DEMO_READY)
 	@echo "compiling the kernels, up to a minute the first time .." >&2
 	@$(BIN)/python -c 'from boom_twin import Twin, load_scene; Twin(load_scene()).warm_up()'
 
@@ -51,7 +61,7 @@ demo: warm
 demo-live: warm
 	PYTHONPATH=test $(BIN)/python -P -m demo.demo_live --out out/demo_live $(if $(DOMAIN),--domain $(DOMAIN))
 
-test: lint warm
+test: lint $(READY) warm
 	$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not system"
 
 lint: $(READY)
@@ -60,23 +70,23 @@ lint: $(READY)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-test-system: warm
+test-system: $(READY) warm
 	$(BIN)/python -m pytest $(PARALLEL) -m "system and not slow"
 
-test-extra: warm $(COLCON_READY) ament client
+test-extra: $(READY) warm $(COLCON_READY) ament client
 	$(BIN)/python -m pytest $(PARALLEL) -m slow
 	@if command -v xmllint >/dev/null; then xmllint --noout package.xml && echo "package.xml: well-formed"; else echo "skipped: package.xml, because xmllint is not there (Debian: libxml2-utils)"; fi
 
-study: warm
+study: $(READY) warm
 	for kind in error stability parts; do $(BIN)/boom_twin study $$kind --out out/study/$$kind || exit 1; done
 	for kind in papers clearance roundoff; do PYTHONPATH=test $(BIN)/python -m studies $$kind --out out/study/$$kind || exit 1; done
 	mkdir -p docs/study && cp out/study/*/*.md out/study/*/*.png docs/study/
 
 BEFORE ?=
-gate: warm
+gate: $(READY) warm
 	$(BIN)/python test/gate.py $(if $(BEFORE),--before $(BEFORE))
 
-soak: warm
+soak: $(READY) warm
 	$(BIN)/python test/bench/soak.py --duration 3600
 	$(BIN)/python test/bench/soak.py --rate 1000
 	$(BIN)/python test/bench/monitor.py --seconds 600
@@ -85,7 +95,7 @@ soak: warm
 
 SECONDS ?= 600
 SEED ?= 1
-fuzz: warm
+fuzz: $(READY) warm
 	PYTHONPATH=test $(BIN)/python -m fuzz.run --seconds $(SECONDS) --seed $(SEED)
 
 # A workspace's Python: colcon, what the package needs, but not the package itself, which colcon is to build.
@@ -120,7 +130,7 @@ session: $(READY)
 figures: $(READY)
 	$(BIN)/python docs/figures.py
 
-measured: warm
+measured: $(READY) warm
 	$(BIN)/python test/bench/measured.py --cold
 
 # The notice that is turned off tells of the theme's end of life (May 2027), hence the upper bounds in setup.py.
