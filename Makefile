@@ -40,12 +40,12 @@ $(BIN)/python:
 
 # What a demonstration needs; tests, studies and docs need more.
 $(DEMO_READY): setup.py | $(BIN)/python
-	@echo "installing what the twin, ROS 2 and the live page need into $(VENV): 53 packages, 700 MB, about a minute .." >&2
+	@echo "installing what the twin, ROS 2 and the live page need into $(VENV): 155 packages, 800 MB, about a minute .." >&2
 	$(BIN)/python -m pip install --quiet --editable ".[ros,monitor]"
 	@touch $@
 
 $(READY): setup.py | $(DEMO_READY)
-	@echo "installing what tests, studies and docs need beside that into $(VENV): 210 packages, 1 GB, about two minutes .." >&2
+	@echo "installing what tests, studies and docs need beside that into $(VENV): 105 packages, 0.9 GB, about a minute .." >&2
 	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers,monitor,docs,batch]"
 	@touch $@ $(DEMO_READY)
 
