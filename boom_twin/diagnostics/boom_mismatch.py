@@ -26,10 +26,15 @@ class OtherBoom:
     An encoder that stands still to the last bit may be dead, and tells nothing about the boom. One that is far off may be
     wrong. If more than half of them are, it is the scene. The test is made once, because a later difference is a
     fault of the rig.
+
+    Attributes
+    ----------
+    is_judged : bool
+        True after that test: no more samples are needed.
     """
 
     def __init__(self) -> None:
-        self._is_judged = False
+        self.is_judged = False
         self._begin = 0
         self._values: list[Array] = []
         self._residuals: list[Array] = []
@@ -42,7 +47,7 @@ class OtherBoom:
 
     def take(self, stamp: int, values: Iterable[Array], residuals: Iterable[Array]) -> str:
         """Take rows of angles and of their residuals (n,) in rad up to a `stamp` (ns); return as `took`."""
-        if self._is_judged:
+        if self.is_judged:
             return ""
         self._values.extend(values)
         self._residuals.extend(residuals)
@@ -53,7 +58,7 @@ class OtherBoom:
         """Return why the session up to now is of another boom, empty if it is not shown; forget what was judged."""
         values, residuals = self._values, self._residuals
         self._begin, self._values, self._residuals = 0, [], []
-        if self._is_judged or len(values) < FEWEST_RESIDUALS or len(residuals) < FEWEST_RESIDUALS:
+        if self.is_judged or len(values) < FEWEST_RESIDUALS or len(residuals) < FEWEST_RESIDUALS:
             return ""
         table, off = np.array(values), np.array(residuals)
         counts = np.isfinite(off).sum(axis=0)
@@ -61,7 +66,7 @@ class OtherBoom:
         live = [i for i in heard if np.nanmax(table[:, i]) > np.nanmin(table[:, i])]
         if 2 * len(live) <= len(heard):
             return ""
-        self._is_judged = True
+        self.is_judged = True
         medians = {i: float(np.nanmedian(off[:, i])) for i in live}
         far = {i: value for i, value in medians.items() if abs(value) > LARGEST_RESIDUAL}
         if 2 * len(far) <= len(live):

@@ -111,10 +111,13 @@ def load_truth(folder: Path) -> TipTruth | None:
             text = file.read(LARGEST_TRUTH + 1)
         if len(text) > LARGEST_TRUTH:
             raise ValueError(f"more than {LARGEST_TRUTH} bytes unpacked")
-        table = np.genfromtxt(BytesIO(text), delimiter=",", names=True)
+        header, _, rows = text.partition(b"\n")
+        columns = np.loadtxt(BytesIO(rows), delimiter=",", ndmin=2, unpack=True)
+        table = dict(zip(header.decode("ascii", "replace").strip().split(","), columns, strict=True))
+        if lacking := [name for name in COLUMNS if name not in table]:
+            raise ValueError(f"no column {lacking[0]}")
         values = {name: table[name] for name in COLUMNS}
-        names = table.dtype.names or ()
-        loads = [table[name] if name in names else np.zeros_like(values["t_s"]) for name in LOAD_COLUMNS]
+        loads = [table.get(name, np.zeros_like(values["t_s"])) for name in LOAD_COLUMNS]
     except (OSError, ValueError, EOFError) as error:
         raise BagError(f"{path}: {error}. It needs columns {', '.join(COLUMNS)}; remove it to replay without.") from None
     return TipTruth(

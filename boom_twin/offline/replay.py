@@ -210,7 +210,8 @@ def replay_into(
                 put(found)
             if recording.is_empty:
                 refused.take(block)
-            given.refuse(other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
+            if not other_boom.is_judged:
+                given.refuse(other_boom.take(int(block.stamps[-1]), *_angles(block, found, joints)))
         given.refuse(other_boom.judge())
     if bar is not None:
         bar.close()

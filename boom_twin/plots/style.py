@@ -83,6 +83,9 @@ def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = 
         if note:
             figure.text(0.988, 1.0 - 0.16 / size[1], shorten(printable(note), NOTE, placeholder=" .."), **SMALL)
         yield figure
+        # once here, or `savefig` draws everything twice
+        figure.get_layout_engine().execute(figure)  # type: ignore[union-attr]
+        figure.set_layout_engine("none")
         content = BytesIO()
         figure.savefig(content, dpi=DPI, metadata={"Software": None}, format=path.suffix[1:] or "png")
     write_atomic(path, content.getvalue())
