@@ -100,7 +100,7 @@ def _mean(one: Density, other: Density) -> Density:
 def density(stamps: Array, values: Array, interval: float = 0.0) -> Density:
     """Return the one-sided power spectral density of `values` (k,) by Welch's method with a Hann window and half overlap.
 
-    Values are interpolated to even times, also across NaN. Its own lines, because importing ``scipy.signal`` takes half a second.
+    Values are interpolated to even times, also across NaN. ``scipy.signal`` has this too, but takes half a second to import.
 
     These are `interval` (s) apart; 0: as far as the `stamps` (k,) usually are.
     """
@@ -117,4 +117,4 @@ def density(stamps: Array, values: Array, interval: float = 0.0) -> Density:
     power = 2.0 * interval * np.square(np.abs(lines)).mean(axis=0) / np.square(window).sum()
     if segment % 2 == 0:
         power[-1] *= 0.5  # the highest line has no twin at a negative frequency
-    return Density(np.fft.rfftfreq(segment, interval)[1:], power, interval, len(parts))
+    return Density(np.asarray(np.fft.rfftfreq(segment, interval)[1:]), power, interval, len(parts))

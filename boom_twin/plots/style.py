@@ -76,18 +76,16 @@ def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = 
         raise UsageError(f"{path}: a picture is a PNG file. Give a name that ends with .png.")
     with matplotlib.rc_context({**matplotlib.rcParamsDefault, **LOOK}):
         figure = Figure(figsize=size, dpi=DPI, layout="constrained")
-        FigureCanvasAgg(figure)
+        canvas = FigureCanvasAgg(figure)
         top = 1.0 - 0.52 / size[1]
         figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, top), w_pad=0.1, h_pad=0.07)  # type: ignore[union-attr, call-arg]
         figure.text(0.012, 1.0 - 0.14 / size[1], printable(title, ""), **LARGE)
         if note:
             figure.text(0.988, 1.0 - 0.16 / size[1], shorten(printable(note), NOTE, placeholder=" .."), **SMALL)
         yield figure
-        # once here, or `savefig` draws everything twice
-        figure.get_layout_engine().execute(figure)  # type: ignore[union-attr]
-        figure.set_layout_engine("none")
         content = BytesIO()
-        figure.savefig(content, dpi=DPI, metadata={"Software": None}, format=path.suffix[1:] or "png")
+        # `savefig` draws everything twice, the first time for its layout
+        canvas.print_png(content, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
     write_atomic(path, content.getvalue())
 
 
