@@ -70,6 +70,7 @@ setup(
             "argcomplete>=3.4,<4",
         ],
         "peers": ["exudyn>=1.13,<2", "pyOMA-2>=1.4,<2"],
+        "modal": ["pyOMA-2>=1.4,<2"],
         "monitor": ["aiohttp>=3.14.4,<4"],
         "batch": [
             "dask>=2025.5,<2027",

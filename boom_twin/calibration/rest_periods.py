@@ -39,6 +39,8 @@ class RestPeriod:
 
     Attributes
     ----------
+    start : float
+        s since the first stroke sample of the session.
     times : ndarray, shape (r,)
         s after the period began, ascending.
     channels : ndarray of int, shape (r,)
@@ -49,6 +51,7 @@ class RestPeriod:
         Mean readings of the stroke transducers, m.
     """
 
+    start: float
     times: Array
     channels: NDArray[np.int64]
     values: Array
@@ -137,4 +140,5 @@ def _period(session: MeasuredSession, start: int, stop: int) -> RestPeriod:
     order = known[np.argsort(at[known], kind="stable")]
     mean = np.nanmean(session.series[Stream.STROKES].of(start, stop).values, axis=0)
     times: Array = np.asarray((at[order] - start) * NANO)
-    return RestPeriod(times, channel[order].astype(np.int64), value[order].astype(float), mean)
+    begin = (start - int(session.series[Stream.STROKES].stamps[0])) * NANO
+    return RestPeriod(begin, times, channel[order].astype(np.int64), value[order].astype(float), mean)

@@ -17,7 +17,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     add_scene(parser)
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the bag and its truth, new or empty")
-    parser.add_argument("--random", metavar="POSTURE", help="random moves from this posture instead of the bundled ones")
+    moves = parser.add_mutually_exclusive_group()
+    moves.add_argument("--random", metavar="POSTURE", help="random moves from this posture instead of the bundled ones")
+    through = "moves from posture to posture, as arch,low,arch, with rest periods in each; one posture: the boom stands still"
+    moves.add_argument("--through", metavar="POSTURES", help=through)
+    acceleration = "of --through: largest acceleration of the undeformed boom's tip, m/s^2 (0.5)"
+    parser.add_argument("--tip-acceleration", type=positive, default=0.5, metavar="A", help=acceleration)
     parser.add_argument("--duration", type=positive, metavar="S", help="s (default 60)")
     parser.add_argument("--seed", type=int, default=0, help="of random moves and of the sensors' noise (0)")
     parser.add_argument("--clean", action="store_true", help="sensors without noise and rounding")
@@ -67,7 +72,17 @@ def run(args: Namespace) -> int:
     from ..bag.session_sheet import RIG_ORIGIN, SessionSheet
     from ..offline.ground_truth import FILE_NAME
     from ..system.result_folder import RIG, result_folder
-    from ..validation.rig import BUNDLED_DURATION, Sensors, bundled, faults, faulty_boom, loads, noise_free, random_programme
+    from ..validation.rig import (
+        BUNDLED_DURATION,
+        Sensors,
+        bundled,
+        faults,
+        faulty_boom,
+        loads,
+        noise_free,
+        random_programme,
+        through_postures,
+    )
     from ..validation.rig import record as record_session
     from ..validation.rig.sensors import RATE
 
@@ -85,7 +100,10 @@ def run(args: Namespace) -> int:
     pushing = [loads.parse(text) for text in args.load]
     loads.check(pushing, duration)
     load = loads.tip_load(scene, pushing, duration, args.seed) if pushing else None
-    programme = random_programme(scene, args.random, duration, args.seed) if args.random else bundled(scene)
+    if args.through:
+        programme = through_postures(scene, args.through.split(","), duration, args.tip_acceleration)
+    else:
+        programme = random_programme(scene, args.random, duration, args.seed) if args.random else bundled(scene)
     drive = faults.drifting(programme, wrong)
     notes = {"origin": RIG_ORIGIN, "noise": "none" if args.clean else "standard", "seed": str(args.seed)}
     if args.wrong:

@@ -65,6 +65,7 @@ ENVELOPE = ResultKind("envelope", ("envelope.csv", "envelope.json", "envelope.pn
 COMPARE = ResultKind(
     "compare", ("compare.png", *(f"{side}/{name}" for side in "AB" for name in REPLAY.files)), is_replaced=True
 )
+MODAL = ResultKind("modal", ("modes.json", "rest_*.png"), is_replaced=True)
 RESPONSE = ResultKind("response", ("response.*", "steady_state.*", "resonance_map.*"), is_replaced=True)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from .exudyn.solve import at_rest, move, simulate, statics
 from .exudyn.stepping import Effort, Scheme
-from .motion import BUNDLED_DURATION, Move, Programme, bundled, random_programme
+from .motion import BUNDLED_DURATION, Move, Programme, bundled, random_programme, through_postures
 from .sensors import Sensors, noise_free
 from .session import RigSession, observe, record
 
@@ -29,4 +29,5 @@ __all__ = [
     "record",
     "simulate",
     "statics",
+    "through_postures",
 ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -179,11 +181,56 @@ def random_programme(scene: Scene, posture: str, duration: float, seed: int) -> 
         now, time = aim, time + span + rng.uniform(*HOLD)
 
 
+def through_postures(scene: Scene, postures: Sequence[str], duration: float, acceleration: float) -> Programme:
+    """Return moves of all cylinders at once from posture to posture, with rest periods of one length in each.
+
+    Parameters
+    ----------
+    postures : sequence of str
+        In the order in which they are reached; a single one gives a boom that stands still.
+    duration : float
+        s, of moves and rest periods together.
+    acceleration : float
+        m/s^2, largest one of the undeformed boom's tip.
+
+    Raises
+    ------
+    UsageError
+        The moves take longer than `duration`.
+    """
+    stops = [strokes_of_posture(scene, posture) for posture in postures]
+    spans = [_span(scene, one, other, acceleration) for one, other in pairwise(stops)]
+    rest = (duration - sum(spans)) / len(stops)
+    if rest < FIRST_HOLD:
+        needed = sum(spans) + FIRST_HOLD * len(stops)
+        raise UsageError(
+            f"duration = {duration:g} s: moves and rest periods of {FIRST_HOLD:g} s take {needed:.0f} s. Give that."
+        )
+    moves, time = list[Move](), rest
+    for span, before, target in zip(spans, stops, stops[1:], strict=False):
+        moves += [Move(int(i), time, span, float(target[i])) for i in np.flatnonzero(target != before)]
+        time += span + rest
+    return Programme(tuple(stops[0].tolist()), tuple(moves))
+
+
+def _span(scene: Scene, first: Array, target: Array, acceleration: float) -> float:
+    """Return the seconds that a move takes whose tip accelerates by `acceleration` (m/s^2) at most."""
+    times = np.linspace(0.0, 1.0, 201)
+    moves = tuple(Move(i, 0.0, 1.0, float(stroke)) for i, stroke in enumerate(target) if stroke != first[i])
+    path = _tip_path(scene, Programme(tuple(first.tolist()), moves), times)
+    largest = float(np.hypot(*np.diff(path, 2, axis=0).T).max()) / times[1] ** 2
+    return math.sqrt(largest / acceleration)
+
+
+def _tip_path(scene: Scene, programme: Programme, times: Array) -> Array:
+    """Return the places (m, 2) of the undeformed boom's tip, m."""
+    end = (scene.sections[-1].length, 0.0)
+    return np.array([section_frames(scene, strokes)[-1].point(end) for strokes in programme(times)[0]])
+
+
 def tip_speed(scene: Scene, programme: Programme, times: Array) -> Array:
     """Return the speed of the undeformed boom's tip (m/s) between successive `times` (m,), shape (m - 1,)."""
-    end = (scene.sections[-1].length, 0.0)
-    path = np.array([section_frames(scene, strokes)[-1].point(end) for strokes in programme(times)[0]])
-    return np.asarray(np.hypot(*np.diff(path, axis=0).T) / np.diff(times))
+    return np.asarray(np.hypot(*np.diff(_tip_path(scene, programme, times), axis=0).T) / np.diff(times))
 
 
 def _reachable(scene: Scene, now: Array, cylinders: list[int], span: float, rng: np.random.Generator) -> Array:

@@ -10,7 +10,7 @@ pytest.importorskip("exudyn")
 from boom_twin import load_scene
 from boom_twin.errors import UsageError
 from boom_twin.scene.kinematics import joint_angles_of_strokes, stroke_range
-from boom_twin.validation.rig import BUNDLED_DURATION, Move, Programme, bundled, random_programme
+from boom_twin.validation.rig import BUNDLED_DURATION, Move, Programme, bundled, random_programme, through_postures
 from boom_twin.validation.rig.motion import RANGE_SAMPLES, TIP_SPEED, tip_speed
 
 SCENE = load_scene()
@@ -66,3 +66,22 @@ def test_another_boom_makes_moves_within_its_own_ranges(sections):
 def test_random_programme_depends_on_its_seed():
     assert random_programme(SCENE, "low", 30.0, 1) == random_programme(SCENE, "low", 30.0, 1)
     assert random_programme(SCENE, "low", 30.0, 1) != random_programme(SCENE, "low", 30.0, 2)
+
+
+def test_moves_through_postures_rest_in_each_and_keep_the_acceleration_of_the_tip():
+    programme = through_postures(SCENE, ["arch", "low", "arch"], 60.0, 0.4)
+    times = np.linspace(0.0, 60.0, 6001)
+    acceleration = np.diff(tip_speed(SCENE, programme, times)) / 0.01
+    assert 0.2 < np.abs(acceleration).max() < 0.41
+    moving = np.abs(programme(times)[1]).max(axis=1) > 0.0
+    starts = times[np.flatnonzero(np.diff(moving.astype(int)) == 1)]
+    stops = times[np.flatnonzero(np.diff(moving.astype(int)) == -1)]
+    assert len(starts) == len(stops) == 2
+    rests = np.array([starts[0], starts[1] - stops[0], 60.0 - stops[1]])
+    assert rests == pytest.approx(rests.mean(), abs=0.03)
+    assert programme(np.array([30.0]))[0][0] == pytest.approx(through_postures(SCENE, ["low"], 60.0, 0.4).first)
+
+
+def test_moves_that_take_longer_than_the_session_are_refused():
+    with pytest.raises(UsageError, match="duration = 9 s"):
+        through_postures(SCENE, ["arch", "low"], 9.0, 0.4)

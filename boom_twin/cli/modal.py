@@ -1,0 +1,104 @@
+"""``boom_twin modal``: natural frequencies, damping and mode shapes of a recorded session."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .arguments import add_json, add_mapping, add_params, add_session_scene, add_window, files_of, window_of
+from .output import open_session_scene, open_session_settings, print_result, tell
+
+if TYPE_CHECKING:
+    from ..report.operational_modes import MeasuredRest
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("bag", metavar="BAG", help="a recorded session with a rest period of 20 s or more, better two minutes")
+    parser.add_argument(
+        "--out", required=True, metavar="DIR", help="folder for modes.json and stabilisation diagrams, new or empty"
+    )
+    add_session_scene(parser)
+    add_params(parser)
+    add_mapping(parser)
+    add_window(parser)
+    add_json(parser)
+
+
+def run(args: Namespace) -> int:
+    """Identify, draw, and print a table."""
+    import json
+
+    import numpy as np
+
+    from ..calibration.rest_periods import Rigging
+    from ..calibration.run import common_mapping, common_reading
+    from ..calibration.sessions import read_sessions
+    from ..plots.stabilisation import stabilisation_picture
+    from ..report.operational_modes import measured_rests
+    from ..system.atomic_files import write_atomic
+    from ..system.result_folder import MODAL, result_folder
+
+    bag, out = Path(args.bag), Path(args.out)
+    scene, settings = open_session_scene(bag, args.scene).scene, open_session_settings(bag, args.params)
+    joints = len(scene.joints)
+    mapped = common_mapping([bag], args.mapping, joints)
+    rigging = Rigging(settings, tuple(mapped.topics.mounts(joints)), common_reading([bag], mapped))
+    with result_folder(out, MODAL, files_of(args, "bag", "scene", "params", "mapping")) as building:
+        tell("reading the session ..")
+        (session,) = read_sessions([bag], mapped.topics, joints, window_of(args))
+        tell("identifying modes ..")
+        rests = measured_rests(session, scene, rigging)
+        files = ["modes.json"]
+        for number, rest in enumerate(rests, 1):
+            files.append(f"rest_{number}.png")
+            title = f"{session.name}, rest period {rest.start:.1f} to {rest.stop:.1f} s"
+            found = np.array([(each.frequency, each.frequency_sigma) for each in rest.modes]).reshape(-1, 2)
+            stabilisation_picture(building.folder / files[-1], title, rest.poles, found, rest.model)
+        write_atomic(building.folder / "modes.json", json.dumps([_as_object(rest) for rest in rests], indent=2) + "\n")
+    print_result(args.json, _flat(rests), [*_as_text(rests), *(str(out / name) for name in files)])
+    return 0
+
+
+def _as_object(rest: MeasuredRest) -> dict[str, Any]:
+    modes = [
+        {
+            "frequency_Hz": each.frequency,
+            "frequency_sigma_Hz": each.frequency_sigma,
+            "damping_ratio": each.damping,
+            "damping_ratio_sigma": each.damping_sigma,
+            "orders": each.orders,
+            "is_line_of_a_load": each.is_line,
+            "model_Hz": each.model,
+            "shape": dict(zip(rest.channels, each.shape.tolist(), strict=True)),
+        }
+        for each in rest.modes
+    ]
+    return {"start_s": rest.start, "stop_s": rest.stop, "model_Hz": rest.model.tolist(), "modes": modes}
+
+
+def _flat(rests: list[MeasuredRest]) -> dict[str, Any]:
+    found: dict[str, Any] = {"rest_start_s": [rest.start for rest in rests], "rest_stop_s": [rest.stop for rest in rests]}
+    rows = [(number, each) for number, rest in enumerate(rests, 1) for each in rest.modes]
+    found["rest"] = [number for number, _ in rows]
+    found["frequency_Hz"] = [each.frequency for _, each in rows]
+    found["frequency_sigma_Hz"] = [each.frequency_sigma for _, each in rows]
+    found["damping_ratio"] = [each.damping for _, each in rows]
+    found["damping_ratio_sigma"] = [each.damping_sigma for _, each in rows]
+    return found | {"model_Hz": [each.model for _, each in rows]}
+
+
+def _as_text(rests: list[MeasuredRest]) -> list[str]:
+    lines = []
+    for number, rest in enumerate(rests, 1):
+        lines.append(f"rest period {number}, {rest.start:.1f} to {rest.stop:.1f} s")
+        for each in rest.modes:
+            model = "no mode of the model is near" if each.model is None else f"model {each.model:.3f} Hz"
+            note = ", hardly damped: the line of a pump rather than a mode" if each.is_line else ""
+            frequency = f"{each.frequency:7.3f} +- {each.frequency_sigma:.3f} Hz"
+            damping = f"damping ratio {100.0 * each.damping:5.2f} +- {100.0 * each.damping_sigma:.2f} %"
+            lines.append(f"  {frequency}, {damping}, {model}{note}")
+        if not rest.modes:
+            lines.append("  no stable mode: record longer, or under more wind")
+    return lines

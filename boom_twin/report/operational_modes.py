@@ -1,0 +1,197 @@
+"""Natural frequencies, damping ratios and mode shapes of a session's rest periods, under whatever load excites the boom.
+
+Stochastic subspace identification with covariances (B. Peeters and G. De Roeck, Mech. Syst. Signal Process. 13 (1999),
+855-878), by pyOMA-2. Poles are computed for model orders up to `HIGHEST_ORDER`. A pole that stays the same from one order to
+the next is stable; stable poles of one frequency are a mode. Deviations follow from the covariance of the output covariances.
+"""
+
+from __future__ import annotations
+
+import logging
+from contextlib import redirect_stderr
+from dataclasses import dataclass
+from io import StringIO
+from typing import Any
+
+import numpy as np
+
+from ..calibration.rest_periods import RestPeriod, Rigging, channel_names, rest_periods
+from ..calibration.sessions import MeasuredSession
+from ..deviation.predictor import BoomPredictor
+from ..errors import BagError, UsageError
+from ..scene.schema import Scene
+from ..types import Array
+
+RATE = 40.0  # Hz, to which samples are averaged
+SHORTEST_REST = 20.0  # s
+SETTLING = 1.0  # s, left out where a rest period begins
+BLOCK_ROWS, HIGHEST_ORDER, RECORD_PARTS = 25, 40, 10
+LARGEST_DAMPING, LARGEST_VARIATION = 0.1, 0.05  # of a pole; its deviation over its frequency
+APART = 0.02  # relative distance of frequencies that belong to two modes
+FEWEST_ORDERS = 10  # at which a mode has a stable pole
+LINE_DAMPING = 0.002  # a free vibration of a boom loses more; a pump does not
+NEAR = 0.2  # relative distance up to which a measured mode belongs to the nearest one of the model
+
+
+@dataclass(frozen=True, slots=True)
+class OperationalMode:
+    """One measured mode.
+
+    Attributes
+    ----------
+    frequency, frequency_sigma : float
+        Hz.
+    damping, damping_sigma : float
+        Damping ratio, 1.
+    orders : int
+        Model orders at which its pole is stable.
+    is_line : bool
+        True if it hardly decays: the line of a pump rather than a mode.
+    shape : ndarray, shape (channels,)
+        Amplitudes at the sensors over the largest, each in standard deviations of the sensor in the rest period.
+    model : float or None
+        Natural frequency of the nearest mode of the model, Hz.
+    """
+
+    frequency: float
+    frequency_sigma: float
+    damping: float
+    damping_sigma: float
+    orders: int
+    is_line: bool
+    shape: Array
+    model: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredRest:
+    """Modes of one rest period.
+
+    Attributes
+    ----------
+    start, stop : float
+        s since the first stroke sample of the session.
+    channels : tuple of str
+        Sensors of the shapes.
+    model : ndarray
+        Natural frequencies of the model, Hz.
+    poles : ndarray, shape (poles, 3)
+        Frequency (Hz), model order, and 1 if the pole is stable, else 0.
+    modes : tuple of OperationalMode
+    """
+
+    start: float
+    stop: float
+    channels: tuple[str, ...]
+    model: Array
+    poles: Array
+    modes: tuple[OperationalMode, ...]
+
+
+def measured_rests(session: MeasuredSession, scene: Scene, rigging: Rigging) -> list[MeasuredRest]:
+    """Return the modes of every rest period of at least `SHORTEST_REST` seconds.
+
+    Raises
+    ------
+    BagError
+        The session has no such rest period, or neither IMU, angles nor forces.
+    UsageError
+        pyOMA-2 is not installed.
+    """
+    periods = rest_periods(session, scene, rigging)
+    long_enough = [each for each in periods if each.times[-1] >= SHORTEST_REST]
+    if not long_enough:
+        longest = max(float(each.times[-1]) for each in periods)
+        raise BagError(
+            f"{session.name}: the longest rest period has {longest:.1f} s; {SHORTEST_REST:g} s are needed. Record a minute or "
+            "more at rest, in wind or under the pump."
+        )
+    return [_measured(session.name, period, scene, rigging) for period in long_enough]
+
+
+def _measured(name: str, period: RestPeriod, scene: Scene, rigging: Rigging) -> MeasuredRest:
+    names = channel_names(len(scene.joints))
+    columns = {names[k]: column for k in np.unique(period.channels) if (column := _even(period, int(k))) is not None}
+    columns = {key: column for key, column in columns.items() if not key.startswith("cylinder_") or "force" in key}
+    leading = [key for key in columns if key.startswith("tip_imu")] or list(columns)
+    if not columns:
+        raise BagError(f"{name}: neither IMU nor angles nor forces. Record one of them.")
+    order = leading + [key for key in columns if key not in leading]
+    values = np.column_stack([columns[key] for key in order])
+    poles, groups = _stable_groups(values[:, : len(leading)])
+    shapes = _shapes(values, len(leading), [float(np.median(each[:, 0])) for each in groups])
+    boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads)
+    boom.start(period.strokes)
+    model = boom.posture.omega[: boom.posture.modes[0]] / (2.0 * np.pi)
+    modes = tuple(_mode(each, shape, model) for each, shape in zip(groups, shapes, strict=True))
+    return MeasuredRest(period.start, period.start + float(period.times[-1]), tuple(order), model.copy(), poles, modes)
+
+
+def _even(period: RestPeriod, channel: int) -> Array | None:
+    """Return means of a channel's readings over steps of 1 / `RATE`, of mean 0 and deviation 1; None if it stands still."""
+    own = (period.channels == channel) & (period.times >= SETTLING)
+    count = int((period.times[-1] - SETTLING) * RATE)
+    places = np.minimum(((period.times[own] - SETTLING) * RATE).astype(int), count - 1)
+    sums, counts = (np.bincount(places, weights, count) for weights in (period.values[own], None))
+    there = np.flatnonzero(counts)
+    if len(there) < 2:
+        return None
+    found = np.interp(np.arange(count), there, sums[there] / counts[there])
+    deviation = float(found.std())
+    return np.asarray((found - found.mean()) / deviation) if deviation > 0.0 else None
+
+
+def _identified(values: Array, leading: int, with_deviations: bool) -> tuple[Array, ...]:
+    """Return frequencies (Hz), damping ratios, labels, deviations of both, and shapes of the poles by row and order."""
+    try:
+        from pyoma2.algorithms.ssi import SSI
+        from pyoma2.setup.single import SingleSetup
+    except ImportError:
+        raise UsageError("pyOMA-2 is not installed. Install it: pip install 'boom_twin[modal]'.") from None
+    limits: Any = {"xi_max": LARGEST_DAMPING, "mpc_lim": None, "mpd_lim": None, "CoV_max": LARGEST_VARIATION}
+    method: Any = SSI(
+        name="ssi", br=BLOCK_ROWS, ordmax=HIGHEST_ORDER, ref_ind=list(range(leading)), hc=limits,
+        calc_unc=with_deviations, nb=RECORD_PARTS,
+    )  # fmt: skip
+    silenced, setup = logging.root.manager.disable, SingleSetup(values, fs=RATE)
+    logging.disable(logging.INFO)
+    try:
+        with redirect_stderr(StringIO()):  # its progress bars
+            setup.add_algorithms(method)
+            setup.run_by_name("ssi")
+    finally:
+        logging.disable(silenced)
+    found = method.result
+    return found.Fn_poles, found.Xi_poles, found.Lab, found.Fn_poles_std, found.Xi_poles_std, found.Phi_poles
+
+
+def _stable_groups(values: Array) -> tuple[Array, list[Array]]:
+    """Return all poles as in `MeasuredRest.poles`, and the stable ones of each mode: frequency, damping, deviations."""
+    frequencies, dampings, labels, frequency_sigmas, damping_sigmas, _ = _identified(values, values.shape[1], True)
+    known = np.isfinite(frequencies)
+    orders = np.broadcast_to(np.arange(frequencies.shape[1]), frequencies.shape)
+    poles = np.column_stack([each[known] for each in (frequencies, orders, labels == 1)]).astype(float)
+    stable = known & (labels == 1)
+    rows = np.column_stack([each[stable] for each in (frequencies, dampings, frequency_sigmas, damping_sigmas)])
+    rows = rows[np.argsort(rows[:, 0])]
+    cuts = np.flatnonzero(np.diff(rows[:, 0]) > APART * rows[1:, 0]) + 1
+    return poles, [part for part in np.split(rows, cuts) if len(part) >= FEWEST_ORDERS]
+
+
+def _shapes(values: Array, leading: int, frequencies: list[float]) -> list[Array]:
+    """Return the real shape at all channels of the pole nearest to each frequency, at the highest order."""
+    if not frequencies:
+        return []
+    found, _, _, _, _, shapes = _identified(values, leading, False)
+    at = found[:, -1]
+    picked = [shapes[int(np.nanargmin(np.abs(at - frequency))), -1] for frequency in frequencies]
+    return [np.real(each / each[np.argmax(np.abs(each))]) for each in picked]
+
+
+def _mode(group: Array, shape: Array, model: Array) -> OperationalMode:
+    frequency, damping, frequency_sigma, damping_sigma = np.median(group, axis=0).tolist()
+    near = [float(each) for each in model if abs(each - frequency) <= NEAR * each]
+    nearest = min(near, key=lambda each: abs(each - frequency), default=None)
+    return OperationalMode(
+        frequency, frequency_sigma, damping, damping_sigma, len(group), damping < LINE_DAMPING, shape, nearest
+    )
