@@ -51,6 +51,8 @@ class Energies:
             if beam.axial:
                 self._stiffness[axial, axial] = beam.axial_stiffness
                 self._damping[axial, axial] = beam.beta * beam.axial_stiffness
+        for hinge in t.hinges:
+            self._stiffness[hinge.z, hinge.z], self._damping[hinge.z, hinge.z] = hinge.stiffness, hinge.damping
         self._lengths, self._forces = np.array(t.cylinders.history), np.array(t.cylinders.z)
         self._pins = [SimpleNamespace(**{name: row[name].item() for name in CLEARANCE.names or ()}) for row in t.clearances]
 
@@ -63,7 +65,7 @@ class Energies:
         return float(-self._plan.weights @ state.history[X])
 
     def strain(self, state: State) -> float:
-        """Return the strain energy of bent and stretched beams, J."""
+        """Return the strain energy of bent and stretched beams and of the base's hinge, J."""
         return float(0.5 * state.z @ self._stiffness @ state.z)
 
     def oil(self, state: State) -> float:
@@ -116,7 +118,7 @@ class Energies:
         return float((stiffened - state.z[self._forces]) @ state.drives[1])
 
     def damping_power(self, state: State) -> float:
-        """Power that beams and oil dampers take, W."""
+        """Power that beams, oil dampers and the base's hinge take, W."""
         rates = state.history[V]
         own, slip = rates[: len(state.z)], rates[self._lengths] - state.drives[1]
         return float(own @ self._damping @ own + self._oil(state.drives[0])[1] @ slip**2)
@@ -145,7 +147,7 @@ class EnergyBalance:
 
     work: float  # done by the drives
     change: float  # kinetic and potential energy at the last row less that at the first
-    damping: float  # taken by beams and oil dampers
+    damping: float  # taken by beams, oil dampers and the base's hinge
     contact: float  # taken by contacts
     gap: float  # largest of work - change - damping - contact at any step, in magnitude
     left: float  # that difference at the end: what time integration took, negative if it gave

@@ -114,6 +114,8 @@ class Equilibrium(SummaryDisplay):
         Undamped modes about this equilibrium, ascending.
     outline : ndarray, shape (k, 2)
         Points of the deflected centre line from base to tip, m.
+    base_turn : float, optional
+        Turn of an elastic base under the load, rad; None for a rigid one.
     doubts : tuple of str
         Warning if the boom is outside the model's validity, see `beyond_validity`.
     """
@@ -126,6 +128,7 @@ class Equilibrium(SummaryDisplay):
     cylinder_forces: Array
     modes: tuple[Mode, ...]
     outline: Array
+    base_turn: float | None = None
     doubts: tuple[str, ...] = ()
 
     @property
@@ -199,6 +202,7 @@ def statics(
         cylinder_forces=found.cylinder_forces,
         modes=natural_modes(plan, state, work, modes),
         outline=outline(plan, state.frames, work.position),
+        base_turn=None if scene.base.stiffness is None else float(state.z[plan.tables.hinges.z[0]]),
         doubts=beyond_validity(scene, float(np.hypot(*(tip - undeformed)))),
     )
 

@@ -291,9 +291,10 @@ def frequency_response(
 
 
 def joint_angles_by_unknowns(plan: Plan) -> Array:
-    """Derivatives of the joint angles by the unknowns, shape (n, unknowns): a section's root against the head before it."""
+    """Derivatives of the joint angles by the unknowns, shape (n, unknowns): a section's root against what carries it."""
     t, found = plan.tables, np.zeros((plan.joints, len(plan.names)))
     head, joint = np.zeros(len(plan.names)), 0
+    head[t.hinges.z] = 1.0
     for operation in t.operations:
         row = operation.row
         if operation.kind in (JOINT_A, JOINT_B):

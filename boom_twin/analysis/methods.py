@@ -87,13 +87,15 @@ def integrate_with(
     """Integrate a drive in equal steps from static equilibrium at t = 0; a failed step sets `status`.
 
     `duration` and `step` are in s, with a row after every `every` steps; `angles` (n,) are joint angles (rad) near the
-    equilibrium. UsageError if the duration is no multiple of `every` steps, or for clearance with the plain product;
-    SolverError if there is no equilibrium.
+    equilibrium. UsageError if the duration is no multiple of `every` steps, or for clearance or an elastic base with the plain
+    product; SolverError if there is no equilibrium.
     """
     method, rows = method or Method(), _row_count(duration, step, every)
     plan = compile_scene(scene, basis)
     if plan.pins and method.product == "plain":
         raise UsageError("product = 'plain': knows ideal pins only. Take riccati, or a scene without the block `clearance`.")
+    if scene.base.stiffness is not None and method.product == "plain":
+        raise UsageError("product = 'plain': knows a rigid base only. Take riccati, or a scene without base.stiffness.")
     depth, first = integrators.depth_of(FAMILIES[method.integrator]), drive(np.zeros(1))[0][0]
     state, work = plan.state(depth), plan.work(depth)
     settle(plan, state, work, first, joint_angles_of_strokes(scene, first, near=angles))

@@ -136,10 +136,11 @@ def _nudge(plan: Plan, increments: Array) -> float:
 
 
 def damping_ratio(plan: Plan, mode: Mode) -> float:
-    """Return the damping ratio from the power that oil and beams dissipate at the mode's frequency."""
+    """Return the damping ratio from the power that oil, beams and base dissipate at the mode's frequency."""
     t, omega = plan.tables, 2.0 * np.pi * mode.frequency
     compliances, lags = plan.compliances_and_lags(mode.drives)
     loss = sum((lags * compliances * mode.increments[t.cylinders.z] ** 2).tolist())
+    loss += sum((t.hinges.damping * mode.increments[t.hinges.z] ** 2).tolist())
     columns = (t.beams[name].tolist() for name in ("z", "bending", "beta", "axial", "axial_stiffness"))
     for row, (z, bending, beta, axial, stiffness) in enumerate(zip(*columns, strict=True)):
         q = mode.increments[z : z + bending]

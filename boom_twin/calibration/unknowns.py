@@ -44,6 +44,8 @@ KINDS = {
     "EI": UnknownKind("N m^2", 0.3, 0.1, relative=True),
     "beta": UnknownKind("s", 1.0, 0.2, relative=True),
     "mass": UnknownKind("kg", 0.1, 0.05, relative=True),
+    "stiffness": UnknownKind("N m/rad", 0.5, 0.1, relative=True),
+    "damping": UnknownKind("N m s/rad", 1.0, 0.2, relative=True),
     "tip.payload": UnknownKind("kg", 50.0, 5.0),
     "line_fill": UnknownKind("kg/m", 10.0, 1.0),
 }
@@ -62,6 +64,7 @@ ASSUMED = {
     "mass": UnknownKind("kg", 0.02, 0.0, relative=True),
     "d": UnknownKind("N s/m", 0.2, 0.0, relative=True),
     "beta": UnknownKind("s", 0.2, 0.0, relative=True),
+    "damping": UnknownKind("N m s/rad", 0.2, 0.0, relative=True),
 }
 """How far parameters that are not estimated may be wrong, by the last word of their names: tolerances, and damping."""
 

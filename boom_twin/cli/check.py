@@ -13,9 +13,9 @@ from ..scene import Scene
 from ..scene.kinematics import strokes_of_posture
 from ..scene.load import DEFAULT_NAME, examine
 from ..scene.oil_spring import STATIONS
-from ..scene.schema import Clearance
+from ..scene.schema import Base, Clearance
 from ..scene.segmentation import LEAST_PARTS
-from ..scene.summary import UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
+from ..scene.summary import UNKNOWNS_BASE, UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from ..system.atomic_files import check_target
 from . import reduce as need
 from .arguments import SENSORS, add_file, add_json, add_scene, files_of, sensors_of
@@ -94,6 +94,7 @@ def summary(name: str, account: Account, oddities: Sequence[Fault]) -> dict[str,
         "section_mass_kg": [section.mass for section in sections],
         "joint_mass_kg": [joint.mass for joint in joints],
         "payload_kg": account.payload,
+        **({"base_stiffness_Nm_rad": account.base.stiffness} if account.base.stiffness is not None else {}),
         "flexible_parts": [len(section.parts) for section in sections],
         "bending_per_part": [section.bending for section in sections],
         "split_at_m": [[split.x for split in section.splits] for section in sections],
@@ -130,6 +131,7 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
     lines = [f"{name}: this scene can be used"]
     lines += [f"  {scene.description}"] if scene.description else []
     lines += [f"  {count} section{'s' * (count > 1)}, {kinds}, {account.length:.2f} m, {account.mass:.1f} kg"]
+    lines += _base(account.base)
     lines += ["", "Masses, kg (links, barrel and rod: of the joint that turns the section)", *_masses(account)]
     lines += ["", "Sections", *_sections(account)]
     lines += ["", "Joints and cylinders", *_cylinders(account)]
@@ -145,6 +147,13 @@ def report(name: str, scene: Scene, account: Account, oddities: Sequence[Fault])
     lines += ["", *(f"Note: {oddity}" for oddity in oddities if oddity.is_note)]
     lines += [f"Warnings: {len(warnings) or 'none'}", *(f"  {warning}" for warning in warnings)]
     return lines
+
+
+def _base(base: Base) -> list[str]:
+    if base.stiffness is None:
+        return []
+    damping = f"{base.damping / 1e3:.4g} kN m s/rad" if base.damping else "no damping"
+    return [f"  elastic base: {base.stiffness / 1e6:.4g} MN m/rad about the pivot of joint 1, {damping}"]
 
 
 def _masses(account: Account) -> list[str]:
@@ -238,6 +247,8 @@ def _left_out(account: Account) -> list[str]:
 
 def _unknowns(account: Account) -> list[str]:
     rows = []
+    if account.base.stiffness is not None:
+        rows.append(["base", str(UNKNOWNS_BASE), "turn"])
     for section, joint in zip(account.sections, account.joints, strict=True):
         rows.append([f"joint {joint.number}", str(joint.unknowns), SIZE_A if joint.kind == "A" else SIZE_B])
         if section.parts:

@@ -33,7 +33,7 @@ def run(args: Namespace) -> int:
 
 
 def as_json(result: Equilibrium) -> dict[str, object]:
-    """Return the keys of a result; `warnings` only if there are any."""
+    """Return the keys of a result; `base_turn_rad` only of an elastic base, `warnings` only if there are any."""
     values: dict[str, object] = {
         "stroke_m": result.strokes,
         "length_m": result.lengths,
@@ -43,6 +43,8 @@ def as_json(result: Equilibrium) -> dict[str, object]:
         "cylinder_force_N": result.cylinder_forces,
         "frequencies_Hz": result.frequencies,
     }
+    if result.base_turn is not None:
+        values["base_turn_rad"] = result.base_turn
     return values | {"warnings": result.doubts} if result.doubts else values
 
 
@@ -52,6 +54,7 @@ def as_text(result: Equilibrium) -> list[str]:
     lines = [
         f"tip            x {x:.4f} m, y {y:.4f} m",
         f"deflection     x {1e3 * dx:+.1f} mm, y {1e3 * dy:+.1f} mm against rigid sections and cylinders",
+        *([] if result.base_turn is None else [f"base           turned by {math.degrees(result.base_turn):+.4f} deg"]),
         "",
         "joint    drive m    length m   angle deg   cylinder force kN",
     ]

@@ -50,6 +50,7 @@ def _shapes(basis: BasisName, n: int) -> tuple[int, modes.Basis, Array, Array]:
 def compile_scene(scene: Scene, basis: BasisName = "end-shapes") -> Plan:
     """Compile `scene`; `basis` chooses the bending shapes of all parts (`boom_twin.kernels.elements.beam_shapes`)."""
     builder = _Builder(scene, basis)
+    builder.base()
     for index in range(len(scene.sections)):
         builder.joint(index)
         builder.section(index)
@@ -76,6 +77,14 @@ class _Builder:
         self.pins: list[str] = []
         self.scale: list[float] = []
         self.gravity = gravity_in_base(scene)
+
+    def base(self) -> None:
+        """Hinge of an elastic base."""
+        base = self.scene.base
+        if base.stiffness is not None:
+            z = self.layout.unknowns(["phi_base"])
+            self.scale.append(1.0)
+            self.layout.add("hinges", z=z, stiffness=base.stiffness, damping=base.damping or 0.0)
 
     # -- joints ---------------------------------------------------------------------------------------------------
 

@@ -443,11 +443,14 @@ def rotate(a, vectors, m, j, k):
 
 @inner
 def modal_loss(t, p, increments):
-    """Return 2 zeta omega (1/s) of a mode by the power that oil dampers and beams take from it."""
+    """Return 2 zeta omega (1/s) of a mode by the power that oil dampers, beams and base take from it."""
     loss = 0.0
     for i in range(p.drives.shape[0]):
         force = increments[t.cylinders[i].z]
         loss += p.lag[i] * p.compliance[i] * force * force
+    for k in range(t.hinges.shape[0]):
+        turn = increments[t.hinges[k].z]
+        loss += t.hinges[k].damping * turn * turn
     for row in range(t.beams.shape[0]):
         beam = t.beams[row]
         for i in range(beam.bending):

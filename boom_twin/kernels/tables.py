@@ -11,13 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..types import Array
+from .elements.base_hinge import HINGE
 from .elements.beam import BEAM as BEAM_ROW
 from .elements.cylinder import CYLINDER, CYLINDER_PART, OIL
 from .elements.linkage import LINKAGE
 from .elements.pin_contact import CLEARANCE
 from .jit import by_reference
 
-SLOTS = 9  # largest size of a cut: x, y, theta, pin C (2), force of cylinder 1, three for the plain product
+SLOTS = 9  # largest size of a cut: x, y, theta, pin C (2), force of cylinder 1, three for the plain product or one for the base
 
 CORRECTIONS = 3  # stored corrections of a step's initial guess
 
@@ -79,6 +80,7 @@ RECORDS = {
     "parts": CYLINDER_PART,
     "oils": OIL,
     "clearances": CLEARANCE,
+    "hinges": HINGE,
 }
 """Dtypes of the record arrays of `Tables`."""
 
@@ -104,6 +106,7 @@ class Tables(NamedTuple):
     parts: np.recarray
     oils: np.recarray
     clearances: np.recarray  # pins that are not ideal, see `kernels.elements.pin_contact`
+    hinges: np.recarray  # of an elastic base
     gravity: Array  # (2,), m/s^2
     moving: Array  # (unknowns,): 1 for coordinates, 0 for forces
     scale: Array  # (unknowns,): factor from increment to angle, rad; 0 for forces
@@ -130,7 +133,7 @@ class State(NamedTuple):
     z : (unknowns,) coordinates and forces, see the tables.
     history : (depth, histories) of unknowns, then mass points; rows: see `kernels.integrators`.
     frames : (operations + 1, 5) x, y, theta, cos, sin before every operation, and at the tip.
-    turns : (joints, 8) cosine and sine of a six-bar's head, section, link L, link R.
+    turns : (joints, 8) cosine and sine of a joint's head, and of a six-bar's section, link L, link R.
     pins : (cylinders, 4) ends C and R of every cylinder, m.
     contacts : (clearances, 8) memory of pins with clearance, see `kernels.elements.pin_contact`.
     drives : (2, cylinders) length (m) and rate (m/s) of the drives at the newest history.

@@ -114,6 +114,9 @@ def variants(scene: Scene) -> tuple[Variant, ...]:
     found += [with_modes(scene, count, where) for where in wheres for count in range(1, MOST_MODES + 1)]
     if scene.clearance is not None and scene.clearance.pins:
         found.insert(0, Variant("all pins ideal", "clearance", (Edit(("clearance",), None),)))
+    if scene.base.stiffness is not None:
+        edits = tuple(Edit(("base", key), None) for key in ("stiffness", "damping") if getattr(scene.base, key) is not None)
+        found.append(Variant("base rigid", "base compliance", edits))
     distinct: dict[tuple[Edit, ...], Variant] = {}
     for variant in found:
         if variant is not None:

@@ -133,7 +133,8 @@ def meaning_at(root: type[BaseModel], place: Place) -> str:
 # -- units -----------------------------------------------------------------------------------------------------------
 
 
-_STATED = re.compile(r"(?:,| in) (m/s\^2|kg/m\^3|kg m\^2|kg/m|kg m|kg|N s/m|N/m|Pa|m\^2|m\^3|m\^4|m|s|rad|degrees)(?![\w^/])")
+_FORCES = r"N m(?: s)?/rad|N(?: s)?/m|Pa"
+_STATED = re.compile(rf"(?:,| in) (m/s\^2|kg/m\^3|kg m\^2|kg/m|kg m|kg|{_FORCES}|m\^2|m\^3|m\^4|m|s|rad|degrees)(?![\w^/])")
 _TERM = r"[A-Za-zµμ°]+(?:(?:\^|\*\*)?-?[1-9]|[²³⁴])?"
 _QUANTITY = re.compile(rf"(?P<number>{NUMBER.pattern})\s*(?P<unit>{_TERM}(?:(?:\s*[*/·]\s*|\s+){_TERM})*)")
 _POWERS = str.maketrans({"²": "**2", "³": "**3", "⁴": "**4", "·": "*", "^": "**", "μ": "µ"})

@@ -1,9 +1,9 @@
 """Change a scene: single parameters by name, keys as an editor would change them, the text with comments kept, another load.
 
 ``cylinder_i.k`` (N/m), ``cylinder_i.d`` (N s/m), ``section_i.EI`` (N m^2), ``section_i.beta`` (s), ``section_i.mass`` (kg, of
-all its parts, without concrete), ``tip.payload`` (kg), ``line_fill`` (kg/m), ``base.inclination`` (rad). k of a cylinder with
-`oil` is that at half its stroke; to change it changes the bulk modulus, and with that k by the same factor over the whole
-stroke.
+all its parts, without concrete), ``tip.payload`` (kg), ``line_fill`` (kg/m), ``base.inclination`` (rad), ``base.stiffness``
+(N m/rad), ``base.damping`` (N m s/rad). k of a cylinder with `oil` is that at half its stroke; to change it changes the bulk
+modulus, and with that k by the same factor over the whole stroke.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ def parameter_names(scene: Scene) -> tuple[str, ...]:
         names += [f"section_{i + 1}.EI"] if scene.is_flexible(i) else []
         names += [f"section_{i + 1}.beta"] if scene.is_flexible(i) and section.beta else []
         names += [f"section_{i + 1}.mass"] if section_mass(section) > 0.0 else []
-    return (*names, "tip.payload", "line_fill", "base.inclination")
+    elastic = [f"base.{key}" for key in ("stiffness", "damping") if getattr(scene.base, key) is not None]
+    return (*names, *elastic, "tip.payload", "line_fill", "base.inclination")
 
 
 def parameter(scene: Scene, name: str) -> float:
@@ -84,7 +85,7 @@ def section_mass(section: Section) -> float:
 
 def _with_one(scene: Scene, name: str, value: float) -> Scene:
     part, key = _owner(scene, name)
-    is_positive = key in ("k", "EI", "mass")
+    is_positive = key in ("k", "EI", "mass", "stiffness")
     bound = "" if key == "inclination" else " and above 0" if is_positive else " and at least 0"
     if not math.isfinite(value) or (bound and not (value > 0.0 if is_positive else value >= 0.0)):
         raise UsageError(f"{name} = {value:g}: must be finite{bound}.")

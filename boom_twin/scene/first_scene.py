@@ -84,7 +84,8 @@ def _text(table: BoomTable, source: str, first: float | None) -> str:
     material = {key: value for key, value in table.material.model_dump().items() if value is not None}
     lines += ["gravity: [0.0, -9.81]", f"material: {yaml_text(material)}", "", "base:"]
     lines += [f"  pivot: {yaml_text(table.base.pivot)}", f"  cylinder_pin: {yaml_text(table.base.cylinder_pin)}"]
-    lines += [f"  inclination: {yaml_text(table.base.inclination)}"] if table.base.inclination else []
+    rest = table.base.model_dump(exclude={"pivot", "cylinder_pin"}, exclude_defaults=True)
+    lines += [f"  {key}: {yaml_text(value)}" for key, value in rest.items()]
     lines += ["", "sections:"]
     for number, section in enumerate(table.sections, 1):
         lines += [f"  # section {number}: a box {section.height:g} x {section.width:g} m, walls {section.wall:g} m"]

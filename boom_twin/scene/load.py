@@ -207,6 +207,7 @@ def _draft(document: Document, known: Any, broken: set[Place]) -> Draft:
 
 CHECKS: tuple[Callable[[Draft], Findings], ...] = (
     values.counts,
+    values.base,
     values.sections,
     values.modes,
     values.joints,

@@ -53,11 +53,13 @@ class Material(Part):
 
 
 class Base(Part):
-    """Base of the boom; an inclination turns it anticlockwise."""
+    """Base of the boom; an inclination turns it anticlockwise, a stiffness lets it turn about the pivot under load."""
 
     pivot: Point = Field(description="[x, y] of the pin of section 1, m")
     cylinder_pin: Point = Field(description="[x, y] of the barrel pin of cylinder 1, m")
     inclination: Finite = Field(default=0.0, description="the turn of the base, rad")
+    stiffness: Positive | None = Field(default=None, description="the stiffness of the hinge on the ground, N m/rad")
+    damping: NotNegative | None = Field(default=None, description="the damping of that hinge, N m s/rad")
 
 
 class RigidPart(Part):

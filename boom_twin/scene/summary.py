@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from .checks.linkages import LinkageAccount, linkage_account
 from .kinematics import RANGE_SAMPLES, stroke_range
 from .oil_spring import stiffness_over_stroke
-from .schema import IDEAL_BELOW, Joint, Pin, Scene
+from .schema import IDEAL_BELOW, Base, Joint, Pin, Scene
 from .segmentation import Split, flexible_parts, splits
 
 
@@ -30,6 +30,10 @@ def left_out(scene: Scene) -> tuple[LeftOut, ...]:
         found.append(LeftOut("line_fill", "the pipe line is empty"))
     if not scene.base.inclination:
         found.append(LeftOut("base.inclination", "the base stands level"))
+    if scene.base.stiffness is None:
+        found.append(LeftOut("base.stiffness", "the base is rigid"))
+    elif not scene.base.damping:
+        found.append(LeftOut("base.damping", "no damping in the hinge of the base"))
     if scene.clearance is None or not scene.clearance.pins:
         return (*found, LeftOut("clearance", "ideal pins"))
     tight = [i for i, pin in enumerate(scene.clearance.pins) if pin.radial_clearance < IDEAL_BELOW]
@@ -83,7 +87,7 @@ def _absent(block: str, items: list[dict[str, str]]) -> list[LeftOut]:
     return found
 
 
-UNKNOWNS_A, UNKNOWNS_B, UNKNOWNS_PIN = 2, 6, 2
+UNKNOWNS_A, UNKNOWNS_B, UNKNOWNS_PIN, UNKNOWNS_BASE = 2, 6, 2, 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,13 +153,15 @@ class JointAccount:
 class Account:
     """Everything about a scene's model. ``length`` is the sum of all sections (m), ``payload`` in kg.
 
-    ``pins`` are those with clearance; each has two unknowns, the offset of its journal.
+    ``pins`` are those with clearance; each has two unknowns, the offset of its journal. An elastic ``base`` has one
+    unknown, its turn.
     """
 
     sections: tuple[SectionAccount, ...]
     joints: tuple[JointAccount, ...]
     pins: tuple[Pin, ...]
     payload: float
+    base: Base
     left_out: tuple[LeftOut, ...]
 
     @property
@@ -172,7 +178,7 @@ class Account:
     def unknowns(self) -> int:
         """Unknowns of one step."""
         own = sum(s.unknowns for s in self.sections) + sum(j.unknowns for j in self.joints)
-        return own + UNKNOWNS_PIN * len(self.pins)
+        return own + UNKNOWNS_PIN * len(self.pins) + UNKNOWNS_BASE * (self.base.stiffness is not None)
 
 
 def weight_of(scene: Scene) -> float:
@@ -189,6 +195,7 @@ def explain(scene: Scene) -> Account:
         joints=tuple(_joint(scene, i) for i in numbers),
         pins=tuple(pin for i in numbers for owner in ("cylinder", "joint") for pin in scene.pins_of(f"{owner}_{i + 1}")),
         payload=scene.payload,
+        base=scene.base,
         left_out=left_out(scene),
     )
 

@@ -41,7 +41,12 @@ def mixed():
     return booms.random_boom(8), "test", (0.02, -0.02, 0.02, -0.02)
 
 
-@pytest.mark.parametrize("boom", [damped, undamped, mixed])
+def on_an_elastic_base():
+    """The default scene on a hinge that takes energy too."""
+    return booms.on_elastic_base(booms.scene_of(booms.document()), 5.0e6, 5.0e4), "arch", (0.03, -0.02, 0.03, 0.02)
+
+
+@pytest.mark.parametrize("boom", [damped, undamped, mixed, on_an_elastic_base])
 def test_balance_closes_with_the_square_of_the_step(boom):
     found = [balance(*boom(), step) for step in STEPS]
     gaps = np.array([own.gap for own in found])

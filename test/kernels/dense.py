@@ -58,6 +58,8 @@ class Dense:
         # closures and lengths do not depend on forces, so rows of forces are still empty
         total = np.array([slope @ force for slope in slopes(self.positions, z)])
         rates = self.motion.rate * at[:histories] + self.motion.offset
+        for hinge in t.hinges:
+            total[hinge.z] += hinge.stiffness * z[hinge.z] + hinge.damping * rates[hinge.z]
         for row, beam in enumerate(t.beams):
             places = slice(beam.z, beam.z + beam.bending)
             lead = z + beam.beta * rates[: len(z)] * (beam.damped > 0)

@@ -70,6 +70,14 @@ SCENES += [
     for key, value in (("modes", 2), ("modes", 5), ("axial", False), ("geometric", False))
 ]
 SCENES += [pytest.param(rod_pin_outboard_of_c(), "arch", id="rod pin outboard of C")]
+SCENES += [
+    pytest.param(booms.on_elastic_base(scene, 5.0e6, 2.0e5), posture, id=f"elastic base, {name}")
+    for scene, posture, name in (
+        (load_scene(), "arch", "default"),
+        (rod_pin_outboard_of_c(), "arch", "rod pin outboard of C"),
+        (booms.random_boom(14), "test", "boom 14"),
+    )
+]
 SCENES += [pytest.param(booms.random_boom(seed), "test", id=f"boom {seed}") for seed in SEEDS]
 
 

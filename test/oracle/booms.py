@@ -40,6 +40,11 @@ def short_boom(sections):
     return scene_of(spec)
 
 
+def on_elastic_base(scene, stiffness=5.0e6, damping=None):
+    """The boom on a base with an elastic hinge, N m/rad and N m s/rad."""
+    return scene.model_copy(update={"base": scene.base.model_copy(update={"stiffness": stiffness, "damping": damping})})
+
+
 def random_boom(seed):
     """Scene with a posture "test"; what it holds follows from the seed."""
     rng = np.random.default_rng(seed)

@@ -80,6 +80,14 @@ def test_incompressible_cylinders(kind):
     assert np.all(table[-1, [1, 3]] < [5e-5, 5e-5 * size])
 
 
+def test_elastic_base():
+    """Its turn has no inertia but that of cylinder 1: 50 Hz beside the 1 Hz of the boom."""
+    scene = booms.on_elastic_base(two_sections("B1", False), 5.0e6, 5.0e4)
+    table, size = errors(scene, np.array([0.6, -0.9]), [0.03, -0.02], STEPS)
+    assert np.all(np.abs(slopes(table) - 2.0) < 0.1)
+    assert np.all(table[-1] < [5e-6, 2e-4, 2e-5, 2e-4 * size])
+
+
 def test_mixed_boom():
     table, size = errors(three_sections(), np.array([0.8, -0.7, -0.5]), [0.02, -0.02, 0.03], STEPS[1:])
     assert np.all(np.abs(slopes(table) - 2.0) < 0.2)

@@ -72,6 +72,7 @@ VARIANTS = {
     "uphill": {"base": {"pivot": [0.1, 0.2], "cylinder_pin": [0.55, -1.05], "inclination": 0.3}},
     "sideways gravity": {"gravity": [3.0, -9.0]},
     "more modes": {"modes": 6},
+    "elastic base": {"base": {"pivot": [0.1, 0.2], "cylinder_pin": [0.55, -1.05], "inclination": 0.1, "stiffness": 5.0e6}},
     "cylinder 1 in front": {"base": {"pivot": [0.0, 0.0], "cylinder_pin": [0.9, -1.1]}},
 }
 

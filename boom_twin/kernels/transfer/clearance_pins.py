@@ -109,8 +109,6 @@ def axis_of(t, state, row):
         return turns[SECTION_TURN], turns[SECTION_TURN + 1]
     if row.place == Q_PIN:
         return turns[LINK_L_TURN], turns[LINK_L_TURN + 1]
-    if row.owner == 0:
-        return 1.0, 0.0
     return turns[HEAD_TURN], turns[HEAD_TURN + 1]
 
 

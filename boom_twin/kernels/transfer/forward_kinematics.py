@@ -130,6 +130,9 @@ def place(t, state, work):
     for i in range(z.shape[0]):
         position[i] = z[i]
     x, y, theta, c, s = 0.0, 0.0, 0.0, 1.0, 0.0
+    if t.hinges.shape[0] > 0:
+        theta = z[t.hinges[0].z]
+        c, s = cosine_and_sine(theta)
     for k in range(t.operations.shape[0]):
         kind, row = t.operations[k].kind, t.operations[k].row
         put_frame(frames[k], x, y, theta, c, s)
@@ -166,11 +169,13 @@ def place(t, state, work):
             c, s = state.turns[row, SECTION_TURN], state.turns[row, SECTION_TURN + 1]
         elif kind == JOINT_A:
             joint = t.joints[row]
+            bx, by = rotated(c, s, t.linkages[row].cx, t.linkages[row].cy)
+            place_barrel(t, state, work, row, joint.x + bx, joint.y + by, theta)
+            set_turn(t, work, joint, PIVOT, z[joint.z + Z_SECTION] - theta)
+            state.turns[row, HEAD_TURN], state.turns[row, HEAD_TURN + 1] = c, s
             dx, dy = offset_of(t, z, joint, PIVOT)
             x, y, theta = joint.x + dx, joint.y + dy, z[joint.z + Z_SECTION]
             c, s = cosine_and_sine(theta)
-            set_turn(t, work, joint, PIVOT, theta)
-            place_barrel(t, state, work, row, joint.x + t.linkages[row].cx, joint.y + t.linkages[row].cy, 0.0)
     last = t.operations.shape[0]
     put_frame(frames[last], x, y, theta, c, s)
     position[t.tip], position[t.tip + 1], position[t.tip + 2] = x, y, theta

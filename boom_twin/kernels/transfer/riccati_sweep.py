@@ -33,7 +33,7 @@ from ..tables import (
 from .clearance_pins import move_ends, torque_of
 from .forward_kinematics import beam_part
 from .six_bar import close_loop, open_loop
-from .slider_crank import close_base, join_rod
+from .slider_crank import barrel_pin, close_base, join_rod
 
 # First operation; degrees of freedom (x, y, theta) of a cut without cylinders. Typed: numba compiles again for literals.
 ROOT, FREE = np.int64(0), np.int64(3)
@@ -146,10 +146,15 @@ def sweep_out(t, state, work, condensed, first, last, m):
             cut[3], cut[4] = cut[0] - (sn * bx + c * by) * cut[2], cut[1] + (c * bx - sn * by) * cut[2]
             m += 2
         elif kind == ROD_PIN:
+            cx, cy = 0.0, 0.0
+            if t.hinges.shape[0] > 0:
+                m -= 1
+                pin = barrel_pin(t, state)
+                cx, cy = -pin[1] * cut[m], pin[0] * cut[m]
             m -= 1
             bx, by = t.outlets[row].x, t.outlets[row].y
             rx, ry = cut[0] - (sn * bx + c * by) * cut[2], cut[1] + (c * bx - sn * by) * cut[2]
-            move_ends(t, work, condensed, t.cylinders[0], 0.0, 0.0, rx, ry, cut[m])
+            move_ends(t, work, condensed, t.cylinders[0], cx, cy, rx, ry, cut[m])
         elif kind == JOINT_B:
             m = open_loop(t, state, work, condensed, row, k, m)
         elif kind == JOINT_A:
@@ -161,6 +166,9 @@ def sweep_out(t, state, work, condensed, first, last, m):
                 cut[0], cut[1] = -free[2], -free[3]
             cut[2], cut[3] = dz[at + Z_SECTION], dz[at + Z_FORCE_A]
             m = FREE + 1
+            if t.hinges.shape[0] > 0:
+                cut[4] = dz[t.hinges[0].z] = -free[2 + 2 * t.joints[row].clearances]
+                m += 1
 
 
 @inner

@@ -1,21 +1,35 @@
 """Substructure A, slider-crank: cylinder 1 between the base and section 1.
 
 Sweeping in, the rod pin adds the cylinder to the cut and opens a column for its force N; at the pivot the section's angle and
-N are what is left to solve. The pivot does not move, or by the offset of its journal only, which is solved with them.
+N are what is left to solve. The pivot does not move, or by the offset of its journal only, which is solved with them. A base
+on an elastic hinge turns; its turn has a column behind that of N.
 """
 
 from __future__ import annotations
 
+from ..elements.base_hinge import hinge_moment, turn_barrel_force, turn_barrel_tangent
 from ..elements.cylinder import AXIAL, END_C, END_R, cylinder_terms
-from ..elements.pin_contact import HOLD_X, HOLD_Y, K_XX, K_XY, K_YY, ROD_END_PIN, TORQUE, TORQUE_TURN, TORQUE_X
+from ..elements.pin_contact import (
+    BARREL_END_PIN,
+    HOLD_X,
+    HOLD_Y,
+    K_XX,
+    K_XY,
+    K_YY,
+    ROD_END_PIN,
+    TORQUE,
+    TORQUE_TURN,
+    TORQUE_X,
+)
 from ..jit import inner
-from ..plane_algebra import factorise, substitute
+from ..plane_algebra import factorise, rotated, substitute
+from ..tables import FRAME_COS, FRAME_SIN
 from .clearance_pins import condense_ends, torque_of
 
 
 @inner
 def join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m):
-    """Add cylinder 1 at outlet `row` of a frame (cos c, sin sn); the cut gains the column N. Returns m + 1."""
+    """Add cylinder 1 at outlet `row` of a frame (cos c, sin sn); return the slots of the cut, more by N and the base's turn."""
     outlet = t.outlets[row]
     pins, cylinder, s, p = state.pins[0], t.cylinders[0], work.s, work.p
     g, h = work.own_g, work.own_h
@@ -29,8 +43,13 @@ def join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m
         p[i] += g[END_R + i]
     p[m] = g[AXIAL]
     p[2] += bx * g[END_R + 1] - by * g[END_R] - torque_of(t, work, cylinder, ROD_END_PIN)
+    turns = t.hinges.shape[0]
+    if turns > 0:
+        cx, cy = barrel_pin(t, state)
+        moment = hinge_moment(t.hinges[0], state.z[t.hinges[0].z], motion)
+        p[m + 1] = turn_barrel_force(g, cx, cy) + moment - torque_of(t, work, cylinder, BARREL_END_PIN)
     if not motion.renew:
-        return m + 1
+        return m + 1 + turns
     for i in range(m + 1):
         s[m, i] = 0.0
         s[i, m] = 0.0
@@ -50,27 +69,47 @@ def join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m
     s[2, 2] += bx * turn_y - by * turn_x - (bx * g[END_R] + by * g[END_R + 1])
     s[m, 2] = bx * h[AXIAL, END_R + 1] - by * h[AXIAL, END_R]
     s[2, m] = s[m, 2]
-    return m + 1
+    if turns > 0:
+        turn_barrel_tangent(t.hinges[0], motion, g, h, cx, cy, bx, by, s, m + 1)
+    return m + 1 + turns
+
+
+@inner
+def barrel_pin(t, state):
+    """Return the vector (m) from the pivot of joint 1 to the barrel pin of cylinder 1, which turns with the base."""
+    base = state.frames[0]
+    return rotated(base[FRAME_COS], base[FRAME_SIN], t.linkages[0].cx, t.linkages[0].cy)
+
+
+@inner
+def slot_of(unknown, offsets):
+    """Return the slot of an unknown of joint A: theta, N, `offsets` x and y of its journal, turn of the base."""
+    if unknown < 2:
+        return 2 + unknown
+    return unknown - 2 if unknown < 2 + offsets else 4
 
 
 @inner
 def close_base(t, work, condensed, renew, operation):
-    """Solve increments of joint A into the gains of `operation`: theta, N, and x, y if the pivot has clearance.
+    """Solve increments of joint A into the gains of `operation`, in the order of `slot_of`.
 
     renew : whether its tangent is made anew. False if singular.
     """
     s, p, b, joint = work.s, work.p, work.right, t.joints[0]
-    a, order, size = condensed.factors[operation], condensed.order[operation], 2 + 2 * joint.clearances
+    a, order, offsets = condensed.factors[operation], condensed.order[operation], 2 * joint.clearances
+    size = 2 + offsets + t.hinges.shape[0]
     if not renew:
-        b[0, 0], b[1, 0] = p[2], p[3]
+        for i in range(size):
+            b[i, 0] = p[slot_of(i, offsets)]
         substitute(a, order, b, size, 1)
-        condensed.free[operation, 0], condensed.free[operation, 1] = b[0, 0], b[1, 0]
+        for i in range(size):
+            condensed.free[operation, i] = b[i, 0]
         return True
     for i in range(size):
-        of = 2 + i if i < 2 else i - 2
+        of = slot_of(i, offsets)
         b[i, 0] = p[of]
         for j in range(size):
-            a[i, j] = s[of, 2 + j if j < 2 else j - 2]
+            a[i, j] = s[of, slot_of(j, offsets)]
     if joint.clearances:
         hold = work.hold[joint.first_clearance]
         b[0, 0] += hold[TORQUE]
@@ -84,6 +123,15 @@ def close_base(t, work, condensed, renew, operation):
         for i in range(2):
             a[0, 2 + i] += hold[TORQUE_X + i]
             a[2 + i, 0] += hold[TORQUE_X + i]
+        if size > 2 + offsets:  # friction turns the base back
+            turn = size - 1
+            b[turn, 0] -= hold[TORQUE]
+            a[turn, turn] += hold[TORQUE_TURN]
+            a[0, turn] -= hold[TORQUE_TURN]
+            a[turn, 0] -= hold[TORQUE_TURN]
+            for i in range(2):
+                a[turn, 2 + i] -= hold[TORQUE_X + i]
+                a[2 + i, turn] -= hold[TORQUE_X + i]
     for i in range(size):
         for j in range(size):
             condensed.blocks[0, i, j] = a[i, j]

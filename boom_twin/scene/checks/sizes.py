@@ -56,6 +56,8 @@ SUSPECTS = (
     Suspect(("line_fill",), 0.0, 100.0, "more than 100 kg/m: the whole load in kg?", "Give the concrete in one metre of pipe."),
     Suspect(("inclination",), 0.0, 0.2, "more than 0.2 rad, which is 11.5 degrees: degrees?",
             "Give radians: 5 degrees are 0.0873."),
+    Suspect(("stiffness",), 1e5, math.inf, "less than 1e5 N m/rad: kN m/rad?", "Give N m/rad: {0:g} kN m/rad are {1:g}.", 1e3),
+    Suspect(("stiffness",), 0.0, 1e12, "more than 1e12 N m/rad, which is rigid", "Leave stiffness out for a rigid base."),
     Suspect(("closed_length", "max_stroke"), 0.0, 50.0, "more than 50 m: mm?", "Give lengths in m."),
     Suspect(("cap_line", "rod_line"), 0.0, 0.5, "more than 0.5 m^3: litres?", "Give m^3: 1 litre is 1e-3."),
 )  # fmt: skip

@@ -7,7 +7,7 @@ import re
 from ...config.yaml_text import Place
 from ...errors import ABSENT
 from ..block_reader import meaning_of
-from ..schema import Cylinder, Joint, Oil, Point, Section
+from ..schema import Base, Cylinder, Joint, Oil, Point, Section
 from . import Draft, Findings
 
 BEAM_NEEDS = ("A", "I", "rho_A")
@@ -108,6 +108,15 @@ def joints(draft: Draft) -> Findings:
             yield from _keys_of_kind(draft, i, joint)
             yield from _range(draft, i, joint)
             yield from _oil_spring(draft, i, joint.cylinder)
+
+
+def base(draft: Draft) -> Findings:
+    """Check that the damper of the base's hinge has its spring."""
+    own = draft.base
+    if own is not None and own.damping is not None and own.stiffness is None:
+        bound = "a damper acts in parallel with the hinge's spring, and stiffness is absent: the base is rigid"
+        remedy = f"Give stiffness, {meaning_of(Base, 'stiffness')}, or remove damping."
+        yield draft.fault(("base", "damping"), own.damping, bound, remedy)
 
 
 def _kind(draft: Draft, i: int, joint: Joint) -> Findings:

@@ -40,7 +40,7 @@ MOST_PAYLOAD = 0.5  # of the boom's mass
 
 TAKES = frozenset(
     ("E", "rho", "A", "I", "k", "rho_A", "mass", "com", "mL", "mR", "payload", "line_fill", "length", "beam", "gravity")
-) | {"inclination", "bulk_modulus"}
+) | {"inclination", "bulk_modulus", "stiffness"}
 """Keys on which all of it depends: where one of these is odd, it would be told again."""
 
 
@@ -80,6 +80,8 @@ def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
         if joint.cylinder.d:
             delay = joint.cylinder.d / middle_stiffness(joint.cylinder)
             parts.append((("joints", i, "cylinder", "d"), joint.cylinder.d, delay))
+    if scene.base.damping and scene.base.stiffness:
+        parts.append((("base", "damping"), scene.base.damping, scene.base.damping / scene.base.stiffness))
     slow, quick = found.frequencies[[0, min(1, len(found.frequencies) - 1)]].tolist()
     first, second = math.pi * slow, math.pi * max(slow, min(quick, QUICK))
     odd = [part for part in parts if first * part[2] < PART_DAMPING[0] or second * part[2] > PART_DAMPING[1]]
@@ -88,7 +90,12 @@ def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
         low, high = (limit * value / (each * delay or TINY) for limit, each in zip(PART_DAMPING, (first, second), strict=True))
         damped = f"a mode of {pace / math.pi:.2g} Hz by {100 * pace * delay:.2g} %"
         bound = f"alone it would damp {damped}; expected {low:.2g} to {high:.2g}"
-        remedy = "beta is 2 zeta / omega in s, d is 2 zeta k / omega in N s/m, zeta being the damping ratio."
+        remedy = (
+            "beta is 2 zeta / omega in s, d is 2 zeta k / omega in N s/m, damping 2 zeta stiffness / omega in N m s/rad, "
+            "zeta being the damping ratio."
+            if place[0] == "base"
+            else "beta is 2 zeta / omega in s, d is 2 zeta k / omega in N s/m, zeta being the damping ratio."
+        )
         yield draft.warning(place, value, bound, remedy)
     if parts and not odd:
         yield from _damping_of_all(draft, scene, found, parts[0])
@@ -97,7 +104,9 @@ def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
 def _damping_of_all(draft: Draft, scene: Scene, found: StraightBoom, part: tuple[Place, float, float]) -> Findings:
     betas = np.array([section.beta or 0.0 for section in scene.sections])
     delays = np.array([(joint.cylinder.d or 0.0) / middle_stiffness(joint.cylinder) for joint in scene.joints])
-    percent = 100.0 * float(np.pi * found.frequencies[0] * (found.sections[0] @ betas + found.joints[0] @ delays))
+    base = (scene.base.damping or 0.0) / (scene.base.stiffness or math.inf)
+    lag = found.sections[0] @ betas + found.joints[0] @ delays + found.base[0] * base
+    percent = 100.0 * float(np.pi * found.frequencies[0] * lag)
     says = f"all damping together gives the first mode a ratio of {percent:.2g} %; "
     remedy = "Give beta (s) of every section and d (N s/m) of every cylinder."
     yield from draft.expect(part[0], part[1], DAMPING, 100.0, " %", remedy, measured=percent, says=says)
@@ -174,6 +183,8 @@ class StraightBoom:
     sections: Array
     joints: Array
     """Shares of strain energy: of bending by section, of oil by joint, shape (k, n)."""
+    base: Array
+    """Share of strain energy of the base's hinge, shape (k,)."""
     levers: Array
     """Change of stroke by angle, m/rad, shape (n,)."""
     moments: Array
@@ -201,10 +212,11 @@ def _estimate(scene: Scene, stiffnesses: Array) -> StraightBoom:
         response[:] = 0.0
     left, sizes, _ = np.linalg.svd(response, full_matrices=False)
     kept = np.flatnonzero(sizes > 1e-9 * sizes.max(initial=0.0))[: n + 2]
-    shares = np.zeros((2 * n, len(kept)))
+    shares = np.zeros((2 * n + 1, len(kept)))
     np.add.at(shares, owner, left[:, kept] ** 2)
     moments = np.maximum(places[None, :] - starts[:-1, None], 0.0) @ masses * float(np.hypot(*scene.gravity))
-    return StraightBoom(1.0 / (2.0 * np.pi * sizes[kept]), shares[:n].T, shares[n:].T, levers, moments, float(masses.sum()))
+    bending, oil, base = shares[:n].T, shares[n:-1].T, shares[-1]
+    return StraightBoom(1.0 / (2.0 * np.pi * sizes[kept]), bending, oil, base, levers, moments, float(masses.sum()))
 
 
 def _masses(scene: Scene, starts: Array) -> tuple[Array, Array]:
@@ -228,7 +240,7 @@ def _cells(ends: tuple[float, float]) -> Array:
 
 
 def _springs(scene: Scene, starts: Array, levers: Array, stiffnesses: Array) -> tuple[Array, NDArray[np.int64], Array]:
-    """Return the places (m), owners (section i, or n + joint i) and compliances (rad/(N m)) of all that bends or gives way."""
+    """Return places (m), owners (section i, n + joint i, 2 n the base) and compliances (rad/(N m)) of all that gives way."""
     n, found = len(scene.sections), []
     for i, section in enumerate(scene.sections):
         if section.beam is not None and section.I is not None and scene.is_flexible(i):
@@ -236,5 +248,7 @@ def _springs(scene: Scene, starts: Array, levers: Array, stiffnesses: Array) -> 
             found += [(starts[i] + place, i, cell / np.float64(scene.material.E * section.I)) for place in _cells(section.beam)]
         if np.isfinite(stiffnesses[i]) and abs(levers[i]) > 0.0:
             found.append((starts[i], n + i, 1.0 / (stiffnesses[i] * levers[i] ** 2)))
+    if scene.base.stiffness is not None:
+        found.append((starts[0], 2 * n, 1.0 / np.float64(scene.base.stiffness)))
     places, owners, compliances = np.array(found or np.zeros((0, 3))).reshape(-1, 3).T
     return places, owners.astype(np.int64), compliances

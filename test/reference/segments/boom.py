@@ -1,8 +1,8 @@
 """The finite-segment reference boom: rigid pieces with bending and axial springs, loops closed by constraints.
 
-Coordinates: heading of every section's root, headings of both links of every six-bar, and at each spring a turn and a
-stretch. Everything else (points, energy, constraints) is written once as plain geometry on `jets`, which give gradients and
-Hessians. Its error falls with the square of the number of springs.
+Coordinates: turn of an elastic base, heading of every section's root, headings of both links of every six-bar, and at each
+spring a turn and a stretch. Everything else (points, energy, constraints) is written once as plain geometry on `jets`, which
+give gradients and Hessians. Its error falls with the square of the number of springs.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Segments:
 
     def start(self, angles: np.ndarray) -> np.ndarray:
         """Coordinates of the undeformed boom at relative joint angles (rad)."""
-        q: list[float] = []
+        q: list[float] = [] if self.scene.base.stiffness is None else [0.0]
         heading = 0.0
         for i, relative in enumerate(angles):
             joint = self.scene.joints[i]
@@ -79,9 +79,13 @@ class Segments:
     def place(self, q: np.ndarray) -> SegmentBoom:
         """The boom at coordinates q."""
         jets, n = iter(coordinates(q)), len(q)
-        (px, py), (cx, cy) = self.scene.base.pivot, self.scene.base.cylinder_pin
+        base, (px, py) = self.scene.base, self.scene.base.pivot
         x, y, head = constant(px, n), constant(py, n), constant(0.0, n)
-        pin, boom = (constant(cx, n), constant(cy, n)), SegmentBoom((x, y, head))
+        boom = SegmentBoom((x, y, head))
+        if base.stiffness is not None:
+            head = next(jets)
+            boom.springs.append((base.stiffness, base.damping or 0.0, head))
+        pin = _point((x, y), head, base.cylinder_pin[0] - px, base.cylinder_pin[1] - py)
         for i, joint in enumerate(self.scene.joints):
             theta = next(jets)
             boom.joints.append(theta - head)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from .lumped_masses import lump_masses
 from .masses import Lump, Lumps
 from .pin_clearance import Bush, contact_of, pin_with_play, refuse_other_pins
 from .six_bar import Link, six_bar
-from .system import Boom, BuiltSection, Frame, Station, oil_stiffness, section_frames
+from .system import Base, Boom, BuiltSection, Frame, Station, oil_stiffness, section_frames
 
 SAME_PLACE = 1e-9  # m
 SHEAR_OVER_AXIAL = 10.0  # GA = 10 EA: Euler-Bernoulli in effect; of the default boom's tip, shear is then 0.02 mm
@@ -113,11 +114,29 @@ def shear_stiffness(shear: float, bending: float, length: float) -> float:
     return 1.0 / (1.0 / shear + length**2 / (12.0 * bending))
 
 
+def add_base(system: Any, ground: int, scene: Scene) -> Base:
+    """Return the ground, or add an elastic base: a body without mass on a pin and a torsional spring at the pivot."""
+    base = scene.base
+    if base.stiffness is None:
+        return Base(ground, (0.0, 0.0), None)
+    node = int(system.AddNode(items.NodeRigidBody2D(referenceCoordinates=[*base.pivot, 0.0])))
+    body = int(system.AddObject(items.ObjectRigidBody2D(mass=0.0, inertia=0.0, nodeNumber=node)))
+    sides = [
+        int(system.AddMarker(items.MarkerBodyRigid(bodyNumber=ground, localPosition=[*base.pivot, 0.0]))),
+        int(system.AddMarker(items.MarkerBodyRigid(bodyNumber=body, localPosition=[0.0, 0.0, 0.0]))),
+    ]
+    system.AddObject(items.ObjectJointRevolute2D(markerNumbers=sides))
+    system.AddObject(
+        items.ObjectConnectorTorsionalSpringDamper(markerNumbers=sides, stiffness=base.stiffness, damping=base.damping or 0.0)
+    )
+    return Base(body, base.pivot, node)
+
+
 def add_pivot(boom: Boom, index: int) -> None:
     """Pin section `index` (0-based) to the head before it, or to the base."""
     inboard = boom.point(boom.sections[index].root, (0.0, 0.0))
     if index == 0:
-        carrier = boom.marker(boom.ground, boom.scene.base.pivot)
+        carrier = boom.on_base(boom.scene.base.pivot)
     else:
         carrier = boom.point(boom.sections[index - 1].head, (boom.scene.sections[index - 1].length, 0.0))
     boom.pin(carrier, inboard)
@@ -129,7 +148,7 @@ def add_joint(boom: Boom, frames: list[Frame], index: int, stroke: float) -> Non
     if index == 0:
         place = boom.scene.sections[0].rod_pin
         assert place is not None
-        barrel_pin = boom.marker(boom.ground, boom.scene.base.cylinder_pin)
+        barrel_pin = boom.on_base(boom.scene.base.cylinder_pin)
         rod_pin = boom.point(boom.sections[0].at(place[0]), place)
         ends = np.array(boom.scene.base.cylinder_pin), frames[0].point(place)
     else:
@@ -245,18 +264,24 @@ def build(
     Raises
     ------
     UsageError
-        The scene has pins with clearance other than of rods, on a rod without mass, or in a lumped boom.
+        The scene has pins with clearance other than of rods, on a rod without mass, or in a lumped boom; a lumped boom has an
+        elastic base.
     """
     refuse_other_pins(scene)
     if lumped and any(pin_with_play(scene, index) is not None for index in range(len(scene.joints))):
         raise UsageError("clearance.pins: a rod pin with clearance needs the rod as a body. Build the boom with lumped=False.")
+    if lumped and scene.base.stiffness is not None:
+        raise UsageError(
+            "base.stiffness: a boom of lumped masses needs a rigid base. Leave it out, or take lumped=False."
+        )
     container = exudyn.SystemContainer()
     system = container.AddSystem()
     ground = int(system.AddObject(items.ObjectGround()))
     frames = section_frames(scene, strokes)
     lumps = lump_masses(scene, frames, strokes) if lumped else None
     gravity = [*gravity_in_base(scene).tolist(), 0.0]
-    boom = Boom(scene, container, system, gravity, ground, nodally_exact, shear_over_axial, elements, lumps)
+    base = add_base(system, ground, scene)
+    boom = Boom(scene, container, system, gravity, base, nodally_exact, shear_over_axial, elements, lumps)
     for index, frame in enumerate(frames):
         boom.sections.append(add_section(boom, frame, index, elements))
         add_pivot(boom, index)

@@ -27,6 +27,7 @@ class Probes:
     forces: tuple[int, ...]
     lengths: tuple[int, ...]
     pins: tuple[tuple[int, int], ...]  # positions of hole and journal, for every pin with play
+    base: int | None  # of an elastic base
 
 
 def attach(boom: Boom) -> Probes:
@@ -40,6 +41,7 @@ def attach(boom: Boom) -> Probes:
         forces=tuple(_on_drive(boom, drive, _FORCE[name]) for drive, name in boom.drives),
         lengths=tuple(_on_drive(boom, drive, kind.Distance) for drive, _ in boom.drives),
         pins=tuple((_on_marker(boom, bush.sides[0]), _on_marker(boom, bush.sides[1])) for bush in boom.bushes),
+        base=None if boom.base.node is None else _sensor(boom, kind.Coordinates, items.SensorNode, nodeNumber=boom.base.node),
     )
 
 
@@ -57,7 +59,8 @@ def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
     roots = np.column_stack([_angle(data(p), s.root) for p, s in zip(probes.roots, boom.sections, strict=True)])
     heads = np.column_stack([_angle(data(p), s.head) for p, s in zip(probes.heads, boom.sections, strict=True)])
     cylinders = [joint.cylinder for joint in boom.scene.joints]
-    before = np.column_stack([np.zeros(len(heads)), heads[:, :-1]])
+    base = np.zeros(len(heads)) if probes.base is None else data(probes.base)[:, 3]
+    before = np.column_stack([base, heads[:, :-1]])
     return {
         "t": data(probes.tip[0])[:, 0],
         "tip": data(probes.tip[0])[:, 1:3],

@@ -26,6 +26,15 @@ class Station:
     angle: float
 
 
+@dataclass(frozen=True, slots=True)
+class Base:
+    """A body, the place of its origin (m), and the node of an elastic base; None for a rigid one, which is the ground."""
+
+    body: int
+    origin: Point
+    node: int | None
+
+
 @dataclass(slots=True)
 class BuiltSection:
     """Stations of one section from root to head; a rigid section has one, at its pivot."""
@@ -60,6 +69,8 @@ class Boom:
     ----------
     container, system : object
         Exudyn's SystemContainer and MainSystem.
+    base : Base
+        Carrier of the pivot and of cylinder 1.
     sections : list of BuiltSection
     nodally_exact : bool
         True if a straight, lightly bent beam is exact at its nodes however few they are.
@@ -81,7 +92,7 @@ class Boom:
     container: Any
     system: Any
     gravity: list[float]
-    ground: int
+    base: Base
     nodally_exact: bool
     shear_over_axial: float
     elements: int
@@ -98,6 +109,10 @@ class Boom:
     def point(self, station: Station, place: Point) -> int:
         """Add a marker on a section, in the section's axes."""
         return self.marker(station.body, (place[0] - station.x, place[1]))
+
+    def on_base(self, place: Point) -> int:
+        """Add a marker on the base, in the axes of the unloaded base."""
+        return self.marker(self.base.body, (place[0] - self.base.origin[0], place[1] - self.base.origin[1]))
 
     def pin(self, one: int, other: int) -> None:
         """Let two markers share their place."""
