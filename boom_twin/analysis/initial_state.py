@@ -57,7 +57,7 @@ class InitialState:
     Attributes
     ----------
     names : tuple of str
-        Of the u unknowns, as `boom_twin.compiler.plan.Plan.names` has them: ``theta_1`` (rad, of section 1 to the base),
+        Of the u unknowns, as `boom_twin.compiler.plan.Plan.names` has them: ``theta_1`` (rad, of section 1),
         ``N_1`` (N), ``q1_part1``, ..
     values, rates : ndarray, shape (u,)
         Coordinates (rad, m, 1) and their rates; of forces (N) the rates are 0.

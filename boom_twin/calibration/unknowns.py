@@ -119,11 +119,11 @@ def usual_names(
     damping : {"d", "beta"}, optional
         Of cylinders, or of sections.
     stiffness : bool
-        Bending stiffness of the sections.
+        Bending stiffness of the sections, and stiffness of an elastic base.
     zeros : {"all", "angles", "none"}
         Of all sensors, of all but the stroke transducers, which are then taken to be right, or none.
     """
-    ends = [".k", *([f".{damping}"] if damping else []), *([".EI"] if stiffness else [])]
+    ends = [".k", *([f".{damping}"] if damping else []), *([".EI", ".stiffness"] if stiffness else [])]
     names = [name for end in ends for name in parameter_names(scene) if name.endswith(end)]
     names += {None: [], "payload": ["tip.payload"], "line_fill": ["line_fill"]}[load]
     trusted = {"all": (), "angles": (Stream.STROKES,), "none": tuple(Stream)}[zeros]

@@ -28,7 +28,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--parameters", metavar="A,B,..", help="just these, as cylinder_1.k,joint_2.zero; else those below")
     parser.add_argument("--load", choices=("payload", "line_fill"), help="besides k of cylinders and zeros of sensors: a load")
     parser.add_argument("--damping", choices=("d", "beta"), help="besides: damping of cylinders, or of sections")
-    parser.add_argument("--stiffness", action="store_true", help="besides: bending stiffness EI of sections")
+    parser.add_argument(
+        "--stiffness", action="store_true", help="besides: bending stiffness EI of sections, stiffness of the base"
+    )
     whose = "zeros of all sensors (default), of all but the stroke transducers, or none"
     parser.add_argument("--zeros", choices=("all", "angles", "none"), default="all", help=whose)
     add_params(parser)

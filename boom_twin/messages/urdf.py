@@ -51,6 +51,11 @@ where the deflected boom has them: see ~/shape for how it bends. A scene tells n
 stand for that. No inertia: see `boom_twin check`.
 """
 
+ELASTIC_BASE = """
+This scene has an elastic base. Sections, links and cylinders are drawn on the unloaded base; only tip and imu_link, and
+~/shape, have its turn.
+"""
+
 
 def urdf(scene: Scene) -> str:
     """Return the URDF document of `scene`, with its links and joints explained in a comment at the top.
@@ -60,6 +65,8 @@ def urdf(scene: Scene) -> str:
     """
     robot = Element("robot", name=NAME)
     robot.append(ElementTree.Comment(ABOUT))
+    if scene.base.stiffness is not None:
+        robot.append(ElementTree.Comment(ELASTIC_BASE))
     for name, rgba in COLOURS.items():
         SubElement(SubElement(robot, "material", name=name), "color", rgba=rgba)
     SubElement(robot, "link", name=FRAME)

@@ -1,8 +1,8 @@
 """Notation of all kernels. Documentation only.
 
 Frames and signs
-    Model plane: x forward, y up, angles anticlockwise, SI units, radians. The frame is fixed to the base (`base_link`). With
-    an inclined base, gravity is rotated instead.
+    Model plane: x forward, y up, angles anticlockwise, SI units, radians. The frame is fixed to the unloaded base
+    (`base_link`). With an inclined base, gravity is rotated instead.
 
 State vector at a cut of the chain
     Z = [e, f]. e = (x, y, theta) is position (m) and orientation (rad). f = (qx, qy, M) is force (N) and torque (N m) that
@@ -25,7 +25,7 @@ Transfer in Newton form
 
 Carried columns
     A closed loop contains a cylinder whose barrel pin C lies further inboard. From the loop's joint to C, e is extended by
-    the increments of C (dx_C, dy_C), or by the force N of cylinder 1. S and p grow accordingly.
+    the increments of C (dx_C, dy_C), or by the force N of cylinder 1 and the turn of an elastic base. S and p grow accordingly.
 
 Time
     Every mass centre and quadrature point has its own history. For each scalar x, an integrator gives acceleration

@@ -44,6 +44,7 @@ def undamped(spec):
 DENSE = [
     pytest.param(load_scene(), "arch", id="default"),
     pytest.param(booms.random_boom(31), "test", id="rigid section, rigid cylinder"),
+    pytest.param(booms.on_elastic_base(load_scene(), 5.0e6, 5.0e4), "arch", id="elastic base"),
 ]
 
 
@@ -62,10 +63,10 @@ def test_sweeps_solve_the_dense_equations(scene, posture):
         assert apart(found.cylinder_forces, unknowns[:, plan.tables.cylinders.z]) < 5e-5
 
 
-@pytest.mark.parametrize("modes", [1, 3])
-def test_tip_force_against_finite_segments(modes):
+@pytest.mark.parametrize("modes, stiffness", [(1, None), (3, None), (3, 5.0e6)])
+def test_tip_force_against_finite_segments(modes, stiffness):
     """An independent model, by energy: 0.05 % up to 30 Hz, however few shapes the scene has for its time steps."""
-    scene = load_scene().model_copy(update={"modes": modes})
+    scene = booms.on_elastic_base(load_scene().model_copy(update={"modes": modes}), stiffness)
     load = np.array([0.6, 0.8, 0.0, 0.0, 0.0, 0.0])
     expected = extrapolated(scene, posture_angles(scene, "arch"), BAND, load)
     found = frequency_response(scene, BAND, posture="arch", tip_force=(0.6, 0.8))

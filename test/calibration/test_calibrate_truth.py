@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calibration.sessions import ENCODERS, cut_to, made, off
+from oracle import booms
 
 from boom_twin import load_scene
 from boom_twin.calibration import Choice, calibrate
@@ -92,6 +93,17 @@ def test_two_sections_without_an_imu(short, two_sections, tmp_path):
         assert abs(wrong[f"cylinder_{i}.k"]) < 0.04 * parameter(short.truth, f"cylinder_{i}.k")
         assert abs(wrong[f"joint_{i}.zero"]) < np.radians(0.01)
     judge(found, 2)
+
+
+def test_an_elastic_base_is_found_by_encoders_and_imu(two_sections, tmp_path):
+    """The tilt of the tip IMU against the encoders goes with the moment of the boom, from posture to posture."""
+    truth, scene = (booms.on_elastic_base(two_sections, stiffness) for stiffness in (5.0e6, 8.0e6))
+    bag = made(truth, "arch", 30.0, 4, ("pump:0.5:150",)).write(tmp_path / "bag", 1)
+    found = calibrate([bag], scene, Choice(names=("base.stiffness",)))
+    assert share_covered(found, truth, np.zeros(2)) == 1.0
+    assert found.estimates[0].value == pytest.approx(5.0e6, rel=0.05)
+    write_scene(found, scene, anew(scene), tmp_path / "new.yaml", "by a test")
+    assert load_scene(tmp_path / "new.yaml").base.stiffness == pytest.approx(found.estimates[0].value, rel=1e-5)
 
 
 def test_oil_gets_another_bulk_modulus(two_sections, tmp_path):

@@ -104,6 +104,13 @@ def test_geometric_stiffness_goes_with_the_square_of_the_load():
     assert orders(off, factors) == pytest.approx(2.0, abs=0.05)
 
 
+def test_a_stiff_base_becomes_rigid():
+    factors = (1e1, 1e2, 1e3, 1e4)
+    rest, move = distances(DEFAULT, DEFAULT, lambda f: booms.on_elastic_base(DEFAULT, 5.0e6 * f), factors)
+    assert orders(rest, factors) == pytest.approx(-1.0, abs=0.01)
+    assert orders(move, factors) == pytest.approx(-1.0, abs=0.05)
+
+
 @pytest.mark.parametrize("section", [0, 2, 4])
 def test_a_single_section_becomes_rigid(section):
     scene, factors = five_sections(), (1e1, 1e2, 1e3, 1e4)

@@ -271,9 +271,7 @@ def build(
     if lumped and any(pin_with_play(scene, index) is not None for index in range(len(scene.joints))):
         raise UsageError("clearance.pins: a rod pin with clearance needs the rod as a body. Build the boom with lumped=False.")
     if lumped and scene.base.stiffness is not None:
-        raise UsageError(
-            "base.stiffness: a boom of lumped masses needs a rigid base. Leave it out, or take lumped=False."
-        )
+        raise UsageError("base.stiffness: a boom of lumped masses needs a rigid base. Leave it out, or take lumped=False.")
     container = exudyn.SystemContainer()
     system = container.AddSystem()
     ground = int(system.AddObject(items.ObjectGround()))

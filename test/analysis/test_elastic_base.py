@@ -1,0 +1,119 @@
+"""A base on an elastic hinge: closed form, Exudyn, contact in its pins, and what commands say of it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from oracle import booms
+from oracle.clearance.scenes import with_pins
+from oracle.oscillation import mean_frequency
+
+from boom_twin import load_scene, simulate, statics
+from boom_twin.analysis.energy_balance import energy_balance
+from boom_twin.analysis.methods import Method, integrate_with
+from boom_twin.analysis.momentum_balance import momentum_balance
+from boom_twin.analysis.motions import motion_of
+from boom_twin.analysis.simulate import course_of
+from boom_twin.cli.main import main
+from boom_twin.errors import UsageError
+from boom_twin.scene.edit import anew
+from boom_twin.scene.kinematics import strokes_of_posture
+
+STIFFNESS, DAMPING = 5.0e6, 5.0e4  # N m/rad, N m s/rad
+RIGID = load_scene()
+SCENE = booms.on_elastic_base(RIGID, STIFFNESS, DAMPING)
+
+
+def turned(angle, point):
+    return complex(*point) * np.exp(1j * angle)
+
+
+@pytest.mark.parametrize("posture", ["horizontal", "arch"])
+def test_moment_of_a_massless_cylinder_turns_the_base(posture):
+    """k phi = moment of the cylinder's force about the pivot; `joint_1` is that of section 1 to the turned base."""
+    spec = SCENE.model_dump(exclude_none=True)
+    del spec["joints"][0]["cylinder"]["barrel"], spec["joints"][0]["cylinder"]["rod"]
+    found = statics(booms.scene_of(spec), posture=posture)
+    barrel = turned(found.base_turn, SCENE.base.cylinder_pin)
+    rod = turned(found.base_turn + found.joints[0], SCENE.sections[0].rod_pin)
+    axis = (rod - barrel) / abs(rod - barrel)
+    assert abs(rod - barrel) - SCENE.joints[0].cylinder.closed_length == pytest.approx(found.lengths[0], abs=1e-9)
+    assert STIFFNESS * found.base_turn == pytest.approx(found.cylinder_forces[0] * (barrel.conjugate() * axis).imag, rel=1e-9)
+
+
+def test_rest_and_stop_are_those_of_exudyn():
+    """Cylinder 1 starts and stops within 0.4 s; then the boom swings by 0.3 m."""
+    rig = pytest.importorskip("boom_twin.validation.rig")
+    strokes = strokes_of_posture(SCENE, "arch")
+    resting, found = rig.at_rest(SCENE, strokes, 8, nodally_exact=True), statics(SCENE, strokes)
+    drive = rig.Programme(tuple(strokes), (rig.Move(0, 0.1, 0.5, strokes[0] + 0.03),))
+    rows, _ = rig.move(resting, drive, 2.0, 1e-3, 1e-3)
+    moved = simulate(SCENE, rows["t_s"], drive(rows["t_s"])[0], dt=1e-3)
+    tip = np.column_stack([rows["tip_x_m"], rows["tip_y_m"]])
+    assert np.abs(found.tip - tip[0]).max() < 1e-3 * np.hypot(*(found.tip - found.tip_rigid))
+    assert found.joints == pytest.approx([rows[f"joint_{i}_rad"][0] for i in range(1, 5)], abs=1e-5)
+    assert found.cylinder_forces == pytest.approx(resting.forces, rel=1e-4)
+    assert np.ptp(tip[rows["t_s"] > 0.5, 1]) > 0.3
+    assert np.linalg.norm(moved.tip[:, :2] - tip, axis=1).max() < 1e-3
+    assert moved.joints[:, 0] == pytest.approx(rows["joint_1_rad"], abs=2e-5)
+
+
+def test_first_frequency_is_that_of_exudyn():
+    """Rising zero crossings of the tip, freely swinging by some centimetres; on a rigid base they come 6 % sooner."""
+    rig = pytest.importorskip("boom_twin.validation.rig")
+    scene, strokes = booms.on_elastic_base(RIGID, STIFFNESS), strokes_of_posture(SCENE, "arch")
+    drive = rig.Programme(tuple(strokes), (rig.Move(0, 0.0, 1.2, strokes[0] + 2e-3),))
+    rows, _ = rig.move(rig.at_rest(scene, strokes, 6, nodally_exact=True), drive, 14.0, 4e-3, 4e-3)
+    free, first = rows["t_s"] > 3.0, statics(scene, drive(np.array([2.0]))[0][0], modes=1).frequencies[0]
+    assert mean_frequency(rows["t_s"][free], rows["tip_y_m"][free]) == pytest.approx(first, rel=1e-3)
+    assert first == pytest.approx(0.942 * statics(RIGID, posture="arch", modes=1).frequencies[0], rel=5e-3)
+
+
+def test_balances_close_with_worn_pins_on_the_base():
+    """Friction and contact act on base and boom alike; the hinge takes energy by its damper."""
+    pins = ("cylinder_1.rod", "cylinder_1.barrel", "joint_1.pivot")
+    scene = booms.on_elastic_base(with_pins(booms.document(), pins, friction=0.1), STIFFNESS, DAMPING)
+    move, times = motion_of(scene), np.linspace(0.0, 0.5, 101)
+    course = course_of(scene, times, move(times)[0], angles=move.angles)
+    energy, momentum = energy_balance(course, 1e-3), momentum_balance(course, 1e-3)
+    assert energy.contact > 5.0 and energy.damping > 0.5 and energy.share < 1e-6
+    assert momentum.linear_share < 1e-7 and momentum.angular_share < 2e-5
+
+
+def test_the_plain_product_refuses_it():
+    with pytest.raises(UsageError, match=r"base\.stiffness"):
+        integrate_with(SCENE, motion_of(SCENE), 0.1, 1e-3, method=Method(product="plain"))
+
+
+def test_a_session_of_the_rig_replays(tmp_path, capsys):
+    """The session carries its scene; without the hinge the twin is off by its turn times the reach."""
+    pytest.importorskip("exudyn")
+    elastic, rigid, bag = tmp_path / "elastic.yaml", tmp_path / "rigid.yaml", str(tmp_path / "bag")
+    elastic.write_text(anew(SCENE))
+    rigid.write_text(anew(RIGID))
+    assert main(["rig", str(elastic), "--random", "arch", "--duration", "6", "--seed", "3", "--out", bag]) == 0
+    errors = []
+    for own in ([], ["--scene", str(rigid)]):
+        capsys.readouterr()
+        assert main(["replay", bag, *own, "--json", "--out", str(tmp_path / f"out{len(errors)}")]) == 0
+        found = json.loads(capsys.readouterr().out)
+        errors.append((found["tip_error_rms_m"], found["tip_estimate_error_rms_m"]))
+    assert max(errors[0]) < 2e-3 and min(errors[1]) > 0.03
+
+
+def test_commands(tmp_path, capsys):
+    path = tmp_path / "boom.yaml"
+    path.write_text(anew(SCENE))
+    assert main(["check", str(path)]) == 0
+    told = capsys.readouterr().out
+    assert "elastic base: 5 MN m/rad about the pivot of joint 1, 50 kN m s/rad" in told
+    assert "base        1  turn" in told and "base.stiffness" not in told
+    assert main(["statics", str(path), "--posture", "arch", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["base_turn_rad"] == pytest.approx(-4.880e-3, rel=1e-3)
+    path.write_text(anew(booms.on_elastic_base(RIGID, None, DAMPING)))
+    assert main(["check", str(path)]) == 1
+    told = capsys.readouterr().err
+    assert "base.damping = 50000.0" in told and "the base is rigid" in told and "Give stiffness" in told
