@@ -114,6 +114,7 @@ def test_table_of_what_leaving_out_does(boom: Path) -> None:
         "no `tip`": re.sub("tip: .*", "", WHOLE),
         "`line_fill: 20.0`": WHOLE + "line_fill: 20.0\n",
         "`base: inclination: 0.0524`": WHOLE.replace("base:", "base:\n  inclination: 0.0524"),
+        "`base: stiffness: 5.0e+6`": WHOLE.replace("base:", "base:\n  stiffness: 5.0e+6"),
     }
     for name, text in scenes.items():
         row = re.search(rf"\| {re.escape(name)} \|.*\| (\S+) \| (\S+) \|", GUIDE)

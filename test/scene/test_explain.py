@@ -29,12 +29,12 @@ def test_masses_and_strokes_of_the_default_scene(bench: Any) -> None:
     assert [joint.mass for joint in found.joints] == pytest.approx(drives)
     assert found.mass == pytest.approx(sum(beams) + sum(roots) + sum(heads) + sum(drives))
     assert found.length == pytest.approx(13.46)
-    assert list(left_out(found)) == ["tip.payload", "line_fill", "base.inclination", "clearance"]
+    assert list(left_out(found)) == ["tip.payload", "line_fill", "base.inclination", "base.stiffness", "clearance"]
     for joint in found.joints:
         assert 0 <= joint.stroke_low < 0.02 and 0.95 * joint.max_stroke < joint.stroke_high <= joint.max_stroke
     loaded = account(bench, line_fill=10.0, tip={"payload": 40.0})
     assert loaded.mass == pytest.approx(found.mass + 134.6 + 40.0)
-    assert list(left_out(loaded)) == ["base.inclination", "clearance"]
+    assert list(left_out(loaded)) == ["base.inclination", "base.stiffness", "clearance"]
 
 
 def test_what_is_not_named_is_listed(bench: Any) -> None:

@@ -52,11 +52,12 @@ def test_a_scene_in_other_units_is_the_same_to_the_bit(bench: Any) -> None:
 
 def test_angles_take_degrees_and_radians(bench: Any) -> None:
     def edit(values: Any) -> None:
-        values["base"]["inclination"] = "3 deg"
+        values["base"] |= {"inclination": "3 deg", "stiffness": "5 MN m/rad", "damping": "50 kN·m·s/rad"}
         values["joints"][0]["range_deg"] = ["-5°", "1.4835298641951802 rad"]
 
     scene = load_scene(bench.edited(edit))
     assert scene.base.inclination == pytest.approx(0.05235987755982989, abs=1e-17)
+    assert (scene.base.stiffness, scene.base.damping) == (5.0e6, 5.0e4)
     assert scene.joints[0].range_deg == pytest.approx((-5.0, 85.0), abs=1e-12)
 
 
@@ -67,6 +68,7 @@ K = "joints[1].cylinder.k"
     ("path", "value", "words"),
     [
         ("base.inclination", "3 m/m", ("`m/m` is no unit of this key, which is in rad",)),
+        ("base.stiffness", "5 kN/mm", ("`kN/mm` is no unit of this key, which is in N m/rad",)),
         ("material.nu", "0.3 mm", ("a number without a unit is needed",)),
         (K, "30 kg/mm", ("`kg/mm` is no unit of this key, which is in N/m", "Give the stiffness of the oil spring, N/m.")),
         (K, "30 kN/mn", ("`kN/mn` is no unit that is known", "N/m")),
