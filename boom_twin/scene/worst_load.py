@@ -1,6 +1,6 @@
 """Largest push and pull of every cylinder under the boom's own weight at rest, over the ranges of all joints.
 
-Sections and cylinders are rigid, links and cylinders hang in the pivots. The weight then turns about pivot i with a sum over
+All parts are rigid, links and cylinders hang in the pivots. The weight then turns about pivot i with a sum over
 the sections from i on, of which each depends on its own heading only, and neighbouring headings differ by a joint angle. So the
 largest sum is found from the tip inwards, section by section over a circle of headings, and none of the postures is tried.
 """

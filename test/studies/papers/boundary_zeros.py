@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from reference.ideal_pins import refuse_clearance
+from reference.ideal_pins import refuse_clearance, refuse_elastic_base
 
 from boom_twin import Scene
 from boom_twin.analysis.equilibrium import clamp_pins, rest_at, set_undeformed
@@ -62,6 +62,7 @@ def bisect(residual: Callable[[float], float], low: float, high: float, width: f
 def equilibrium(scene: Scene, posture: str) -> BoundaryZero:
     """Both ways in a posture; ideal pins."""
     refuse_clearance(scene, "the bisection of the boundary")
+    refuse_elastic_base(scene, "the bisection of the boundary")
     if scene.joints[0].cylinder.k is None:
         raise UsageError("joints[0].cylinder.k: not given, so section 1 cannot be held at another angle. Give it a stiffness.")
     strokes, angles = strokes_of_posture(scene, posture), posture_angles(scene, posture)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from reference.ideal_pins import refuse_elastic_base
 from scipy import linalg
 
 from boom_twin import Scene
@@ -48,6 +49,7 @@ def digits(error: float) -> float:
 
 def one_step(scene: Scene, angles: np.ndarray, step: float, rho: float) -> StepRoundoff:
     """Compare on a boom at rest at joint `angles` (rad), undeformed, that gravity begins to move; step in s."""
+    refuse_elastic_base(scene, "the dense solver")
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     set_undeformed(plan, state, angles)
