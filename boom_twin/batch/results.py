@@ -107,7 +107,7 @@ _ALWAYS: dict[str, str] = {
     "wall_s": "double", "realtime_factor": "double", "peak_memory_bytes": "int64", "tip_acceleration_max_m_s2": "double",
     "joint_residual_rms_rad": "list", "joint_residual_normalised_mean": "list", "joint_residual_normalised_std": "list",
     "session_incomplete": "string", "file_sha256": "string", "output_sha256": "string", "scene": "string",
-    "scene_sha256": "string", "baseline": "string", "mapping": "string", "version": "string", "fingerprint": "string",
+    "scene_sha256": "string", "mapping": "string", "version": "string", "fingerprint": "string",
     "key": "string", "report": "bool", "calibration_reason": "string", "calibration_remarks": "string",
 }  # fmt: skip
 """Columns that every table has, with their types; the others are the figures of `boom_twin.report.quantities`, numbers."""

@@ -38,7 +38,6 @@ class SessionTask:
     scene: str | None
     params: str | None
     mapping: str | None
-    baseline: str | None
     report: bool  # is to be written, with its pictures
     keep_bag: bool  # of the replay
     time: float  # limit, s
@@ -87,13 +86,10 @@ def row_of(task: SessionTask) -> Row:
     from ..report.quantities import read
     from ..system.result_folder import REPLAY, result_folder
 
-    session, params, mapping, baseline = (
-        None if each is None else Path(each) for each in (task.session, task.params, task.mapping, task.baseline)
-    )
-    assert session is not None
+    session, params = Path(task.session), None if task.params is None else Path(task.params)
     scene, settings = scene_of(session, task.scene), settings_of(session, params).settings
     window = TimeWindow(task.start, task.duration)
-    options = ReplayOptions(mapping=mapping, baseline=baseline, window=window)
+    options = ReplayOptions(mapping=task.mapping, window=window)
     with result_folder(Path(task.out), REPLAY, [session]) as building:
         found = evaluated_replay(building, session, scene, settings, options)
         if task.report:

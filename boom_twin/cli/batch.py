@@ -37,7 +37,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_file(parser, "--scene", scene, "SCENE")
     add_params(parser)
     add_mapping(parser)
-    add_file(parser, "--baseline", "of all sessions; as for replay")
     add_window(parser)
     parser.add_argument("--report", action="store_true", help="write report.html with its pictures for every session")
     parser.add_argument("--calibrate", action="store_true", help="estimate the scene's parameters from every session as well")
@@ -92,7 +91,7 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
     from ..batch.sources import fingerprint, key_of
     from ..system.received_files import sha256_of
 
-    given = {name: getattr(args, name) for name in ("scene", "params", "mapping", "baseline")}
+    given = {name: getattr(args, name) for name in ("scene", "params", "mapping")}
     contents = [f"{name} {sha256_of(path.resolve())}" for name, path in given.items() if path is not None]
     window = window_of(args)
     kinds = [str(args.report), str(args.keep_bags), str(args.calibrate)]

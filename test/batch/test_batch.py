@@ -193,7 +193,7 @@ def test_no_scheduler_answers(
 
 def task(key: str = "key", session: object = "s", out: object = "o", **changes: object) -> SessionTask:
     given = {"fingerprint": "", "report": False, "keep_bag": False, "time": 600.0, "memory": 10**9, "retries": 0} | changes
-    for name in ("scene", "params", "mapping", "baseline"):
+    for name in ("scene", "params", "mapping"):
         given.setdefault(name, None)
     return SessionTask(key, str(session), str(out), **given)  # type: ignore[arg-type]
 

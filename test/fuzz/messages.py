@@ -22,7 +22,6 @@ from ros_messages import encoded
 from boom_twin import Sample, Settings, Stream, load_scene
 from boom_twin.bag.session_file import PARSE_ERRORS
 from boom_twin.bag.session_files import sensor_message
-from boom_twin.health.baseline import load_baseline
 from boom_twin.messages.cdr_decoder import CdrDecoder
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import SampleDecoder
@@ -79,7 +78,7 @@ def _encoded(sample: Sample, little_endian: bool = True) -> bytes:
 def _outputs() -> dict[str, list[bytes]]:
     """What a twin publishes, by role."""
     random, scene = np.random.default_rng(3), load_scene()
-    twin, encoder = drive_twin(scene, baseline=load_baseline(None)), ReportEncoder(scene, Settings())
+    twin, encoder = drive_twin(scene, health=True), ReportEncoder(scene, Settings())
     found: dict[str, list[bytes]] = {}
     for number in range(400):
         for stream in Stream:
@@ -176,7 +175,7 @@ class _Listener:
     def __init__(self) -> None:
         self.odd = 0
         scene, topics = load_scene(), load_topics()
-        self._twin, self._decoder = drive_twin(scene, baseline=load_baseline(None)), SampleDecoder(4, topics)
+        self._twin, self._decoder = drive_twin(scene, health=True), SampleDecoder(4, topics)
         self._wires = {stream: CdrDecoder(TYPES[stream], field=kind.field) for stream, kind in SENSORS.items()}
         self._feed, self._topics = Feed("fuzz", Store(2000), topics, scene), topics
 

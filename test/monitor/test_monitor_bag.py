@@ -155,7 +155,7 @@ def test_a_session_without_anything_to_show_is_refused(faulty: Path, tmp_path: P
     with pytest.raises(BagError):
         bag_feed(tmp_path, load_scene(), Settings())
     with pytest.raises(UsageError, match="none"):
-        bag_feed(faulty, load_scene(), Settings(), baseline=tmp_path / "none.yaml")
+        bag_feed(faulty, load_scene(), Settings(), mapping=tmp_path / "none.yaml")
     stamps = 10**18 + 5_000_000 * np.arange(100)
     write_session(tmp_path / "far", stamps, np.full((100, 4), 50.0), np.zeros((100, 4)), np.zeros((100, 2)), {})
     assert "no stroke could be used" in read_all(bag_feed(tmp_path / "far", load_scene(), Settings())).trouble

@@ -12,7 +12,6 @@ from drive_twin import ARCH_DRIVES
 from boom_twin import Settings, Stream, Twin, load_scene, replay
 from boom_twin.bag.reader import read, scan
 from boom_twin.cli.replay import as_text
-from boom_twin.health.baseline import load_baseline
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import load_topics
@@ -77,7 +76,7 @@ def test_the_result_bag_holds_what_the_three_calls_give(session, first):
     wanted = {name: inputs[stream].type for name, stream in roles.items()}
     scene, store = load_scene(), jazzy()
     reads = StrokeReading(first[0].summary["strokes"])
-    live, decoder = Twin(scene, baseline=load_baseline(), reads=reads), SampleDecoder(4)
+    live, decoder = Twin(scene, health=True, reads=reads), SampleDecoder(4)
     encoder = ReportEncoder(scene, Settings())
     expected = []
     for name, log_time, message in read(scan(session), wanted):

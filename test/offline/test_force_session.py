@@ -19,7 +19,6 @@ from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
 from boom_twin.errors import BagError
-from boom_twin.health.baseline import Baseline, load_baseline
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.protocol import layout
@@ -63,7 +62,7 @@ def test_residuals_zeros_and_diagnostics(scene, samples):
     topics, now = load_topics(), 0.0
     required = {stream: topic.required for stream, topic in topics.inputs.items()}
     sensors, names = sensors_of(scene, Settings(), required, [None] * 4), {s: t.name for s, t in topics.inputs.items()}
-    twin, watch, found = drive_twin(scene, baseline=Baseline()), TwinWatch(sensors, names, Thresholds(), lambda: now), []
+    twin, watch, found = drive_twin(scene, health=True), TwinWatch(sensors, names, Thresholds(), lambda: now), []
     watch.begin()
     alarms = set()
     for sample in samples:
@@ -89,7 +88,7 @@ def test_residuals_zeros_and_diagnostics(scene, samples):
 def test_a_stuck_or_silent_sensor_is_told_and_a_shaken_boom_is_not(scene, samples):
     """A load that the model does not know changes a force by far more than its noise, from one reading to the next."""
     known = set()
-    twin = drive_twin(scene, baseline=load_baseline(None))
+    twin = drive_twin(scene, health=True)
     stuck, last = 0.0, samples[-1].stamp
     for sample in samples:
         if sample.stream is FORCES:

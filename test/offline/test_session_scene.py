@@ -13,7 +13,7 @@ from offline.booms_apart import as_document, scene_text, session
 
 from boom_twin import Settings, Stream, load_scene, replay
 from boom_twin.bag.reader import scan
-from boom_twin.bag.session_model import baseline_of, scene_of
+from boom_twin.bag.session_model import scene_of
 from boom_twin.bag.session_sheet import FILE_NAME, SessionSheet, sha256
 from boom_twin.bag.writer import SessionWriter
 from boom_twin.cli.main import main
@@ -170,19 +170,9 @@ def test_a_sheet_that_could_not_be_read_again_is_not_written(tmp_path):
 def test_a_scene_that_was_changed_is_told(five, tmp_path, capsys):
     bag = without_scene(five, tmp_path / "bag")
     sheet = (five / FILE_NAME).read_text()
-    (bag / FILE_NAME).write_text(sheet.replace("gravity", "# by hand\n  gravity", 1))
+    (bag / FILE_NAME).write_text(sheet.replace("gravity", "# by hand\n  gravity", 1) + "baseline: of 0.1.0\n")
     assert main(["info", str(bag)]) == 0
     assert "was changed since the session was made" in capsys.readouterr().err
-
-
-def test_the_baseline_is_that_of_the_recording(four, tmp_path):
-    assert baseline_of(four).source == "default baseline"
-    SessionSheet("0", baseline="description: learnt\nangle_error: 0.001\n").write(tmp_path)
-    found = baseline_of(tmp_path)
-    assert (found.baseline.angle_error, found.source) == (0.001, f"{tmp_path / FILE_NAME}, baseline")
-    SessionSheet("0", baseline="angle_error: -1\n").write(tmp_path)
-    with pytest.raises(BagError, match=r"session\.yaml, baseline: .*--baseline"):
-        baseline_of(tmp_path)
 
 
 def test_what_never_reached_the_recorder_is_told(four, tmp_path, capsys):

@@ -38,8 +38,8 @@ ALONE = "/alone"
 SLOWLY = ("--namespace", ALONE.strip("/"), "--rate", "0.01", "--wait", "0")
 PLAYED = ("cylinder_strokes", "joint_angles", "tip_imu", "rosout", "parameter_events")
 CONFIG = Path(boom_twin.__file__).parent / "msg_config"
-OPTIONAL = {"/front/cylinder_forces", "/clock", "/front/boom_twin/baseline"}
-"""What there is with forces in the session, with --clock, with a baseline of one's own."""
+OPTIONAL = {"/front/cylinder_forces", "/clock"}
+"""What there is with forces in the session, with --clock."""
 PAGE = re.compile(r"open (http://127\.0\.0\.1:\d+/)")
 
 
