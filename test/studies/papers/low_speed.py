@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from reference.ideal_pins import refuse_clearance
 
 from boom_twin import Scene
 from boom_twin.analysis.drive import STEP_TOLERANCE
@@ -38,12 +37,9 @@ def tip_of_move(scene: Scene, move: StrokeMotion, step: float, every: int = 1, v
 
     Raises
     ------
-    UsageError
-        The scene has pins with clearance.
     SolverError
         A step fails.
     """
-    refuse_clearance(scene, "the low-speed form")
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, move.first, move.angles)
