@@ -11,7 +11,7 @@ from studies.__main__ import main
 DOCS = Path(__file__).parents[2] / "docs" / "study"
 FILES = {
     "papers": ("papers_low_speed.png",),
-    "clearance": ("clearance.png", "clearance_convergence.png", "clearance_static.png"),
+    "clearance": ("clearance.png", "clearance_static.png"),
     "roundoff": ("roundoff.png",),
 }
 

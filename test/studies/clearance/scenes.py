@@ -41,11 +41,6 @@ def with_pins(scene: Scene, pins: Sequence[Pin]) -> Scene:
     return _with(scene, pins=tuple(pins))
 
 
-def without_friction(scene: Scene) -> Scene:
-    """`scene` with frictionless contact of one material."""
-    return _with(scene, contact=pins_of(scene).contact.model_copy(update={"friction": 0.0, "bush": None}))
-
-
 def pins_of(scene: Scene) -> Clearance:
     """The block of a scene that has one."""
     return scene.clearance or Clearance()
