@@ -50,8 +50,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Replay what is not done yet, and write the table of all; exit code 1 if a session failed."""
     from ..batch.cluster import REMEDY, connected, rows_of
-    from ..batch.page import write_page
-    from ..batch.results import PAGE, TABLE, batch_folder, counts, write_table
+    from ..batch.results import PAGE, TABLE, batch_folder, counts, write_page, write_table
     from ..batch.sources import sessions_of
 
     if missing := [name for name in ("pyarrow", "psutil") if find_spec(name) is None]:

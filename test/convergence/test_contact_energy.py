@@ -7,8 +7,8 @@ import pytest
 from oracle import booms
 from oracle.clearance.scenes import RODS, with_pins
 
+from boom_twin.analysis.balances import Energies
 from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
-from boom_twin.analysis.energy_balance import Energies
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.simulate import RHO
 from boom_twin.compiler.compile import compile_scene

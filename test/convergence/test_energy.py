@@ -7,7 +7,7 @@ import pytest
 from convergence import motions
 from oracle import booms
 
-from boom_twin.analysis.energy_balance import energy_balance
+from boom_twin.analysis.balances import energy_balance
 from boom_twin.analysis.simulate import course_of
 from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
