@@ -23,10 +23,11 @@ psutil, parquet = pytest.importorskip("psutil"), pytest.importorskip("pyarrow.pa
 pytest.importorskip("distributed")
 
 
+from command import main  # noqa: E402
+
 from boom_twin import load_scene, replay  # noqa: E402
 from boom_twin.batch.session_task import SessionTask, row_of  # noqa: E402
 from boom_twin.calibration import calibrate  # noqa: E402
-from boom_twin.cli.main import main  # noqa: E402
 from boom_twin.system.child_process import python_command  # noqa: E402
 
 COUNT = 5

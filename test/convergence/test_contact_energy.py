@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import posture_angles, strokes_of_posture
 from oracle import booms
 from oracle.clearance.scenes import RODS, with_pins
 
@@ -16,7 +17,6 @@ from boom_twin.compiler.plan import width_of
 from boom_twin.kernels.elements.pin_contact import LOST
 from boom_twin.kernels.integrators import GENERALISED_ALPHA
 from boom_twin.kernels.transfer.time_step import run
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 LONG = {1e-3: 2000, 1e-4: 5000, 1e-5: 5000}
 PULSE, DURATION = np.array([0.03, -0.02, 0.03, 0.02]), 0.4  # m, s: a jerk of all four cylinders

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import joint_angles_of_strokes, strokes_of_posture
 
 from boom_twin import Settings, frequency_response, load_scene, statics
 from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.modal import natural_modes
 from boom_twin.deviation.posture import linearise
 from boom_twin.deviation.predictor import BoomPredictor
-from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 SCENE = load_scene()
 DRIVES = strokes_of_posture(SCENE, "arch")

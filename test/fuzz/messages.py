@@ -15,22 +15,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from default_boom import posture_angles, strokes_of_posture
 from drive_twin import drive_twin
 from numpy.random import Generator
-from ros_messages import encoded
+from recordings import sensor_message
+from ros_messages import TYPES, Output, ReportEncoder, SampleDecoder, decode, encoded, load_topics
 
 from boom_twin import Sample, Settings, Stream, load_scene
 from boom_twin.bag.session_file import PARSE_ERRORS
-from boom_twin.bag.session_files import sensor_message
 from boom_twin.messages.cdr_decoder import CdrDecoder
-from boom_twin.messages.report_encoder import ReportEncoder
-from boom_twin.messages.sample_decoder import SampleDecoder
-from boom_twin.messages.topic_table import TYPES, Output, load_topics
-from boom_twin.messages.type_store import PADDING, decode
+from boom_twin.messages.type_store import PADDING
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import alarms, dump, layout, state
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.types import SENSORS
 
 from .mutate import damaged, pick

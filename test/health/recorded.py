@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from recordings import read, scan, write_session
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import write_session
 from boom_twin.config.settings import Settings
 from boom_twin.types import Alarm, Health, Report
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import anew, parameter, with_parameters
 from health.recorded import session
 
 from boom_twin import Twin, load_scene
-from boom_twin.cli.main import main
-from boom_twin.scene.edit import anew, parameter, with_parameters
 from boom_twin.twin.blocks import block_of
 
 BAGS = Path(__file__).parents[2] / "bags"

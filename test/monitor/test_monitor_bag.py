@@ -10,14 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from monitor.conftest import GAP, read_all
+from recordings import SessionSheet, read, scan, write_session
+from ros_messages import TYPES, Output, load_topics
 
-from boom_twin import Settings, TimeWindow, load_scene, replay, statics
+from boom_twin import BagError, Settings, TimeWindow, UsageError, load_scene, replay, statics
 from boom_twin.analysis.posture_modes import ModeList
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import write_session
-from boom_twin.bag.session_sheet import SessionSheet
-from boom_twin.errors import BagError, UsageError
-from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.monitor.data.analyst import ResponseList
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback

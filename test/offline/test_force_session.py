@@ -7,24 +7,23 @@ import math
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin, note_drives
 from matplotlib.axes import Axes
+from recordings import read, scan
+from ros_messages import load_topics
 
-from boom_twin import Sample, Settings, Stream, load_scene, replay
-from boom_twin.bag.reader import read, scan
+from boom_twin import BagError, Sample, Settings, Stream, load_scene, replay
 from boom_twin.bag.session_files import write_samples
-from boom_twin.cli.main import main
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
-from boom_twin.errors import BagError
-from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.protocol import layout
 from boom_twin.offline.history import HistoryBuilder
 from boom_twin.plots.residuals import residual_picture
-from boom_twin.scene.kinematics import strokes_of_posture
 
 MS, START, COUNT = 1_000_000, 1_700_000_000_000_000_000, 800
 FORCES, WRONG, SIGMA = Stream.FORCES, 1500.0, 100.0

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import joint_angles_of_strokes, strokes_of_posture
+from recordings import read, scan, write_session
+from ros_messages import Output, load_topics
 
 from boom_twin import load_scene, replay
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import write_session
-from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.offline.summary import alarm_as_text
-from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 START, STEP = 1_700_000_000_000_000_000, 5_000_000
 

@@ -8,22 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import default_text
 from drive_twin import note_drives
 from offline.booms_apart import as_document, scene_text, session
+from recordings import SessionSheet, SessionWriter, scan, scene_of
+from ros_messages import fill_header, load_topics, new_message
 
-from boom_twin import Settings, Stream, load_scene, replay
-from boom_twin.bag.reader import scan
-from boom_twin.bag.session_model import scene_of
-from boom_twin.bag.session_sheet import FILE_NAME, SessionSheet, sha256
-from boom_twin.bag.writer import SessionWriter
-from boom_twin.cli.main import main
+from boom_twin import BagError, Settings, Stream, load_scene, replay
+from boom_twin.bag.session_sheet import FILE_NAME, sha256
 from boom_twin.cli.output import warn_incomplete
 from boom_twin.diagnostics.boom_mismatch import OtherBoom
-from boom_twin.errors import BagError
-from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import fill_header, new_message
 from boom_twin.monitor.data.bag_feed import bag_feed
-from boom_twin.scene.load import DEFAULT_NAME, default_text
+from boom_twin.scene.load import DEFAULT_NAME
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 FAULTY = "sections: []\n"

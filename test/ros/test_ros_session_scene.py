@@ -13,18 +13,17 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from command import main
+from default_boom import default_text
 from geometry_msgs.msg import PointStamped
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from recordings import mapping_of
+from ros_messages import Output, stamp_of
 from ros_rig import Rig, all_stored, joint_state, published
 from ruamel.yaml import YAML
 from sensor_msgs.msg import JointState
 
-from boom_twin.bag.session_model import mapping_of
-from boom_twin.cli.main import main
-from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.messages.topic_table import Output
 from boom_twin.ros.bag.recorder import COMPLETE
-from boom_twin.scene.load import default_text
 
 MAPPING = """
 inputs:

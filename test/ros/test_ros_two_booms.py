@@ -19,15 +19,13 @@ pytest.importorskip("aiohttp")
 
 import rclpy
 from rclpy.node import NodeNameNonExistentError
+from recordings import load_mapping, mapping_of, read, scan
+from ros_messages import TYPES, Output
 from ros_rig import all_stored, published
 from ruamel.yaml import YAML
 
 import boom_twin
 from boom_twin import replay
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_model import mapping_of
-from boom_twin.messages.mapping import load_mapping
-from boom_twin.messages.topic_table import TYPES, Output
 from boom_twin.ros.bag.recorder import COMPLETE
 from boom_twin.ros.runtime import message_class, qos_profile
 

@@ -7,14 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
+from ros_messages import Output, ReportEncoder
 
 from boom_twin import Report, Sample, Settings, Stream, load_scene, statics
 from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.health.sensor_check import MISSTATED
-from boom_twin.messages.report_encoder import ReportEncoder
-from boom_twin.messages.topic_table import Output
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.driver import drive
 from boom_twin.types import Change
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
+from ros_messages import Output, ReportEncoder
 
 from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
-from boom_twin.messages.report_encoder import ReportEncoder
-from boom_twin.messages.topic_table import Output
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.load_shedding import HEALTH_ABOVE, SHAPES_ABOVE
 
 SECONDS, RATE = 8, 100

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 
 from boom_twin import Report, Sample, Stream, Twin, load_scene
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin import loaded_model
 from boom_twin.twin.loaded_model import ModelPreparation
 

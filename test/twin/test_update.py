@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 
 from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import ReportBlock, SampleBlock, block_of
 
 MS, N = 1_000_000, 4

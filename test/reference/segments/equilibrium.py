@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from boom_twin.errors import SolverError
+from boom_twin import SolverError
 
 from .boom import SegmentBoom, Segments
 from .geometry import oil_stiffness

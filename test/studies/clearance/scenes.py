@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
+from default_boom import clearance_text
 from ruamel.yaml import YAML
 
 from boom_twin import Scene
 from boom_twin.scene.checks.values import names_of
-from boom_twin.scene.load import clearance_text
 from boom_twin.scene.schema import Clearance, Pin
 
 Treatment = Literal["contact", "spring-damper"]

@@ -10,14 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from boom_twin import Scene
+from boom_twin import Scene, SolverError
 from boom_twin.analysis.drive import STEP_TOLERANCE
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.motions import Motion as StrokeMotion
 from boom_twin.analysis.simulate import RHO
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.compiler.plan import Plan
-from boom_twin.errors import SolverError
 from boom_twin.kernels.integrators import GENERALISED_ALPHA, HAT, OFFSET, OLD, ROWS, A, V, X, prepare
 from boom_twin.kernels.tables import OK, SENTENCES, Motion, State, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
