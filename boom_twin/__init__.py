@@ -10,6 +10,7 @@ The stable API, imported when first used::
     Twin(scene, settings=None).update(sample)           sample by sample: prediction, residuals
     replay(bag, scene, out)                             a recorded session through the twin
     TimeWindow(start, duration)                         a part of a session, for replay
+    BoomTwinError                                       every error of the package, and its kinds
 
 A scene is a `Scene`, a file, a dict with its keys, or None for the default one.
 """
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from .analysis.simulate import simulate
     from .bag.time_window import TimeWindow
     from .config.settings import Settings, load_settings
+    from .errors import BagError, BoomTwinError, SceneError, SceneWarning, SolverError, UsageError
     from .offline.replay import replay
     from .scene import Scene, load_scene
     from .twin.twin import Twin
@@ -34,13 +36,19 @@ if TYPE_CHECKING:
 __version__ = "0.2.0"
 
 _HOMES = {
+    "BagError": "errors",
+    "BoomTwinError": "errors",
     "Report": "types",
     "Sample": "types",
     "Scene": "scene",
+    "SceneError": "errors",
+    "SceneWarning": "errors",
     "Settings": "config.settings",
+    "SolverError": "errors",
     "Stream": "types",
     "TimeWindow": "bag.time_window",
     "Twin": "twin.twin",
+    "UsageError": "errors",
     "frequency_response": "analysis.frequency_response",
     "load_scene": "scene",
     "load_settings": "config.settings",
@@ -51,13 +59,19 @@ _HOMES = {
 }
 
 __all__ = [
+    "BagError",
+    "BoomTwinError",
     "Report",
     "Sample",
     "Scene",
+    "SceneError",
+    "SceneWarning",
     "Settings",
+    "SolverError",
     "Stream",
     "TimeWindow",
     "Twin",
+    "UsageError",
     "frequency_response",
     "load_scene",
     "load_settings",

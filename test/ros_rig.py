@@ -12,13 +12,11 @@ import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped
+from recordings import read, scan
+from ros_messages import TYPES, Output, Topics, jazzy, stamp_of
 from sensor_msgs.msg import Imu, JointState
 
 from boom_twin import load_scene, statics
-from boom_twin.bag.reader import read, scan
-from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.messages.topic_table import TYPES, Output, Topics
-from boom_twin.messages.type_store import jazzy
 
 PATIENCE = 240.0  # s
 PERIOD = 5_000_000  # ns

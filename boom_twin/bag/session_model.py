@@ -13,7 +13,6 @@ from pathlib import Path
 from ..config.settings import Settings, checked, load_settings
 from ..config.yaml_text import plain
 from ..errors import BagError, Fault, SceneError, UsageError
-from ..health.baseline import Baseline, baseline_from, load_baseline
 from ..messages.mapping import load_mapping, mapping_from
 from ..messages.topic_table import Topics
 from ..scene.load import DEFAULT_NAME, default_text, examine_text, read_text
@@ -21,7 +20,6 @@ from ..scene.schema import Scene
 from ..types import Stream, StrokeReading
 from .session_sheet import KeptText, kept, kept_parameters, rig_version, sha256
 
-DEFAULT_BASELINE = "default baseline"
 DEFAULT_MAPPING = "default mapping"
 DEFAULT_PARAMETERS = "default parameters"
 LENGTHS_SINCE = 0, 2  # first version of the virtual rig whose transducers read lengths
@@ -50,14 +48,6 @@ class SessionScene:
     def sha256(self) -> str:
         """SHA-256 of the text."""
         return sha256(self.text)
-
-
-@dataclass(frozen=True)
-class SessionBaseline:
-    """A baseline and its source."""
-
-    baseline: Baseline
-    source: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,17 +92,6 @@ def _recorded_sha256(session: Path) -> str | None:
     """Return the SHA-256 of the scene's text at the time of the session; None if it was not kept."""
     digest = kept(session, "scene_sha256", "--scene")
     return None if digest is None else digest.text
-
-
-def baseline_of(session: Path, given: Path | None = None) -> SessionBaseline:
-    """Return the baseline (healthy state) of a session's rig, from the same sources as the scene in `scene_of`."""
-    own = kept(session, "baseline", "--baseline") if given is None else None
-    if own is not None:
-        try:
-            return SessionBaseline(baseline_from(plain(own.text), own.source), own.source)
-        except (UsageError, ValueError) as error:
-            raise BagError(f"{own.source}: {error} Give the baseline by --baseline.") from None
-    return SessionBaseline(load_baseline(given), str(given or DEFAULT_BASELINE))
 
 
 @dataclass(frozen=True, slots=True)

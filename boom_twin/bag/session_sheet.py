@@ -33,9 +33,8 @@ class SessionSheet:
     ----------
     version : str
         Version of this package.
-    scene, baseline, parameters, mapping : str or None
-        Text of the scene file, of the baseline (healthy state of the rig), of the ROS parameter file, and of the file that
-        names topics and sensors.
+    scene, parameters, mapping : str or None
+        Text of the scene file, of the ROS parameter file, and of the file that names topics and sensors.
     topics : dict of str to str or None
         Type by topic to be recorded; None for a type unknown at the start.
     note, origin : str or None
@@ -57,7 +56,6 @@ class SessionSheet:
     origin: str | None = None
     twin: Mapping[str, object] = field(default_factory=dict)
     started: datetime | None = None
-    baseline: str | None = None
     strokes: StrokeReading | None = None
 
     def write(self, directory: Path, counts: Sequence[Mapping[str, str | int | None]] | None = None) -> None:
@@ -86,7 +84,6 @@ class SessionSheet:
             "twin": dict(self.twin),
             "scene_sha256": sha256(self.scene) if self.scene else None,
             "scene": _block(self.scene),
-            "baseline": _block(self.baseline),
             "parameters": _block(self.parameters),
             "mapping": _block(self.mapping),
         }
@@ -117,7 +114,7 @@ def kept(session: Path, key: str, option: str) -> KeptText | None:
     ----------
     session : Path
     key : str
-        Key of ``session.yaml``: scene, baseline, parameters, mapping, ..
+        Key of ``session.yaml``: scene, parameters, mapping, ..
     option : str
         Option by which a user gives another text, for the error message.
 

@@ -1,4 +1,4 @@
-"""One session of a batch: its task, the process that does it, and the resulting row of the table."""
+"""One session of a batch: its task, the supervised process that does it, and the resulting row of the table."""
 
 from __future__ import annotations
 
@@ -14,12 +14,97 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from ..errors import BoomTwinError
 from ..system.child_process import python_command
-from .supervised_process import end_with_caller, run_supervised
 
 if TYPE_CHECKING:
     from ..bag.time_window import TimeWindow
     from ..config.settings import Settings
     from ..scene.schema import Scene
+import signal
+import subprocess
+import time
+from collections.abc import Sequence
+from tempfile import TemporaryFile
+from threading import Thread
+
+LOOK_PERIOD = 0.1  # seconds between two measurements of the memory
+STDERR_BYTES = 2000  # number of last bytes of a process's stderr that are reported
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Result of a supervised process."""
+
+    output: bytes  # content of its stdout; whole only if there is no reason
+    reason: str  # of the failure in one line; empty if it ended with code 0
+    peak: int  # largest observed resident memory, bytes; pages that its processes share are counted in each
+
+
+def run_supervised(command: Sequence[str], task: bytes, seconds: float, memory: int) -> Outcome:
+    """Run `command` with the line `task` on stdin and return its result.
+
+    Stdin stays open: its end shows the process that its caller has ended. The process leads a group of its own, and all of
+    the group is ended with it. It may take so many `seconds`, and with all its children so much resident `memory`, bytes.
+    """
+    with TemporaryFile() as out, TemporaryFile() as told:
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=out, stderr=told, start_new_session=True)
+        assert process.stdin is not None
+        try:
+            with suppress(BrokenPipeError):
+                process.stdin.write(task)
+                process.stdin.flush()
+            reason, peak = _watch(process, seconds, memory)
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            code = process.wait()
+            with suppress(BrokenPipeError):
+                process.stdin.close()
+        out.seek(0)
+        if not reason and code:
+            told.seek(max(0, told.seek(0, os.SEEK_END) - STDERR_BYTES))
+            lines = told.read().decode(errors="replace").strip().splitlines()
+            cause = f"signal {-code}" if code < 0 else f"itself with code {code}"
+            reason = lines[-1] if lines and code > 0 else f"its process was ended by {cause}"
+        return Outcome(out.read(), reason, peak)
+
+
+def _watch(process: subprocess.Popen[bytes], seconds: float, memory: int) -> tuple[str, int]:
+    """Wait for the end of a process. Return the limit that it passed (empty if none) and its largest observed memory, bytes."""
+    end, peak = time.monotonic() + seconds, 0
+    while True:
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(LOOK_PERIOD)
+            return "", peak
+        peak = max(peak, _memory(process.pid))
+        if peak > memory:
+            return f"needs {peak / 1e6:.0f} MB of memory, more than {memory / 1e6:.0f} MB. Raise --memory.", peak
+        if time.monotonic() > end:
+            return f"takes longer than {seconds:g} s. Raise --timeout.", peak
+
+
+def _memory(pid: int) -> int:
+    """Return the resident memory of a process and all its children, bytes."""
+    import psutil
+
+    total = 0
+    with suppress(psutil.Error):
+        process = psutil.Process(pid)
+        for each in (process, *process.children(recursive=True)):
+            with suppress(psutil.Error):
+                total += each.memory_info().rss
+    return total
+
+
+def end_with_caller() -> None:
+    """End this process and its group when its caller ends. Call it after the line on stdin is read."""
+    Thread(target=_wait_for_end, name="caller", daemon=True).start()
+
+
+def _wait_for_end() -> None:
+    sys.stdin.read()
+    if os.getpgid(0) == os.getpid():
+        os.killpg(0, signal.SIGKILL)
+
 
 OK, FAILED = "ok", "failed"
 """Status of a row."""
@@ -38,7 +123,6 @@ class SessionTask:
     scene: str | None
     params: str | None
     mapping: str | None
-    baseline: str | None
     report: bool  # is to be written, with its pictures
     keep_bag: bool  # of the replay
     time: float  # limit, s
@@ -87,13 +171,10 @@ def row_of(task: SessionTask) -> Row:
     from ..report.quantities import read
     from ..system.result_folder import REPLAY, result_folder
 
-    session, params, mapping, baseline = (
-        None if each is None else Path(each) for each in (task.session, task.params, task.mapping, task.baseline)
-    )
-    assert session is not None
+    session, params = Path(task.session), None if task.params is None else Path(task.params)
     scene, settings = scene_of(session, task.scene), settings_of(session, params).settings
     window = TimeWindow(task.start, task.duration)
-    options = ReplayOptions(mapping=mapping, baseline=baseline, window=window)
+    options = ReplayOptions(mapping=task.mapping, window=window)
     with result_folder(Path(task.out), REPLAY, [session]) as building:
         found = evaluated_replay(building, session, scene, settings, options)
         if task.report:

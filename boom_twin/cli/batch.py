@@ -37,7 +37,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_file(parser, "--scene", scene, "SCENE")
     add_params(parser)
     add_mapping(parser)
-    add_file(parser, "--baseline", "of all sessions; as for replay")
     add_window(parser)
     parser.add_argument("--report", action="store_true", help="write report.html with its pictures for every session")
     parser.add_argument("--calibrate", action="store_true", help="estimate the scene's parameters from every session as well")
@@ -51,8 +50,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Replay what is not done yet, and write the table of all; exit code 1 if a session failed."""
     from ..batch.cluster import REMEDY, connected, rows_of
-    from ..batch.page import write_page
-    from ..batch.results import PAGE, TABLE, batch_folder, counts, write_table
+    from ..batch.results import PAGE, TABLE, batch_folder, counts, write_page, write_table
     from ..batch.sources import sessions_of
 
     if missing := [name for name in ("pyarrow", "psutil") if find_spec(name) is None]:
@@ -92,7 +90,7 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
     from ..batch.sources import fingerprint, key_of
     from ..system.received_files import sha256_of
 
-    given = {name: getattr(args, name) for name in ("scene", "params", "mapping", "baseline")}
+    given = {name: getattr(args, name) for name in ("scene", "params", "mapping")}
     contents = [f"{name} {sha256_of(path.resolve())}" for name, path in given.items() if path is not None]
     window = window_of(args)
     kinds = [str(args.report), str(args.keep_bags), str(args.calibrate)]

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from .arguments import add_file, add_json, add_params, add_session_scene, add_window, files_of, window_of
+from .arguments import add_json, add_params, add_session_scene, add_window, files_of, window_of
 from .output import open_session_scene, open_session_settings, print_result, tell, warn
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_session_scene(parser)
     add_params(parser)
     add_window(parser)
-    add_file(parser, "--baseline", "as for replay")
     kept = "folder for compare.png and the replays: new, empty, or of an earlier compare; without it nothing is kept"
     parser.add_argument("--out", metavar="DIR", help=kept)
     add_json(parser)
@@ -36,7 +35,7 @@ def run(args: Namespace) -> int:
 
     with ExitStack() as stack:
         out = Path(args.out or stack.enter_context(TemporaryDirectory()) + "/compare")
-        building = stack.enter_context(result_folder(out, COMPARE, files_of(args, "A", "B", "scene", "params", "baseline")))
+        building = stack.enter_context(result_folder(out, COMPARE, files_of(args, "A", "B", "scene", "params")))
         one, other = (_side(args, Path(getattr(args, name)), building, name) for name in ("A", "B"))
         rows = rows_of(one, other)
         if args.out:
@@ -61,7 +60,7 @@ def _side(args: Namespace, path: Path, building: UnfinishedResult, name: str) ->
         tell(f"replaying {session} ..")
         scene, settings = open_session_scene(session, args.scene), open_session_settings(session, args.params)
         inner = building.inner(name)
-        evaluated_replay(inner, session, scene, settings, ReplayOptions(baseline=args.baseline, window=window))
+        evaluated_replay(inner, session, scene, settings, ReplayOptions(window=window))
         return inner.folder
 
     return side_of(path, replayed, window)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
-from .arguments import add_file, add_mapping, add_params, add_ros_args, add_session_scene, add_window, ros_arguments, window_of
+from .arguments import add_mapping, add_params, add_ros_args, add_session_scene, add_window, ros_arguments, window_of
 from .output import open_scene, open_session_scene, open_session_settings, tell, warn_incomplete
 
 if TYPE_CHECKING:
@@ -40,8 +40,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     add_session_scene(parser)
     add_params(parser)
-    usual = "what is known of this rig while all is well, for a session's twin (as recorded, else the package's)"
-    add_file(parser, "--baseline", usual)
     add_mapping(parser)
     add_window(parser)
     parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
@@ -85,7 +83,7 @@ def run(args: Namespace) -> int:
 
 def _passed_on(args: Namespace) -> list[str]:
     """Return the options that this command passes on to `boom_twin record`."""
-    options = {"--scene": args.scene, "--mapping": args.mapping, "--baseline": args.baseline, "--params": args.params}
+    options = {"--scene": args.scene, "--mapping": args.mapping, "--params": args.params}
     given = [part for option, value in options.items() if value for part in (option, str(value))]
     return [*given, *ros_arguments(args)]
 
@@ -108,7 +106,7 @@ def _sessions(args: Namespace) -> SessionList:
     def open_feed(path: Path) -> Feed:
         warn_incomplete(scan(path))
         scene, settings = open_session_scene(path, args.scene), open_session_settings(path, args.params, args.namespace)
-        return bag_feed(path, scene, settings, args.mapping, args.baseline, window, args.namespace)
+        return bag_feed(path, scene, settings, args.mapping, window, args.namespace)
 
     tell("opening the session (compiles for up to a minute the first time) ..")
     return SessionList(sessions_in(args.bag), open_feed)

@@ -46,9 +46,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--duration", type=positive, metavar="S", help="stop after so many seconds (on Ctrl-C)")
     parser.add_argument("--split-size", type=size, metavar="BYTES", help="begin a new file from this size on: 500M, 2G")
     parser.add_argument("--split-duration", type=long_enough, metavar="S", help="begin a new file after so many seconds")
-    kept = "kept in session.yaml (that of the running twin, if it is there)"
-    parser.add_argument("--scene", metavar="SCENE", type=Path, help=f"scene of the rig, {kept}")
-    parser.add_argument("--baseline", metavar="FILE", type=Path, help=f"what is known of the rig while all is well, {kept}")
+    kept = "scene of the rig, kept in session.yaml (that of the running twin, if it is there)"
+    parser.add_argument("--scene", metavar="SCENE", type=Path, help=kept)
     parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file, copied too (the package's own)")
     parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors, copied and used (the package's own)")
     parser.add_argument("--note", metavar="TEXT", help="kept in session.yaml and in the bag")
@@ -111,17 +110,13 @@ def run(args: Namespace) -> int:
 def _sheet(args: Namespace) -> SessionSheet:
     """Return the session metadata known before recording starts. The files that are given must be valid."""
     from ..bag.session_model import scene_from
-    from ..health.baseline import load_baseline
 
     scene = None if args.scene is None else scene_from(args.scene)
     if scene is not None:
         tell_oddities(scene.oddities, scene.source)
-    if args.baseline:
-        load_baseline(args.baseline)
     return SessionSheet(
         __version__,
         scene=None if scene is None else scene.text,
-        baseline=args.baseline and args.baseline.read_text(encoding="utf-8-sig"),
         parameters=(args.params or DEFAULT_PARAMETERS).read_text(encoding="utf-8"),
         mapping=(args.mapping or DEFAULT_FILE).read_text(encoding="utf-8-sig"),
         note=args.note,
@@ -135,7 +130,6 @@ def _with_twin_values(sheet: SessionSheet, answers: Mapping[str, Any], frame: st
 
     The prefix that the twin puts before the `frame` of the mapping becomes part of the mapping, so that a replay has it too.
     """
-    from ..ros.bag.recorder import TEXTS
     from ..ros.bag.subscriptions import with_mapped
 
     changes: dict[str, Any] = {"twin": answers["parameters"]} if "parameters" in answers else {}
@@ -147,13 +141,11 @@ def _with_twin_values(sheet: SessionSheet, answers: Mapping[str, Any], frame: st
             f"the running twin has the mapping {own_mapping}, and session.yaml holds "
             f"{given_mapping or 'the default one'}: a replay would differ. Record with --mapping {own_mapping}"
         )
-    for name in TEXTS:
-        if name in answers:
-            given, own = getattr(sheet, name), answers[name]
-            if given is None:
-                changes[name] = own
-            elif given != own:
-                warn(f"the running twin has another {name} than --{name} gives; session.yaml holds the one given")
+    own = answers.get("scene")
+    if own is not None and sheet.scene is None:
+        changes["scene"] = own
+    elif own not in (None, sheet.scene):
+        warn("the running twin has another scene than --scene gives; session.yaml holds the one given")
     return replace(sheet, **changes)
 
 

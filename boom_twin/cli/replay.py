@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from ..offline.progress import progress_of
 from .arguments import (
     SESSION,
-    add_file,
     add_json,
     add_mapping,
     add_namespace,
@@ -41,8 +40,6 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
     )
-    usual = "what is known of this rig while all is well; by default as the session was recorded, else the package's"
-    add_file(parser, "--baseline", usual)
     purpose = "name causes of what health sees, by twins of booms that have a fault; takes about five times as long"
     parser.add_argument("--causes", action="store_true", help=purpose)
     parser.add_argument("--no-health", action="store_true", help="do not judge the rig's health")
@@ -80,7 +77,7 @@ def run(args: Namespace) -> int:
     if window.start:
         tell(f"at {window.start:g} s the model starts at rest, whatever the boom did: its first seconds show that")
     tell("preparing the model (compiles for up to a minute the first time) ..")
-    out, sources = Path(args.out), files_of(args, "bag", "scene", "params", "mapping", "baseline")
+    out, sources = Path(args.out), files_of(args, "bag", "scene", "params", "mapping")
     with result_folder(out, REPLAY, sources) as building:
         joints, name = len(scene.scene.joints), f"samples.{args.table}"
         table = SampleTable(table_file(building.folder / name, joints), joints) if args.table else None
@@ -89,7 +86,6 @@ def run(args: Namespace) -> int:
             mapping=args.mapping,
             changes=not args.no_changes,
             health=not args.no_health,
-            baseline=args.baseline,
             window=window,
             namespace=args.namespace,
             with_bag=not args.no_bag,

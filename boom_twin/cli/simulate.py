@@ -19,9 +19,8 @@ from .arguments import add_json, add_scene, files_of, not_negative, refuse_given
 from .output import open_scene, print_result, warn
 
 if TYPE_CHECKING:
-    from ..analysis.energy_balance import EnergyBalance
+    from ..analysis.balances import EnergyBalance, MomentumBalance
     from ..analysis.initial_state import InitialState
-    from ..analysis.momentum_balance import MomentumBalance
     from ..analysis.simulate import Simulation
 
     Balances = tuple[EnergyBalance, MomentumBalance]
@@ -70,9 +69,8 @@ def _share(text: str) -> float:
 
 def run(args: Namespace) -> int:
     """Read, simulate, write."""
-    from ..analysis.energy_balance import energy_balance
+    from ..analysis.balances import energy_balance, momentum_balance
     from ..analysis.initial_state import write_state
-    from ..analysis.momentum_balance import momentum_balance
     from ..analysis.simulate import RHO, course_of, simulate
     from ..compiler.compile import compile_scene
     from ..scene.edit import with_rigid_cylinders

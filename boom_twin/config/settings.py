@@ -20,7 +20,7 @@ Table = TypeVar("Table", bound=BaseModel)
 _GONE = ("jerk_density", "lag", "stroke_agility", "step", "look_step", "step_tip_error", "step_acceleration_error", "rho")
 RETIRED = dict.fromkeys(
     (*_GONE, "section_deviation"), "without effect since 0.2.0, whose filter adapts by itself: leave it out"
-) | {"false_alarms": "without effect since 0.2.0: leave it out"}
+) | dict.fromkeys(("false_alarms", "baseline"), "without effect since 0.2.0: leave it out")
 """Parameters of earlier versions, and the remedy for each."""
 
 
@@ -153,7 +153,7 @@ def load_thresholds(path: Path, namespace: str = "") -> Thresholds:
 
 
 DEFAULT_FILE = Path(str(files("boom_twin") / "msg_config" / "twin.yaml"))
-NODE_ONLY = ("scene", "mapping", "health", "causes", "baseline", "frame_prefix", "hardware_id", "autostart", "monitor")
+NODE_ONLY = ("scene", "mapping", "health", "causes", "frame_prefix", "hardware_id", "autostart", "monitor")
 STROKE_RATE = 0.5
 """Upper bound of a cylinder's speed, m/s."""
 

@@ -1,4 +1,4 @@
-"""Inputs of a replay: the session with its scene, mapping, settings and baseline, given or as it was recorded."""
+"""Inputs of a replay: the session with its scene, mapping and settings, given or as it was recorded."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ from typing import Any
 from ..bag.joint_names import refuse_other_names
 from ..bag.reader import Session, scan
 from ..bag.session_model import (
-    SessionBaseline,
     SessionScene,
     SessionStrokes,
-    baseline_of,
     mapping_of,
     scene_of,
     settings_of,
@@ -41,7 +39,6 @@ class ReplayOptions:
     mapping: str | Path | None = None
     changes: bool = True
     health: bool = True
-    baseline: str | Path | None = None
     window: TimeWindow = WHOLE
     namespace: str = ""
     with_bag: bool = True
@@ -71,8 +68,8 @@ class ReplayInputs:
     wanted : list of str
         Input topics to read: that of the strokes, and those of other inputs with messages.
     strokes : SessionStrokes
-    baseline : SessionBaseline or None
-        None if health is not judged.
+    health : bool
+        True if the rig's health is judged.
     window : TimeWindow
     """
 
@@ -83,7 +80,7 @@ class ReplayInputs:
     topics: Topics
     wanted: list[str]
     strokes: SessionStrokes
-    baseline: SessionBaseline | None
+    health: bool
     window: TimeWindow
 
     @property
@@ -104,7 +101,6 @@ class ReplayInputs:
         found = {
             "scene": self.kept.source,
             "scene_sha256": self.kept.sha256,
-            "baseline": None if self.baseline is None else self.baseline.source,
             "mapping": self.mapping,
             "strokes": self.strokes.reading,
             "strokes_source": self.strokes.source,
@@ -115,9 +111,8 @@ class ReplayInputs:
 
     def twin(self, causes: bool = False) -> Twin:
         """Return a twin for the session, which names causes of faults if that is asked for."""
-        mounts, usual = self.topics.mounts(len(self.scene.joints)), self.baseline
-        baseline = None if usual is None else usual.baseline
-        return Twin(self.scene, self.settings, mounts, baseline, self.strokes.reading, self.topics.absent, causes=causes)
+        mounts, reads = self.topics.mounts(len(self.scene.joints)), self.strokes.reading
+        return Twin(self.scene, self.settings, mounts, self.health, reads, self.topics.absent, causes=causes)
 
     def refuse(self, reason: str) -> None:
         """Raise BagError if there is a `reason` for which the session is of another boom than the scene."""
@@ -145,8 +140,7 @@ def replay_inputs(
     ]
     strokes = strokes_of(session.path, mapped)
     refuse_other_names(session, topics, len(joints), kept.source)
-    baseline = baseline_of(session.path, Path(options.baseline) if options.baseline else None) if options.health else None
-    return ReplayInputs(session, kept, settings, mapped.source, topics, wanted, strokes, baseline, options.window)
+    return ReplayInputs(session, kept, settings, mapped.source, topics, wanted, strokes, options.health, options.window)
 
 
 def scene_for(session: Path, scene: SceneSource | SessionScene) -> SessionScene:

@@ -108,7 +108,6 @@ def replay(
     mapping: str | Path | None = None,
     changes: bool = True,
     health: bool = True,
-    baseline: str | Path | None = None,
     window: TimeWindow = WHOLE,
     namespace: str = "",
     with_bag: bool = True,
@@ -135,8 +134,6 @@ def replay(
         Repeat what was changed while the session was recorded (load, limits, zeros, starts from rest), at the same stamps.
     health : bool
         Judge the rig's health, see `Report.health`.
-    baseline : path, optional
-        Baseline of this rig; by default the one that the session was recorded with, else the package's own.
     window : TimeWindow, optional
         The part of the session that is replayed. The model starts at rest where that begins, whatever the boom did then; the
         times of the result count from there.
@@ -156,13 +153,13 @@ def replay(
     Raises
     ------
     UsageError
-        The mapping, a setting or the baseline cannot be used.
+        The mapping or a setting cannot be used.
     BagError
         The session cannot be read, has no strokes, is of another boom than the scene, or gave no prediction; what it was
         recorded with cannot be used; or `out` cannot be written, or holds anything else than an earlier result.
     """
     with result_folder(Path(out), REPLAY, [Path(bag)]) as building:
-        options = ReplayOptions(progress, mapping, changes, health, baseline, window, namespace, with_bag, causes)
+        options = ReplayOptions(progress, mapping, changes, health, window, namespace, with_bag, causes)
         return replay_into(building, bag, scene, settings, options)
 
 

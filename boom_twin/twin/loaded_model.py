@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor
 from ..errors import BoomTwinError
-from ..health.baseline import Baseline
 from ..health.monitor import HealthMonitor
 from ..scene.edit import loaded
 from ..scene.schema import Scene
@@ -46,14 +45,14 @@ def loaded_model(
     scene: Scene,
     settings: Settings,
     mounts: Sequence[Mount | None],
-    baseline: Baseline | None,
+    health: bool,
     reads: StrokeReading,
     absent: Collection[str],
 ) -> LoadedModel:
     """Return the model of `scene` under the load of `settings`; for the parameters see `boom_twin.Twin`."""
     scene = loaded(scene, *settings.load)
     boom = BoomPredictor(scene, settings, mounts, reads)
-    judge = None if baseline is None else HealthMonitor(scene, settings, tuple(mounts), absent)
+    judge = HealthMonitor(scene, settings, tuple(mounts), absent) if health else None
     _ = boom.held  # made here, where no sample waits for it
     return LoadedModel(scene, limits_of(scene, boom, settings, absent), boom, judge)
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ..config.settings import Settings
 from ..errors import BoomTwinError, SolverError
-from ..health.baseline import Baseline
 from ..health.causes import Hypothesis
 from ..health.fault_twins import FaultTwins, Follower
 from ..kernels.tables import SENTENCES
@@ -40,7 +39,7 @@ class SampleTaker:
         scene: SceneSource = None,
         settings: Settings | None = None,
         mounts: Sequence[Mount | None] = (),
-        baseline: Baseline | None = None,
+        health: bool = False,
         reads: StrokeReading = StrokeReading.LENGTH,
         absent: Collection[str] = (),
         doubted: Collection[str] = (),
@@ -48,7 +47,7 @@ class SampleTaker:
         is_live: bool = False,
     ) -> None:
         self.reads, self.absent, scene = reads, frozenset(absent), as_scene(scene)
-        self.scene, self.settings, self.baseline = scene, settings or Settings(), baseline
+        self.scene, self.settings, self._health = scene, settings or Settings(), health
         self.counts: Counter[str] = Counter()
         self.shedding = LoadShedding()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
@@ -60,7 +59,7 @@ class SampleTaker:
         self._doubted = frozenset(doubted)
         self._judged = True  # health, with the present sample
         self._fault_twins: FaultTwins | None = None
-        if causes and baseline is not None:
+        if causes and health:
             self._fault_twins = FaultTwins(self.scene, self._maker(), self.settings.name_odds, is_live)
         self._begin()
 
@@ -108,7 +107,7 @@ class SampleTaker:
 
     def _model(self, settings: Settings) -> LoadedModel:
         self._former: BlockUpdate | None = None
-        return loaded_model(self.scene, settings, self.mounts, self.baseline, self.reads, self.absent)
+        return loaded_model(self.scene, settings, self.mounts, self._health, self.reads, self.absent)
 
     def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
         """Use this model, which has the present load, in place of that of `before`."""

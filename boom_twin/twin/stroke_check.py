@@ -1,4 +1,4 @@
-"""Check strokes against what the cylinders can do: range, rate and, with a baseline, the angles."""
+"""Check strokes against what the cylinders can do: range and rate."""
 
 from __future__ import annotations
 

@@ -30,8 +30,8 @@ class Twin(SampleTaker):
     mounts : sequence of Mount or None, optional
         Of every joint's angle sensor: None is an encoder of the joint (the default), else an inclinometer, see
         `boom_twin.deviation.sensor_model.Mounting`.
-    baseline : Baseline, optional
-        With it the rig's health is judged, see `Report.health`.
+    health : bool
+        Judge the rig's health, see `Report.health`.
     reads : StrokeReading
         What the stroke transducers read: the lengths of the cylinders, oil compressed, or, of sessions that were made before
         version 0.2.0, their drives.
@@ -40,7 +40,7 @@ class Twin(SampleTaker):
     doubted : collection of str
         Channels of angle sensors, of forces and of the IMU whose zeros may drift by any amount.
     causes : bool
-        With a baseline, causes of faults are named, see `boom_twin.health.fault_twins`.
+        With `health`, causes of faults are named, see `boom_twin.health.fault_twins`.
     is_live : bool
         True if no sample may wait for the name of a cause.
 
@@ -56,7 +56,7 @@ class Twin(SampleTaker):
     shedding : LoadShedding
         Is told by a live user how full the queue of samples is; decides what is then left out.
     judge : HealthMonitor or None
-        Of the rig's health; None without a baseline.
+        Of the rig's health; None without `health`.
 
     Notes
     -----

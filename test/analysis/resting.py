@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from default_boom import posture_angles, strokes_of_posture
 
 from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.compiler.plan import first_row, taken_apart
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 
 @dataclass(frozen=True)

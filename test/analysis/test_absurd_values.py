@@ -9,12 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import default_text, strokes_of_posture
 
-from boom_twin import Scene, load_scene, simulate, statics
-from boom_twin.cli.main import main
-from boom_twin.errors import SolverError, UsageError
-from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.load import default_text
+from boom_twin import Scene, SolverError, UsageError, load_scene, simulate, statics
 
 ABSURD = {
     "barrel": ("barrel: {mass: 12.0, inertia: 0.6", "barrel: {mass: 12.0, inertia: 1e+300"),

@@ -9,8 +9,7 @@ from studies.clearance.scenes import treated, with_play
 from studies.stops import StopMotion, halt
 
 from boom_twin import load_scene
-from boom_twin.analysis.energy_balance import energy_balance
-from boom_twin.analysis.momentum_balance import Momenta, momentum_balance
+from boom_twin.analysis.balances import Momenta, energy_balance, momentum_balance
 from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import course_of
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analysis.resting import at_rest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 
 from boom_twin import Sample, Stream, load_scene
@@ -15,7 +16,6 @@ from boom_twin.analysis.bending_stress import BendingStressModel
 from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import course_of
 from boom_twin.deviation.estimate_row import WIDTH
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import estimate_of
 from boom_twin.validation.rig.exudyn import solve
 from boom_twin.validation.rig.exudyn.system import Boom, section_frames

@@ -6,14 +6,14 @@ import json
 
 import numpy as np
 import pytest
+from boom_twin.analysis.energy_balance import energy_balance
+from boom_twin.analysis.momentum_balance import momentum_balance
 from oracle import booms
 from oracle.clearance.scenes import with_pins
 from oracle.oscillation import mean_frequency
 
 from boom_twin import load_scene, simulate, statics
-from boom_twin.analysis.energy_balance import energy_balance
 from boom_twin.analysis.methods import Method, integrate_with
-from boom_twin.analysis.momentum_balance import momentum_balance
 from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import course_of
 from boom_twin.cli.main import main

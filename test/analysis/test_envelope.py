@@ -10,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
 
-from boom_twin import Scene, load_scene, statics
+from boom_twin import Scene, SolverError, load_scene, statics
 from boom_twin.analysis.envelope import Envelope, envelope
-from boom_twin.cli.main import main
-from boom_twin.errors import SolverError
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import posture_angles, strokes_of_posture, with_rigid_cylinders
 
 from boom_twin import load_scene, simulate
-from boom_twin.cli.main import main
-from boom_twin.scene.edit import with_rigid_cylinders
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.scene.schema import Clearance
 
 SCENE = load_scene()

@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from analysis.resting import at_rest
+from default_boom import posture_angles, strokes_of_posture
 from oracle import booms
 from oracle.clearance.scenes import PINS, RODS, with_pins
 from oracle.response import DenseModel, extrapolated
 from scipy.optimize import brentq
 
-from boom_twin import frequency_response, load_scene, simulate, statics
+from boom_twin import UsageError, frequency_response, load_scene, simulate, statics
 from boom_twin.analysis.frequency_response import linearised_boom, with_all_shapes
 from boom_twin.analysis.modal import drive_at_rest
-from boom_twin.errors import UsageError
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 BAND = np.geomspace(0.05, 30.0, 40)  # Hz
 FORCES = ([1.0, 0.0], [0.0, 1.0])

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture, with_rigid_cylinders
 from oracle import booms
 
-from boom_twin import load_scene, simulate, statics
-from boom_twin.errors import SolverError, UsageError
-from boom_twin.scene.edit import with_rigid_cylinders
-from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin import SolverError, UsageError, load_scene, simulate, statics
 from boom_twin.scene.oil_spring import stiffness
 from boom_twin.validation.rig import Move, Programme
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from analysis.resting import at_rest
+from default_boom import strokes_of_angles
 from oracle import booms, segments
 from scipy.linalg import eigh, null_space
 
-from boom_twin import load_scene, statics
+from boom_twin import SolverError, UsageError, load_scene, statics
 from boom_twin.analysis.modal import damping_ratio, natural_modes
-from boom_twin.errors import SolverError, UsageError
-from boom_twin.scene.kinematics import strokes_of_angles
 from boom_twin.validation.study import scene_changes as made
 
 CASES = [pytest.param(load_scene(), "arch", id="default"), pytest.param(booms.random_boom(28), "test", id="boom 28")]

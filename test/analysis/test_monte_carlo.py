@@ -6,13 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import parameter, strokes_of_posture, with_parameters
 
-from boom_twin import load_scene, simulate, statics
+from boom_twin import UsageError, load_scene, simulate, statics
 from boom_twin.analysis.monte_carlo import simulate_samples
-from boom_twin.cli.main import main
-from boom_twin.errors import UsageError
-from boom_twin.scene.edit import parameter, with_parameters
-from boom_twin.scene.kinematics import strokes_of_posture
 
 SCENE = load_scene()
 STROKES = strokes_of_posture(SCENE, "arch")

@@ -7,7 +7,7 @@ import pytest
 from analysis.tip_force_steps import tip_under
 from oracle import booms
 
-from boom_twin import frequency_response, load_scene, statics
+from boom_twin import UsageError, frequency_response, load_scene, statics
 from boom_twin.analysis.resonance_map import named_postures, resonance_map
 from boom_twin.analysis.steady_state import (
     INSTANTS,
@@ -16,7 +16,6 @@ from boom_twin.analysis.steady_state import (
     pump_load,
     steady_state,
 )
-from boom_twin.errors import UsageError
 from boom_twin.scene.pump_pulses import upward
 
 SCENE = load_scene()

@@ -10,10 +10,7 @@ import numpy as np
 import pytest
 from fuzz.mcap_files import rewrite
 from mcap.writer import IndexType
-
-from boom_twin.bag.reader import Session, read
-from boom_twin.bag.session_files import write_session
-from boom_twin.bag.writer import FILE_NAME
+from recordings import FILE_NAME, Session, read, write_session
 
 NOTES = {"origin": "synthetic, made for a test"}
 JOINT_STATE = "sensor_msgs/msg/JointState"

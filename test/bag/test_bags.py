@@ -11,21 +11,17 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
+from recordings import FILE_NAME, Session, SessionWriter, read, recover, scan, write_session
+from ros_messages import Topic, jazzy, load_topics, new_message
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 from ruamel.yaml import YAML
 
-from boom_twin import Stream
+from boom_twin import BagError, Stream, UsageError
 from boom_twin.bag.inspect import inspect
 from boom_twin.bag.metadata import read_metadata, write_metadata
-from boom_twin.bag.reader import Session, read, scan
-from boom_twin.bag.recovery.recover import recover
-from boom_twin.bag.session_files import write_session
-from boom_twin.bag.writer import FILE_NAME, SessionWriter
-from boom_twin.errors import BagError, UsageError
-from boom_twin.messages.topic_table import Qos, Topic, load_topics
-from boom_twin.messages.type_store import jazzy, new_message
+from boom_twin.messages.topic_table import Qos
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
 POINT = Topic(

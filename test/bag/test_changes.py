@@ -8,17 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from default_boom import joint_angles_of_strokes, strokes_of_posture
+from recordings import SessionWriter, read, scan, sensor_message
+from ros_messages import TYPES, Output, decode_changes, encode_changes, jazzy, load_topics, new_message
 
-from boom_twin import Sample, Settings, Stream, load_scene, replay
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import sensor_message
-from boom_twin.bag.writer import SessionWriter
-from boom_twin.errors import BagError
-from boom_twin.messages.report_encoder import decode_changes, encode_changes
-from boom_twin.messages.topic_table import TYPES, Output, load_topics
-from boom_twin.messages.type_store import jazzy, new_message
+from boom_twin import BagError, Sample, Settings, Stream, load_scene, replay
 from boom_twin.offline.session_samples import Changes
-from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 from boom_twin.types import Change
 
 TYPE = TYPES[Output.CHANGES]

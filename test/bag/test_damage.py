@@ -9,16 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import main
 from fuzz.mcap_files import joined, records
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType
+from recordings import FILE_NAME, Session, SessionWriter, read, scan
+from ros_messages import load_topics
 
-from boom_twin import Stream
-from boom_twin.bag.reader import Session, read, scan
-from boom_twin.bag.writer import FILE_NAME, SessionWriter
-from boom_twin.cli.main import main
-from boom_twin.errors import BagError
-from boom_twin.messages.topic_table import load_topics
+from boom_twin import BagError, Stream
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
 JOINT_STATE = "sensor_msgs/msg/JointState"

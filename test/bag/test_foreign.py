@@ -10,14 +10,13 @@ from typing import Any
 
 import pytest
 import zstandard
+from command import main
 from mcap.reader import make_reader
 from mcap.writer import Writer
+from recordings import FILE_NAME, Session, read, scan
+from ros_messages import jazzy
 
-from boom_twin.bag.reader import Session, read, scan
-from boom_twin.bag.writer import FILE_NAME
-from boom_twin.cli.main import main
-from boom_twin.errors import BagError
-from boom_twin.messages.type_store import jazzy
+from boom_twin import BagError
 
 Content = Callable[[Session], list[tuple[Any, ...]]]
 Entry = tuple[str, str, str, int, bytes]  # topic, type, encoding, log time (ns), data

@@ -15,20 +15,17 @@ from typing import Any
 import lz4.frame
 import pytest
 import zstandard
+from command import main
 from mcap.writer import MCAP0_MAGIC
+from recordings import SessionWriter, read, recover, scan
+from ros_messages import load_topics
 
-from boom_twin import Stream
+from boom_twin import BagError, Stream
 from boom_twin.bag import mcap_file, mcap_records
 from boom_twin.bag.mcap_records import LARGEST_SUMMARY
 from boom_twin.bag.metadata import FILE_NAME as METADATA
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.recovery.recover import recover
 from boom_twin.bag.session_sheet import FILE_NAME as SHEET
-from boom_twin.bag.writer import SessionWriter
-from boom_twin.cli.main import main
 from boom_twin.config.yaml_text import plain
-from boom_twin.errors import BagError
-from boom_twin.messages.topic_table import load_topics
 from boom_twin.offline import ground_truth as truth
 
 ROOT = Path(__file__).parents[2]

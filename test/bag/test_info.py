@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import main
 from mcap.reader import make_reader
 from mcap.writer import Writer
-from ros_messages import joint_state
+from recordings import FILE_NAME, SessionWriter
+from ros_messages import joint_state, load_topics
 
 from boom_twin import Stream
-from boom_twin.bag.writer import FILE_NAME, SessionWriter
-from boom_twin.cli.main import main
-from boom_twin.messages.topic_table import load_topics
 
 ROOT = Path(__file__).parents[2]
 START, STEP = 10**18, 5_000_000

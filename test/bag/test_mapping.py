@@ -8,15 +8,15 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from recordings import SessionSheet, load_mapping, mapping_of
+from ros_messages import load_topics
 from ruamel.yaml import YAML
 
-from boom_twin import Stream
+from boom_twin import BagError, Stream, UsageError
 from boom_twin.bag.metadata import dump
-from boom_twin.bag.session_model import DEFAULT_MAPPING, mapping_of, strokes_of
-from boom_twin.bag.session_sheet import FILE_NAME, RIG_ORIGIN, SessionSheet
-from boom_twin.errors import BagError, UsageError
-from boom_twin.messages.mapping import load_mapping
-from boom_twin.messages.topic_table import DEFAULT_FILE, load_topics
+from boom_twin.bag.session_model import DEFAULT_MAPPING, strokes_of
+from boom_twin.bag.session_sheet import FILE_NAME, RIG_ORIGIN
+from boom_twin.messages.topic_table import DEFAULT_FILE
 from boom_twin.types import StrokeReading
 
 EXAMPLE = """

@@ -9,19 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import joint_angles_of_strokes, strokes_of_posture
 from fuzz.mcap_files import rewrite
-from ros_messages import IMU, JOINT_STATE, encoded
+from recordings import FILE_NAME, read, scan, write_session
+from ros_messages import IMU, JOINT_STATE, TYPES, decode, encoded, new_message
 from rosbags.serde import SerdeError
 
-from boom_twin import load_scene, replay
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import write_session
-from boom_twin.bag.writer import FILE_NAME
-from boom_twin.cli.main import main
-from boom_twin.errors import BagError
-from boom_twin.messages.topic_table import TYPES
-from boom_twin.messages.type_store import PADDING, decode, new_message
-from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+from boom_twin import BagError, load_scene, replay
+from boom_twin.messages.type_store import PADDING
 
 NOISE = np.random.default_rng(5)
 

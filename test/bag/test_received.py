@@ -12,12 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from command import main
+from recordings import mapping_of, recover, scan
 
-from boom_twin.bag.reader import scan
-from boom_twin.bag.recovery.recover import recover
-from boom_twin.bag.session_model import mapping_of
-from boom_twin.cli.main import main
-from boom_twin.errors import BagError
+from boom_twin import BagError
 from boom_twin.offline.ground_truth import FILE_NAME as TRUTH
 from boom_twin.offline.ground_truth import load_truth
 from boom_twin.report.compare import side_of

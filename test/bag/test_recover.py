@@ -14,20 +14,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import main
 from fuzz.mcap_files import joined, records
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.writer import CompressionType, IndexType, Writer
+from recordings import FILE_NAME, recover, scan
 from rosbags.highlevel import AnyReader
 
+from boom_twin import BagError
 from boom_twin.bag import mcap_records as content
-from boom_twin.bag.reader import scan
-from boom_twin.bag.recovery.recover import Recovery, recover
-from boom_twin.bag.writer import FILE_NAME
-from boom_twin.cli.main import main
-from boom_twin.errors import BagError
+from boom_twin.bag.recovery.recover import Recovery
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 Row = tuple[str, str, int, int, int, bytes]

@@ -15,18 +15,15 @@ from threading import Event
 
 import pytest
 from mcap.writer import CompressionType
-from ros_messages import encoded, joint_state
+from recordings import read, recover, scan
+from ros_messages import encoded, joint_state, load_topics
 from rosbags.highlevel import AnyReader
 
-from boom_twin import Stream
+from boom_twin import BagError, Stream
 from boom_twin.bag import async_writer as module
 from boom_twin.bag.async_writer import FileSplit, Storage
 from boom_twin.bag.metadata import read_metadata
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.recovery.recover import recover
 from boom_twin.bag.writer import BagWriter, recorded
-from boom_twin.errors import BagError
-from boom_twin.messages.topic_table import load_topics
 
 TOPIC = load_topics().inputs[Stream.STROKES]
 STEP = 5_000_000

@@ -11,22 +11,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import strokes_of_posture
+from recordings import Session, read_both, recover, scan, write_session
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
-from boom_twin import TimeWindow, load_scene, replay
-from boom_twin.bag.reader import Session, read_both, scan
-from boom_twin.bag.recovery.recover import recover
-from boom_twin.bag.session_files import write_session
+from boom_twin import BagError, TimeWindow, load_scene, replay
 from boom_twin.batch.sources import sessions_of
-from boom_twin.cli.main import main
-from boom_twin.errors import BagError
 from boom_twin.offline.inputs import ReplayOptions
 from boom_twin.offline.replay import replay_into
 from boom_twin.offline.sample_table import SampleTable, table_file
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.system.result_folder import REPLAY, result_folder
 
 Content = Callable[[Session], list[tuple[Any, ...]]]

@@ -23,10 +23,11 @@ psutil, parquet = pytest.importorskip("psutil"), pytest.importorskip("pyarrow.pa
 pytest.importorskip("distributed")
 
 
+from command import main  # noqa: E402
+
 from boom_twin import load_scene, replay  # noqa: E402
 from boom_twin.batch.session_task import SessionTask, row_of  # noqa: E402
 from boom_twin.calibration import calibrate  # noqa: E402
-from boom_twin.cli.main import main  # noqa: E402
 from boom_twin.system.child_process import python_command  # noqa: E402
 
 COUNT = 5
@@ -193,7 +194,7 @@ def test_no_scheduler_answers(
 
 def task(key: str = "key", session: object = "s", out: object = "o", **changes: object) -> SessionTask:
     given = {"fingerprint": "", "report": False, "keep_bag": False, "time": 600.0, "memory": 10**9, "retries": 0} | changes
-    for name in ("scene", "params", "mapping", "baseline"):
+    for name in ("scene", "params", "mapping"):
         given.setdefault(name, None)
     return SessionTask(key, str(session), str(out), **given)  # type: ignore[arg-type]
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from boom_twin import UsageError
 from boom_twin.batch.sources import fingerprint, key_of, sessions_of
-from boom_twin.errors import UsageError
 
 
 @pytest.fixture

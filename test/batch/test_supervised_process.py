@@ -13,7 +13,7 @@ import pytest
 
 psutil = pytest.importorskip("psutil")
 
-from boom_twin.batch.supervised_process import Outcome, run_supervised  # noqa: E402
+from boom_twin.batch.session_task import Outcome, run_supervised  # noqa: E402
 
 PLENTY = 120.0, 4_000_000_000
 
@@ -57,11 +57,11 @@ def test_one_that_takes_too_much_memory_is_ended() -> None:
 def test_it_ends_with_its_caller(tmp_path: Path) -> None:
     """The caller is killed, as a worker may be."""
     child = (
-        "import os, sys, time; from boom_twin.batch.supervised_process import end_with_caller; sys.stdin.readline(); "
+        "import os, sys, time; from boom_twin.batch.session_task import end_with_caller; sys.stdin.readline(); "
         "end_with_caller(); open(sys.argv[1], 'w').write(str(os.getpid())); time.sleep(600)"
     )
     caller = (
-        "import sys; from boom_twin.batch.supervised_process import run_supervised; "
+        "import sys; from boom_twin.batch.session_task import run_supervised; "
         "run_supervised([sys.executable, '-c', sys.argv[1], sys.argv[2]], b'task\\n', 600.0, 10**10)"
     )
     place = tmp_path / "pid"

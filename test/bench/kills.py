@@ -27,13 +27,12 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from boom_twin import load_scene
+from boom_twin import BagError, load_scene
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.recovery.recover import recover
 from boom_twin.bag.session_files import write_session
 from boom_twin.bag.session_sheet import incompleteness
 from boom_twin.cli.main import main as command_line
-from boom_twin.errors import BagError
 from boom_twin.scene.kinematics import strokes_of_posture
 
 PATIENCE = 300.0

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from default_boom import parameter, with_parameters
 from drive_twin import drive_readings, note_drives
 from oracle import booms
+from recordings import write_session
 
 from boom_twin import Scene
-from boom_twin.bag.session_files import write_session
-from boom_twin.scene.edit import parameter, with_parameters
 from boom_twin.validation import rig
 from boom_twin.validation.rig.loads import parse, tip_load
 

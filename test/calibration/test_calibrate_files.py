@@ -6,12 +6,12 @@ import json
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import parameter
+from recordings import load_mapping
 
 from boom_twin import load_scene
 from boom_twin.calibration import run
-from boom_twin.cli.main import main
-from boom_twin.messages.mapping import load_mapping
-from boom_twin.scene.edit import parameter
 
 TEXT = """# my boom
 description: "a test boom"
@@ -22,7 +22,7 @@ description: "a test boom"
 @pytest.fixture(scope="module")
 def source(two_sections, tmp_path_factory):
     """The boom of two sections as a file with comments: the default one's text, cut."""
-    from boom_twin.scene.load import default_text
+    from default_boom import default_text
 
     text = default_text()
     for start, end in (("  - {length: 3.20", "# Joint i turns"), ("  - {kind: B2", "# Boom angles")):

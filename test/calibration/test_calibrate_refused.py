@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
+from recordings import write_session
 
-from boom_twin import load_scene
-from boom_twin.bag.session_files import write_session
+from boom_twin import BagError, UsageError, load_scene
 from boom_twin.calibration import Choice, calibrate
-from boom_twin.errors import BagError, UsageError
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.validation import rig
 
 SECOND = 200  # rows

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from calibration.sessions import ENCODERS, cut_to, made, off
+from default_boom import anew, parameter
 from oracle import booms
 
 from boom_twin import load_scene
 from boom_twin.calibration import Choice, calibrate
 from boom_twin.calibration.output import write_scene
-from boom_twin.scene.edit import anew, parameter
 from boom_twin.scene.schema import Oil
 
 

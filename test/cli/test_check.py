@@ -8,9 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from boom_twin.cli.main import main
-from boom_twin.scene.load import default_text
+from command import main
+from default_boom import default_text
 
 
 def _scene(folder: Path, old: str, new: str) -> str:

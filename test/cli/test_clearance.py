@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import clearance_text, default_text, strokes_of_posture, with_end_mark
 
 from boom_twin import load_scene
-from boom_twin.cli.main import main
-from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.load import clearance_text, default_text, with_end_mark
 
 
 @pytest.fixture

@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from command import main
+from default_boom import default_text
 
 from boom_twin import load_scene
-from boom_twin.cli.main import main
-from boom_twin.scene.load import default_text
 
 ANSWERS = """Small boom
 0, 0

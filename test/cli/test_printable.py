@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from command import main
+from default_boom import default_text
 
-from boom_twin.cli.main import main
-from boom_twin.errors import BoomTwinError
-from boom_twin.scene.load import default_text
+from boom_twin import BoomTwinError
 from boom_twin.system.terminal_text import printable
 
 SCENES = {

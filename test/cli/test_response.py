@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import main
 from oracle import booms
 
 from boom_twin import frequency_response, load_scene, statics
-from boom_twin.cli.main import main
 
 Capture = pytest.CaptureFixture[str]
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import strokes_of_posture
 
 from boom_twin import load_scene
-from boom_twin.cli.main import main
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.pump_pulses import ease
 
 HEADER = "t_s,stroke_1_m,stroke_2_m,stroke_3_m,stroke_4_m\n"

@@ -9,12 +9,13 @@ import sys
 from pathlib import Path
 
 import pytest
+from command import main
+from default_boom import default_text
 
 from boom_twin import __version__
-from boom_twin.cli.main import COMMANDS, EXAMPLES, main
+from boom_twin.cli.main import COMMANDS, EXAMPLES
 from boom_twin.cli.replay import flat
 from boom_twin.offline.progress import TenthLines
-from boom_twin.scene.load import default_text
 
 STROKES = "0.63,0.165,0.235,0.187"
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import posture_angles, strokes_of_posture
 from oracle import booms
 from oracle.clearance.scenes import RODS, with_pins
 
+from boom_twin.analysis.balances import Energies
 from boom_twin.analysis.drive import PASSES, STEP_TOLERANCE
-from boom_twin.analysis.energy_balance import Energies
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.simulate import RHO
 from boom_twin.compiler.compile import compile_scene
@@ -16,7 +17,6 @@ from boom_twin.compiler.plan import width_of
 from boom_twin.kernels.elements.pin_contact import LOST
 from boom_twin.kernels.integrators import GENERALISED_ALPHA
 from boom_twin.kernels.transfer.time_step import run
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 LONG = {1e-3: 2000, 1e-4: 5000, 1e-5: 5000}
 PULSE, DURATION = np.array([0.03, -0.02, 0.03, 0.02]), 0.4  # m, s: a jerk of all four cylinders

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from convergence import motions
+from default_boom import posture_angles, strokes_of_posture
 from oracle import booms
 
-from boom_twin.analysis.energy_balance import energy_balance
+from boom_twin.analysis.balances import energy_balance
 from boom_twin.analysis.simulate import course_of
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)
 

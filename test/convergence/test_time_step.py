@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from convergence import motions
+from default_boom import posture_angles
 from oracle import segments
 
 from boom_twin import load_scene, simulate
-from boom_twin.scene.kinematics import posture_angles
 
 DURATION, SAMPLES, TRAVEL = 1.6, 40, (0.05, -0.02, 0.03, 0.02)
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from boom_twin.errors import BoomTwinError
+from boom_twin import BoomTwinError
 from boom_twin.messages.topic_table import Topics, load_topics
 from boom_twin.ros.startup import require_rclpy
 

@@ -12,8 +12,8 @@ from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
+from boom_twin import BoomTwinError
 from boom_twin.bag.async_writer import PATIENCE as DISK_PATIENCE
-from boom_twin.errors import BoomTwinError
 from boom_twin.ros.startup import STOPS, on_stop_signal
 from boom_twin.system.child_process import end_process, python_command
 

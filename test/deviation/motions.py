@@ -9,9 +9,9 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from default_boom import strokes_of_posture
 
 from boom_twin import load_scene, simulate
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.types import SECOND
 from boom_twin.validation.rig.motion import Move, Programme, ease
 from boom_twin.validation.rig.sensors import Sensors, read, sampling_stamps

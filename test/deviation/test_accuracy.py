@@ -9,12 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import default_text, strokes_of_posture
 
 from boom_twin import Sample, Stream, Twin, load_scene, statics
-from boom_twin.cli.main import main
 from boom_twin.deviation.accuracy import TipAccuracy, accuracy_at
-from boom_twin.scene.kinematics import strokes_of_posture
-from boom_twin.scene.load import default_text
 
 SCENE = load_scene()
 ARCH = strokes_of_posture(SCENE, "arch")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from scipy.linalg import expm
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
@@ -12,7 +13,6 @@ from boom_twin.deviation.mixture import mix
 from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.deviation.rows import length_row
 from boom_twin.deviation.states import LOADS, PREDICTION
-from boom_twin.scene.kinematics import strokes_of_posture
 
 SCENE = load_scene()
 DRIVES = strokes_of_posture(SCENE, "arch")

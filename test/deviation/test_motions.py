@@ -7,7 +7,6 @@ import pytest
 from deviation.motions import measured, rms, true_motion
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.health.baseline import load_baseline
 from boom_twin.offline.recording import Recording
 from boom_twin.twin.blocks import SampleBlock
 from boom_twin.types import SECOND
@@ -41,7 +40,7 @@ def test_more_samples_a_second_are_better(name):
 
 def test_the_angle_sensor_of_the_joint_replaces_a_transducer_that_sticks():
     """Cylinder 4 sticks at rest, is found when it moves, and the tip is right again a second after that."""
-    session, twin, tips = measured("rests"), Twin(load_scene(), baseline=load_baseline(None)), {}
+    session, twin, tips = measured("rests"), Twin(load_scene(), health=True), {}
     times, boom = true_motion("rests")
     stuck = session.strokes.copy()
     stuck[1200:, 3] = stuck[1200, 3]
@@ -58,7 +57,7 @@ def test_the_angle_sensor_of_the_joint_replaces_a_transducer_that_sticks():
 @pytest.mark.parametrize(("name", "rate"), [("stops", 50.0), ("sweep", 50.0), ("12 Hz", 50.0)])
 def test_no_sensor_is_accused_of_a_motion_in_haste(name, rate):
     """At 50 Hz a filter that lags has the readings of joints jump."""
-    twin, session, alarms = Twin(load_scene(), baseline=load_baseline(None)), measured(name, rate), set()
+    twin, session, alarms = Twin(load_scene(), health=True), measured(name, rate), set()
     for stamp, strokes, joints in zip(session.stamps.tolist(), session.strokes, session.joints, strict=True):
         for stream, values in ((Stream.STROKES, strokes), (Stream.ANGLES, joints)):
             if (health := twin.update(Sample(stream, stamp, values)).health) is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import joint_angles_of_strokes, strokes_of_posture
 from oracle import booms
 
 from boom_twin import Scene, Settings, frequency_response, load_scene, statics
@@ -11,7 +12,6 @@ from boom_twin.analysis.equilibrium import Equilibrium, rest_at
 from boom_twin.analysis.modal import natural_modes
 from boom_twin.deviation.posture import linearise
 from boom_twin.deviation.predictor import BoomPredictor
-from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 from boom_twin.types import Mount
 
 RIGID = load_scene()

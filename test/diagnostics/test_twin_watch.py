@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 
 from boom_twin import Report, Sample, Settings, Stream, load_scene
@@ -17,7 +18,6 @@ from boom_twin.diagnostics.model_status import stress_model, stress_status
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import estimate_of
 from boom_twin.types import Residuals
 

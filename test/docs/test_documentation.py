@@ -8,10 +8,11 @@ import re
 from pathlib import Path
 
 import pytest
+from command import main
 from ruamel.yaml import YAML
 
 import boom_twin
-from boom_twin.cli.main import COMMANDS, main
+from boom_twin.cli.main import COMMANDS
 from boom_twin.config.settings import NODE_ONLY, Settings, Thresholds, read_parameters
 
 ROOT = Path(__file__).parents[2]

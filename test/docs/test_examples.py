@@ -9,9 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from command import main
+from recordings import load_mapping
 
-from boom_twin.cli.main import COMMANDS, EXAMPLES, main
-from boom_twin.messages.mapping import load_mapping
+from boom_twin.cli.main import COMMANDS, EXAMPLES
 
 ROOT = Path(__file__).parents[2]
 

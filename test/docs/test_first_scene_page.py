@@ -6,8 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-
-from boom_twin.cli.main import main
+from command import main
 
 PAGE = (Path(__file__).parents[2] / "docs" / "your_boom_init.md").read_text(encoding="utf-8")
 EXAMPLES = Path(__file__).parents[2] / "examples"

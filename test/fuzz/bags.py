@@ -17,16 +17,13 @@ from pathlib import Path
 import lz4.frame
 import numpy as np
 import zstandard
+from default_boom import posture_angles, strokes_of_posture
 from mcap.opcode import Opcode
 from numpy.random import Generator
+from recordings import Session, recover, scan, write_session
 
-from boom_twin import load_scene, replay
-from boom_twin.bag.reader import Session, scan
-from boom_twin.bag.recovery.recover import recover
+from boom_twin import BagError, BoomTwinError, load_scene, replay
 from boom_twin.bag.session_file import as_bag_error
-from boom_twin.bag.session_files import write_session
-from boom_twin.errors import BagError, BoomTwinError
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 from .mcap_files import PREFIX, VARIANTS, joined, records, rewrite
 from .mutate import DAMAGES, damaged, flipped, pick, rearranged

@@ -15,23 +15,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from default_boom import posture_angles, strokes_of_posture
 from drive_twin import drive_twin
 from numpy.random import Generator
-from ros_messages import encoded
+from recordings import sensor_message
+from ros_messages import TYPES, Output, ReportEncoder, SampleDecoder, decode, encoded, load_topics
 
 from boom_twin import Sample, Settings, Stream, load_scene
 from boom_twin.bag.session_file import PARSE_ERRORS
-from boom_twin.bag.session_files import sensor_message
-from boom_twin.health.baseline import load_baseline
 from boom_twin.messages.cdr_decoder import CdrDecoder
-from boom_twin.messages.report_encoder import ReportEncoder
-from boom_twin.messages.sample_decoder import SampleDecoder
-from boom_twin.messages.topic_table import TYPES, Output, load_topics
-from boom_twin.messages.type_store import PADDING, decode
+from boom_twin.messages.type_store import PADDING
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import alarms, dump, layout, state
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.types import SENSORS
 
 from .mutate import damaged, pick
@@ -79,7 +75,7 @@ def _encoded(sample: Sample, little_endian: bool = True) -> bytes:
 def _outputs() -> dict[str, list[bytes]]:
     """What a twin publishes, by role."""
     random, scene = np.random.default_rng(3), load_scene()
-    twin, encoder = drive_twin(scene, baseline=load_baseline(None)), ReportEncoder(scene, Settings())
+    twin, encoder = drive_twin(scene, health=True), ReportEncoder(scene, Settings())
     found: dict[str, list[bytes]] = {}
     for number in range(400):
         for stream in Stream:
@@ -176,7 +172,7 @@ class _Listener:
     def __init__(self) -> None:
         self.odd = 0
         scene, topics = load_scene(), load_topics()
-        self._twin, self._decoder = drive_twin(scene, baseline=load_baseline(None)), SampleDecoder(4, topics)
+        self._twin, self._decoder = drive_twin(scene, health=True), SampleDecoder(4, topics)
         self._wires = {stream: CdrDecoder(TYPES[stream], field=kind.field) for stream, kind in SENSORS.items()}
         self._feed, self._topics = Feed("fuzz", Store(2000), topics, scene), topics
 

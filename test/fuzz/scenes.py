@@ -14,14 +14,13 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from default_boom import strokes_of_posture
 from numpy.random import Generator
 from ruamel.yaml import YAML
 from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import YAMLError
 
-from boom_twin import Scene, load_scene, simulate, statics
-from boom_twin.errors import BoomTwinError, SceneError, SceneWarning
-from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin import BoomTwinError, Scene, SceneError, SceneWarning, load_scene, simulate, statics
 from boom_twin.scene.load import NUMBER
 
 from .mutate import cut, damaged, pick, rearranged

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from io import StringIO
 
-from boom_twin.cli.main import main
+from command import main
 
 
 class Kind(StrEnum):

@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from recordings import read, scan, write_session
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import write_session
 from boom_twin.config.settings import Settings
-from boom_twin.health.baseline import Baseline
 from boom_twin.types import Alarm, Health, Report
 
 NANO = 1e-9
@@ -77,10 +75,10 @@ class Outcome(NamedTuple):
         return np.array([report.prediction.tip_position for report in self.reports if report.prediction is not None])
 
 
-def run(samples: Iterable[Sample], settings: Settings | None = None, baseline: Baseline | None = None, twin=None) -> Outcome:
+def run(samples: Iterable[Sample], settings: Settings | None = None, twin=None) -> Outcome:
     """A twin of the default boom takes them all."""
     samples = list(samples)
-    twin = twin or Twin(load_scene(), settings, baseline=baseline or Baseline())
+    twin = twin or Twin(load_scene(), settings, health=True)
     reports = [twin.update(sample) for sample in samples]
     return Outcome(twin, reports, [r.health for r in reports if r.health is not None], samples[0].stamp)
 

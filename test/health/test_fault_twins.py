@@ -5,12 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import anew, parameter, with_parameters
 from health.recorded import session
 
 from boom_twin import Twin, load_scene
-from boom_twin.cli.main import main
-from boom_twin.health.baseline import load_baseline
-from boom_twin.scene.edit import anew, parameter, with_parameters
 from boom_twin.twin.blocks import block_of
 
 BAGS = Path(__file__).parents[2] / "bags"
@@ -62,7 +61,7 @@ def test_causes_need_health(tmp_path, capsys):
 def test_sample_by_sample_as_by_blocks():
     """A twin that takes samples one by one names the same causes, with the same reports of health, as one that takes blocks."""
     scene, samples = stiffer("cylinder_2.k"), session(16.0)
-    one, many = (Twin(scene, baseline=load_baseline(), causes=True) for _ in range(2))
+    one, many = (Twin(scene, health=True, causes=True) for _ in range(2))
     single = [report.health for sample in samples for report in one.update(sample).all if report.health is not None]
     found = []
     for first in range(0, len(samples), 997):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
-from boom_twin.health.baseline import Baseline
 from boom_twin.health.tip_load import TipLoadMonitor
 from boom_twin.types import Alarm
 
@@ -34,7 +33,7 @@ def alarms(stream: Stream, channel: int, shift: float, settings: Settings | None
     """Return every alarm that began or ended while a boom rests and a channel reads `shift` too much, after a `ramp`."""
     rng, found, sigmas = np.random.default_rng(5), [], {Stream.ANGLES: 1.745e-4, Stream.IMU: 0.05, Stream.FORCES: 100.0}
     lengths, others = rest()
-    twin = Twin(load_scene(), settings, baseline=Baseline())
+    twin = Twin(load_scene(), settings, health=True)
     for k in range(4800):
         share = 1.0 if ramp == 0 else min(1.0, (k - ONSET) / ramp, (END - k) / ramp)
         readings = {Stream.STROKES: lengths + rng.normal(0.0, 2e-5, 4)}

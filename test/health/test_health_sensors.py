@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import default_text
 from ruamel.yaml import YAML
 
+from boom_twin import SceneWarning, load_scene, statics
 from boom_twin import Stream as Channels
-from boom_twin import load_scene, statics
-from boom_twin.errors import SceneWarning
 from boom_twin.health.sensor_check import SensorCheck, repeats, sensor_ranges
-from boom_twin.scene.load import default_text
 
 SIGMA, RESOLUTION, PERIOD, ROWS = 1.745e-4, 8.727e-5, 0.005, 20
 LOW, HIGH = np.full(4, -1.0), np.full(4, 1.0)

@@ -133,7 +133,7 @@ def test_noise_of_all_sensors_at_once_is_told_as_noise():
     assert healthy().health[-1].noise["noise_over_stroke_sigma"] < 1.1
 
 
-def test_a_twin_without_a_baseline_tells_nothing():
+def test_a_twin_without_health_tells_nothing():
     twin = Twin(load_scene())
     outcome = run(session(3.0), twin=twin)
     assert outcome.health == [] and twin.judge is None

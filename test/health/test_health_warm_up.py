@@ -16,7 +16,7 @@ CODE = """
 import sys
 from pathlib import Path
 from boom_twin.bag.reader import scan
-from boom_twin.bag.session_model import baseline_of, mapping_of, scene_of, strokes_of
+from boom_twin.bag.session_model import mapping_of, scene_of, strokes_of
 from boom_twin.health.sensor_findings import find
 from boom_twin.health.sensor_survey import summarise, survey
 from boom_twin.offline.session_samples import SessionSamples
@@ -27,7 +27,7 @@ from boom_twin.twin.update import measure, update, write_residual
 path = Path(sys.argv[1])
 scene, mapped = scene_of(path, None).scene, mapping_of(path, None, 4, "")
 topics = mapped.topics
-twin = Twin(scene, baseline=baseline_of(path, None).baseline, reads=strokes_of(path, mapped).reading)
+twin = Twin(scene, health=True, reads=strokes_of(path, mapped).reading)
 twin.warm_up()
 kernels = update, measure, write_residual, survey, summarise, find
 ready = [len(kernel.dispatcher.signatures) for kernel in kernels]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reference.segments.equations import coordinates, cos, sin
+from reference.segments.jets import coordinates, cos, sin
 
 from boom_twin.kernels import plane_algebra as algebra
 from boom_twin.kernels.elements import beam, cylinder

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import posture_angles, strokes_of_posture
 
 from boom_twin import load_scene
 from boom_twin.analysis.methods import Method, integrate_with
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 CONVERGED = Method(tolerance=1e-12)
 DIRECTION = np.array([1.0, 0.0, 0.6, 0.0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import posture_angles, strokes_of_posture
 from kernels.dense import NUDGE, Dense
 from studies.roundoff.exact_step import one_step
 
@@ -12,7 +13,6 @@ from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels.integrators import GENERALISED_ALPHA, HAT, OFFSET, OLD, prepare
 from boom_twin.kernels.tables import Motion
 from boom_twin.kernels.transfer.time_step import advance
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 from boom_twin.validation.study.long_booms import long_boom
 
 STEP, RHO, STEPS = 1e-3, 0.8, 20

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from default_boom import posture_angles, strokes_of_posture
 from kernels.dense import Dense, riccati_pass
 from oracle import booms
 from oracle.clearance.scenes import RODS, with_pins
@@ -18,7 +19,6 @@ from boom_twin.kernels.tables import DIGITS_LOST, NOT_CONVERGED, NOT_FINITE, OK,
 from boom_twin.kernels.transfer.forward_kinematics import place
 from boom_twin.kernels.transfer.matrix_product import new_product
 from boom_twin.kernels.transfer.time_step import advance
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
 
 SEEDS = [2, 3, 4, 8, 14, 18, 25]
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from ros_messages import encoded, joint_state
+from ros_messages import TYPES, SampleDecoder, decode, encoded, joint_state, stamp_of
 
 from boom_twin import Stream
 from boom_twin.messages.cdr_decoder import CdrDecoder
-from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
-from boom_twin.messages.topic_table import TYPES
-from boom_twin.messages.type_store import decode
 from boom_twin.types import SENSORS
 
 

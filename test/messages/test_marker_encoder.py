@@ -7,15 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
-from ros_messages import decoded
+from ros_messages import Output, decoded, stamp_of
 
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.messages.marker_encoder import TRACE, ShapeMarkers, force_colour
-from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.messages.topic_table import Output
 from boom_twin.predictions import Prediction
-from boom_twin.scene.kinematics import strokes_of_posture
 
 FACTOR, FULL = 7.5, 5.0e4  # N
 PERIOD = 5_000_000  # ns

@@ -6,13 +6,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from ros_messages import decoded, encoded
+from ros_messages import Output, ReportEncoder, decode_health, decoded, encoded, stamp_of
 
 from boom_twin import Report, Settings, Stream, load_scene
 from boom_twin.deviation.estimate_row import COORDINATES, RATES, WIDTH
-from boom_twin.messages.report_encoder import ReportEncoder, decode_health
-from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.messages.topic_table import Output
 from boom_twin.predictions import Prediction
 from boom_twin.twin.blocks import estimate_of
 from boom_twin.types import Alarm, Health, Ranked, Residuals

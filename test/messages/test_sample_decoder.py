@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ros_messages import imu, joint_state
+from ros_messages import SampleDecoder, Topics, imu, joint_state, load_topics
 
 from boom_twin import Stream
-from boom_twin.messages.sample_decoder import MOST_NAMES, ODDITIES, SampleDecoder
-from boom_twin.messages.topic_table import Sensor, Topics, load_topics, usual
+from boom_twin.messages.sample_decoder import MOST_NAMES, ODDITIES
+from boom_twin.messages.topic_table import Sensor, usual
 from boom_twin.types import SENSORS
 
 FINITE = st.floats(-1e6, 1e6)

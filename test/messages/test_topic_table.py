@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from ros_messages import Output, load_topics
+
 from boom_twin import Stream
-from boom_twin.messages.topic_table import Output, load_topics
 
 
 def test_defaults_are_those_of_the_interface() -> None:

@@ -17,12 +17,10 @@ import numpy as np
 import pytest
 from drive_twin import ARCH_DRIVES, note_drives
 from made_once import MadeOnce
+from recordings import read, scan, write_session
+from ros_messages import SampleDecoder, load_topics, stamp_of
 
 from boom_twin import Settings, Stream, load_scene, replay
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import write_session
-from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
-from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.data.bag_feed import BagFeed, bag_feed
 from boom_twin.monitor.data.feed import Feed
 

@@ -10,14 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from monitor.conftest import GAP, read_all
+from recordings import SessionSheet, read, scan, write_session
+from ros_messages import TYPES, Output, load_topics
 
-from boom_twin import Settings, TimeWindow, load_scene, replay, statics
+from boom_twin import BagError, Settings, TimeWindow, UsageError, load_scene, replay, statics
 from boom_twin.analysis.posture_modes import ModeList
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import write_session
-from boom_twin.bag.session_sheet import SessionSheet
-from boom_twin.errors import BagError, UsageError
-from boom_twin.messages.topic_table import TYPES, Output, load_topics
 from boom_twin.monitor.data.analyst import ResponseList
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
@@ -155,7 +152,7 @@ def test_a_session_without_anything_to_show_is_refused(faulty: Path, tmp_path: P
     with pytest.raises(BagError):
         bag_feed(tmp_path, load_scene(), Settings())
     with pytest.raises(UsageError, match="none"):
-        bag_feed(faulty, load_scene(), Settings(), baseline=tmp_path / "none.yaml")
+        bag_feed(faulty, load_scene(), Settings(), mapping=tmp_path / "none.yaml")
     stamps = 10**18 + 5_000_000 * np.arange(100)
     write_session(tmp_path / "far", stamps, np.full((100, 4), 50.0), np.zeros((100, 4)), np.zeros((100, 2)), {})
     assert "no stroke could be used" in read_all(bag_feed(tmp_path / "far", load_scene(), Settings())).trouble

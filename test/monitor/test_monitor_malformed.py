@@ -13,11 +13,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ros_messages import TYPES, Output, Topic, encode_health, jazzy, load_topics, new_message
 
 from boom_twin import Stream
-from boom_twin.messages.report_encoder import encode_health
-from boom_twin.messages.topic_table import TYPES, Output, Topic, load_topics
-from boom_twin.messages.type_store import jazzy, new_message
 from boom_twin.monitor.data.analyst import Analyst
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.received_messages import LONGEST_REASON

@@ -16,10 +16,9 @@ import pytest
 from aiohttp import ClientSession, ClientWebSocketResponse, CookieJar, WSMsgType, WSServerHandshakeError
 from aiohttp.test_utils import TestServer
 from monitor.test_monitor_lamps import ERROR, OK, status
+from ros_messages import load_topics
 
-from boom_twin import load_scene
-from boom_twin.errors import BagError
-from boom_twin.messages.topic_table import load_topics
+from boom_twin import BagError, load_scene
 from boom_twin.monitor.access_control import AccessControl
 from boom_twin.monitor.actions import ViewerActions
 from boom_twin.monitor.data.feed import Feed, SessionList, sessions_in

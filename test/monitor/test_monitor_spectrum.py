@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from scipy.signal import lfilter, welch
 
 from boom_twin import frequency_response, load_scene
 from boom_twin.analysis.posture_modes import ModeList
 from boom_twin.monitor.data.analyst import RESPONSE_FREQUENCIES, ResponseList
 from boom_twin.monitor.data.spectrum import FREQUENCIES, SEGMENT, spectrogram, spectrum
-from boom_twin.scene.kinematics import strokes_of_posture
 
 RATE = 200.0
 TIMES = np.arange(int(40 * RATE)) / RATE

@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from default_boom import anew
 from oracle import booms
+from recordings import SessionSheet, write_session
 from ruamel.yaml import YAML
 
 from boom_twin import load_scene, statics
-from boom_twin.bag.session_files import write_session
-from boom_twin.bag.session_sheet import SessionSheet
-from boom_twin.scene.edit import anew
 
 ORDERS = {3: (0, 1, 2), 4: (0, 1, 2, 3), 5: (0, 1, 1, 2, 3)}
 POSTURES = {3: (60, 20, -30), 4: (60, 20, -30, -80), 5: (75, 50, 10, -5, -40)}

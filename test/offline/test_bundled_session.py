@@ -8,15 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drive_twin import ARCH_DRIVES
+from recordings import read, scan
+from ros_messages import ReportEncoder, SampleDecoder, jazzy, load_topics, stamp_of
 
 from boom_twin import Settings, Stream, Twin, load_scene, replay
-from boom_twin.bag.reader import read, scan
 from boom_twin.cli.replay import as_text
-from boom_twin.health.baseline import load_baseline
-from boom_twin.messages.report_encoder import ReportEncoder
-from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
-from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import jazzy
 from boom_twin.types import StrokeReading
 
 SESSIONS = {"length": Path(__file__).parents[2] / "bags" / "arch_session", "drive": ARCH_DRIVES}
@@ -77,7 +73,7 @@ def test_the_result_bag_holds_what_the_three_calls_give(session, first):
     wanted = {name: inputs[stream].type for name, stream in roles.items()}
     scene, store = load_scene(), jazzy()
     reads = StrokeReading(first[0].summary["strokes"])
-    live, decoder = Twin(scene, baseline=load_baseline(), reads=reads), SampleDecoder(4)
+    live, decoder = Twin(scene, health=True, reads=reads), SampleDecoder(4)
     encoder = ReportEncoder(scene, Settings())
     expected = []
     for name, log_time, message in read(scan(session), wanted):

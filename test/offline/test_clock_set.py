@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.offline.ground_truth import TipErrors, TipTruth
 from boom_twin.offline.recording import Recording
-from boom_twin.scene.kinematics import strokes_of_posture
 
 MS = 1_000_000
 

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from recordings import SessionSheet, SessionWriter, read_both, scan
+from ros_messages import TYPES, fill_header, jazzy, load_topics, stamp_of
+
 from boom_twin import Stream, load_scene, replay
-from boom_twin.bag.reader import read_both, scan
-from boom_twin.bag.session_sheet import SessionSheet
-from boom_twin.bag.writer import SessionWriter
-from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.messages.topic_table import TYPES, load_topics
-from boom_twin.messages.type_store import fill_header, jazzy
 from boom_twin.types import SECOND
 
 SESSION = Path(__file__).parents[2] / "bags" / "pump_session"

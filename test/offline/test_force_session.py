@@ -7,25 +7,23 @@ import math
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin, note_drives
 from matplotlib.axes import Axes
+from recordings import read, scan
+from ros_messages import load_topics
 
-from boom_twin import Sample, Settings, Stream, load_scene, replay
-from boom_twin.bag.reader import read, scan
+from boom_twin import BagError, Sample, Settings, Stream, load_scene, replay
 from boom_twin.bag.session_files import write_samples
-from boom_twin.cli.main import main
 from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
-from boom_twin.errors import BagError
-from boom_twin.health.baseline import Baseline, load_baseline
-from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.protocol import layout
 from boom_twin.offline.history import HistoryBuilder
 from boom_twin.plots.residuals import residual_picture
-from boom_twin.scene.kinematics import strokes_of_posture
 
 MS, START, COUNT = 1_000_000, 1_700_000_000_000_000_000, 800
 FORCES, WRONG, SIGMA = Stream.FORCES, 1500.0, 100.0
@@ -63,7 +61,7 @@ def test_residuals_zeros_and_diagnostics(scene, samples):
     topics, now = load_topics(), 0.0
     required = {stream: topic.required for stream, topic in topics.inputs.items()}
     sensors, names = sensors_of(scene, Settings(), required, [None] * 4), {s: t.name for s, t in topics.inputs.items()}
-    twin, watch, found = drive_twin(scene, baseline=Baseline()), TwinWatch(sensors, names, Thresholds(), lambda: now), []
+    twin, watch, found = drive_twin(scene, health=True), TwinWatch(sensors, names, Thresholds(), lambda: now), []
     watch.begin()
     alarms = set()
     for sample in samples:
@@ -89,7 +87,7 @@ def test_residuals_zeros_and_diagnostics(scene, samples):
 def test_a_stuck_or_silent_sensor_is_told_and_a_shaken_boom_is_not(scene, samples):
     """A load that the model does not know changes a force by far more than its noise, from one reading to the next."""
     known = set()
-    twin = drive_twin(scene, baseline=load_baseline(None))
+    twin = drive_twin(scene, health=True)
     stuck, last = 0.0, samples[-1].stamp
     for sample in samples:
         if sample.stream is FORCES:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from drive_twin import ARCH_DRIVES, drive_twin
 from health.recorded import written
+from recordings import scene_of
 
 from boom_twin import Settings, Stream, load_scene
-from boom_twin.bag.session_model import scene_of
 from boom_twin.offline import history, recording
 from boom_twin.offline.recording import Recording, Stretch
 from boom_twin.report.evaluation import Evaluation, Evaluator, evaluated_replay

@@ -6,16 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from recordings import SessionSheet, SessionWriter, read, scan, write_session
+from ros_messages import fill_header, load_topics, new_message
 
-from boom_twin import Stream, load_scene, replay
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import write_session
-from boom_twin.bag.session_sheet import SessionSheet
-from boom_twin.bag.writer import SessionWriter
-from boom_twin.cli.main import main
-from boom_twin.errors import UsageError
-from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import fill_header, new_message
+from boom_twin import Stream, UsageError, load_scene, replay
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 JOINT_STATE = "sensor_msgs/msg/JointState"

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 
 import pytest
+from command import main
 
 from boom_twin import TimeWindow, replay
-from boom_twin.cli.main import main
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"
 OF_THE_RUN = {"wall_s", "realtime_factor", "output_sha256"}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.offline.refused_strokes import RefusedStrokes
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import block_of
 
 TRAVEL = np.array([joint.cylinder.max_stroke for joint in load_scene().joints])

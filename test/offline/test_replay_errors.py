@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
+from recordings import SessionWriter, write_session
+from ros_messages import fill_header, load_topics, new_message
 
-from boom_twin import Stream, load_scene, replay
-from boom_twin.bag.session_files import write_session
-from boom_twin.bag.writer import SessionWriter
+from boom_twin import BagError, Stream, load_scene, replay
 from boom_twin.cli.replay import as_text
-from boom_twin.errors import BagError
-from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import fill_header, new_message
-from boom_twin.scene.kinematics import strokes_of_posture
 
 START, STEP = 1_700_000_000_000_000_000, 5_000_000
 

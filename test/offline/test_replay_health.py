@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import joint_angles_of_strokes, strokes_of_posture
+from recordings import read, scan, write_session
+from ros_messages import Output, load_topics
 
 from boom_twin import load_scene, replay
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import write_session
-from boom_twin.errors import UsageError
-from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.offline.summary import alarm_as_text
-from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 START, STEP = 1_700_000_000_000_000_000, 5_000_000
 
@@ -74,9 +72,3 @@ def test_health_can_be_left_out(session, tmp_path):
     assert summary["alarms"] == []
     found = scan(tmp_path / "bag").find(load_topics().outputs[Output.HEALTH].absolute)
     assert found is None or found.count == 0
-
-
-def test_a_baseline_that_is_none(session, tmp_path):
-    (tmp_path / "baseline.yaml").write_text("angle_error: -1.0\n")
-    with pytest.raises(UsageError, match=r"baseline\.yaml.*angle_error"):
-        replay(session, load_scene(), tmp_path / "out", baseline=tmp_path / "baseline.yaml")

@@ -12,16 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import strokes_of_posture
+from recordings import scan, write_session
 
-from boom_twin import Settings, load_scene, replay
-from boom_twin.bag.reader import scan
-from boom_twin.bag.session_files import write_session
-from boom_twin.cli.main import main
-from boom_twin.errors import BagError
+from boom_twin import BagError, Settings, load_scene, replay
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.offline.inputs import ReplayOptions
 from boom_twin.offline.replay import replay_into
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.system.result_folder import REPLAY, result_folder
 
 START, STEP = 1_700_000_000_000_000_000, 5_000_000

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import fields
 
 import numpy as np
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.predictions import Prediction
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.schema import Clearance, Pin
 from boom_twin.twin.blocks import report_block
 

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
+from recordings import write_session
 
 from boom_twin import Sample, Stream, load_scene
-from boom_twin.bag.session_files import write_session
-from boom_twin.cli.main import main
 from boom_twin.offline import recording
 from boom_twin.offline.recording import Recording, Stretch
 from boom_twin.offline.sample_table import SampleTable, columns_of, predicted_columns, table_file
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import block_of
 
 START, STEP = 1_700_000_000_000_000_000, 5_000_000

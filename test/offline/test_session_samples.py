@@ -9,16 +9,22 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.writer import CompressionType, IndexType, Writer
+from recordings import load_mapping, scan
+from ros_messages import (
+    TYPES,
+    Output,
+    SampleDecoder,
+    Topics,
+    decode,
+    decode_changes,
+    encode_changes,
+    jazzy,
+    load_topics,
+    stamp_of,
+)
 
-from boom_twin import Sample, Stream
-from boom_twin.bag.reader import scan
+from boom_twin import BagError, Sample, Stream
 from boom_twin.bag.session_file import REMEDY
-from boom_twin.errors import BagError
-from boom_twin.messages.mapping import load_mapping
-from boom_twin.messages.report_encoder import decode_changes, encode_changes
-from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
-from boom_twin.messages.topic_table import TYPES, Output, Topics, load_topics
-from boom_twin.messages.type_store import decode, jazzy
 from boom_twin.offline.session_samples import Changes, SessionSamples
 from boom_twin.twin.blocks import samples_in
 from boom_twin.types import Change

@@ -8,22 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import default_text
 from drive_twin import note_drives
 from offline.booms_apart import as_document, scene_text, session
+from recordings import SessionSheet, SessionWriter, scan, scene_of
+from ros_messages import fill_header, load_topics, new_message
 
-from boom_twin import Settings, Stream, load_scene, replay
-from boom_twin.bag.reader import scan
-from boom_twin.bag.session_model import baseline_of, scene_of
-from boom_twin.bag.session_sheet import FILE_NAME, SessionSheet, sha256
-from boom_twin.bag.writer import SessionWriter
-from boom_twin.cli.main import main
+from boom_twin import BagError, Settings, Stream, load_scene, replay
+from boom_twin.bag.session_sheet import FILE_NAME, sha256
 from boom_twin.cli.output import warn_incomplete
 from boom_twin.diagnostics.boom_mismatch import OtherBoom
-from boom_twin.errors import BagError
-from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import fill_header, new_message
 from boom_twin.monitor.data.bag_feed import bag_feed
-from boom_twin.scene.load import DEFAULT_NAME, default_text
+from boom_twin.scene.load import DEFAULT_NAME
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 FAULTY = "sections: []\n"
@@ -170,19 +167,9 @@ def test_a_sheet_that_could_not_be_read_again_is_not_written(tmp_path):
 def test_a_scene_that_was_changed_is_told(five, tmp_path, capsys):
     bag = without_scene(five, tmp_path / "bag")
     sheet = (five / FILE_NAME).read_text()
-    (bag / FILE_NAME).write_text(sheet.replace("gravity", "# by hand\n  gravity", 1))
+    (bag / FILE_NAME).write_text(sheet.replace("gravity", "# by hand\n  gravity", 1) + "baseline: of 0.1.0\n")
     assert main(["info", str(bag)]) == 0
     assert "was changed since the session was made" in capsys.readouterr().err
-
-
-def test_the_baseline_is_that_of_the_recording(four, tmp_path):
-    assert baseline_of(four).source == "default baseline"
-    SessionSheet("0", baseline="description: learnt\nangle_error: 0.001\n").write(tmp_path)
-    found = baseline_of(tmp_path)
-    assert (found.baseline.angle_error, found.source) == (0.001, f"{tmp_path / FILE_NAME}, baseline")
-    SessionSheet("0", baseline="angle_error: -1\n").write(tmp_path)
-    with pytest.raises(BagError, match=r"session\.yaml, baseline: .*--baseline"):
-        baseline_of(tmp_path)
 
 
 def test_what_never_reached_the_recorder_is_told(four, tmp_path, capsys):

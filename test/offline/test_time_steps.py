@@ -12,18 +12,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import joint_angles_of_strokes, strokes_of_posture
 from mcap.reader import make_reader
 from mcap.writer import IndexType, Writer
+from recordings import SessionWriter, read, scan, sensor_message
+from ros_messages import jazzy, load_topics, stamp_of
 
 from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import sensor_message
-from boom_twin.bag.writer import SessionWriter
-from boom_twin.cli.main import main
-from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import jazzy
-from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 SECOND, START, ROWS = 10**9, 1_700_000_000 * 10**9, 1600
 DAY = 86_400 * SECOND

@@ -6,12 +6,12 @@ from copy import deepcopy
 from functools import cache
 
 import numpy as np
+from default_boom import default_text
 from reference.segments.boom import Segments
 from reference.segments.geometry import link_headings
 from ruamel.yaml import YAML
 
 from boom_twin import Scene
-from boom_twin.scene.load import default_text
 
 LEAST_LEVER = 0.08  # m/rad, of every cylinder at the posture
 BARREL_PINS = ("root", "beam", "head", "given")

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_angles
 from oracle import booms
 
 from boom_twin import Scene
-from boom_twin.scene.kinematics import strokes_of_angles
 
 RIGID = {"mass": 150.0, "com": [1.5, 0.03], "inertia": 120.0}
 

@@ -10,7 +10,7 @@ from reference.segments.equilibrium import energy, equilibrium
 from reference.segments.geometry import oil_stiffness
 from scipy.linalg import eigh, null_space
 
-from boom_twin.errors import SolverError
+from boom_twin import SolverError
 
 
 def mass_matrix(boom):

@@ -10,9 +10,10 @@ import pytest
 
 pytest.importorskip("exudyn")
 
+from default_boom import strokes_of_posture
+
 import boom_twin
 from boom_twin import load_scene
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.validation.rig import Move, Programme, simulate, statics
 
 REFERENCE = Path(__file__).parents[1] / "data" / "reference"

@@ -9,9 +9,9 @@ from oracle.oscillation import mean_frequency
 
 pytest.importorskip("exudyn")
 
+from default_boom import examine_text, example_text, posture_angles, strokes_of_posture
+
 from boom_twin import simulate, statics
-from boom_twin.scene.kinematics import posture_angles, strokes_of_posture
-from boom_twin.scene.load import examine_text, example_text
 from boom_twin.validation import rig
 from boom_twin.validation.rig.faults import parse
 from boom_twin.validation.rig.faulty_boom import changes, with_faults

@@ -9,8 +9,9 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+from ros_messages import TYPES
+
 import boom_twin
-from boom_twin.messages.topic_table import TYPES
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ElementTree.parse(ROOT / "package.xml").getroot()

@@ -8,11 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from command import main
+from default_boom import examine
 
-from boom_twin import load_scene
-from boom_twin.cli.main import main
-from boom_twin.errors import SceneError
-from boom_twin.scene.load import examine
+from boom_twin import SceneError, load_scene
 
 DOCS = Path(__file__).parents[2] / "docs"
 PARTS = ("your_boom.md", "your_boom_check.md")

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
 
 from boom_twin import load_scene
-from boom_twin.cli.main import main
 from boom_twin.plots.joint_ranges import joint_ranges_picture
 
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from default_boom import posture_angles, skeleton, strokes_of_posture
 
 from boom_twin import load_scene
 from boom_twin.analysis.undeflected import UndeflectedBoom
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.plots.history import Orbits
 from boom_twin.plots.posture import orbits_picture
-from boom_twin.scene.kinematics import posture_angles, skeleton, strokes_of_posture
 
 SCENE, ROWS = load_scene(), 40
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from oracle import booms
 from oracle.clearance.scenes import PINS, RODS, with_pins
 
 from boom_twin import statics
 from boom_twin.analysis.methods import integrate_with
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.schema import IDEAL_BELOW
 
 TRAVEL, RISE = np.array([0.03, -0.02, 0.03, 0.02]), 0.3  # m, s

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import example_text, posture_angles, skeleton
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracle import booms
 from ruamel.yaml import YAML
 
 from boom_twin import simulate, statics
-from boom_twin.scene.kinematics import PassiveJoints, posture_angles, skeleton
-from boom_twin.scene.load import example_text
+from boom_twin.scene.kinematics import PassiveJoints
 
 few = settings(max_examples=12, deadline=None, derandomize=True, database=None)
 FLIP = np.array([1.0, -1.0])

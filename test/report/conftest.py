@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
 from drive_twin import ARCH_DRIVES, note_drives
 from health.recorded import session
 from made_once import MadeOnce
+from recordings import write_session
 
 from boom_twin import Stream
-from boom_twin.bag.session_files import write_session
-from boom_twin.cli.main import main
 
 SECONDS, WRONG_FROM, WRONG_BY = 24.0, 12.0, 0.0035
 

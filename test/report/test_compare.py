@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
+from command import main
 
-from boom_twin.cli.main import main
 from boom_twin.report.compare import ComparedSession, rows_of
 from boom_twin.report.quantities import Quantity
 

@@ -7,13 +7,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture, with_parameters
 
 from boom_twin import Sample, Stream, Twin, load_scene, simulate, statics
 from boom_twin.offline.history import HistoryBuilder
 from boom_twin.offline.recording import Recording
 from boom_twin.report.vibration import SHORTEST_REST, RestFinder, course, still, vibrations
-from boom_twin.scene.edit import with_parameters
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.types import SECOND, Array, StrokeReading
 
 TIMES = np.arange(0.0, 5.0, 0.005)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import rainflow
+from command import main
 
-from boom_twin.cli.main import main
-from boom_twin.errors import UsageError
+from boom_twin import UsageError
 from boom_twin.report.fatigue import RainflowCounter, damage_of, endured
 
 MPA = 1e6

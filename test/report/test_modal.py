@@ -6,8 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-
-from boom_twin.cli.main import main
+from command import main
 
 ROOT = Path(__file__).parents[2]
 

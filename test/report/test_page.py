@@ -6,10 +6,9 @@ import re
 from pathlib import Path
 
 import pytest
+from command import main
 from health.recorded import written
 from page_outline import outline
-
-from boom_twin.cli.main import main
 
 TITLES = ("Alarms", "Residuals", "Natural frequencies and damping", "Tip", "Bending of the sections", "Gaps and events")
 

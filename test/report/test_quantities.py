@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from boom_twin.errors import BagError
+from boom_twin import BagError
 from boom_twin.report.quantities import FREQUENCY_ERROR, BatchMeans, PathLength, read
 
 

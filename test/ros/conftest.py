@@ -14,15 +14,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from default_boom import joint_angles_of_strokes, strokes_of_posture
 from demo.isolation import Isolation
 from made_once import MadeOnce
+from recordings import SessionWriter, load_mapping, read_both, scan, write_session
 
 from boom_twin import Stream, load_scene, statics
-from boom_twin.bag.reader import read_both, scan
-from boom_twin.bag.session_files import write_session
-from boom_twin.bag.writer import SessionWriter
-from boom_twin.messages.mapping import load_mapping
-from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
 
 PATIENCE = 240.0  # s; the first node compiles
 SECONDS, RATE = 4.0, 200.0

@@ -14,7 +14,7 @@ import pytest
 pytest.importorskip("rclpy")
 
 
-from boom_twin.bag.reader import scan
+from recordings import scan
 
 PUMP = Path(__file__).parents[2] / "bags" / "pump_session"
 

@@ -19,12 +19,12 @@ from eventually import eventually
 
 pytest.importorskip("rclpy")
 
+from default_boom import default_text
+from recordings import mapping_of, scan, scene_of
+from ros_messages import Output
+
 import boom_twin
 from boom_twin import Stream
-from boom_twin.bag.reader import scan
-from boom_twin.bag.session_model import mapping_of, scene_of
-from boom_twin.messages.topic_table import Output
-from boom_twin.scene.load import default_text
 
 LAUNCH = Path(boom_twin.__file__).parent / "launch"
 PYTHON = os.environ.get("LAUNCH_PYTHON", sys.executable)

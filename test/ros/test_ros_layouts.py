@@ -10,13 +10,12 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from command import main
+from ros_messages import load_topics, new_message
 from ruamel.yaml import YAML
 
 import boom_twin
-from boom_twin.cli.main import main
 from boom_twin.messages.marker_encoder import ShapeMarkers
-from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import new_message
 from boom_twin.messages.view_files import RVIZ, VIEWS
 
 ROOT = Path(boom_twin.__file__).parent

@@ -8,10 +8,10 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from ros_messages import Output, load_topics
 from ros_rig import Rig
 
 from boom_twin.diagnostics.levels import Level, Status
-from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.ros.diagnostics_publisher import DiagnosticsPublisher
 from boom_twin.ros.node.diagnostics import ClockCheck
 

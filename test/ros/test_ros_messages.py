@@ -10,12 +10,12 @@ import pytest
 pytest.importorskip("rclpy")
 
 from rclpy.serialization import serialize_message
+from ros_messages import TYPES, decode, jazzy
 from ros_rig import joint_state
 from sensor_msgs.msg import Imu
 
 from boom_twin import Stream
-from boom_twin.messages.topic_table import TYPES
-from boom_twin.messages.type_store import PADDING, decode, jazzy
+from boom_twin.messages.type_store import PADDING
 from boom_twin.types import SECOND
 
 NAN, INF = float("nan"), float("inf")

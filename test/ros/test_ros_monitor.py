@@ -15,10 +15,9 @@ pytest.importorskip("rclpy")
 
 import rclpy
 from rclpy.serialization import deserialize_message
+from ros_messages import Output, encode_health, load_topics
 from std_srvs.srv import Trigger
 
-from boom_twin.messages.report_encoder import encode_health
-from boom_twin.messages.topic_table import Output, load_topics
 from boom_twin.monitor.actions import AT_NODE, ViewerActions
 from boom_twin.monitor.data.status import Severity
 from boom_twin.ros.monitor_feed import TopicFeed

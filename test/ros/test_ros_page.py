@@ -17,10 +17,9 @@ from eventually import eventually
 pytest.importorskip("rclpy")
 pytest.importorskip("aiohttp")
 
+from default_boom import default_text
 from lifecycle_msgs.msg import Transition
 from ros_rig import Rig
-
-from boom_twin.scene.load import default_text
 
 
 def gone(pid: int) -> None:

@@ -18,12 +18,10 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Vector3Stamped
 from playwright import sync_api
+from recordings import read, scan
+from ros_messages import decode_health, load_topics, stamp_of
 
 from boom_twin import load_scene, load_settings
-from boom_twin.bag.reader import read, scan
-from boom_twin.messages.report_encoder import decode_health
-from boom_twin.messages.sample_decoder import stamp_of
-from boom_twin.messages.topic_table import load_topics
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.data.status import LEVELS
 

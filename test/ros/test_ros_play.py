@@ -17,16 +17,16 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
+from command import main
+from recordings import scan
+from ros_messages import stamp_of
 from ros_rig import all_stored, spin_until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 
 from boom_twin.bag.advice import publishable
 from boom_twin.bag.metadata import Recorded, offered_qos
-from boom_twin.bag.reader import scan
 from boom_twin.bag.writer import BagWriter
-from boom_twin.cli.main import main
-from boom_twin.messages.sample_decoder import stamp_of
 from boom_twin.messages.topic_table import Qos
 from boom_twin.ros.bag.player import CATCH_UP, Player
 from boom_twin.types import SECOND

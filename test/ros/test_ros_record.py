@@ -15,7 +15,9 @@ import pytest
 pytest.importorskip("rclpy")
 
 import rclpy
+from command import main
 from rcl_interfaces.msg import ParameterEvent
+from recordings import read, recover, scan
 from ros_rig import Rig, joint_state
 from rosbags.highlevel import AnyReader
 from ruamel.yaml import YAML
@@ -23,9 +25,6 @@ from sensor_msgs.msg import JointState
 
 from boom_twin import __version__
 from boom_twin.bag.inspect import inspect
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.recovery.recover import recover
-from boom_twin.cli.main import main
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 STATE = "boom_twin_recorder: recording"

@@ -11,9 +11,9 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from default_boom import default_text
 
 from boom_twin.ros.node.main import main
-from boom_twin.scene.load import default_text
 
 HAS_ROS = pytest.mark.skipif(find_spec("rclpy") is None, reason="rclpy is not installed")
 WITHOUT = """

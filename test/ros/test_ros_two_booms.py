@@ -19,15 +19,13 @@ pytest.importorskip("aiohttp")
 
 import rclpy
 from rclpy.node import NodeNameNonExistentError
+from recordings import load_mapping, mapping_of, read, scan
+from ros_messages import TYPES, Output
 from ros_rig import all_stored, published
 from ruamel.yaml import YAML
 
 import boom_twin
 from boom_twin import replay
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_model import mapping_of
-from boom_twin.messages.mapping import load_mapping
-from boom_twin.messages.topic_table import TYPES, Output
 from boom_twin.ros.bag.recorder import COMPLETE
 from boom_twin.ros.runtime import message_class, qos_profile
 
@@ -38,8 +36,8 @@ ALONE = "/alone"
 SLOWLY = ("--namespace", ALONE.strip("/"), "--rate", "0.01", "--wait", "0")
 PLAYED = ("cylinder_strokes", "joint_angles", "tip_imu", "rosout", "parameter_events")
 CONFIG = Path(boom_twin.__file__).parent / "msg_config"
-OPTIONAL = {"/front/cylinder_forces", "/clock", "/front/boom_twin/baseline"}
-"""What there is with forces in the session, with --clock, with a baseline of one's own."""
+OPTIONAL = {"/front/cylinder_forces", "/clock"}
+"""What there is with forces in the session, with --clock."""
 PAGE = re.compile(r"open (http://127\.0\.0\.1:\d+/)")
 
 

@@ -9,10 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from default_boom import default_text, examine, example_text, with_end_mark
 from ruamel.yaml import YAML
 
-from boom_twin.errors import Fault, SceneError
-from boom_twin.scene.load import default_text, examine, example_text, with_end_mark
+from boom_twin import SceneError
+from boom_twin.errors import Fault
 
 Values = dict[str, Any]
 Edit = Callable[[Values], None]

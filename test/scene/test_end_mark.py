@@ -7,11 +7,10 @@ from collections.abc import Iterable
 from typing import Any
 
 import pytest
+from command import main
+from default_boom import clearance_text, default_text, examine
 
-from boom_twin import load_scene
-from boom_twin.cli.main import main
-from boom_twin.errors import SceneError, SceneWarning
-from boom_twin.scene.load import clearance_text, default_text, examine
+from boom_twin import SceneError, SceneWarning, load_scene
 
 
 def silent_cuts(bench: Any, text: str, places: Iterable[int]) -> list[int]:

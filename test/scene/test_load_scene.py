@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from default_boom import default_text
 from scene.editing import put
 
-from boom_twin import load_scene
+from boom_twin import SceneError, SceneWarning, load_scene
 from boom_twin.config.yaml_text import plain
-from boom_twin.errors import SceneError, SceneWarning
-from boom_twin.scene.load import default_text
 
 
 def test_the_default_scene_loads_without_warnings_from_everywhere_and_is_frozen(bench: Any) -> None:

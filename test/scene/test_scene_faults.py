@@ -6,11 +6,11 @@ import math
 from typing import Any
 
 import pytest
+from default_boom import clearance_text, default_text
 from scene.editing import GONE, OIL, put
 
-from boom_twin import load_scene
-from boom_twin.errors import ABSENT, SceneError
-from boom_twin.scene.load import clearance_text, default_text
+from boom_twin import SceneError, load_scene
+from boom_twin.errors import ABSENT
 
 # Each row: the place that is edited and, if it is another one, the place of the fault; the new value; words of the message.
 

@@ -10,8 +10,7 @@ from typing import Any
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from boom_twin import load_scene
-from boom_twin.errors import SceneError, SceneWarning
+from boom_twin import SceneError, SceneWarning, load_scene
 from boom_twin.scene.summary import explain
 
 Place = tuple[str | int, ...]

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from default_boom import examine_text, example_text
 
 from boom_twin import Scene, load_scene, statics
 from boom_twin.scene.boom_table import read_table
 from boom_twin.scene.first_scene import first_scene
 from boom_twin.scene.kinematics import cylinder_length, linkage, stroke_curve
-from boom_twin.scene.load import examine_text, example_text
 from boom_twin.scene.worst_load import worst_loads
 
 TABLE = Path(__file__).parents[2] / "examples/z_fold_28m_table.yaml"

@@ -10,8 +10,8 @@ from studies.__main__ import main
 
 DOCS = Path(__file__).parents[2] / "docs" / "study"
 FILES = {
-    "papers": ("papers_low_speed.png", "papers_postures.png"),
-    "clearance": ("clearance.png", "clearance_convergence.png", "clearance_static.png"),
+    "papers": ("papers_low_speed.png",),
+    "clearance": ("clearance.png", "clearance_static.png"),
     "roundoff": ("roundoff.png",),
 }
 

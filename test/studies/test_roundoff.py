@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import posture_angles
 from studies.roundoff.exact_step import digits, one_step
 from studies.roundoff.report import TARGET, TURN_UP_STEPS, turn_up
 
 from boom_twin import load_scene
-from boom_twin.scene.kinematics import posture_angles
 from boom_twin.validation.study.long_booms import long_boom
 
 

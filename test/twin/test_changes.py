@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from default_boom import joint_angles_of_strokes, loaded, strokes_of_posture
 from drive_twin import drive_twin
 
-from boom_twin import Report, Sample, Stream, load_scene
-from boom_twin.errors import UsageError
-from boom_twin.scene.edit import loaded
-from boom_twin.scene.kinematics import joint_angles_of_strokes, strokes_of_posture
+from boom_twin import Report, Sample, Stream, UsageError, load_scene
 
 RATE = 5_000_000  # ns
 

@@ -7,15 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
+from ros_messages import Output, ReportEncoder
 
 from boom_twin import Report, Sample, Settings, Stream, load_scene, statics
 from boom_twin.deviation.predictor import BoomPredictor
-from boom_twin.health.baseline import load_baseline
 from boom_twin.health.sensor_check import MISSTATED
-from boom_twin.messages.report_encoder import ReportEncoder
-from boom_twin.messages.topic_table import Output
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.driver import drive
 from boom_twin.types import Change
 
@@ -43,16 +41,12 @@ def bits(reports: list[Report]) -> list[bytes]:
 def test_a_twin_that_began_anew_is_repeated_by_one_that_does() -> None:
     """A node that was started again, or activated again, knew nothing of before; its zeros it has from the change alone."""
     again, anew = (replace(CHANGE, settings=Settings().live, is_new=is_new) for is_new in (False, True))
-    samples, known = [item for item in items() if isinstance(item, Sample)], load_baseline()
+    samples = [item for item in items() if isinstance(item, Sample)]
     kept, reports = (
-        [
-            step.report
-            for step in drive(drive_twin(load_scene(), baseline=known), [*samples[:40], change, *samples[40:]])
-            if step
-        ]
+        [step.report for step in drive(drive_twin(load_scene(), health=True), [*samples[:40], change, *samples[40:]]) if step]
         for change in (again, anew)
     )
-    other = drive_twin(load_scene(), baseline=known)
+    other = drive_twin(load_scene(), health=True)
     other.requests.zero(CHANGE.zeros)
     fresh = [other.update(sample) for sample in samples[40:]]
     assert len(bits(fresh)) > 15 and bits(reports[40:]) == bits(fresh)
@@ -81,10 +75,10 @@ def spoilt_samples(seconds: float, noise: float = 1.0) -> Iterator[Sample]:
 def test_health_judged_after_a_sample_was_told_is_the_same() -> None:
     """Every message of the two ways, to the bit; what was told first lacks nothing but the health."""
     whole, apart, encoder = {}, {}, ReportEncoder(load_scene(), Settings())
-    for step in drive(drive_twin(load_scene(), baseline=load_baseline()), spoilt_samples(6.0)):
+    for step in drive(drive_twin(load_scene(), health=True), spoilt_samples(6.0)):
         for key, data in encoder.fill(step.report):
             whole.setdefault(key, []).append(data)
-    twin, told = drive_twin(load_scene(), baseline=load_baseline()), set()
+    twin, told = drive_twin(load_scene(), health=True), set()
     for step in drive(twin, spoilt_samples(6.0), judged=False):
         assert step.report.health is None
         messages = encoder.fill(step.report)
@@ -108,7 +102,7 @@ def test_what_health_finds_changes_the_estimate_alone(monkeypatch: pytest.Monkey
     for is_heard in (True, False):
         if not is_heard:
             monkeypatch.setattr(BoomPredictor, "leave_out", lambda *_: None)
-        reports = [step.report for step in drive(drive_twin(load_scene(), baseline=load_baseline()), spoilt_samples(5.0, 3.0))]
+        reports = [step.report for step in drive(drive_twin(load_scene(), health=True), spoilt_samples(5.0, 3.0))]
         judged = [each.health for each in reports if each.health is not None]
         assert {alarm.cause for alarm in judged[-1].alarms} == {"joint_3.sensor"}
         assert judged[-1].noise["noise_over_angle_sigma"] > MISSTATED

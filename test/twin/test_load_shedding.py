@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
+from ros_messages import Output, ReportEncoder
 
 from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
-from boom_twin.health.baseline import load_baseline
-from boom_twin.messages.report_encoder import ReportEncoder
-from boom_twin.messages.topic_table import Output
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.load_shedding import HEALTH_ABOVE, SHAPES_ABOVE
 
 SECONDS, RATE = 8, 100
@@ -22,7 +20,7 @@ LEFT_OUT = {Output.SHAPE, Output.HEALTH, Output.TIP_UNCERTAINTY, Output.JOINT_ST
 def run(share: float) -> tuple[Twin, list[Report], list[tuple[Output, bytes]]]:
     """A boom at rest whose encoders read what is predicted, with noise."""
     scene, random = load_scene(), np.random.default_rng(4)
-    twin, encoder = drive_twin(scene, baseline=load_baseline()), ReportEncoder(scene, Settings())
+    twin, encoder = drive_twin(scene, health=True), ReportEncoder(scene, Settings())
     strokes, reports = strokes_of_posture(scene, "arch"), []
     for k in range(SECONDS * RATE):
         twin.shedding.filled(share if k in BUSY else 0.0)

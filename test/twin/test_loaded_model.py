@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 
 from boom_twin import Report, Sample, Stream, Twin, load_scene
-from boom_twin.health.baseline import load_baseline
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin import loaded_model
 from boom_twin.twin.loaded_model import ModelPreparation
 
@@ -53,13 +52,13 @@ def driven(twin: Twin, preparation: ModelPreparation, asked: dict[int, Any], row
 
 
 def test_no_sample_waits_for_the_model_of_another_load_and_a_replay_repeats_it(makers: list[str]) -> None:
-    rows, twin = samples(160), drive_twin(load_scene(), baseline=load_baseline())
+    rows, twin = samples(160), drive_twin(load_scene(), health=True)
     reports = driven(twin, ModelPreparation(twin), {50: {"payload": 40.0}}, rows)
     assert makers == ["MainThread", "model"]
     changes = [report.change for report in reports if report.change is not None]
     assert [change.settings["payload"] for change in changes] == [-1.0, 40.0]
     assert 50 * STEP <= changes[1].stamp <= 100 * STEP and changes[1].from_rest
-    other = drive_twin(load_scene(), baseline=load_baseline())
+    other = drive_twin(load_scene(), health=True)
     for sample, report in zip(rows, reports, strict=True):
         if report.change is not None:
             other.requests.repeat(report.change)

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
+from recordings import read, scan
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene
-from boom_twin.bag.reader import read, scan
 from boom_twin.deviation.sensor_model import TURN
-from boom_twin.scene.kinematics import strokes_of_posture
 
 MS = 1_000_000
 ARCH = Path(__file__).parents[2] / "bags" / "arch_session"

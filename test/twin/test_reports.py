@@ -6,10 +6,10 @@ import pickle
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 
 from boom_twin import Report, Sample, Scene, Stream, load_scene
-from boom_twin.scene.kinematics import strokes_of_posture
 
 
 def reports(scene: Scene, count: int = 120) -> list[Report]:

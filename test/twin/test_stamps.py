@@ -6,11 +6,10 @@ import copy
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 
-from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.errors import UsageError
-from boom_twin.scene.kinematics import strokes_of_posture
+from boom_twin import Sample, Stream, Twin, UsageError, load_scene
 from boom_twin.validation.rig.motion import Move, Programme
 
 MS = 1_000_000

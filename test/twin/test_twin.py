@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 
 from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.types import StrokeReading
 
 MS = 1_000_000

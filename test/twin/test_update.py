@@ -7,11 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 
 from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
-from boom_twin.health.baseline import load_baseline
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.twin.blocks import ReportBlock, SampleBlock, block_of
 
 MS, N = 1_000_000, 4
@@ -69,7 +68,7 @@ def test_blocks_of_any_size_give_what_single_samples_give(seed: int, new: Callab
     rng = np.random.default_rng(100 + seed)
     samples = stream(seed, strange=0.0 if seed == 0 else 0.02, new=new)
     mounts = ("root", None, "head", "root") if seed == 1 else ()
-    usual = load_baseline() if seed < 3 else None
+    usual = seed < 3
     one, many = (new(load_scene(), Settings(), mounts, usual) for _ in range(2))
     first, blocks = 0, 0
     while first < len(samples):
@@ -101,7 +100,7 @@ def test_predictions_from_lengths_know_nothing_of_what_else_is_measured(seed: in
     ]
 
     def predictions(given: list[Sample]) -> list[object]:
-        twin = Twin(load_scene(), baseline=load_baseline())
+        twin = Twin(load_scene(), health=True)
         return [row[5] for row in told([twin.update(sample) for sample in given]) if row[5]]
 
     assert predictions(alone) == predictions(samples) == predictions(mixed) == predictions(others)

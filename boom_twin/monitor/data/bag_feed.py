@@ -75,7 +75,6 @@ def bag_feed(
     scene: Scene | SessionScene | None,
     settings: Settings,
     mapping: Path | None = None,
-    baseline: Path | None = None,
     window: TimeWindow = WHOLE,
     namespace: str = "",
 ) -> BagFeed:
@@ -89,9 +88,9 @@ def bag_feed(
     BagError
         It cannot be read, is of another boom, or has nothing that can be shown.
     UsageError
-        The mapping or the baseline cannot be used.
+        The mapping cannot be used.
     """
-    options = ReplayOptions(mapping=mapping, baseline=baseline, window=window, namespace=namespace)
+    options = ReplayOptions(mapping=mapping, window=window, namespace=namespace)
     given = replay_inputs(path, scene, settings, options)
     session, topics = given.session, given.topics.reading(given.strokes.reading)
     counts = {name: found.count for name in _names(topics) if (found := session.find(name)) is not None and found.count}

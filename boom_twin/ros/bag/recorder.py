@@ -35,20 +35,17 @@ LOOK = 0.5
 """Seconds between looks for new topics, publishers and the disk."""
 LOOKS = 2
 """Looks from one state on ``/diagnostics`` to the next."""
-TEXTS = ("scene", "baseline")
-"""Services of the twin that tell what its model was built from."""
 COMPLETE = "every required topic has a publisher"
 
 
 class _TwinValues:
-    """Values that the node ``boom_twin`` is asked for once: its ``parameters``, and by the services' names its `TEXTS`."""
+    """Values that the node ``boom_twin`` is asked for once: its ``parameters``, and its ``scene``."""
 
     def __init__(self, node: Node) -> None:
         client = AsyncParameterClient(node, NODE)
         self._services = {"parameters": (client.services_are_ready, partial(client.get_parameters, list(NAMES)))}
-        for name in TEXTS:
-            service = node.create_client(Trigger, f"{NODE}/{name}")
-            self._services[name] = service.service_is_ready, partial(service.call_async, Trigger.Request())
+        service = node.create_client(Trigger, f"{NODE}/scene")
+        self._services["scene"] = service.service_is_ready, partial(service.call_async, Trigger.Request())
         self._answers: dict[str, Future] = {}
 
     def poll(self) -> dict[str, object]:
@@ -168,7 +165,7 @@ class Recorder:
     def run(self, stopped: Callable[[], bool], on_twin: Callable[[Mapping[str, object]], None]) -> list[TopicCount]:
         """Record until `stopped`, which is asked every `boom_twin.ros.runtime.WAKE` s; return the counts by topic.
 
-        `on_twin` is told what the twin says of itself, if there is one: its ``parameters``, and `TEXTS` by name.
+        `on_twin` is told what the twin says of itself, if there is one: its ``parameters``, and the text of its ``scene``.
 
         Raises
         ------

@@ -31,7 +31,7 @@ from ...types import SENSORS, Report, Sample, Stream
 from ..runtime import Log, message_class, one_line, qos_profile
 from .diagnostics import Diagnostics
 from .monitor_process import MonitorProcess
-from .parameters import baseline_of, baseline_text, current, declare, frame_of, guard, path_of, refusal
+from .parameters import current, declare, frame_of, guard, path_of, refusal
 from .receive_queue import ReceiveQueue
 from .services import Services, StartLog
 
@@ -173,18 +173,17 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             self._log.warning(str(oddity))
         settings, joints = current(self, Settings), len(scene.joints)
         topics = load_mapping(path_of(self, "mapping"), joints).of_joints(joint.range_deg for joint in scene.joints)
-        mounts, baseline = topics.mounts(joints), baseline_of(self)
-        reads, absent, causes = topics.stroke_reading, topics.absent, self.get_parameter("causes").value
-        twin = Twin(scene, settings, mounts, baseline, reads, absent, causes=causes, is_live=True)
+        mounts, reads, absent = topics.mounts(joints), topics.stroke_reading, topics.absent
+        health, causes = (self.get_parameter(name).value for name in ("health", "causes"))
+        twin = Twin(scene, settings, mounts, health, reads, absent, causes=causes, is_live=True)
         self._log.info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
         twin.warm_up()
         import_module("scipy.special")  # of the first alarm and the first pause, whose samples would wait for it for 0.3 s
         self._twin, self._decoder, self._preparation = twin, SampleDecoder(joints, topics), ModelPreparation(twin)
         self._encoder = ReportEncoder(scene, settings, frame_of(self, topics))
-        texts = {"scene": found.text} | baseline_text(self)
         self._diagnostics.configure(twin, self._decoder, name)
         acknowledge, is_active = self._diagnostics.watch.acknowledge, lambda: bool(self._subscriptions_in)
-        self._twin_services = Services(self, twin, acknowledge, is_active, self.queue.catch_up, texts)
+        self._twin_services = Services(self, twin, acknowledge, is_active, self.queue.catch_up, found.text)
         self._start_log = StartLog(self._log)
         self._log.info("model ready")
 

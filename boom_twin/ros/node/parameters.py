@@ -16,7 +16,6 @@ from rclpy.parameter import Parameter
 
 from ...config.settings import RETIRED, Settings, Table, Thresholds, checked, nearest
 from ...errors import UsageError
-from ...health.baseline import Baseline, load_baseline
 from ...messages.topic_table import Topics
 from ..runtime import one_line
 
@@ -47,7 +46,6 @@ TABLE = (
     ParameterRow("mapping", "", "path of the file of topics and sensors; empty: topics.yaml", AT_START),
     ParameterRow("health", True, "judge the rig's health: ~/health, ~/tip/uncertainty", FIXED),
     ParameterRow("causes", True, "name causes of what health sees, by twins of booms that have a fault", FIXED),
-    ParameterRow("baseline", "", "path of what is known of the rig while all is well; empty: the package's", FIXED),
     ParameterRow("frame_prefix", "", "put before the frame of all outputs, as robot_state_publisher does: front/", FIXED),
     ParameterRow("hardware_id", "", "of the boom, in every status of /diagnostics; empty: the node's name", AT_START),
     ParameterRow("autostart", True, "the node configures and activates itself", AT_START),
@@ -128,7 +126,7 @@ def guard(node: Node, is_configured: Callable[[], bool], tune: Callable[[dict[st
 
 
 def path_of(node: Node, name: str) -> Path | None:
-    """Return the path in the parameter ``scene``, ``mapping`` or ``baseline``; None = the package's own."""
+    """Return the path in the parameter ``scene`` or ``mapping``; None = the package's own."""
     text: str = node.get_parameter(name).value
     return Path(text) if text else None
 
@@ -140,17 +138,6 @@ def frame_of(node: Node, topics: Topics) -> str:
         told = "names of frames have no leading slash (tf2)"
         raise UsageError(f"{SOURCE}: frame_prefix = {prefix!r}: {told}. Give {prefix.lstrip('/')!r}.")
     return prefix + topics.frame
-
-
-def baseline_of(node: Node) -> Baseline | None:
-    """Return the baseline of the rig's health; None if health is not judged. Raises UsageError for an unusable file."""
-    return load_baseline(path_of(node, "baseline")) if node.get_parameter("health").value else None
-
-
-def baseline_text(node: Node) -> dict[str, str]:
-    """Return the text of the baseline file under ``baseline``; nothing if it is the package's own, or none is used."""
-    path = path_of(node, "baseline")
-    return {"baseline": path.read_text(encoding="utf-8-sig")} if path and node.get_parameter("health").value else {}
 
 
 def current(node: Node, table: type[Table]) -> Table:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -29,7 +29,7 @@ class Services:
 
     ``~/reset``, ``~/acknowledge`` and by sensor ``~/rezero/joint_i``, ``cylinder_i``, ``cylinder_force_i``, ``tip_imu``.
 
-    ``~/scene`` and ``~/baseline`` answer with the texts that the model was built from.
+    ``~/scene`` answers with the text of the scene that the model was built from.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ class Services:
         Whether the node is.
     catch_up : callable
         Lets the twin take what arrived before a request.
-    texts : dict of str to str
-        Of what the model was built from: scene and, unless it is the package's own, baseline.
+    scene : str
+        Text of the scene that the model was built from.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class Services:
         acknowledge: Callable[[], str],
         is_active: Callable[[], bool],
         catch_up: Callable[[], None],
-        texts: Mapping[str, str],
+        scene: str,
     ) -> None:
         self._node, self._twin, self._is_active, self._catch_up = node, twin, is_active, catch_up
         numbers = range(1, twin.plan.joints + 1)
@@ -65,7 +65,7 @@ class Services:
         self._services: list[Service] = [
             node.create_service(Trigger, f"~/{name}", partial(self._answer, name, act)) for name, act in acts.items()
         ]
-        self._services += [node.create_service(Trigger, f"~/{name}", partial(_tell, text)) for name, text in texts.items()]
+        self._services.append(node.create_service(Trigger, "~/scene", partial(_tell, scene)))
 
     def close(self) -> None:
         """Withdraw the services."""

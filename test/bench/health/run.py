@@ -33,7 +33,6 @@ from bench.record import keep
 from boom_twin import Twin, load_scene
 from boom_twin.bag.session_files import samples_of
 from boom_twin.health.alarms import Alarms
-from boom_twin.health.baseline import load_baseline
 from boom_twin.scene.edit import with_parameters
 from boom_twin.twin.blocks import ReportBlock, block_of
 from boom_twin.types import NANO
@@ -94,7 +93,7 @@ def row_of(number: int, causes: bool = False) -> dict[str, Any]:
     rows, _ = move(resting, programme, DURATION, STEP, STEP, SCHEME, load, changing)
     seen = spoil(observe(boom, programme, rows, sensors, number, load), faults, number)
     imu, forces = (getattr(seen, name) if name in streams else None for name in ("imu", "forces"))
-    twin, alarms = Twin(scene, baseline=load_baseline(), causes=causes), Alarms()
+    twin, alarms = Twin(scene, health=True, causes=causes), Alarms()
     first = int(seen.stamps[0])
     samples = samples_of(seen.stamps, seen.strokes, seen.joints, imu, seen.angle_stamps, forces)
     for report in twin.update_block(block_of(samples, len(scene.joints))):

@@ -6,9 +6,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from boom_twin import load_scene
+from boom_twin import BoomTwinError, load_scene
 from boom_twin.compiler.compile import compile_scene
-from boom_twin.errors import BoomTwinError
 from boom_twin.kernels.elements.pin_contact import APPROACH, CLOSED, COLUMNS, Journal, pin_force
 from boom_twin.scene.load import default_text
 from boom_twin.scene.schema import Clearance, ContactLaw, Pin

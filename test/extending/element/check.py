@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 from ruamel.yaml import YAML
 
-from boom_twin import Scene, load_scene, statics
+from boom_twin import BoomTwinError, Scene, load_scene, statics
 from boom_twin.compiler.compile import compile_scene
-from boom_twin.errors import BoomTwinError
 from boom_twin.scene.load import default_text
 from boom_twin.scene.schema import Support, Tip
 from boom_twin.scene.summary import left_out

@@ -7,7 +7,6 @@ import numpy as np
 
 from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.bag.reader import read, scan
-from boom_twin.health.baseline import Baseline
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import load_topics
 from boom_twin.types import StrokeReading
@@ -35,7 +34,7 @@ assert np.allclose(spoilt.imu[-1], [(1.0 + SHARE) * imu[-1, 0], imu[-1, 1]])
 
 def alarms(readings):
     """Return channel and kind of every alarm, with its beginning (s)."""
-    twin, found = Twin(scene, baseline=Baseline(), reads=StrokeReading.DRIVE), {}
+    twin, found = Twin(scene, health=True, reads=StrokeReading.DRIVE), {}
     for stamp, *rows in zip(stamps.tolist(), strokes, joints, readings, strict=True):
         for stream, values in zip(RECORDED, rows, strict=True):
             health = twin.update(Sample(stream, stamp, values)).health

@@ -19,7 +19,6 @@ from boom_twin.config.settings import Thresholds
 from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
-from boom_twin.health.baseline import Baseline
 from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
 from boom_twin.messages.topic_table import load_topics
@@ -52,7 +51,7 @@ topics = load_topics()
 required = {stream: topic.required for stream, topic in topics.inputs.items()}
 sensors, names = sensors_of(scene, Settings(), required, [None] * 4), {s: topic.name for s, topic in topics.inputs.items()}
 now = 0.0
-watch, twin = TwinWatch(sensors, names, Thresholds(), lambda: now), Twin(scene, baseline=Baseline())
+watch, twin = TwinWatch(sensors, names, Thresholds(), lambda: now), Twin(scene, health=True)
 watch.begin()
 found = []
 for sample in samples:
@@ -106,7 +105,7 @@ assert table["residuals"] == {"title": "tip inclinometer", "factor": 1.0, "unit"
 assert not feed.topic_rows.dropped.by_topic
 
 # A sensor that falls silent is told, and what a calibration holds out is compared with it.
-twin, alarms = Twin(scene, baseline=Baseline()), set()
+twin, alarms = Twin(scene, health=True), set()
 for sample in samples:
     if sample.stream is not INCLINATION or sample.stamp < samples[0].stamp + 10**9:
         health = twin.update(sample).health

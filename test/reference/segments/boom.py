@@ -11,13 +11,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from reference.ideal_pins import refuse_clearance
 
 from boom_twin import Scene
 from boom_twin.scene.schema import Cylinder, Joint
 
-from .equations import Jet, angle, constant, coordinates, cos, inverse, root, sin
 from .geometry import gravity_in_base, half_segment, link_headings, pieces, pins, rigid_masses, spring_stiffness
+from .jets import Jet, angle, constant, coordinates, cos, inverse, root, sin
 
 Place = tuple[Jet, Jet]
 
@@ -46,16 +45,9 @@ class SegmentBoom:
 
 
 class Segments:
-    """A scene with about 4 `fineness` springs in every flexible section; 0 makes all sections rigid.
-
-    Raises
-    ------
-    UsageError
-        The scene has pins with clearance.
-    """
+    """A scene with about 4 `fineness` springs in every flexible section; 0 makes all sections rigid. Ideal pins."""
 
     def __init__(self, scene: Scene, fineness: int) -> None:
-        refuse_clearance(scene, "the finite-segment boom")
         self.scene, self.fineness = scene, fineness
         self.gravity = gravity_in_base(scene)
 

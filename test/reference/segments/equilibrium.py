@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from boom_twin.errors import SolverError
+from boom_twin import SolverError
 
 from .boom import SegmentBoom, Segments
-from .equations import Jet
 from .geometry import oil_stiffness
+from .jets import Jet
 
 PASSES = 60
 SETTLED = 1e-11  # m and rad, largest increment

@@ -3,111 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from boom_twin import Scene
-from boom_twin.scene.schema import Cylinder, CylinderPart, Joint, Point, RigidPart
-
-
-class Bodies:
-    """Bodies of a scene: first all links L, then all links R, barrels, rods.
-
-    Attributes
-    ----------
-    mass, inertia : ndarray, shape (2 (n - 1) + 2 n,)
-        kg, kg m^2.
-    left_middle, right_middle : ndarray, shape (n - 1,)
-        Centre of a link, m along it from its own pin.
-    barrel, rod : ndarray, shape (n,)
-        Centre of barrel and rod, m from their pins.
-    on_left : list of bool
-        Whether the rod is pinned to link L.
-    rod_ahead, rod_aside : ndarray, shape (n - 1,)
-        Where, m along and to the left of that link.
-    """
-
-    def __init__(self, scene: Scene) -> None:
-        six_bars, cylinders = scene.joints[1:], [joint.cylinder for joint in scene.joints]
-        self.left_middle = np.array([0.5 * (joint.lL or 0.0) for joint in six_bars])
-        self.right_middle = np.array([0.5 * (joint.lR or 0.0) for joint in six_bars])
-        self.on_left = [joint.kind != "B3" for joint in six_bars]
-        self.rod_ahead, self.rod_aside = np.array([_rod_pin(joint) for joint in six_bars]).reshape(-1, 2).T
-        barrels = [_cylinder_part(cylinder.barrel) for cylinder in cylinders]
-        rods = [_cylinder_part(cylinder.rod) for cylinder in cylinders]
-        self.barrel, self.rod = np.array([part[2] for part in barrels]), np.array([part[2] for part in rods])
-        links = [(joint.mL or 0.0, (joint.mL or 0.0) * (joint.lL or 0.0) ** 2 / 12) for joint in six_bars]
-        links += [(joint.mR or 0.0, (joint.mR or 0.0) * (joint.lR or 0.0) ** 2 / 12) for joint in six_bars]
-        self.mass, self.inertia = np.array([*links, *(part[:2] for part in (*barrels, *rods))]).T
-
-
-def _rod_pin(joint: Joint) -> tuple[float, float]:
-    """Return the rod pin on link L from D (B1, B2), or on link R from E (B3), in m along and to the left."""
-    along, aside = joint.R or (0.0, 0.0)
-    if joint.kind == "B1":
-        return joint.lL or 0.0, 0.0
-    return (along, aside) if joint.kind == "B2" else ((joint.lR or 0.0) - along, -aside)
-
-
-def _cylinder_part(part: CylinderPart | None) -> tuple[float, float, float]:
-    """Mass, inertia, distance of the centre from the pin; a part that is not there weighs nothing."""
-    return (0.0, 0.0, 0.0) if part is None else (part.mass, part.inertia, part.com)
-
-
-@dataclass(frozen=True)
-class Angles:
-    """Heading of a link against the head before, and its derivatives by the joint angle; each of shape (joints,)."""
-
-    value: np.ndarray
-    first: np.ndarray
-    second: np.ndarray
-
-
-class Linkages:
-    """All six-bars of a boom, kinds B1 to B3."""
-
-    def __init__(self, joints: Sequence[Joint]) -> None:
-        self.d = np.array([complex(*joint.D) for joint in joints if joint.D])
-        self.e = np.array([complex(*joint.E) for joint in joints if joint.E])
-        self.left = np.array([joint.lL for joint in joints], dtype=float)
-        self.right = np.array([joint.lR for joint in joints], dtype=float)
-        self.side = np.array([_side(joint) for joint in joints])
-
-    def angles(self, phi: np.ndarray) -> tuple[Angles, Angles]:
-        """Links L (from D) and R (from E) at joint angles `phi` (rad), shape (joints,).
-
-        The diagonal D->E has length r and heading a; by the law of cosines L is turned from it by an angle that depends on
-        r alone, and R from its reverse likewise.
-        """
-        turned = self.e * np.exp(1j * phi)
-        gap, rate = turned - self.d, 1j * turned
-        square = np.abs(gap) ** 2
-        inner, bend = np.conj(gap) * rate, -np.conj(gap) * turned
-        u1, u2 = 2.0 * inner.real, 2.0 * (np.abs(rate) ** 2 + bend.real)
-        r = np.sqrt(square)
-        r1 = u1 / (2.0 * r)
-        span = Angles(r, r1, u2 / (2.0 * r) - r1**2 / r)
-        a = Angles(np.angle(gap), inner.imag / square, bend.imag / square - inner.imag * u1 / square**2)
-        left, right, side = _opening(span, self.left, self.right), _opening(span, self.right, self.left), self.side
-        return (
-            Angles(a.value + side * left.value, a.first + side * left.first, a.second + side * left.second),
-            Angles(a.value + np.pi - side * right.value, a.first - side * right.first, a.second - side * right.second),
-        )
-
-
-def _opening(span: Angles, own: np.ndarray, other: np.ndarray) -> Angles:
-    """Angle between the diagonal and the link of length `own` (m), over the joint angle."""
-    r, excess = span.value, own**2 - other**2
-    cosine = (r + excess / r) / (2.0 * own)
-    by_r, by_rr = (1.0 - excess / r**2) / (2.0 * own), excess / (own * r**3)
-    sine = np.sqrt(1.0 - cosine**2)
-    slope = -by_r / sine
-    curvature = -(by_rr + cosine * slope**2) / sine
-    return Angles(np.arccos(cosine), slope * span.first, curvature * span.first**2 + slope * span.second)
-
+from boom_twin.scene.schema import Cylinder, Joint, Point, RigidPart
 
 SPRINGS = 4  # per flexible section and unit of fineness, about
 SAME_PLACE = 1e-9  # m

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from boom_twin.errors import UsageError
+from boom_twin import UsageError
 from boom_twin.validation.contact_law import Contact
 
 from . import geometry

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boom_twin.plots.style import BLUE, GREEN, GREY, INK, ORANGE, SKY, TONES, picture
-
-from .convergence import MEASURES, Convergence
+from boom_twin.plots.style import BLUE, GREY, INK, ORANGE, TONES, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,30 +79,3 @@ def _switch(axes: Axes, switch: float) -> None:
     axes.text(1.1e6 * switch, 0.97, "ideal below", transform=axes.get_xaxis_transform(), va="top", fontsize=11, color=INK)
     axes.set_xlim(left=0.4e6 * switch)
     axes.set_xticks(np.geomspace(1.0, 1000.0, 4), ["1", "10", "100", "1000"])
-
-
-CURVES = {  # boom, program: colour, width, marker
-    ("all rods' pins, elastic boom", "boom_twin"): (SKY, 1.6, "D"),
-    ("one pin, rigid boom", "boom_twin"): (BLUE, 2.4, "o"),
-    ("one pin, rigid boom", "SciPy"): (GREEN, 1.6, "^"),
-}
-
-
-def convergence_picture(path: Path, title: str, note: str, found: Convergence) -> None:
-    """Write a panel a measure: error over run time; the boom with one pin against the independent model where there is one."""
-    chosen = [line for line in found.lines if line.against == "independent" or line.case.startswith("all")]
-    with picture(path, title, note, (16.0, 8.0)) as figure:
-        grid = figure.subplots(1, len(MEASURES), squeeze=False)[0]
-        for measure, (axes, name) in enumerate(zip(grid, MEASURES, strict=True)):
-            for line in chosen:
-                colour, width, marker = CURVES[line.case, line.program]
-                run_time = 1e3 * np.array(line.seconds) / found.span
-                label = f"{line.program}, {line.case}"
-                axes.loglog(run_time, line.errors[:, measure], color=colour, linewidth=width, marker=marker, label=label)
-                for mark, x, y in list(zip(line.marks, run_time, line.errors[:, measure], strict=True))[1::3]:
-                    text = f"{1e3 * mark:g} ms" if line.program == "boom_twin" else f"{mark:.0e}"
-                    axes.annotate(text, (x, y), (9, 3), textcoords="offset points", fontsize=10.5, color=colour)
-            axes.set_title(name.split(",")[0])
-            axes.set_xlabel("run time, ms per simulated second")
-            axes.set_ylabel(f"error: {name}")
-        figure.legend(*grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)

@@ -11,9 +11,7 @@ from boom_twin.scene.schema import IDEAL_BELOW
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.validation.study.report import page, table
 
-from . import convergence as near
-from .convergence import MEASURES, Convergence, convergence
-from .pictures import RestOffsetCurve, Trace, convergence_picture, sinking_picture, swing_picture
+from .pictures import RestOffsetCurve, Trace, sinking_picture, swing_picture
 from .rest_stop_cost import (
     BRAKE,
     COUNT,
@@ -34,7 +32,7 @@ PINS = ("ideal", "contact", "linear")
 SHOWN_CLEARANCE = 1e-4  # m, of the table of rests
 
 
-def report(scene: Scene, swings: list[Swing], shifts: list[Shift], found: Convergence, costs: list[Cost]) -> str:
+def report(scene: Scene, swings: list[Swing], shifts: list[Shift], costs: list[Cost]) -> str:
     """Return all sections."""
     block = pins_of(scene)
     sizes = ", ".join(f"{1e6 * size:g}" for size in sorted({pin.radial_clearance for pin in block.pins}))
@@ -42,7 +40,7 @@ def report(scene: Scene, swings: list[Swing], shifts: list[Shift], found: Conver
         "# Play in the pins",
         f"{len(block.pins)} pins have a radial clearance of {sizes} um. Contact law: {block.contact.law}, restitution "
         f"{block.contact.restitution:g}.",
-        *_stops(swings), *_rests(shifts), *_convergence(found), *_costs(costs),
+        *_stops(swings), *_rests(shifts), *_costs(costs),
         "Limits: one motion per posture.",
     ]  # fmt: skip
     return page(parts)
@@ -79,20 +77,6 @@ def _rests(found: list[Shift]) -> list[str]:
     ]
 
 
-def _convergence(found: Convergence) -> list[str]:
-    lines = [line for line in found.lines if line.program == "boom_twin" and line.against == "independent"]
-    if not lines:
-        return ["## Convergence", "There is no independent model: no cylinder has k, barrel and rod."]
-    rows = [(f"{1e3 * step:g}", *errors) for step, errors in zip(lines[0].marks, lines[0].errors.tolist(), strict=True)][1::3]
-    return [
-        "## Convergence",
-        "![Error against run time](clearance_convergence.png)",
-        f"Rms errors of a stop within {1e3 * near.BRAKE:g} ms with one worn pin in a rigid boom. Reference: Lagrange's "
-        "equations, integrated by SciPy between touch and release (`test/reference/worn_pin`).",
-        table(("step, ms", *MEASURES), rows),
-    ]
-
-
 def _costs(found: list[Cost]) -> list[str]:
     by = {(own.pins, own.treatment): (1e6 * own.gentle, 1e6 * own.violent) for own in found}
     counts = sorted({pins for pins, _ in by if pins})
@@ -119,12 +103,10 @@ def write(scene: Scene, out: Path, quick: bool = False) -> list[Path]:
         swings(scene, postures, QUICK_HOLD if quick else HOLD),
         shifts(scene, postures, QUICK_COUNT if quick else COUNT),
     )
-    found = convergence(scene, quick)
-    paths = [out / f"clearance{part}" for part in (".md", ".png", "_static.png", "_convergence.png")]
-    write_atomic(paths[0], report(scene, stops, rests, found, costs(scene, quick)))
+    paths = [out / f"clearance{part}" for part in (".md", ".png", "_static.png")]
+    write_atomic(paths[0], report(scene, stops, rests, costs(scene, quick)))
     traces = [Trace(own.posture, own.model, own.times, own.height, own.acceleration) for own in stops]
     swing_picture(paths[1], "The tip after a stop: ideal pins, contact, linearised pins", NOTE, traces, SHOWN)
     sinking = [RestOffsetCurve(own.posture, own.pin, own.clearances, own.shifts) for own in rests]
     sinking_picture(paths[2], "The resting tip with play in the pin of one rod", NOTE, sinking, IDEAL_BELOW)
-    convergence_picture(paths[3], "Motions with play: error against run time", NOTE, found)
     return paths

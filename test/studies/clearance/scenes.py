@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
+from default_boom import clearance_text
 from ruamel.yaml import YAML
 
 from boom_twin import Scene
 from boom_twin.scene.checks.values import names_of
-from boom_twin.scene.load import clearance_text
 from boom_twin.scene.schema import Clearance, Pin
 
 Treatment = Literal["contact", "spring-damper"]
@@ -39,11 +39,6 @@ def treated(scene: Scene, treatment: Treatment) -> Scene:
 def with_pins(scene: Scene, pins: Sequence[Pin]) -> Scene:
     """`scene` with `pins` in place of its own; laws and treatment stay."""
     return _with(scene, pins=tuple(pins))
-
-
-def without_friction(scene: Scene) -> Scene:
-    """`scene` with frictionless contact of one material."""
-    return _with(scene, contact=pins_of(scene).contact.model_copy(update={"friction": 0.0, "bush": None}))
 
 
 def pins_of(scene: Scene) -> Clearance:

@@ -9,16 +9,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from reference.ideal_pins import refuse_clearance, refuse_elastic_base
 
-from boom_twin import Scene
+from boom_twin import Scene, SolverError
 from boom_twin.analysis.drive import STEP_TOLERANCE
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.motions import Motion as StrokeMotion
 from boom_twin.analysis.simulate import RHO
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.compiler.plan import Plan
-from boom_twin.errors import SolverError
 from boom_twin.kernels.integrators import GENERALISED_ALPHA, HAT, OFFSET, OLD, ROWS, A, V, X, prepare
 from boom_twin.kernels.tables import OK, SENTENCES, Motion, State, Work
 from boom_twin.kernels.transfer.forward_kinematics import place
@@ -38,13 +36,9 @@ def tip_of_move(scene: Scene, move: StrokeMotion, step: float, every: int = 1, v
 
     Raises
     ------
-    UsageError
-        The scene has pins with clearance.
     SolverError
         A step fails.
     """
-    refuse_clearance(scene, "the low-speed form")
-    refuse_elastic_base(scene, "the low-speed form")
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
     settle(plan, state, work, move.first, move.angles)

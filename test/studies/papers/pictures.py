@@ -7,50 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from boom_twin.plots.style import BLUE, GREY, INK, ORANGE, picture
-
-LOOKS = {  # pins, program: colour, width, dashes
-    ("ideal", "own"): (GREY, 2.4, "-"),
-    ("ideal", "peer"): (INK, 1.0, "--"),
-    ("worn", "own"): (ORANGE, 2.4, "-"),
-    ("worn", "peer"): (BLUE, 1.0, "--"),
-}
-
-
-@dataclass(frozen=True)
-class StopTrace:
-    """Stop of the boom in one posture, m rows.
-
-    Times (s), rise of the tip (mm), its vertical acceleration (m/s^2) and the force of cylinder 1 (kN), each (m,).
-    """
-
-    posture: str
-    pins: str
-    program: str
-    times: np.ndarray
-    rise: np.ndarray
-    acceleration: np.ndarray
-    force: np.ndarray
-
-
-def posture_picture(path: Path, title: str, note: str, peer: str, traces: list[StopTrace]) -> None:
-    """Write a column a posture; `peer` is the name of the independent program."""
-    postures = list(dict.fromkeys(trace.posture for trace in traces))
-    with picture(path, title, note, (5.0 * max(len(postures), 2), 11.0)) as figure:
-        grid = figure.subplots(3, len(postures), squeeze=False, sharex=True)
-        for column, posture in enumerate(postures):
-            for trace in (own for own in traces if own.posture == posture):
-                colour, width, dashes = LOOKS[trace.pins, trace.program]
-                label = f"{trace.pins} pins, {'this model' if trace.program == 'own' else peer}"
-                rows = (trace.rise, trace.acceleration, trace.force)
-                for axes, values in zip(grid[:, column], rows, strict=True):
-                    axes.plot(trace.times, values, color=colour, linewidth=width, linestyle=dashes, label=label)
-            grid[0, column].set_title(posture)
-            grid[2, column].set_xlabel("time, s")
-        grid[0, 0].set_ylabel("rise of the tip, mm")
-        grid[1, 0].set_ylabel("vertical acceleration, m/s²")
-        grid[2, 0].set_ylabel("force of cylinder 1, kN")
-        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+from boom_twin.plots.style import BLUE, GREY, ORANGE, picture
 
 
 @dataclass(frozen=True)

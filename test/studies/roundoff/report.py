@@ -16,8 +16,7 @@ from boom_twin.system.atomic_files import write_atomic
 from boom_twin.validation.study import scene_changes as made
 from boom_twin.validation.study.long_booms import long_boom, seven_sections
 from boom_twin.validation.study.report import page, table
-from boom_twin.validation.study.stability.cases import short
-from boom_twin.validation.study.stability.setups import smooth
+from boom_twin.validation.study.stability.cases import short, smooth
 
 from .exact_step import StepRoundoff, digits, one_step
 from .pictures import roundoff_picture

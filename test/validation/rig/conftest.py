@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from default_boom import default_text
 from ruamel.yaml import YAML
-
-from boom_twin.scene.load import default_text
 
 
 @pytest.fixture

@@ -7,8 +7,7 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin import load_scene
-from boom_twin.errors import UsageError
+from boom_twin import UsageError, load_scene
 from boom_twin.validation.rig import Move, Programme
 from boom_twin.validation.rig.faults import RigFault, check, drifting, parse
 

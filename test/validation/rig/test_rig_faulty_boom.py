@@ -9,10 +9,10 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin import Scene, load_scene
-from boom_twin.errors import UsageError
-from boom_twin.scene.edit import parameter, parameter_names
-from boom_twin.scene.kinematics import strokes_of_posture
+from default_boom import parameter, strokes_of_posture
+
+from boom_twin import Scene, UsageError, load_scene
+from boom_twin.scene.edit import parameter_names
 from boom_twin.validation.rig import Move, Programme, Sensors, record, simulate, statics
 from boom_twin.validation.rig.faults import parse
 from boom_twin.validation.rig.faulty_boom import changes, with_faults, wrong_by

@@ -9,10 +9,9 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin import load_scene, statics
-from boom_twin.errors import UsageError
-from boom_twin.scene.edit import with_parameters
-from boom_twin.scene.kinematics import strokes_of_posture
+from default_boom import strokes_of_posture, with_parameters
+
+from boom_twin import UsageError, load_scene, statics
 from boom_twin.validation.rig import Programme, simulate
 from boom_twin.validation.rig.loads import PumpLoad, WindLoad, check, parse, tip_load
 from boom_twin.validation.rig.motion import ease

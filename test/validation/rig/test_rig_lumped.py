@@ -9,9 +9,9 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin import load_scene
-from boom_twin.errors import UsageError
-from boom_twin.scene.kinematics import strokes_of_posture
+from default_boom import strokes_of_posture
+
+from boom_twin import UsageError, load_scene
 from boom_twin.scene.schema import Clearance, Pin
 from boom_twin.validation.rig import Move, Programme, Scheme, at_rest, move
 

@@ -7,9 +7,10 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin import load_scene
-from boom_twin.errors import UsageError
-from boom_twin.scene.kinematics import joint_angles_of_strokes, stroke_range
+from default_boom import joint_angles_of_strokes
+
+from boom_twin import UsageError, load_scene
+from boom_twin.scene.kinematics import stroke_range
 from boom_twin.validation.rig import BUNDLED_DURATION, Move, Programme, bundled, random_programme, through_postures
 from boom_twin.validation.rig.motion import RANGE_SAMPLES, TIP_SPEED, tip_speed
 

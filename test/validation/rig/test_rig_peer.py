@@ -6,8 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from boom_twin.cli.main import main
+from command import main
 
 
 def test_missing_exudyn_is_one_clear_error(

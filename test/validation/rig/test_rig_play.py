@@ -9,9 +9,9 @@ import pytest
 
 pytest.importorskip("exudyn")
 
-from boom_twin import Scene, load_scene, simulate, statics
-from boom_twin.errors import UsageError
-from boom_twin.scene.kinematics import strokes_of_posture
+from default_boom import strokes_of_posture
+
+from boom_twin import Scene, UsageError, load_scene, simulate, statics
 from boom_twin.scene.schema import Clearance, Pin
 from boom_twin.validation.rig import Move, Programme, at_rest, move
 from boom_twin.validation.rig.exudyn.pin_clearance import contact_of

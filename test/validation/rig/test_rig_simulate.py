@@ -8,8 +8,9 @@ from oracle.oscillation import mean_frequency
 
 pytest.importorskip("exudyn")
 
+from default_boom import strokes_of_posture
+
 from boom_twin import Scene
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.validation.rig import Move, Programme, simulate
 
 

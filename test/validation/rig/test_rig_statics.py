@@ -7,8 +7,10 @@ import pytest
 
 pytest.importorskip("exudyn")
 
+from default_boom import joint_angles_of_strokes, strokes_of_posture
+
 from boom_twin import Scene
-from boom_twin.scene.kinematics import joint_angles_of_strokes, stroke_curve, strokes_of_posture
+from boom_twin.scene.kinematics import stroke_curve
 from boom_twin.validation.rig import statics
 
 G = 9.81

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 
 import pytest
+from default_boom import examine, with_end_mark
 
-from boom_twin.scene.load import examine, with_end_mark
 from boom_twin.validation.study.long_booms import long_boom
 
 

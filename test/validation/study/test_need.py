@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
 from oracle import booms
 from ruamel.yaml import YAML
 
-from boom_twin import Scene, load_scene, simulate, statics
+from boom_twin import Scene, UsageError, load_scene, simulate, statics
 from boom_twin.analysis.motions import motion_of
-from boom_twin.cli.main import main
-from boom_twin.errors import UsageError
 from boom_twin.reduction.search import Proposal, propose
 from boom_twin.scene.edit import edited
 

@@ -10,9 +10,8 @@ import pytest
 from boom_twin import load_scene
 from boom_twin.analysis.methods import Method
 from boom_twin.validation.study.stability import report as stability
-from boom_twin.validation.study.stability.cases import Case, cases
+from boom_twin.validation.study.stability.cases import Case, cases, smooth
 from boom_twin.validation.study.stability.runner import METHODS, limit_of, one, run
-from boom_twin.validation.study.stability.setups import smooth
 
 COARSE = {"dt 2e-2 s", "dt 5e-2 s", "dt 5e-2 s, fast"}
 QUICK = [case for case in cases(load_scene()) if case.quick]

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from command import main
 
-from boom_twin.cli.main import main
+from boom_twin import BagError
 from boom_twin.cli.study import KINDS
-from boom_twin.errors import BagError
 from boom_twin.system.result_folder import result_folder, study
 
 

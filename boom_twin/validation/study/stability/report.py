@@ -14,9 +14,8 @@ from ....scene.kinematics import section_angles
 from ....scene.schema import Scene
 from ....system.atomic_files import write_atomic
 from ..report import page, table, write_json
-from .cases import Case, cases, long_holds
+from .cases import Case, cases, long_holds, move_in_words
 from .runner import METHODS, CaseResult, Limit, limit_of, run
-from .setups import move_in_words
 from .verdict import BOUNDS
 
 NO_EQUILIBRIUM = "no equilibrium"

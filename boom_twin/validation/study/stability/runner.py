@@ -14,8 +14,7 @@ from ....errors import SolverError
 from ....scene.kinematics import joint_angles_of_strokes
 from ....types import Array
 from ..scene_changes import lighter_gravity
-from .cases import Case
-from .setups import Setup
+from .cases import Case, Setup
 from .verdict import Facts, against_motion, against_rest
 
 METHODS: dict[str, Method] = {
