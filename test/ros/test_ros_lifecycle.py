@@ -50,6 +50,9 @@ def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote
     for name, value in [("imu_sigma", 0.05), ("scene", "other.yaml")]:
         refused = remote.set(name, value)
         assert not refused.successful and f"{name}: fixed while the node is configured" in refused.reason
+    before = {"imu_sigma": 0.03, "scene": "", "autostart": False, "gap": Settings().gap}
+    assert all(remote.set(name, value).successful for name, value in before.items())  # as they are
+    assert not remote.set("autostart", True).successful
     assert not any(remote.set(name, absurd).successful for name, absurd in [("gap", 1e308), ("gap", 5e-324), ("payload", -2.0)])
     assert remote.set("gap", 0.2).successful
     assert remote.change(Transition.TRANSITION_CLEANUP)

@@ -65,6 +65,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         self._outputs: dict[Output, LifecyclePublisher] = {}
         self._subscriptions_in: list[Subscription[Any]] = []
         self._refused = ""
+        # rclpy has no public way to answer a transition that the present state lacks, nor to ask for the state.
         self._service_change_state.callback = partial(self._change_state, self._service_change_state.callback)
         declare(self)
         self._topics = load_mapping(path_of(self, "mapping"))
@@ -79,10 +80,16 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         return bool(self.get_parameter("autostart").value)
 
     def set_parameters_atomically(self, parameter_list: list[Parameter[Any]]) -> SetParametersResult:
-        """Set parameters as any node does; give a reason with fault and remedy where rclpy has none."""
+        """Set parameters as any node does; give a reason with fault and remedy where rclpy has none.
+
+        A value that a parameter has already is accepted and changes nothing, also where the parameter is fixed.
+        """
         if reason := refusal(self, parameter_list):
             return SetParametersResult(successful=False, reason=reason)
-        return super().set_parameters_atomically(parameter_list)
+        now = [self.get_parameter_or(each.name) for each in parameter_list]
+        pairs = zip(parameter_list, now, strict=True)
+        changed = [new for new, old in pairs if (new.type_, new.value) != (old.type_, old.value)]
+        return super().set_parameters_atomically(changed) if changed else SetParametersResult(successful=True)
 
     def start(self) -> bool:
         """Configure and activate the node; return True if both succeeded."""
