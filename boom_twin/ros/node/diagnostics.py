@@ -218,8 +218,8 @@ class Diagnostics:
             idle, told["preparing_s"] = PREPARING, time.monotonic() - since
         found = yield from self.watch.look(told, idle, *ends, clock, received, wrong, left_out, WORDS)
         yield
+        self._tell_oddities()  # whoever sees a count finds its line in the log
         self._publisher.show(found)
-        self._tell_oddities()
         self._tell_types()
         self._tell_clock(clock, max((each.wait for each in received.values() if each.wait > 0.0), default=0.0))
 
