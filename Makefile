@@ -49,10 +49,9 @@ $(READY): setup.py | $(DEMO_READY)
 	$(BIN)/python -m pip install --quiet --editable ".[ros,test,peers,monitor,docs,batch]"
 	@touch $@ $(DEMO_READY)
 
-# Compiling the kernels is part of the set-up: about 40 s, kept in ~/.cache/boom_twin until a kernel changes.
+# Compiling the kernels is part of the set-up.
 warm: $(DEMO_READY)
-	@echo "compiling the kernels, up to a minute the first time .." >&2
-	@$(BIN)/python -c 'from boom_twin import Twin, load_scene; Twin(load_scene()).warm_up()'
+	@$(BIN)/boom_twin warm
 
 demo: warm
 	PYTHONPATH=test $(BIN)/python -P -m demo.demo --out out/demo $(if $(DOMAIN),--domain $(DOMAIN))
@@ -138,5 +137,6 @@ docs: $(READY)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 
 clean:
+	@if [ -x $(BIN)/boom_twin ]; then $(BIN)/boom_twin warm --remove; fi
 	rm -rf $(VENV) $(COLCON) $(NODE) build *.egg-info
 	@echo "kept: out, which may hold recordings"

@@ -1,4 +1,4 @@
-"""Choose scene, baseline, settings and mapping of a session: a given file, else the session's, else the package's.
+"""Choose scene, settings and mapping of a session: a given file, else the session's, else the package's.
 
 An invalid given file raises UsageError (a scene: SceneError). An invalid text of the session raises BagError, with the
 option that gives another.

@@ -48,6 +48,7 @@ COMMANDS: dict[str, str] = {
     "modal": "measured natural frequencies and damping, stabilisation diagram (extra modal)",
     "batch": "many recorded sessions through the twin, one table (extra batch)",
     "compare": "two recorded sessions side by side",
+    "warm": "compile the kernels beforehand, for an image; remove them",
     "study": "reports on the methods: error against run time",
     "rig": "make a synthetic session on the virtual rig (extra peers)",
 }
@@ -81,6 +82,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "modal": ("modal bags/night --out out/modal",),
     "batch": ("batch 'bags/*' --out out/batch",),
     "compare": ("compare bags/before bags/after --out out/compare",),
+    "warm": ("warm", "warm --remove"),
     "study": ("study error --out out/study/error",),
     "rig": ("rig --out out/soft --fault cylinder_2.k:softer:0.3", "rig --list-faults"),
 }

@@ -17,7 +17,7 @@ from ..health.sensor_monitor import noise_as_text
 from ..predictions import Estimate, Prediction
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Health, Report, StrokeReading
-from .levels import Bounds, ComponentJudge, Level, Status
+from .levels import Bounds, ComponentJudge, Level, Status, Value
 
 FAILURE_SHOWN = 1.0
 """Seconds for which a failure is shown."""
@@ -32,7 +32,7 @@ class ModelWatch:
     def __init__(self, now: float) -> None:
         self._predictions = self._failures = self._broken = 0
         self._predicted_at = self._unfed_at = now  # newest looks with a prediction, and without strokes
-        self._counts: Mapping[str, str | int] = {}  # of that with a prediction
+        self._counts: Mapping[str, Value] = {}  # of that with a prediction
         self._is_deflected = False
         self._failure, self._failed_at, self.has_news = "", -FAILURE_SHOWN, False
         self._looked, self._steps = now, 0
@@ -60,11 +60,12 @@ class ModelWatch:
         self._failure, self.has_news = reason, True
 
     def status(
-        self, judge: ComponentJudge, counts: Mapping[str, str | int], is_active: bool, is_fed: bool, words: Mapping[str, str]
+        self, judge: ComponentJudge, counts: Mapping[str, Value], idle: str, is_fed: bool, words: Mapping[str, str]
     ) -> Status:
-        """Return the status of the model; the twin listens if `is_active`, and strokes come if it `is_fed`.
+        """Return the status of the model; strokes come if it `is_fed`.
 
-        `counts` are reported too. `words` say what those of irregular samples are of.
+        `idle` is why the twin does not listen, empty if it does. `counts` are reported too.
+        `words` describe those of irregular samples.
         """
         now, stale_after = judge.at.now, judge.at.thresholds.stale_after
         judge.note(counts)
@@ -76,28 +77,29 @@ class ModelWatch:
         if not is_fed:
             self._unfed_at = now
         silent = now - max(self._predicted_at, self._unfed_at)
-        if not is_active:
-            judge.fault(Level.WARN, "not active")
+        if idle:
+            judge.fault(Level.WARN, idle)
         elif now - self._failed_at <= FAILURE_SHOWN:
             judge.fault(Level.ERROR, self._failure)
         elif not is_fed or (not self._predictions and silent <= stale_after):
             judge.fault(Level.WARN, "waiting for strokes")
         elif silent > stale_after:
-            judge.fault(Level.ERROR, f"no prediction for {silent:.1f} s, though strokes come{self._why(counts, words)}")
+            judge.note({"no_prediction_s": silent})
+            judge.fault(Level.ERROR, f"no prediction, though strokes come{self._why(counts, words)}")
         elif self._is_deflected:
             judge.fault(Level.WARN, f"deflected: {words.get('deflected', '')}")
         if self._predicted_at == now:
             self._counts = dict(counts)
         return judge.finish("following the strokes")
 
-    def _why(self, counts: Mapping[str, str | int], words: Mapping[str, str]) -> str:
+    def _why(self, counts: Mapping[str, Value], words: Mapping[str, str]) -> str:
         """Return in words what was counted most since the newest prediction; empty if nothing was."""
         new = {key: value - int(self._counts.get(key, 0)) for key, value in counts.items() if isinstance(value, int)}
         most = max(new, key=lambda key: new[key], default="")
         if not most or new[most] <= 0:
             return ""
         name = most.partition(": ")[2]
-        return f": {new[most]} times {name} ({words.get(name, 'see the counts')})"
+        return f": {name} ({words.get(name, 'see the counts')})"
 
     def _check_load(self, judge: ComponentJudge) -> None:
         """Judge the run time of a step against the time available for it."""
@@ -107,7 +109,7 @@ class ModelWatch:
         load = self._busy / span if span > 0.0 else nan
         means = (self._busy / steps, self._longest, span / steps) if steps else (nan, nan, nan)
         judge.note(dict(zip(("step_mean_s", "step_longest_s", "step_budget_s"), means, strict=True)))
-        told = f"the model takes {load:.0%} of the time there is: end other work of this computer, or lower the strokes' rate"
+        told = "the model takes most of the time there is: end other work of this computer, or lower the strokes' rate"
         judge.check("load", load, Bounds(thresholds.load_warn, thresholds.load_error), told)
         if steps:
             self._predicted_at = now
@@ -181,7 +183,7 @@ class ResidualWindow:
         if count:
             rms, mean, largest = float(np.sqrt(np.mean(values**2))), float(np.mean(values)), float(np.abs(values).max())
         window = min(thresholds.residual_window, now - self._since)
-        told = f"{rms:.2f} times as large as noise explains, for {window:.2g} s"
+        told = "larger than noise explains"
         told += "; health finds no fault in that" if is_judged and alarm is None else ""
         if alarm is not None:
             judge.fault(*alarm)
@@ -189,7 +191,7 @@ class ResidualWindow:
         judge.check("rms_normalised", rms, Bounds() if explained else bounds, told)
         judge.note({"mean_normalised": mean, "largest_normalised": largest, "count": count, "window_s": window})
         if not count:
-            judge.fault(Level.STALE, f"none for {window:.2g} s")
+            judge.fault(Level.STALE, "none within the window")
         return judge.finish(explained or "as large as noise explains")
 
 

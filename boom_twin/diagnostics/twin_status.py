@@ -10,7 +10,7 @@ import numpy as np
 from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Thresholds
 from ..types import Health, Report, Sample, Stream
-from .levels import ComponentJudge, Evaluation, Level, Status
+from .levels import ComponentJudge, Evaluation, Level, Status, Value
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, stress_status
 from .sensor_status import SensorSpec, sensor_status
 from .stream_stats import Rows, StreamWatch
@@ -125,8 +125,8 @@ class TwinWatch:
 
     def look(
         self,
-        counts: Mapping[str, str | int],
-        is_active: bool,
+        counts: Mapping[str, Value],
+        idle: str,
         publishers: Mapping[Stream, Peers],
         subscribers: Iterable[Peers],
         clock: float,
@@ -143,8 +143,8 @@ class TwinWatch:
         ----------
         counts, words : dict
             Counts reported with the model; what they are of, by the last part of their names.
-        is_active : bool
-            True if the twin listens.
+        idle : str
+            Why the twin does not listen; empty if it does.
         publishers, subscribers : dict of Stream to Peers, iterable of Peers
             Peers of every input, and of all outputs.
         clock : float
@@ -161,9 +161,9 @@ class TwinWatch:
         def judge(name: str, key: str = "") -> ComponentJudge:
             return self._judges.setdefault(key or name, ComponentJudge(name)).begin(at)
 
-        is_fed = is_active and not self._is_silent(self._streams[Stream.STROKES], at.now)
-        found = [self._model.status(judge("model"), counts, is_active, is_fed, words or {})]
-        if not is_active:
+        is_fed = not idle and not self._is_silent(self._streams[Stream.STROKES], at.now)
+        found = [self._model.status(judge("model"), counts, idle, is_fed, words or {})]
+        if idle:
             return found
         sensors, longest = list[Status](), self.thresholds.gap_warn
         for stream, watch in self._streams.items():

@@ -13,8 +13,11 @@ import hashlib
 import os
 import pickle
 import pwd
+import re
+import shutil
 import stat
 import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -31,7 +34,9 @@ KERNEL_SOURCES = (
     "health/sensor_survey.py", "health/sensor_findings.py", "types.py",
 )  # fmt: skip
 """Folders and modules of the package that kernels, or the constants in them, come from."""
-SUFFIX = ".kernel"
+SUFFIX, USER = ".kernel", ".user"
+CACHE_NAME = re.compile("[0-9a-f]{16}")
+KEPT = 30 * 86400.0  # s for which a cache is kept that no known installation uses
 _DIGEST = hashlib.sha256().digest_size
 
 
@@ -42,20 +47,54 @@ def source_hash(root: Path = ROOT) -> str:
         for path in sorted((root / name).rglob("*.py")) or [root / name]:
             digest.update(path.relative_to(root).as_posix().encode() + b"\0")
             digest.update(path.read_bytes())
-    settings = sorted(pair for pair in os.environ.items() if pair[0].startswith("NUMBA_") and pair[0] != "NUMBA_CACHE_DIR")
-    digest.update(repr(settings).encode())
+    digest.update(repr(_settings()).encode())
     return digest.hexdigest()[:16]
 
 
-def cache_folder() -> Path:
-    """Return the folder of kernels of this source state, in ``NUMBA_CACHE_DIR``, else in ``boom_twin`` of the user's cache.
+def _settings() -> list[tuple[str, str]]:
+    """Return numba's settings in the environment, on which compiled code depends."""
+    return sorted(pair for pair in os.environ.items() if pair[0].startswith("NUMBA_") and pair[0] != "NUMBA_CACHE_DIR")
+
+
+def cache_root() -> Path:
+    """Return the folder of all caches: ``NUMBA_CACHE_DIR``, else ``boom_twin`` in the user's cache.
 
     A relative path in ``XDG_CACHE_HOME`` counts as none, as its specification says.
     """
     if own := os.environ.get("NUMBA_CACHE_DIR"):
-        return Path(own) / source_hash()
+        return Path(own)
     home = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    return (home if home.is_absolute() else Path(os.path.expanduser("~/.cache"))) / "boom_twin" / source_hash()
+    return (home if home.is_absolute() else Path(os.path.expanduser("~/.cache"))) / "boom_twin"
+
+
+def cache_folder() -> Path:
+    """Return the folder of kernels of this source state."""
+    return cache_root() / source_hash()
+
+
+def all_caches() -> list[Path]:
+    """Return the folders of kernels of all source states."""
+    return [each for each in cache_root().glob("*") if CACHE_NAME.fullmatch(each.name) and not each.is_symlink()]
+
+
+def claim(folder: Path) -> None:
+    """Note in `folder` that this installation uses it, and remove caches that no installation uses.
+
+    Those are: the cache of an earlier state of this installation, unless another one uses it too; a cache whose installations
+    are gone, or are not known, if nothing was written there for `KEPT` s.
+    """
+    settings = _settings()
+    name = hashlib.sha256(repr((str(ROOT), settings)).encode()).hexdigest()[:16] + USER
+    with suppress(OSError):
+        if (folder / name).exists():
+            return
+        write_checked(folder / name, str(ROOT).encode())
+        for other in set(all_caches()) - {folder}:
+            is_own = (other / name).exists()
+            (other / name).unlink(missing_ok=True)
+            is_used = any(Path((read_checked(user) or b"").decode() or "?").exists() for user in other.glob(f"*{USER}"))
+            if not is_used and (is_own or time.time() - other.stat().st_mtime > KEPT):
+                shutil.rmtree(other, ignore_errors=True)
 
 
 def fault_of(folder: Path) -> str | None:

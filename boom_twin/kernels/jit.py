@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..errors import UsageError
-from .compiled_cache import SUFFIX, KernelCache, cache_folder, fault_of
+from .compiled_cache import SUFFIX, KernelCache, cache_folder, claim, fault_of
 
 Fields = TypeVar("Fields")
 
@@ -61,6 +61,7 @@ def _folder() -> Path | None:
         return None
     if not any(folder.glob(f"*{SUFFIX}")):
         logging.getLogger("boom_twin").warning(COMPILING, folder)
+    claim(folder)
     return folder
 
 

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ..system.child_process import beside
 from ..types import Array
 from .history import History, Truth
 from .posture import posture_picture
 from .residuals import SIGMA, has_spectrum, residual_picture, running_mean, spectrum_picture
-from .style import BLUE, GREEN, GREY, ORANGE, SKY, legend_above, picture
+from .style import BLUE, GREEN, GREY, ORANGE, SKY, import_plotting, legend_above, picture
 from .tip import tip_picture
 
 
@@ -29,17 +30,24 @@ def replay_pictures(
     if len(history.stamps_s) == 0:
         return []
     directory.mkdir(parents=True, exist_ok=True)
-    tip_picture(directory / "tip.png", session, history, truth, note)
-    written = [directory / "tip.png"]
-    if history.residual_names:
-        written.append(directory / "residuals.png")
-        residual_picture(written[-1], session, history, note)
-    if history.shapes:
-        written.append(directory / "posture.png")
-        posture_picture(written[-1], session, history, note)
-    if has_spectrum(history):
-        written.append(directory / "spectrum.png")
-        spectrum_picture(written[-1], session, history, note)
+    import_plotting()
+    tip, residuals, posture, spectrum = (directory / f"{name}.png" for name in ("tip", "residuals", "posture", "spectrum"))
+    written = [tip]
+
+    def draw_residuals() -> None:
+        if history.residual_names:
+            residual_picture(residuals, session, history, note)
+
+    with beside(draw_residuals):  # it takes as long as the others together
+        tip_picture(tip, session, history, truth, note)
+        if history.residual_names:
+            written.append(residuals)
+        if history.shapes:
+            written.append(posture)
+            posture_picture(posture, session, history, note)
+        if has_spectrum(history):
+            written.append(spectrum)
+            spectrum_picture(spectrum, session, history, note)
     return written
 
 

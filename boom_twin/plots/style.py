@@ -62,23 +62,29 @@ LARGE: dict[str, Any] = {"fontsize": 17, "color": INK, "va": "top", "ha": "left"
 SMALL: dict[str, Any] = {"fontsize": 13, "color": GREY, "va": "top", "ha": "right", "style": "italic", "parse_math": False}
 
 
+def import_plotting() -> Any:
+    """Import matplotlib, which takes long; return it, its canvas without a display, and its figure."""
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    return matplotlib, FigureCanvasAgg, Figure
+
+
 @contextmanager
 def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = (16.0, 9.0)) -> Iterator[Figure]:
     """Provide a titled figure of `size` (hundreds of pixels), and write it to `path` as PNG at the end of the block.
 
     Equal arrays give equal bytes: the file contains no time and no version. UsageError if `path` does not end with .png.
     """
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+    matplotlib, FigureCanvasAgg, Figure = import_plotting()
     if path.suffix.lower() != ".png":
         raise UsageError(f"{path}: a picture is a PNG file. Give a name that ends with .png.")
     with matplotlib.rc_context({**matplotlib.rcParamsDefault, **LOOK}):
         figure = Figure(figsize=size, dpi=DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
         top = 1.0 - 0.52 / size[1]
-        figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, top), w_pad=0.1, h_pad=0.07)  # type: ignore[union-attr, call-arg]
+        figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, top), w_pad=0.1, h_pad=0.07)
         figure.text(0.012, 1.0 - 0.14 / size[1], printable(title, ""), **LARGE)
         if note:
             figure.text(0.988, 1.0 - 0.16 / size[1], shorten(printable(note), NOTE, placeholder=" .."), **SMALL)

@@ -71,6 +71,10 @@ def one_line(error: BaseException) -> str:
 
 WAKE = 0.2
 """Time (s) between looks at whether it is over."""
+LATE = 0.5
+"""Time (s) of work on messages, without a turn of the timers, after which the row of the events executor is too long."""
+PAUSE = 0.05
+"""Most time (s) between two messages that counts as work on messages: one long callback makes no row."""
 TURN = 10.0
 """Time (s) of a turn of the events executor: each leaves 32 bytes behind in rclpy 7.1, half a megabyte in an hour of `WAKE`."""
 
@@ -79,13 +83,15 @@ class CallbackTurns:
     """Turns in which the callbacks of `node` run: until `is_due`, which is asked every `WAKE` s, or until `end`.
 
     The events executor takes half the processor time, but it is experimental. Its ``spin`` does not return, with a finite wait
-    neither as long as messages come, so a timer ends every turn. Where it is missing or fails, the single-threaded executor
-    goes on, whose turns are at most one callback long.
+    neither as long as messages come, so a timer ends every turn. It keeps one row of events for messages, services and timers.
+    In a flood of messages that row grows without limit. It is then dropped, see `_drop_row`. Where the events executor is
+    missing or fails, the single-threaded executor goes on. Its turns are at most one callback long.
     """
 
     def __init__(self, node: Node, is_due: Callable[[], bool]) -> None:
         self._node, self._is_due = node, is_due
         self._turn, self._last = Future(), 0.0
+        self._worked, self._newest = 0.0, time.monotonic()
         self._executors: list[Callable[[], Any]] = [
             lambda: import_module("rclpy.experimental").EventsExecutor(),
             SingleThreadedExecutor,
@@ -97,9 +103,14 @@ class CallbackTurns:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._executor is not None:
-            self._executor.remove_node(self._node)
+        self._release()
         self._node.destroy_timer(self._timer)
+
+    def is_flooded(self) -> bool:
+        """Return True if messages keep timers and services from their turn; ask at every message."""
+        now = time.monotonic()
+        self._worked, self._newest = self._worked + min(now - self._newest, PAUSE), now
+        return self._worked > LATE
 
     def run(self) -> None:
         """Run one turn, of `TURN` s at most."""
@@ -116,11 +127,14 @@ class CallbackTurns:
             self._turn.set_result(None)
 
     def _look(self) -> None:
+        self._worked = 0.0
         if self._is_due() or time.monotonic() >= self._last:
             self.end()
 
     def _call_back(self, is_whole: bool) -> None:
         try:
+            if self.is_flooded() and len(self._executors) > 1:
+                self._drop_row()
             if self._executor is None:
                 self._executor = self._executors[0]()
                 self._executor.add_node(self._node)
@@ -135,10 +149,28 @@ class CallbackTurns:
                 raise
             told = f"events executor: {one_line(error)}; the single-threaded executor goes on, at twice the processor time"
             Log(self._node).warning(told)
-            if self._executor is not None:
-                self._executor.remove_node(self._node)
-            self._executor = None
+            self._release()
             del self._executors[0]
+
+    def _drop_row(self) -> None:
+        """Give up the events executor and its row.
+
+        A new one hears only of what arrives from now on. So the single-threaded executor takes all that waits before.
+        """
+        self._release()
+        depths = [each.qos_profile.depth for each in self._node.subscriptions]
+        interim, left = SingleThreadedExecutor(), sum(depths) + 2 * max(depths, default=0)  # twice for the timers between
+        interim.add_node(self._node)
+        while left > 0 and not self._is_due():
+            interim.spin_once(timeout_sec=0.0)
+            left -= 1
+        interim.remove_node(self._node)
+        self._worked = 0.0
+
+    def _release(self) -> None:
+        if self._executor is not None:
+            self._executor.remove_node(self._node)
+        self._executor = None
 
 
 _BOTH = Signature([Parameter(name, Parameter.POSITIONAL_ONLY) for name in ("data", "info")])

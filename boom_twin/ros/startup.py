@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable
 from importlib.util import find_spec
 from types import FrameType
@@ -56,9 +55,7 @@ def _nothing(unraisable: object) -> None:
 class StopSignal:
     """Stop request by one of `STOPS`: checked between callbacks; KeyboardInterrupt if a callback takes too long.
 
-    rclpy reports an exception inside a callback as a fault of the callback. Python handles signals only between its
-    instructions, and one instruction of the compiler may take seconds. So a thread ends a process that does not stop.
-    Use this only in a process without unsaved data.
+    rclpy reports an exception inside a callback as a fault of the callback. Use this only in a process without unsaved data.
 
     Attributes
     ----------
@@ -68,15 +65,9 @@ class StopSignal:
 
     LONGEST = 0.5
     """Time (s) allowed to a callback before it is interrupted."""
-    LAST = 1.7
-    """Time (s) after which the thread ends the process."""
 
     def __init__(self) -> None:
         self.asked = False
-        reading, writing = os.pipe()
-        os.set_blocking(writing, False)
-        signal.set_wakeup_fd(writing, warn_on_full_buffer=False)  # written at once, even within one instruction
-        threading.Thread(target=self._end, args=(reading,), daemon=True).start()
         on_stop_signal(self._ask)
 
     def _ask(self) -> None:
@@ -84,16 +75,21 @@ class StopSignal:
         signal.signal(signal.SIGALRM, _interrupt)
         signal.setitimer(signal.ITIMER_REAL, self.LONGEST)
 
-    def _end(self, reading: int) -> None:
-        while os.read(reading, 1)[0] not in STOPS:
-            pass
-        time.sleep(self.LAST)
-        os.write(sys.stderr.fileno(), b"stopped in the midst of its work\n")
-        os._exit(0)
-
     def over(self) -> None:
         """Interrupt nothing from now on, because the process is ending."""
         signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+def end_with_threads(code: int) -> int:
+    """Return the exit code; if a daemon thread still works, end the process with it here.
+
+    Python does not wait for daemon threads. A compiler in one of them would crash while its library is unloaded.
+    """
+    if any(each.daemon for each in threading.enumerate()):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    return code
 
 
 def require_rclpy() -> None:

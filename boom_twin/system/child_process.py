@@ -1,12 +1,18 @@
-"""Command line of a child process that runs a module of this package, and nothing from the working directory."""
+"""Child processes: the command line of one that runs a module of this package only, and a copy of this process."""
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from .cores import usable_cores
 
 ROOT = Path(__file__).absolute().parents[2]
 """Folder or zip archive from which this process imported ``boom_twin``."""
@@ -44,3 +50,29 @@ def end_process(process: subprocess.Popen[Any], timeout: float, by: signal.Signa
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
+
+
+@contextmanager
+def beside(work: Callable[[], None]) -> Iterator[None]:
+    """Do `work`, which writes files, in a copy of this process while the block runs.
+
+    It is done here, after the block, if the copy failed; also with a single core, or with threads, which a copy would lack.
+    """
+    if sys.platform != "linux" or usable_cores() < 2 or threading.active_count() > 1:
+        yield
+        work()
+        return
+    pid = os.fork()
+    if pid == 0:
+        code = 1
+        try:
+            work()
+            code = 0
+        finally:
+            os._exit(code)
+    try:
+        yield
+    finally:
+        _, status = os.waitpid(pid, 0)
+    if status:
+        work()

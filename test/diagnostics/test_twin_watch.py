@@ -47,7 +47,7 @@ class Rig:
         return self.look()
 
     def look(self) -> dict[str, Status]:
-        found = all_pieces(self.watch.look({"scene": "s"}, True, self.peers, [Peers("/out", ("/screen",))], self.now + 1e9))
+        found = all_pieces(self.watch.look({"scene": "s"}, "", self.peers, [Peers("/out", ("/screen",))], self.now + 1e9))
         return {status.name: status for status in found}
 
     def _message(self, stream: Stream) -> None:
@@ -100,8 +100,8 @@ def test_a_residual_that_grows_and_shrinks_again(rig: Rig) -> None:
     told = [rig.second()["residual joint_3"] for rig.scale in [5.0] * 14 + [1.0] * 20]
     assert [status.values["window_s"] for status in told[:14]] == pytest.approx([*range(1, 11), 10, 10, 10, 10])
     raised = next(status for status in told if status.level == Level.ERROR)
-    assert raised.message.endswith(f"for {raised.values['window_s']:.2g} s") and raised.values["window_s"] < 5.0
-    assert told[13].message.endswith("for 10 s") and told[-1].level == Level.OK
+    assert raised.message == "larger than noise explains" and raised.values["window_s"] < 5.0
+    assert told[-1].level == Level.OK
 
 
 def test_a_failure_of_the_model_is_urgent_once(rig: Rig) -> None:
@@ -128,14 +128,15 @@ def test_strokes_that_give_no_prediction_are_an_error_with_what_is_wrong_with_th
             rig._message(Stream.STROKES)
         words = {"leap": "far from where it was", "late": "late"}
         counts = {"scene": "s", "samples: leap": leaps, "samples: late": 7}
-        return all_pieces(rig.watch.look(counts, True, rig.peers, [], rig.now + 1e9, words=words))[0]
+        return all_pieces(rig.watch.look(counts, "", rig.peers, [], rig.now + 1e9, words=words))[0]
 
     after(rig, 2)
     assert look(3).level == Level.OK
     monkeypatch.setattr(rig, "_report", refused)
     found = [look(3 + 100 * k) for k in range(1, 5)]
     assert found[0].level == Level.OK and found[-1].level == Level.ERROR
-    assert found[-1].message == "no prediction for 4.0 s, though strokes come: 400 times leap (far from where it was)"
+    assert found[-1].message == "no prediction, though strokes come: leap (far from where it was)"
+    assert found[-1].values["no_prediction_s"] == pytest.approx(4.0)
     monkeypatch.undo()
     assert look(403).level == Level.OK
 
@@ -155,9 +156,9 @@ def test_a_boom_outside_the_models_validity_is_a_warning_as_long_as_it_is(rig: R
 def test_a_model_that_is_too_slow_and_clocks_that_differ(rig: Rig) -> None:
     rig.behind[Stream.ANGLES] = 0.08
     found = after(rig, 4, took=0.004)
-    assert found["model"].level == Level.WARN and "80% of the time" in found["model"].message
+    assert found["model"].level == Level.WARN and found["model"].values["load"] == pytest.approx(0.8)
     angles = found["joint_angles"]
-    assert angles.level == Level.WARN and "stamped 0.080 s behind the strokes" in angles.message
+    assert angles.level == Level.WARN and "stamped behind the strokes" in angles.message
     assert angles.values["clock_offset_s"] == pytest.approx(0.08) and angles.values["clock_offset_s_warn"] == 0.05
 
 

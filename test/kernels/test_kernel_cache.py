@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from boom_twin.cli.main import main
 from boom_twin.kernels import compiled_cache as kernel_cache
 from boom_twin.kernels.compiled_cache import ROOT, cache_folder, fault_of, read_checked, source_hash, write_checked
 
@@ -64,7 +65,7 @@ def test_what_one_process_compiled_another_loads(tmp_path: Path) -> None:
     assert "compiling the model" in first.stderr and "compiling" not in second.stderr
     (folder,) = (tmp_path / "cache").iterdir()
     assert folder.stat().st_mode & 0o777 == 0o700
-    assert {path.suffix for path in folder.iterdir()} == {".kernel"}
+    assert {path.suffix for path in folder.iterdir()} == {".kernel", ".user"}
 
 
 LOST = """
@@ -77,12 +78,43 @@ def test_machine_code_whose_handing_over_was_interrupted_is_used_and_not_kept(tm
     """A signal that comes while LLVM hands it over raises there, in a callback of C, where every exception is lost."""
     done = run(tmp_path / "cache", before=LOST)
     assert told(done) == "(4.0, 4.0) loaded 0" and "Traceback" not in done.stderr
-    assert list((tmp_path / "cache").glob("*/*")) == []
+    assert list((tmp_path / "cache").glob("*/*.kernel")) == []
 
 
 def test_a_loaded_kernel_can_be_called_by_one_that_is_compiled(tmp_path: Path) -> None:
     run(tmp_path / "cache")
     assert told(run(tmp_path / "cache", after=CALLER)).splitlines() == ["(4.0, 4.0) loaded 2", "11.0"]
+
+
+def test_caches_that_no_installation_uses_are_removed_with_a_new_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    names = ("earlier", "shared", "of_others", "unknown", "forgotten")
+    caches = {name: tmp_path / f"{place:016x}" for place, name in enumerate(names)}
+    for folder in caches.values():
+        folder.mkdir(mode=0o700)
+        write_checked(folder / "add.kernel", b"code")
+    kernel_cache.claim(caches["shared"])
+    (own,) = caches["shared"].glob("*.user")
+    shutil.copy(own, caches["earlier"])
+    for name in ("shared", "of_others"):
+        write_checked(caches[name] / "other.user", str(tmp_path).encode())
+    write_checked(caches["forgotten"] / "gone.user", b"/gone")
+    os.utime(caches["forgotten"], (0.0, 0.0))
+    new = cache_folder()
+    new.mkdir(mode=0o700)
+    kernel_cache.claim(new)
+    assert {name for name, folder in caches.items() if folder.exists()} == {"shared", "of_others", "unknown"}
+    assert not own.exists() and len(list(new.glob("*.user"))) == 1
+    (tmp_path / "index").mkdir()
+    assert main(["warm", "--remove"]) == 0 and "removed 4 folders of compiled kernels" in capsys.readouterr().out
+    assert [each.name for each in tmp_path.iterdir()] == ["index"]
+
+
+def test_warm_says_where_the_kernels_are(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["warm"]) == 0 and main(["warm"]) == 0
+    assert f"kernels in {cache_folder()}" in (out := capsys.readouterr().out) and "nothing to compile" in out
 
 
 def harmed(path: Path, harm: str) -> None:

@@ -14,6 +14,7 @@ pytest.importorskip("rclpy")
 
 from lifecycle_msgs.msg import Transition
 from rcl_interfaces.srv import DescribeParameters
+from ros_rig import Rig
 
 from boom_twin import Settings
 
@@ -49,6 +50,9 @@ def test_parameters_have_bounds_and_are_fixed_while_configured(idle: Any, remote
     for name, value in [("imu_sigma", 0.05), ("scene", "other.yaml")]:
         refused = remote.set(name, value)
         assert not refused.successful and f"{name}: fixed while the node is configured" in refused.reason
+    before = {"imu_sigma": 0.03, "scene": "", "autostart": False, "gap": Settings().gap}
+    assert all(remote.set(name, value).successful for name, value in before.items())  # as they are
+    assert not remote.set("autostart", True).successful
     assert not any(remote.set(name, absurd).successful for name, absurd in [("gap", 1e308), ("gap", 5e-324), ("payload", -2.0)])
     assert remote.set("gap", 0.2).successful
     assert remote.change(Transition.TRANSITION_CLEANUP)
@@ -85,19 +89,8 @@ ACTIVE, PREPARING = "active;", "preparing the model"
 CLOSED = pytest.mark.skipif(signal.getsignal(signal.SIGHUP) is signal.SIG_IGN, reason="nohup: a closed terminal ends nothing")
 
 
-@pytest.mark.parametrize(
-    ("moment", "number"),
-    [
-        ("", signal.SIGINT),
-        pytest.param(ACTIVE, signal.SIGHUP, marks=CLOSED),
-        pytest.param(PREPARING, signal.SIGTERM, marks=pytest.mark.slow),
-    ],
-)
-def test_signals_end_the_node_in_order_at_any_time(
-    spawn_node: Callable[..., Any], number: signal.Signals, moment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if moment == PREPARING:
-        monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))  # so that it compiles
+@pytest.mark.parametrize(("moment", "number"), [("", signal.SIGINT), pytest.param(ACTIVE, signal.SIGHUP, marks=CLOSED)])
+def test_signals_end_the_node_in_order_at_any_time(spawn_node: Callable[..., Any], number: signal.Signals, moment: str) -> None:
     node = spawn_node()
     node.wait_for(moment)
     while not is_caught(node, signal.SIGTERM):
@@ -107,3 +100,19 @@ def test_signals_end_the_node_in_order_at_any_time(
         assert "stopping" in node.said()
     else:
         assert "Traceback" not in node.said() and "FATAL" not in node.said()
+
+
+def test_a_node_that_compiles_answers_and_ends(
+    spawn_node: Callable[..., Any], new_rig: Callable[..., Rig], remote: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = new_rig()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))  # so that the node compiles
+    node = spawn_node()
+    rig.until(lambda: rig.words("model") == PREPARING)
+    assert remote.state() == "active" and remote.set("payload", 30.0).successful
+    refused = remote.set("scene", "other.yaml")
+    assert not refused.successful and "fixed while the node is configured" in refused.reason
+    before = float(rig.values("model")["preparing_s"])
+    rig.until(lambda: float(rig.values("model")["preparing_s"]) > before + 0.5)
+    assert node.stop(signal.SIGINT) == 0 and "stopping" in node.said(), node.said()
+    assert not any(word in node.said() for word in ("Traceback", "FATAL", "model ready")), node.said()

@@ -185,7 +185,7 @@ class _Twin:
             raise BagError(f"{reason}: the scene is of another boom. Give the one of this by --scene.")
 
     def _look(self) -> None:
-        found = all_pieces(self._watch.look(self.twin.counts, True, self._peers, (), self._time))
+        found = all_pieces(self._watch.look(self.twin.counts, "", self._peers, (), self._time))
         store, now = self._feed.store, self._feed.now()
         store.set_statuses(now, store.statuses(now).updated(now, map(_as_message, found), self._time))
         self._looked = self._time

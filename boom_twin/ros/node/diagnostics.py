@@ -15,7 +15,7 @@ from rclpy.qos import LivelinessPolicy, QoSCompatibility, QoSProfile, qos_check_
 
 from ...bag.joint_names import extra_names_message, strange_names_message
 from ...config.settings import Thresholds
-from ...diagnostics.levels import Level
+from ...diagnostics.levels import Level, Value
 from ...diagnostics.model_status import stress_model
 from ...diagnostics.sensor_status import sensors_of
 from ...diagnostics.topic_status import Peers
@@ -110,6 +110,7 @@ class ClockCheck:
 
 WORDS = {**EVENTS, **ODDITIES, "too large": f"a message of more than {LARGEST >> 10} KiB, which is left out"}
 """Descriptions logged with the first irregular sample of each kind."""
+NOT_ACTIVE, PREPARING = "not active", "preparing the model"
 TICK = 0.1  # s of steady time between checks for an urgent state
 PERIOD = 1.0  # s between diagnostics messages if nothing is urgent
 PIECE = 0.002  # s between pieces of a check; samples are processed in between
@@ -145,6 +146,7 @@ class Diagnostics:
         self._work: Iterator[None] | None = None
         self._newest_piece, self._is_peers_turn = 0.0, False
         self._due, self._active = time.monotonic() + PERIOD, False
+        self._preparing_since: float | None = None
         self.watch = TwinWatch({}, {}, Thresholds())
         self._counts: dict[str, Mapping[str, int]] = {}
         self._shedding: LoadShedding | None = None
@@ -152,6 +154,10 @@ class Diagnostics:
         self._scene, self._joints = "", 0
         self._told: set[str] = set()
         self._clock = ClockCheck()
+
+    def prepare(self) -> None:
+        """Report from now on that the model is being prepared, until `configure` or `stop`."""
+        self._preparing_since = time.monotonic()
 
     def configure(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
         """Watch a newly configured twin."""
@@ -162,6 +168,7 @@ class Diagnostics:
         self._counts = {"samples": twin.counts, "messages": decoder.oddities, "received": self._queue.oddities}
         self._scene, self._joints, self._decoder, self._shedding = scene, twin.plan.joints, decoder, twin.shedding
         self._told.clear()
+        self._preparing_since = None
 
     def start(self) -> None:
         """Start watching when the node becomes active. From now on a silent input is stale."""
@@ -199,17 +206,20 @@ class Diagnostics:
 
     def _look(self) -> Iterator[None]:
         clock = self._node.get_clock().now().nanoseconds * NANO
-        told: dict[str, str | int] = {"scene": self._scene}
+        told: dict[str, Value] = {"scene": self._scene}
         told |= {f"{kind}: {name}": count for kind, found in self._counts.items() for name, count in sorted(found.items())}
         peers = self._peers
         wrong, received = self._wrong_names(), self._queue.look()
         ends = peers.publishers, peers.subscribers.values()
         shed = self._shedding
         left_out = {} if shed is None else {"shapes": shed.shapes, "looks at health": shed.health}
-        found = yield from self.watch.look(told, self._active, *ends, clock, received, wrong, left_out, WORDS)
+        since, idle = self._preparing_since, "" if self._active else NOT_ACTIVE
+        if since is not None:
+            idle, told["preparing_s"] = PREPARING, time.monotonic() - since
+        found = yield from self.watch.look(told, idle, *ends, clock, received, wrong, left_out, WORDS)
         yield
+        self._tell_oddities()  # whoever sees a count finds its line in the log
         self._publisher.show(found)
-        self._tell_oddities()
         self._tell_types()
         self._tell_clock(clock, max((each.wait for each in received.values() if each.wait > 0.0), default=0.0))
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from ...errors import BoomTwinError
 from ...system.cores import use_one_blas_thread
 from ...system.terminal_text import open_closed_streams
-from ..startup import StopSignal, require_rclpy
+from ..startup import StopSignal, end_with_threads, require_rclpy
 
 use_one_blas_thread()
 
@@ -34,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
         require_rclpy()
-        return _run(arguments, StopSignal())
+        return end_with_threads(_run(arguments, StopSignal()))
     except BoomTwinError as error:
         print(f"twin_node: {error}", file=sys.stderr)
         return 1
@@ -67,7 +67,7 @@ def _live(node: TwinNode, stop: StopSignal) -> int:
     from ..runtime import STOPPED, CallbackTurns
 
     def is_over() -> bool:
-        return node.finished or stop.asked
+        return node.finished or stop.asked or (node.failed and node.autostart)
 
     try:
         if node.autostart and not node.start():
@@ -78,6 +78,8 @@ def _live(node: TwinNode, stop: StopSignal) -> int:
     except STOPPED:
         pass
     stop.over()
+    if node.failed:
+        return 1
     if not node.finished:
         node.get_logger().info("stopping")
         node.leave()

@@ -29,6 +29,7 @@ from ...twin.loaded_model import ModelPreparation
 from ...twin.twin import Twin
 from ...types import SENSORS, Report, Sample, Stream
 from ..runtime import Log, message_class, one_line, qos_profile
+from .background_task import BackgroundTask
 from .diagnostics import Diagnostics
 from .monitor_process import MonitorProcess
 from .parameters import current, declare, frame_of, guard, path_of, refusal
@@ -41,8 +42,10 @@ SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FA
 class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not typed
     """Node ``boom_twin``: strokes, joint angles and tip IMU in, predictions and residuals out.
 
-    It listens only while it is active, so a publisher that has matched its subscriptions is heard. The model advances
-    by the stamps of the samples; no timer and no clock has a part in what is published, except on ``/diagnostics``.
+    It listens only while it is active and its model is ready, so a publisher that has matched its subscriptions is heard. The
+    model advances by the stamps of the samples. No timer and no clock affects what is published, except on ``/diagnostics``.
+    Compiling the model may take a minute. A thread does it after the transition to configure; the node may be activated
+    meanwhile.
 
     Raises
     ------
@@ -54,18 +57,22 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         super().__init__(NODE)
         self._log = Log(self)
         self.finished = False  # after the transition to shut down
+        self.failed = False  # the model could not be made
+        self._is_configured = self._is_active = False
+        self._making: BackgroundTask[Twin] | None = None
         self._twin: Twin | None = None
         self._page: MonitorProcess | None = None
         self._outputs: dict[Output, LifecyclePublisher] = {}
         self._subscriptions_in: list[Subscription[Any]] = []
         self._refused = ""
+        # rclpy has no public way to answer a transition that the present state lacks, nor to ask for the state.
         self._service_change_state.callback = partial(self._change_state, self._service_change_state.callback)
         declare(self)
         self._topics = load_mapping(path_of(self, "mapping"))
         self.queue = ReceiveQueue()
         self._diagnostics = Diagnostics(self, self._topics, self.queue)
         self._diagnostics.watch.thresholds = current(self, Thresholds)
-        guard(self, lambda: self._twin is not None, self._tune)
+        guard(self, lambda: self._is_configured, self._tune)
 
     @property
     def autostart(self) -> bool:
@@ -73,10 +80,16 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         return bool(self.get_parameter("autostart").value)
 
     def set_parameters_atomically(self, parameter_list: list[Parameter[Any]]) -> SetParametersResult:
-        """Set parameters as any node does; give a reason with fault and remedy where rclpy has none."""
+        """Set parameters as any node does; give a reason with fault and remedy where rclpy has none.
+
+        A value that a parameter has already is accepted and changes nothing, also where the parameter is fixed.
+        """
         if reason := refusal(self, parameter_list):
             return SetParametersResult(successful=False, reason=reason)
-        return super().set_parameters_atomically(parameter_list)
+        now = [self.get_parameter_or(each.name) for each in parameter_list]
+        pairs = zip(parameter_list, now, strict=True)
+        changed = [new for new, old in pairs if (new.type_, new.value) != (old.type_, old.value)]
+        return super().set_parameters_atomically(changed) if changed else SetParametersResult(successful=True)
 
     def start(self) -> bool:
         """Configure and activate the node; return True if both succeeded."""
@@ -97,9 +110,9 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             return response
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Load the scene, compile its model, offer the outputs; on failure, log the reason and return FAILURE."""
+        """Load the scene, offer the outputs, begin to make the model; on failure, log the reason and return FAILURE."""
         try:
-            self._build()
+            self._begin_making()
         except BoomTwinError as error:
             self._log.fatal(str(error))
             return FAILURE
@@ -113,32 +126,22 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         if self.get_parameter("monitor").value:
             mapping, scene = (self.get_parameter(name).value for name in ("mapping", "scene"))
             self._page = MonitorProcess(self, self._topics, mapping, scene)
+        self._is_configured, self.failed = True, False
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Start listening; the model starts from the next full stroke sample."""
-        assert self._twin is not None
-        self._preparation.finish()
-        self._twin.renew()
-        self._diagnostics.start()
-        gc.collect()
-        gc.freeze()  # what lives from here on as long as the node is not searched again
+        """Start listening, as soon as the model is ready; it starts from the next full stroke sample."""
         outcome = super().on_activate(state)
-        for name, streams in self._topics.heard.items():
-            topic = self._topics.inputs[streams[0]]
-            kind, qos = message_class(topic.type), qos_profile(topic.qos)
-            decoder = CdrDecoder(topic.type, field=SENSORS[streams[0]].field)
-            put = self.queue.open(name, topic.qos.depth, partial(self._receive, streams, decoder))
-            self._subscriptions_in.append(self.create_subscription(kind, name, put, qos, raw=True))
-        heard = ", ".join(subscription.topic_name for subscription in self._subscriptions_in)
-        self._log.info(f"active; listening to {heard}")
+        self._is_active = True
+        self._listen()
         return outcome
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop listening."""
-        self.queue.catch_up()
-        for sample in self._decoder.assembler.rest():
-            self._take(sample)
+        if self._twin is not None:
+            self.queue.catch_up()
+            for sample in self._decoder.assembler.rest():
+                self._take(sample)
         self._stop_listening()
         return super().on_deactivate(state)
 
@@ -165,27 +168,66 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         with suppress(RuntimeError):  # RCLError: no transition goes on from here
             self.trigger_shutdown()
 
-    def _build(self) -> None:
-        """Compile a twin from scene and settings."""
+    def _begin_making(self) -> None:
+        """Read scene, mapping and settings, and make the twin of them in a thread."""
         found = scene_from(path_of(self, "scene"))
         scene, name = found.scene, found.source
         for oddity in found.oddities:
             self._log.warning(str(oddity))
         settings, joints = current(self, Settings), len(scene.joints)
         topics = load_mapping(path_of(self, "mapping"), joints).of_joints(joint.range_deg for joint in scene.joints)
-        mounts, reads, absent = topics.mounts(joints), topics.stroke_reading, topics.absent
-        health, causes = (self.get_parameter(name).value for name in ("health", "causes"))
-        twin = Twin(scene, settings, mounts, health, reads, absent, causes=causes, is_live=True)
+        health, causes = (self.get_parameter(key).value for key in ("health", "causes"))
+        mounts, frame = topics.mounts(joints), frame_of(self, topics)
+
+        def make() -> Twin:
+            reads, absent = topics.stroke_reading, topics.absent
+            twin = Twin(scene, settings, mounts, health, reads, absent, causes=causes, is_live=True)
+            twin.warm_up()
+            import_module("scipy.special")  # the first alarm and the first pause need it; their samples would wait 0.3 s
+            return twin
+
+        def use(twin: Twin) -> None:
+            self._decoder, self._preparation = SampleDecoder(joints, topics), ModelPreparation(twin)
+            self._encoder = ReportEncoder(scene, settings, frame)
+            self._diagnostics.configure(twin, self._decoder, name)
+            acknowledge, is_heard = self._diagnostics.watch.acknowledge, lambda: bool(self._subscriptions_in)
+            self._twin_services = Services(self, twin, acknowledge, is_heard, self.queue.catch_up, found.text)
+            self._start_log = StartLog(self._log)
+            self._twin = twin
+            self._log.info("model ready")
+            now = current(self, Settings)
+            self._tune({key: getattr(now, key) for key in now.live_names() if getattr(now, key) != getattr(settings, key)})
+            self._listen()
+
         self._log.info(f"{name}: {len(scene.sections)} sections; preparing the model (a minute at first start)")
-        twin.warm_up()
-        import_module("scipy.special")  # of the first alarm and the first pause, whose samples would wait for it for 0.3 s
-        self._twin, self._decoder, self._preparation = twin, SampleDecoder(joints, topics), ModelPreparation(twin)
-        self._encoder = ReportEncoder(scene, settings, frame_of(self, topics))
-        self._diagnostics.configure(twin, self._decoder, name)
-        acknowledge, is_active = self._diagnostics.watch.acknowledge, lambda: bool(self._subscriptions_in)
-        self._twin_services = Services(self, twin, acknowledge, is_active, self.queue.catch_up, found.text)
-        self._start_log = StartLog(self._log)
-        self._log.info("model ready")
+        self._diagnostics.prepare()
+        self._making = BackgroundTask(self, make, use, self._give_up)
+
+    def _give_up(self, error: Exception) -> None:
+        """Return to the state before configuring, because the model could not be made; log the reason."""
+        self._log.fatal(str(error) if isinstance(error, BoomTwinError) else "".join(traceback.format_exception(error)))
+        self.failed = True
+        if self._is_active:
+            self.trigger_deactivate()
+        self.trigger_cleanup()
+
+    def _listen(self) -> None:
+        """Start listening, if the node is active and the model is ready."""
+        if self._twin is None or not self._is_active:
+            return
+        self._preparation.finish()
+        self._twin.renew()
+        self._diagnostics.start()
+        gc.collect()
+        gc.freeze()  # what lives from here on as long as the node is not searched again
+        for name, streams in self._topics.heard.items():
+            topic = self._topics.inputs[streams[0]]
+            kind, qos = message_class(topic.type), qos_profile(topic.qos)
+            decoder = CdrDecoder(topic.type, field=SENSORS[streams[0]].field)
+            put = self.queue.open(name, topic.qos.depth, partial(self._receive, streams, decoder))
+            self._subscriptions_in.append(self.create_subscription(kind, name, put, qos, raw=True))
+        heard = ", ".join(subscription.topic_name for subscription in self._subscriptions_in)
+        self._log.info(f"active; listening to {heard}")
 
     def _tune(self, live: dict[str, float]) -> None:
         """Apply the live parameters that were set."""
@@ -196,6 +238,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             self._preparation.tune(asked)
 
     def _stop_listening(self) -> None:
+        self._is_active = False
         self._diagnostics.stop()
         while self._subscriptions_in:
             self.destroy_subscription(self._subscriptions_in.pop())
@@ -206,6 +249,9 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         for publisher in self._outputs.values():
             self.destroy_lifecycle_publisher(publisher)
         self._outputs.clear()
+        self._is_configured = False
+        if self._making is not None:
+            self._making.abandon()
         if self._twin is not None:
             self._twin_services.close()
             self._preparation.close()

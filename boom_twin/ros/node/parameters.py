@@ -63,7 +63,8 @@ def declare(node: Node) -> None:
     UsageError
         A value given at start has the wrong type or is out of range, or is of a parameter that there is not, or no more.
     """
-    for name in sorted(node._parameter_overrides.keys() & RETIRED.keys()):
+    given = node._parameter_overrides  # rclpy has no public way to see those that were not declared
+    for name in sorted(given.keys() & RETIRED.keys()):
         raise UsageError(f"{SOURCE}: {name}: {RETIRED[name]}. See msg_config/twin.yaml.")
     try:
         for row in TABLE:
@@ -74,7 +75,7 @@ def declare(node: Node) -> None:
         raise UsageError(f"{SOURCE}: {one_line(error)}. {remedy}") from error
     except ParameterException as error:
         raise UsageError(f"{SOURCE}: {one_line(error)}. See msg_config/twin.yaml.") from error
-    if told := _unknown(node, node._parameter_overrides):
+    if told := _unknown(node, given):
         raise UsageError(f"{SOURCE}: {told}. See msg_config/twin.yaml.")
 
 

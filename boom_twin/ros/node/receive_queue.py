@@ -1,8 +1,8 @@
 """Bounded queue of received messages, so that a flood leaves time for services, timers and diagnostics.
 
 The executor only puts messages here, which takes some microseconds; they are read between two turns of it, for a limited time.
-Left to itself rclpy's events executor calls back once for every message that ever arrived, in one row with services and timers:
-where messages come faster than they are read, the row grows without limit.
+rclpy's events executor calls back once for every message that ever arrived, in one row with services and timers. So messages
+are taken over before they are read. Where even that is too slow, `boom_twin.ros.runtime.CallbackTurns` drops the row.
 """
 
 from __future__ import annotations
@@ -178,7 +178,7 @@ class ReceiveQueue:
     def _read_at_once(self, turns: CallbackTurns) -> None:
         if not self.is_behind:
             self.work(BUDGET)
-        if self:
+        if self or turns.is_flooded():
             self._on_put = None
             turns.end()
 

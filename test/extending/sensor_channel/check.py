@@ -63,7 +63,7 @@ for sample in samples:
 assert {residuals.names for residuals in found} == {(CHANNEL,)} and len(found) == count
 values, ratios = (np.array([getattr(residuals, part)[0] for residuals in found]) for part in ("values", "normalised"))
 assert np.abs(values - WRONG).max() < 6e-4 and ratios.min() > 5.0
-looked = all_pieces(watch.look({}, True, {stream: Peers(name) for stream, name in names.items()}, (), now))
+looked = all_pieces(watch.look({}, "", {stream: Peers(name) for stream, name in names.items()}, (), now))
 statuses = {status.name: status.message for status in looked}
 assert statuses[f"sensor {CHANNEL}"] == "measuring"
 assert {"tip_inclination", "residual tip_inclination"} <= set(statuses)
