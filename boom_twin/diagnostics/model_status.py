@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Mapping
-from math import isfinite, nan
+from math import nan
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ..health.sensor_monitor import noise_as_text
 from ..predictions import Estimate, Prediction
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Health, Report, StrokeReading
-from .levels import Bounds, ComponentJudge, Level, Status
+from .levels import Bounds, ComponentJudge, Level, Status, Value
 
 FAILURE_SHOWN = 1.0
 """Seconds for which a failure is shown."""
@@ -83,7 +83,7 @@ class ModelWatch:
         elif not is_fed or (not self._predictions and silent <= stale_after):
             judge.fault(Level.WARN, "waiting for strokes")
         elif silent > stale_after:
-            judge.fault(Level.ERROR, f"no prediction for {silent:.1f} s, though strokes come{self._why(counts, words)}")
+            judge.fault(Level.ERROR, f"no prediction, though strokes come{self._why(counts, words)}")
         elif self._is_deflected:
             judge.fault(Level.WARN, f"deflected: {words.get('deflected', '')}")
         if self._predicted_at == now:
@@ -97,7 +97,7 @@ class ModelWatch:
         if not most or new[most] <= 0:
             return ""
         name = most.partition(": ")[2]
-        return f": {new[most]} times {name} ({words.get(name, 'see the counts')})"
+        return f": {name} ({words.get(name, 'see the counts')})"
 
     def _check_load(self, judge: ComponentJudge) -> None:
         """Judge the run time of a step against the time available for it."""
@@ -107,7 +107,7 @@ class ModelWatch:
         load = self._busy / span if span > 0.0 else nan
         means = (self._busy / steps, self._longest, span / steps) if steps else (nan, nan, nan)
         judge.note(dict(zip(("step_mean_s", "step_longest_s", "step_budget_s"), means, strict=True)))
-        told = f"the model takes {load:.0%} of the time there is: end other work of this computer, or lower the strokes' rate"
+        told = "the model takes too much of the time there is: end other work of this computer, or lower the strokes' rate"
         judge.check("load", load, Bounds(thresholds.load_warn, thresholds.load_error), told)
         if steps:
             self._predicted_at = now
@@ -142,12 +142,13 @@ class LoadWatch:
         if load is None:
             return None
         if load.is_there:
-            self.explanation = f"a load at the tip moves the boom: {load.text}"
+            self.explanation = "a load at the tip moves the boom"
         judge.note({"rms_N": load.rms})
         if (pulses := load.pulses) is not None:
             frequency = {"frequency_Hz": pulses.frequency, "frequency_sigma_Hz": pulses.frequency_sigma}
             judge.note({"pulses_N": pulses.height} | frequency)
-        return judge.finish(load.text)
+        found = "pump pulses at the tip" if pulses is not None else "a load at the tip that the model does not know"
+        return judge.finish(found if load.is_there else "no load at the tip beside the known one")
 
 
 class ResidualWindow:
@@ -181,15 +182,14 @@ class ResidualWindow:
         if count:
             rms, mean, largest = float(np.sqrt(np.mean(values**2))), float(np.mean(values)), float(np.abs(values).max())
         window = min(thresholds.residual_window, now - self._since)
-        told = f"{rms:.2f} times as large as noise explains, for {window:.2g} s"
-        told += "; health finds no fault in that" if is_judged and alarm is None else ""
+        told = "larger than noise explains" + ("; health finds no fault in that" if is_judged and alarm is None else "")
         if alarm is not None:
             judge.fault(*alarm)
         bounds = Bounds(thresholds.residual_warn, nan if is_judged else thresholds.residual_error)
         judge.check("rms_normalised", rms, Bounds() if explained else bounds, told)
         judge.note({"mean_normalised": mean, "largest_normalised": largest, "count": count, "window_s": window})
         if not count:
-            judge.fault(Level.STALE, f"none for {window:.2g} s")
+            judge.fault(Level.STALE, "no readings")
         return judge.finish(explained or "as large as noise explains")
 
 
@@ -214,7 +214,7 @@ class HealthWatch:
         ended = [alarm for alarm in self._alarms.all if alarm.until is not None]
         self._alarms.forget_ended()
         self._before.clear()
-        return "; ".join(f"{alarm.channel}: {alarm.told}" for alarm in ended) or "no alarm has ended"
+        return "; ".join(alarm.told for alarm in ended) or "no alarm has ended"
 
     def of(self, channel: str) -> tuple[Level, str] | None:
         """Return level and words of the active alarm of a channel; None without one."""
@@ -240,12 +240,12 @@ class HealthWatch:
         judge.note({"alarms": lasting, "not_acknowledged": len(alarms) - lasting + self._before.total()})
         for number, alarm in enumerate(alarms, 1):
             times = 1 + self._before[repeated(alarm)]
-            ended = f" (ended{f', {times} times' if times > 1 else ''}; not acknowledged)"
-            judge.fault(_level_of(alarm), f"{alarm.channel}: {alarm.told}{'' if alarm.until is None else ended}")
-            judge.note({f"{number} {key}": value for key, value in {"channel": alarm.channel, **values_of(alarm)}.items()})
+            judge.fault(_level_of(alarm), alarm.told if alarm.until is None else f"{alarm.told} (ended, not acknowledged)")
+            values: dict[str, Value] = {"channel": alarm.channel, **values_of(alarm), "times": times}
+            judge.note({f"{number} {key}": value for key, value in values.items()})
         judge.note(self._noise)
-        for told in noise_as_text(self._noise):
-            judge.fault(Level.WARN, told)
+        if noise_as_text(self._noise):
+            judge.fault(Level.WARN, "most sensors of a stream are noisier than its setting states")
         return judge.finish("no alarm")
 
 
@@ -273,7 +273,5 @@ def stress_status(
         megapascals = {f"{name}_MPa": float(stress) / MEGA, f"{name}_sigma_MPa": float(sigma) / MEGA}
         judge.note({f"{name}_Nm": float(moment)} | megapascals)
     most = int(abs(found.stresses).argmax())
-    sigma = float(found.stress_sigmas[most])
-    deviation = f" ± {sigma / MEGA:.2g}" if isfinite(sigma) else ""
-    largest = f"{found.stresses[most] / MEGA:.3g}{deviation} MPa"
-    return judge.finish(f"{largest} in {model.stations[most].name}, the most of all stations")
+    judge.note({"largest_MPa": float(found.stresses[most]) / MEGA, "largest_at": model.stations[most].name})
+    return judge.finish("bending stress of all stations")

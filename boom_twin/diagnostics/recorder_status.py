@@ -42,11 +42,11 @@ def recording_status(judge: ComponentJudge, counts: Sequence[TopicCount], disk: 
     thresholds, missed = judge.at.thresholds, sum(count.missed or 0 for count in counts)
     if end:
         judge.fault(Level.ERROR, end)
-    judge.check("never_arrived", missed, Bounds(warn=0), f"{missed} messages were published and never arrived")
-    told = f"messages of the last {disk.lag:.1f} s are not on the disk yet"
-    judge.check("lag_s", disk.lag, Bounds(thresholds.lag_warn, thresholds.lag_error), told)
+    judge.check("never_arrived", missed, Bounds(warn=0), "messages were published and never arrived")
+    lag = Bounds(thresholds.lag_warn, thresholds.lag_error)
+    judge.check("lag_s", disk.lag, lag, "the newest messages are not on the disk yet")
     room = Bounds(thresholds.disk_warn, thresholds.disk_error, low=True)
-    judge.check("disk_left_s", disk.left, room, f"the disk is full in {disk.left:.0f} s")
+    judge.check("disk_left_s", disk.left, room, "the disk is nearly full")
     judge.note({} if end is None else {ENDED: 1})
     judge.note({"disk_free_bytes": disk.free, "waiting_bytes": disk.waiting, "written_bytes": disk.written})
     for count in counts:

@@ -68,14 +68,14 @@ def topic_status(
     publishers.warn(judge)
     if stream.newest is None and not is_required:
         return judge.finish("not there; optional")
-    told = f"silent for {age:.1f} s" if stream.newest is not None else "nothing received yet"
+    told = "silent" if stream.newest is not None else "nothing received yet"
     if stream.newest is None and len(publishers.names) > len(publishers.incompatible):
-        told += f", though a publisher is there. {OTHER_USER}"
+        told += f"; though a publisher is there. {OTHER_USER}"
     judge.check_age(age, told)
     if stream.newest is not None:
         judge.note({"newest_stamp_s": seconds(stream.newest), "clock_minus_stamp_s": at.clock - stream.newest * NANO})
     where = "behind" if offset > 0.0 else "ahead of"
-    told = f"stamped {abs(offset):.3f} s {where} the strokes: synchronise the sensors' clocks"
+    told = f"stamped {where} the strokes: synchronise the sensors' clocks"
     judge.check("clock_offset_s", abs(offset), Bounds(at.thresholds.clock_offset), told)
     return judge.finish("listened to" if stream.newest is not None else "waiting for a message")
 
@@ -88,7 +88,7 @@ def outputs_status(judge: ComponentJudge, subscribers: Iterable[Peers]) -> Statu
         judge.note({f"subscribers {each.address}": len(each.names)})
         each.warn(judge, f"{each.address}: ")
     if shared:
-        told = f"{shared} of them are published by another node too: give each node a namespace of its own, or end one"
+        told = "some of them are published by another node too: give each node a namespace of its own, or end one"
         judge.fault(Level.ERROR, told)
     return judge.finish("offered")
 
@@ -104,7 +104,7 @@ def publishers_status(judge: ComponentJudge, publishers: Mapping[Stream, Peers],
     for address, sharing in streams.items():
         peers, names = publishers[sharing[0]], ", ".join(publishers[sharing[0]].names)
         judge.note({f"{address} publishers": names, f"{address} gids": ", ".join(peers.ids)})
-        told = f"{len(peers.names)} publishers of {address}: {names}. {FOLLOWED}"
+        told = f"several publishers of {address}: {names}. {FOLLOWED}"
         surplus = max(0, len(peers.names) - len(sharing))
         judge.check(f"{address} surplus", surplus, Bounds(error=0.0), told, at_once=True)
         judge.note({f"{address} newest_stamp_s": followed[sharing[0]]})
@@ -144,7 +144,7 @@ class ReceptionWatch:
             self._check(judge, name, each)
         for name, count in left_out.items():
             new = count - self._left_out.get(name, 0)
-            told = f"too many messages for the time there is: {new} {name} left out, no prediction"
+            told = f"too many messages for the time there is; {name} left out, no prediction"
             judge.check(f"{name} left_out", new, Bounds(warn=0), told, at_once=True)
         self._before, self._left_out = dict(topics), dict(left_out)
         return judge.finish("all that arrives is read at once")
@@ -157,10 +157,10 @@ class ReceptionWatch:
         published = each.received - before.received + lost
         share = (lost + dropped) / published if published else nan
         judge.note({f"{name} {key}": getattr(each, key) for key in ("received", "lost", "dropped", "waiting")})
-        told = f"{name}: {share:.0%} of the messages were not read ({lost} never arrived, {dropped} gave way to newer ones)"
+        told = f"{name}: messages were not read"
         judge.check(f"{name} unread_share", share, Bounds(thresholds.unread_warn, thresholds.unread_error), told)
         judge.note({f"{name} latency_s": each.latency})
-        told = f"{name}: messages wait {each.wait:.3f} s for their turn: too many come, or the model is too slow"
+        told = f"{name}: messages wait too long, because too many come or the model is too slow"
         judge.check(f"{name} wait_s", each.wait, Bounds(thresholds.wait_warn, thresholds.wait_error), told)
         if not each.is_numbered:
             judge.note({f"{name} lost": "unknown: numbers of several publishers, or of one that started anew"})

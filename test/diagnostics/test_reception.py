@@ -29,11 +29,11 @@ def test_messages_that_never_arrive_give_way_or_wait() -> None:
     keys = ("received", "wait_s", "latency_s")
     assert [well.values[f"cylinder_strokes {key}"] for key in keys] == [600, 0.001, 0.004]
     some = received(*(Reception(1000 * k, 20 * k, 30 * k, 0, 0.001) for k in range(4)))
-    assert some.level == Level.WARN and "5% of the messages were not read (20 never arrived, 30 gave way" in some.message
+    assert some.level == Level.WARN and some.message.endswith("messages were not read")
     most = received(*(Reception(1000 * k, 0, 900 * k, 4, 0.001) for k in range(4)))
     assert most.level == Level.ERROR and most.values["cylinder_strokes dropped"] == 2700
     slow = received(*(Reception(1000 * k, 0, 0, 100, 0.4) for k in range(4)))
-    assert slow.level == Level.WARN and "messages wait 0.400 s" in slow.message
+    assert slow.level == Level.WARN and "messages wait too long" in slow.message
     anew = received(Reception(1000, 0, 900), Reception(2000, 0, 1800), Reception(10, 0, 0, 0, 0.001))
     assert anew.values["cylinder_strokes unread_share"] == 0.0
     assert "unknown" in str(received(Reception(10, is_numbered=False)).values["cylinder_strokes lost"])
@@ -43,7 +43,7 @@ def test_what_is_left_out_is_told_at_once_and_only_what_is_new() -> None:
     watch, judge = ReceptionWatch(), ComponentJudge("reception")
     found = [watch.status(begun(judge, 10.0 * k), {}, {"shapes": count}) for k, count in enumerate((0, 7, 7, 7))]
     assert [status.level for status in found] == [Level.OK, Level.WARN, Level.OK, Level.OK]
-    assert found[1].message == "too many messages for the time there is: 7 shapes left out, no prediction"
+    assert found[1].message == "too many messages for the time there is; shapes left out, no prediction"
     assert [status.values["shapes left_out"] for status in found] == [0, 7, 0, 0]
 
 
@@ -62,12 +62,12 @@ def recorded(topics: list[TopicCount] = TOPICS, end: str | None = None, **disk: 
     [
         ({}, Level.OK, "running"),
         ({"end": ""}, Level.OK, "ended"),
-        ({"topics": [TopicCount("/a", 500, 0, 3)]}, Level.WARN, "3 messages were published and never arrived"),
-        ({"lag": 3.0}, Level.WARN, "messages of the last 3.0 s are not on the disk yet"),
-        ({"lag": 6.0}, Level.ERROR, "messages of the last 6.0 s are not on the disk yet"),
+        ({"topics": [TopicCount("/a", 500, 0, 3)]}, Level.WARN, "messages were published and never arrived"),
+        ({"lag": 3.0}, Level.WARN, "the newest messages are not on the disk yet"),
+        ({"lag": 6.0}, Level.ERROR, "the newest messages are not on the disk yet"),
         ({"left": 2000.0}, Level.OK, "running"),
-        ({"left": 900.0}, Level.WARN, "the disk is full in 900 s"),
-        ({"left": 0.0}, Level.ERROR, "the disk is full in 0 s"),
+        ({"left": 900.0}, Level.WARN, "the disk is nearly full"),
+        ({"left": 0.0}, Level.ERROR, "the disk is nearly full"),
         ({"end": "the disk is full"}, Level.ERROR, "the disk is full"),
     ],
 )

@@ -100,8 +100,8 @@ def test_a_residual_that_grows_and_shrinks_again(rig: Rig) -> None:
     told = [rig.second()["residual joint_3"] for rig.scale in [5.0] * 14 + [1.0] * 20]
     assert [status.values["window_s"] for status in told[:14]] == pytest.approx([*range(1, 11), 10, 10, 10, 10])
     raised = next(status for status in told if status.level == Level.ERROR)
-    assert raised.message.endswith(f"for {raised.values['window_s']:.2g} s") and raised.values["window_s"] < 5.0
-    assert told[13].message.endswith("for 10 s") and told[-1].level == Level.OK
+    assert raised.message == "larger than noise explains" and raised.values["window_s"] < 5.0
+    assert told[13].message == raised.message and told[-1].level == Level.OK
 
 
 def test_a_failure_of_the_model_is_urgent_once(rig: Rig) -> None:
@@ -135,7 +135,7 @@ def test_strokes_that_give_no_prediction_are_an_error_with_what_is_wrong_with_th
     monkeypatch.setattr(rig, "_report", refused)
     found = [look(3 + 100 * k) for k in range(1, 5)]
     assert found[0].level == Level.OK and found[-1].level == Level.ERROR
-    assert found[-1].message == "no prediction for 4.0 s, though strokes come: 400 times leap (far from where it was)"
+    assert found[-1].message == "no prediction, though strokes come: leap (far from where it was)"
     monkeypatch.undo()
     assert look(403).level == Level.OK
 
@@ -155,9 +155,9 @@ def test_a_boom_outside_the_models_validity_is_a_warning_as_long_as_it_is(rig: R
 def test_a_model_that_is_too_slow_and_clocks_that_differ(rig: Rig) -> None:
     rig.behind[Stream.ANGLES] = 0.08
     found = after(rig, 4, took=0.004)
-    assert found["model"].level == Level.WARN and "80% of the time" in found["model"].message
+    assert found["model"].level == Level.WARN and "too much of the time" in found["model"].message
     angles = found["joint_angles"]
-    assert angles.level == Level.WARN and "stamped 0.080 s behind the strokes" in angles.message
+    assert angles.level == Level.WARN and "stamped behind the strokes" in angles.message
     assert angles.values["clock_offset_s"] == pytest.approx(0.08) and angles.values["clock_offset_s_warn"] == 0.05
 
 
@@ -166,15 +166,13 @@ def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() ->
     prediction = drive_twin(scene).update(Sample(Stream.STROKES, 10**18, strokes)).prediction
     model, judge = stress_model(scene), ComponentJudge("bending")
     assert model is not None and prediction is not None
-    for load, told in (
-        (np.zeros(2), "-94.4 MPa in section 1 at 0.60 m"),
-        (np.array([0.0, -100.0]), "-98.1 ± 0.73 MPa in section 1"),
-    ):
+    for load, largest in ((np.zeros(2), -94.4), (np.array([0.0, -100.0]), -98.1)):
         variance = np.full(2, 400.0)
         estimate = replace(estimate_of(10**18, np.zeros(WIDTH)), load=load, load_variance=variance)
         judge.begin(Evaluation(Thresholds(), 0.0, 0.0))
         status = stress_status(judge, model, prediction, estimate)
-        assert status.level == Level.OK and status.message.startswith(told), status.message
+        assert status.level == Level.OK and status.values["largest_at"] == "section 1 at 0.60 m"
+        assert status.values["largest_MPa"] == pytest.approx(largest, abs=0.1)
     assert status.values["section_1_at_0.60_m_sigma_MPa"] == pytest.approx(0.73, rel=0.02)
     rigid = scene.model_copy(update={"modes": 0})
     assert stress_model(rigid) is None

@@ -86,7 +86,7 @@ def test_who_is_at_the_other_end(node: Any, rig: Rig) -> None:
     other.create_publisher(String, "/cylinder_forces", 10)
     kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     other.create_subscription(PointStamped, "/boom_twin/tip/position", print, kept)
-    rig.until(lambda: "2 publishers of /cylinder_strokes" in rig.words("publishers"))
+    rig.until(lambda: "several publishers of /cylinder_strokes" in rig.words("publishers"))
     assert rig.level("publishers") == ERROR
     assert all(name in rig.words("publishers") for name in ("/rig", "/rig/other"))
     rig.until(lambda: "/boom_twin/tip/position: incompatible QoS: /rig/other:" in rig.words("outputs"))
