@@ -123,7 +123,7 @@ def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
 
     files = [found.file]
     if not args.no_pictures:
-        files += draw(found.result, found.history, out)
+        files += draw(found.result, found.history, found.scene, out)
     if args.report:
         files.append(write_report(found, out))
     return files
