@@ -107,7 +107,8 @@ def alarm_text(channel: str, kind: str, cause: str | None, language: str = "en")
     last, place = (cause or "").rpartition(".")[2], channel
     if last in THINGS:
         place = last
-    thing = translated(THINGS.get(_parts(place)[0], place), language).format(n=_parts(channel)[1])
+    name = THINGS.get(_parts(place)[0])
+    thing = place if name is None else translated(name, language).format(n=_parts(channel)[1])
     what = translated(sentence.what, language).format(thing=thing)
     stop = "。" if language == "zh" else "."
     space = "" if language == "zh" else " "

@@ -110,7 +110,6 @@ def _sessions(args: Namespace) -> SessionList:
         scene, settings = open_session_scene(path, args.scene), open_session_settings(path, args.params, args.namespace)
         return bag_feed(path, scene, settings, args.mapping, args.baseline, window, args.namespace)
 
-    tell("opening the session (compiles for up to a minute the first time) ..")
     return SessionList(sessions_in(args.bag), open_feed)
 
 

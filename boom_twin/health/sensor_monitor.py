@@ -157,6 +157,9 @@ class SensorMonitor:
             fault.seen = end
             return []
         name = self._names[channel]
-        evidence = f"by {size:+.3g} {self._sensors.unit}" if size else evidence
+        if size:
+            evidence = (
+                f"by {math.degrees(size):+.3g} deg" if self._sensors.unit == "rad" else f"by {size:+.3g} {self._sensors.unit}"
+            )
         self._faults[key] = _Fault(Alarm(name, kind, start, None, f"{name}.sensor", evidence), end, size, level - size)
         return [self._faults[key].alarm]

@@ -82,7 +82,7 @@ def test_spikes_do_not_mask():
 def test_a_jump_lasts_until_it_jumps_back():
     watched = Watched()
     (began,) = watched.take(findings(0, "jump", 0.01))
-    assert "+0.01" in began.evidence and watched.watch.masked.tolist() == [True, False]
+    assert began.evidence == "by +0.573 deg" and watched.watch.masked.tolist() == [True, False]
     assert watched.rest(5 * SETTLED) == [] and watched.watch.masked[0]
     assert watched.take(findings(0, "jump", 0.02)) == [], "further away"
     watched.rest(SETTLED)
