@@ -60,6 +60,7 @@ _RESULT_BAG = ("bag/session_0.mcap", "bag/metadata.yaml", "bag/session.yaml")
 _FIGURES = ("summary.json", "quantities.json", "*.png", "report.html", "samples.*")
 REPLAY = ResultKind("replay", (*_FIGURES, *_RESULT_BAG), is_replaced=True)
 RIG = ResultKind("rig", _SESSION, is_replaced=False)
+IMPORT = ResultKind("import", _SESSION, is_replaced=False)
 RECOVER = ResultKind("recover", _SESSION, is_replaced=False)
 ENVELOPE = ResultKind("envelope", ("envelope.csv", "envelope.json", "envelope.png"), is_replaced=True)
 COMPARE = ResultKind(

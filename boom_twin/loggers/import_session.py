@@ -1,0 +1,258 @@
+"""Write tables of loggers as a session: the messages that the rig would have published.
+
+A reading is in the unit that the mapping names, SI units by default. Signs, zeros and mounts are in the mapping alone,
+which the session keeps.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import tzinfo
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bag.metadata import dump
+from ..bag.session_files import sensor_message
+from ..bag.session_sheet import SessionSheet
+from ..bag.writer import SessionWriter
+from ..config.yaml_text import plain
+from ..errors import BagError
+from ..messages.mapping import load_mapping, mapping_from
+from ..messages.topic_table import Topics
+from ..types import NANO, SECOND, SENSORS, Array, Sample, Stream, channels_of, sensor_kind, stream_of
+from .assignment import Assignment, assign
+from .column_file import ColumnFile
+from .log_table import LogRows, LogTable
+from .times import Stamps, TableTimes, read_times, zone_of
+
+CLOCK_SET = SECOND  # ns by which stamps step back where the logger's clock was set, and not one row is late
+WHOLE_SHARE = 0.5  # share of the rows with a value in all columns of a stream, below which its channels come row by row
+
+
+class ReadTable(NamedTuple):
+    """Rows of a table and their times."""
+
+    rows: LogRows
+    times: TableTimes
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """First and last stamp, ns."""
+        return int(self.times.stamps.min()), int(self.times.stamps.max())
+
+    @property
+    def span_text(self) -> str:
+        """First and last stamp in words."""
+        start, end = self.span
+        if not self.times.is_absolute:
+            return f"{start * NANO:g} to {end * NANO:g} s"
+        return " to ".join(f"{np.datetime64(stamp, 'ns').astype('datetime64[ms]')}" for stamp in (start, end)) + " UTC"
+
+
+@dataclass(frozen=True)
+class ImportedSession:
+    """What was imported.
+
+    Attributes
+    ----------
+    assignment : Assignment
+    read : dict of int to ReadTable
+        Rows of the tables with channels, by the numbers of the tables.
+    counts : dict of str to int
+        Messages by topic.
+    """
+
+    assignment: Assignment
+    read: dict[int, ReadTable]
+    counts: dict[str, int]
+
+
+class _Readings(NamedTuple):
+    """Readings of one stream in one table: log times and stamps (ns), values (rows, channels), and the channels it has.
+
+    `is_apart` is True if each row has some of the channels only, as signals of a bus come.
+    """
+
+    stream: Stream
+    logs: Stamps
+    stamps: Stamps
+    values: Array
+    own: NDArray[np.bool_]
+    is_apart: bool
+
+
+def import_session(
+    tables: Sequence[LogTable],
+    out: Path,
+    given: ColumnFile,
+    sheet: SessionSheet,
+    joints: int | None = None,
+    mapping: Path | None = None,
+) -> ImportedSession:
+    """Write the session of some tables into the new or empty folder `out`.
+
+    Parameters
+    ----------
+    tables : sequence of LogTable
+    out : Path
+    given : ColumnFile
+        Columns, times and time zone that the names do not tell.
+    sheet : SessionSheet
+        Version, scene and note that the session keeps.
+    joints : int, optional
+        Number of joints of the scene, if there is one.
+    mapping : Path, optional
+        Names, units, signs and zeros of the rig's sensors, kept in the session.
+
+    Raises
+    ------
+    BagError
+        A table cannot be read, a cylinder has no column, a column has no unit, or the tables have no time in common.
+    UsageError
+        The mapping or the time zone cannot be used.
+    """
+    assignment = assign(tables, given, joints)
+    assignment.check(joints)
+    joints = joints or assignment.joints
+    text, topics = _mapping(mapping, assignment, joints)
+    zone = zone_of(given.timezone) if given.timezone else None
+    read = _read(assignment, given, zone)
+    _check_spans(assignment, read)
+    shift = max(0, SECOND - min(each.span[0] for each in read.values()))
+    readings = [
+        found
+        for number, own in read.items()
+        for found in _readings(assignment, number, own.rows, own.times.stamps + shift, topics, joints)
+    ]
+    origin = f"imported from {', '.join(dict.fromkeys(Path(table.source).name for table in tables))}"
+    counts = _write(out, readings, topics, joints, origin)
+    replace(sheet, mapping=text or None, origin=origin).write(out)
+    return ImportedSession(assignment, read, counts)
+
+
+def _mapping(path: Path | None, assignment: Assignment, joints: int) -> tuple[str, Topics]:
+    """Return the mapping that the session keeps, in which channels without a column have no sensor."""
+    topics = load_mapping(path, joints)
+    text = "" if path is None else path.read_text(encoding="utf-8-sig")
+    there = {use.channel for use in assignment.used}
+    streams = {stream_of(channel) for channel in there}
+    lacking = [
+        channel
+        for stream, channels in channels_of(joints).items()
+        for channel in channels
+        if stream in streams and channel not in there
+    ]
+    if not set(lacking) - topics.absent:
+        return text, topics
+    document: dict[str, Any] = plain(text) or {}
+    document = {**document, "sensors": {**(document.get("sensors") or {}), **dict.fromkeys(lacking, "none")}}
+    return dump(document), mapping_from(document, str(path), joints)
+
+
+def _read(assignment: Assignment, given: ColumnFile, zone: tzinfo | None) -> dict[int, ReadTable]:
+    found: dict[int, ReadTable] = {}
+    for number in sorted({use.table for use in assignment.used}):
+        table, places = assignment.tables[number], assignment.times[number]
+        rows = table.read([use.place for use in assignment.used if use.table == number], places)
+        found[number] = ReadTable(rows, read_times(table, rows, places, given.time_of(table), zone))
+    return found
+
+
+def _check_spans(assignment: Assignment, read: dict[int, ReadTable]) -> None:
+    """Raise BagError for a channel twice at a time, and for a table without a time in common with the strokes."""
+    spans = {number: each.span for number, each in read.items()}
+    told = {number: f"{assignment.tables[number].source}: {each.span_text}" for number, each in read.items()}
+    if len({each.times.is_absolute for each in read.values()}) > 1:
+        remedy = "Choose the columns of dates: time in --columns FILE."
+        raise BagError(f"times since a start beside dates: {'; '.join(told.values())}. {remedy}")
+    by_channel: dict[str, list[tuple[int, int, int]]] = {}
+    for use in assignment.used:
+        by_channel.setdefault(use.channel, []).append((*spans[use.table], use.table))
+    for channel, parts in by_channel.items():
+        for (_, end, first), (start, _, second) in zip(sorted(parts), sorted(parts)[1:], strict=False):
+            if start <= end:
+                raise BagError(
+                    f"{channel}: {told[first]}, and {told[second]}, which overlap. Leave one out, or give column and file of "
+                    f"{channel} in --columns FILE."
+                )
+    strokes = {use.table for use in assignment.used if stream_of(use.channel) is Stream.STROKES}
+    for number, (start, end) in spans.items():
+        if not any(start <= spans[other][1] and spans[other][0] <= end for other in strokes):
+            raise BagError(
+                f"{told[number]}: no time in common with the strokes ({'; '.join(told[other] for other in strokes)}). "
+                "Check dates and time zones."
+            )
+
+
+def log_times(stamps: Stamps) -> Stamps:
+    """Return the times at which rows with these stamps (ns) were logged, in their order.
+
+    A row whose stamp steps back was logged with the row before. Where stamps step back by more than `CLOCK_SET` the clock was
+    set, and the log goes on by a usual step.
+    """
+    steps = np.diff(stamps)
+    usual = int(np.median(steps[steps > 0])) if np.any(steps > 0) else 1
+    shifts = np.zeros(len(stamps), np.int64)
+    for row in np.flatnonzero(steps < -CLOCK_SET).tolist():
+        highest = int(np.max((stamps + shifts)[: row + 1]))
+        shifts[row + 1 :] = max(int(shifts[row]), highest + usual - int(stamps[row + 1]))
+    return np.maximum.accumulate(stamps + shifts)
+
+
+def _readings(
+    assignment: Assignment, number: int, rows: LogRows, stamps: Stamps, topics: Topics, joints: int
+) -> list[_Readings]:
+    """Return the readings of one table in the units of the mapping."""
+    uses = {use.channel: use for use in assignment.used if use.table == number}
+    found, logs = list[_Readings](), log_times(stamps)
+    for stream in Stream:
+        sensors = topics.sensors_of(stream, joints)
+        if not any(channel in uses for channel in sensors):
+            continue
+        values = np.full((len(stamps), len(sensors)), np.nan)
+        own = np.array([channel in uses for channel in sensors])
+        for column, (channel, sensor) in enumerate(sensors.items()):
+            if channel in uses:
+                units, unit = sensor_kind(channel).units, uses[channel].unit
+                readings = rows.numbers[uses[channel].place]
+                values[:, column] = readings if unit == sensor.unit else readings * (units[unit] / units[sensor.unit])
+        there = np.isfinite(values[:, own])
+        filled = there.any(axis=1)
+        is_apart = bool(there.all(axis=1).sum() < WHOLE_SHARE * filled.sum())
+        found.append(_Readings(stream, logs[filled], stamps[filled], values[filled], own, is_apart))
+    return found
+
+
+def _write(out: Path, readings: list[_Readings], topics: Topics, joints: int, origin: str) -> dict[str, int]:
+    """Write all messages in the order of log times, strokes first; return their counts by topic."""
+    logs = np.concatenate([each.logs for each in readings])
+    parts = np.concatenate([np.full(len(each.logs), part) for part, each in enumerate(readings)])
+    places = np.concatenate([np.arange(len(each.logs)) for each in readings])
+    streams = np.array([[*Stream].index(each.stream) for each in readings])[parts]
+    order: NDArray[np.int64] = np.lexsort((places, streams, logs))
+    names = {
+        stream: [
+            "" if channel in topics.absent else sensor.name for channel, sensor in topics.sensors_of(stream, joints).items()
+        ]
+        for stream in Stream
+    }
+    names_of = [
+        [name if is_own else "" for name, is_own in zip(names[each.stream], each.own, strict=True)] for each in readings
+    ]
+    inputs = {topics.inputs[each.stream].absolute: topics.inputs[each.stream] for each in readings}
+    counts: Counter[str] = Counter()
+    with SessionWriter(out, inputs, {"origin": origin}) as bag:
+        for part, place, log in zip(parts[order].tolist(), places[order].tolist(), logs[order].tolist(), strict=True):
+            own = readings[part]
+            values, named = own.values[place], names_of[part]
+            if own.is_apart and not SENSORS[own.stream].is_imu:
+                named = [name if value == value else "" for name, value in zip(named, values, strict=True)]
+            topic = topics.inputs[own.stream].absolute
+            counts[topic] += 1
+            bag.write(topic, log, sensor_message(Sample(own.stream, int(own.stamps[place]), values), named))
+    return dict(counts)
