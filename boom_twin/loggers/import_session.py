@@ -22,6 +22,8 @@ from ..bag.session_sheet import SessionSheet
 from ..bag.writer import SessionWriter
 from ..config.yaml_text import plain
 from ..errors import BagError
+from ..messages.cdr_encoder import STAMP, NumberFields, Template
+from ..messages.encoded_block import EncodedBlock, EncodedRows
 from ..messages.mapping import load_mapping, mapping_from
 from ..messages.topic_table import Topics
 from ..types import NANO, SECOND, SENSORS, Array, Sample, Stream, channels_of, sensor_kind, stream_of
@@ -31,6 +33,7 @@ from .log_table import LogRows, LogTable
 from .times import Stamps, TableTimes, read_times, zone_of
 
 CLOCK_SET = SECOND  # ns by which stamps step back where the logger's clock was set, and not one row is late
+TOGETHER = 4096  # messages that are encoded together
 WHOLE_SHARE = 0.5  # share of the rows with a value in all columns of a stream, below which its channels come row by row
 
 
@@ -230,29 +233,55 @@ def _readings(
 
 def _write(out: Path, readings: list[_Readings], topics: Topics, joints: int, origin: str) -> dict[str, int]:
     """Write all messages in the order of log times, strokes first; return their counts by topic."""
-    logs = np.concatenate([each.logs for each in readings])
-    parts = np.concatenate([np.full(len(each.logs), part) for part, each in enumerate(readings)])
-    places = np.concatenate([np.arange(len(each.logs)) for each in readings])
-    streams = np.array([[*Stream].index(each.stream) for each in readings])[parts]
-    order: NDArray[np.int64] = np.lexsort((places, streams, logs))
-    names = {
-        stream: [
-            "" if channel in topics.absent else sensor.name for channel, sensor in topics.sensors_of(stream, joints).items()
-        ]
-        for stream in Stream
-    }
-    names_of = [
-        [name if is_own else "" for name, is_own in zip(names[each.stream], each.own, strict=True)] for each in readings
-    ]
-    inputs = {topics.inputs[each.stream].absolute: topics.inputs[each.stream] for each in readings}
+    kinds = [kind for each in readings for kind in _kinds(each, topics, joints)]
+    logs, stamps = (np.concatenate([getattr(kind, name) for kind in kinds]) for name in ("logs", "stamps"))
+    numbers = np.repeat(np.arange(len(kinds)), [len(kind.logs) for kind in kinds])
+    rows = np.concatenate([np.arange(len(kind.logs)) for kind in kinds])
+    ranks = np.array([kind.rank for kind in kinds])[numbers]
+    order = np.lexsort((np.concatenate([kind.places for kind in kinds]), ranks, logs))
     counts: Counter[str] = Counter()
+    inputs = {topics.inputs[each.stream].absolute: topics.inputs[each.stream] for each in readings}
     with SessionWriter(out, inputs, {"origin": origin}) as bag:
-        for part, place, log in zip(parts[order].tolist(), places[order].tolist(), logs[order].tolist(), strict=True):
-            own = readings[part]
-            values, named = own.values[place], names_of[part]
-            if own.is_apart and not SENSORS[own.stream].is_imu:
-                named = [name if value == value else "" for name, value in zip(named, values, strict=True)]
-            topic = topics.inputs[own.stream].absolute
-            counts[topic] += 1
-            bag.write(topic, log, sensor_message(Sample(own.stream, int(own.stamps[place]), values), named))
+        for first in range(0, len(order), TOGETHER):
+            part = order[first : first + TOGETHER]
+            encoded = []
+            for number in np.unique(numbers[part]).tolist():
+                places, kind = np.flatnonzero(numbers[part] == number), kinds[number]
+                own = part[places]
+                (data,) = kind.template.fill(stamps[own], kind.values[rows[own]])
+                encoded.append(EncodedRows(kind.topic, places, data))
+                counts[kind.topic] += len(places)
+            bag.write_block(EncodedBlock(logs[part], encoded))
     return dict(counts)
+
+
+class _Kind(NamedTuple):
+    """Messages with the same names: places of their rows in the table, log times, stamps, values of the names."""
+
+    topic: str
+    rank: int
+    places: NDArray[np.int64]
+    logs: Stamps
+    stamps: Stamps
+    values: Array
+    template: Template
+
+
+def _kinds(readings: _Readings, topics: Topics, joints: int) -> list[_Kind]:
+    """Return the readings of a stream by the names that their messages have."""
+    stream, sensors = readings.stream, topics.sensors_of(readings.stream, joints)
+    named = np.array([channel not in topics.absent for channel in sensors]) & readings.own
+    masks = np.broadcast_to(named, readings.values.shape)
+    if readings.is_apart and not SENSORS[stream].is_imu:
+        masks = masks & np.isfinite(readings.values)
+    patterns, kinds = np.unique(masks, axis=0, return_inverse=True)
+    found = []
+    for number, pattern in enumerate(patterns):
+        fields, places = NumberFields(), np.flatnonzero(kinds.ravel() == number)
+        blanks = np.array([fields.double() if is_there else 0.0 for is_there in pattern])
+        names = [sensor.name if is_there else "" for sensor, is_there in zip(sensors.values(), pattern, strict=True)]
+        message = SENSORS[stream].message, sensor_message(Sample(stream, STAMP * SECOND, blanks), names)
+        own = readings.logs[places], readings.stamps[places], readings.values[places][:, pattern]
+        template = Template([message], fields)
+        found.append(_Kind(topics.inputs[stream].absolute, [*Stream].index(stream), places, *own, template))
+    return found
