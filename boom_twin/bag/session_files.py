@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -103,27 +103,19 @@ def samples_of(
     return sorted(samples, key=lambda sample: sample.stamp)
 
 
-def sensor_message(sample: Sample, names: Sequence[str] | None = None) -> Any:
-    """Return the message that a rig's sensor sends. An Imu has only the acceleration in the plane.
-
-    `names` are those of the values in the message, or axes of an Imu; a value without a name is left out. The default names are
-    those of the package.
-    """
+def sensor_message(sample: Sample) -> Any:
+    """Return the message that a rig's sensor sends. An Imu has only the acceleration in the plane."""
     kind = SENSORS[sample.stream]
     msg = new_message(kind.message)
     if kind.is_imu:
         fill_header(msg.header, sample.stamp, IMU_FRAME)
-        for axis, value in zip(names or kind.ends, sample.values, strict=True):
-            if axis:
-                setattr(msg.linear_acceleration, axis, float(value))
+        msg.linear_acceleration.x, msg.linear_acceleration.z = map(float, sample.values)
         msg.orientation.w = 1.0
         msg.orientation_covariance[0] = msg.angular_velocity_covariance[0] = _UNKNOWN
         return msg
     fill_header(msg.header, sample.stamp, FRAME)
-    all_names = names or [f"{kind.named}_{end}" for end in kind.ends or range(1, 1 + len(sample.values))]
-    pairs = [(name, float(value)) for name, value in zip(all_names, sample.values, strict=True) if name]
-    msg.name = [name for name, _ in pairs]
-    setattr(msg, kind.field, np.array([value for _, value in pairs]))
+    msg.name = [f"{kind.named}_{end}" for end in kind.ends or range(1, 1 + len(sample.values))]
+    setattr(msg, kind.field, np.array(sample.values, dtype=float))
     return msg
 
 

@@ -161,6 +161,7 @@ def _use(found: Assignment, use: ColumnUse) -> None:
         name = found.tables[use.table].headers[use.place]
         found.problems.append(
             f"{use.channel}: {told} ({found.header(use)}, first {first}). "
-            f"Give --column {use.channel}={name!r}:UNIT with one of {', '.join(units)}."
+            f"Write the unit behind the name, as {name + f' [{next(iter(units))}]'!r}, "
+            f"or give --column {use.channel}={name!r}:UNIT, with one of {', '.join(units)}."
         )
     found.used.append(use)

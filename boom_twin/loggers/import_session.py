@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bag.metadata import dump
-from ..bag.session_files import sensor_message
 from ..bag.session_sheet import SessionSheet
+from ..bag.session_writer import BY_NAME, LogTimes, named_message
 from ..bag.writer import SessionWriter
 from ..config.yaml_text import plain
 from ..errors import BagError
@@ -32,7 +32,6 @@ from .column_file import ColumnFile
 from .log_table import LogRows, LogTable
 from .times import Stamps, TableTimes, read_times, zone_of
 
-CLOCK_SET = SECOND  # ns by which stamps step back where the logger's clock was set, and not one row is late
 TOGETHER = 4096  # messages that are encoded together
 WHOLE_SHARE = 0.5  # share of the rows with a value in all columns of a stream, below which its channels come row by row
 
@@ -192,27 +191,13 @@ def _check_spans(assignment: Assignment, read: dict[int, ReadTable]) -> None:
             )
 
 
-def log_times(stamps: Stamps) -> Stamps:
-    """Return the times at which rows with these stamps (ns) were logged, in their order.
-
-    A row whose stamp steps back was logged with the row before. Where stamps step back by more than `CLOCK_SET` the clock was
-    set, and the log goes on by a usual step.
-    """
-    steps = np.diff(stamps)
-    usual = int(np.median(steps[steps > 0])) if np.any(steps > 0) else 1
-    shifts = np.zeros(len(stamps), np.int64)
-    for row in np.flatnonzero(steps < -CLOCK_SET).tolist():
-        highest = int(np.max((stamps + shifts)[: row + 1]))
-        shifts[row + 1 :] = max(int(shifts[row]), highest + usual - int(stamps[row + 1]))
-    return np.maximum.accumulate(stamps + shifts)
-
-
 def _readings(
     assignment: Assignment, number: int, rows: LogRows, stamps: Stamps, topics: Topics, joints: int
 ) -> list[_Readings]:
     """Return the readings of one table in the units of the mapping."""
     uses = {use.channel: use for use in assignment.used if use.table == number}
-    found, logs = list[_Readings](), log_times(stamps)
+    found, clock = list[_Readings](), LogTimes()
+    logs = np.array([clock.at(stamp) for stamp in stamps.tolist()])
     for stream in Stream:
         sensors = topics.sensors_of(stream, joints)
         if not any(channel in uses for channel in sensors):
@@ -272,7 +257,7 @@ def _kinds(readings: _Readings, topics: Topics, joints: int) -> list[_Kind]:
     stream, sensors = readings.stream, topics.sensors_of(readings.stream, joints)
     named = np.array([channel not in topics.absent for channel in sensors]) & readings.own
     masks = np.broadcast_to(named, readings.values.shape)
-    if readings.is_apart and not SENSORS[stream].is_imu:
+    if readings.is_apart and SENSORS[stream].message == BY_NAME:
         masks = masks & np.isfinite(readings.values)
     patterns, kinds = np.unique(masks, axis=0, return_inverse=True)
     found = []
@@ -280,7 +265,7 @@ def _kinds(readings: _Readings, topics: Topics, joints: int) -> list[_Kind]:
         fields, places = NumberFields(), np.flatnonzero(kinds.ravel() == number)
         blanks = np.array([fields.double() if is_there else 0.0 for is_there in pattern])
         names = [sensor.name if is_there else "" for sensor, is_there in zip(sensors.values(), pattern, strict=True)]
-        message = SENSORS[stream].message, sensor_message(Sample(stream, STAMP * SECOND, blanks), names)
+        message = SENSORS[stream].message, named_message(Sample(stream, STAMP * SECOND, blanks), names)
         own = readings.logs[places], readings.stamps[places], readings.values[places][:, pattern]
         template = Template([message], fields)
         found.append(_Kind(topics.inputs[stream].absolute, [*Stream].index(stream), places, *own, template))

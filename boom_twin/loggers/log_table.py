@@ -141,7 +141,8 @@ class ArrayTable(LogTable):
 
     def first(self, place: int) -> list[str]:
         """See `LogTable`."""
-        return [str(value) for value in [*self._columns.values()][place][:200].tolist() if value == value]
+        values = [value for value in [*self._columns.values()][place][:200].tolist() if value == value]
+        return [f"{value:.9g}" if isinstance(value, float) else str(value) for value in values]
 
     def read(self, numbers: Sequence[int], times: Sequence[int]) -> LogRows:
         """See `LogTable`."""
@@ -180,6 +181,10 @@ def _times(array: NDArray[Any]) -> Times:
 def table_of_frame(frame: Any, source: str = "table") -> ArrayTable:
     """Return the table of a data frame (pandas, polars) or of a dict of arrays. A pandas index of times is its first column."""
     columns: dict[str, Any] = {}
+    if not (isinstance(frame, Mapping) or hasattr(frame, "columns")):
+        raise UsageError(
+            f"{source}: {type(frame).__name__} is no table. Give a path, a data frame, or a dict of arrays by name."
+        )
     index = getattr(frame, "index", None)
     if index is not None and (getattr(index, "name", None) or getattr(index, "dtype", np.dtype(int)).kind == "M"):
         if getattr(index, "tz", None) is not None:
