@@ -79,6 +79,7 @@ setup(
             "pyarrow>=18,<27",
             "psutil>=5.9,<8",
         ],
+        "import": ["npTDMS>=1.13,<2", "asammdf>=8.8,<9", "pyarrow>=18,<27", "tzdata>=2025.1"],
         "fatigue": ["rainflow>=3.2,<4"],
         "notebook": ["pandas>=2.2,<4", "nbclient>=0.10,<1", "nbformat>=5.10,<6", "ipykernel>=6.29,<8"],
         "completion": ["argcomplete>=3.4,<4"],

@@ -8,7 +8,8 @@ The stable API, imported when first used::
     undeflected(scene, strokes, joint_rates=None)       a state that a simulation may start from
     frequency_response(scene, frequencies, posture=..)  the boom's answer to a harmonic force or stroke
     Twin(scene, settings=None).update(sample)           sample by sample: prediction, residuals
-    replay(bag, scene, out)                             a recorded session through the twin
+    replay(bag, scene, out)                             a recorded session or a table of readings through the twin
+    SessionWriter(out, scene).write(sample)             a session from samples of a live source
     TimeWindow(start, duration)                         a part of a session, for replay
     BoomTwinError                                       every error of the package, and its kinds
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from .analysis.frequency_response import frequency_response
     from .analysis.initial_state import undeflected
     from .analysis.simulate import simulate
+    from .bag.session_writer import SessionWriter
     from .bag.time_window import TimeWindow
     from .config.settings import Settings, load_settings
     from .errors import BagError, BoomTwinError, SceneError, SceneWarning, SolverError, UsageError
@@ -43,6 +45,7 @@ _HOMES = {
     "Scene": "scene",
     "SceneError": "errors",
     "SceneWarning": "errors",
+    "SessionWriter": "bag.session_writer",
     "Settings": "config.settings",
     "SolverError": "errors",
     "Stream": "types",
@@ -66,6 +69,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "SceneWarning",
+    "SessionWriter",
     "Settings",
     "SolverError",
     "Stream",

@@ -102,7 +102,7 @@ def _columns_of(table: CsvTable) -> dict[Stream, list[str]]:
         Stream.IMU: ["imu_x_m_s2", "imu_z_m_s2"],
         Stream.FORCES: [f"{name}_N" for name in channels[Stream.FORCES]],
     }
-    table.require([TIME, *columns[Stream.STROKES]])
+    table.require([TIME, *columns[Stream.STROKES]], " `boom_twin import` reads files with other headers.")
     _refuse_unknown(table, [TIME, *(name for names in columns.values() for name in names)])
     return columns
 
@@ -111,7 +111,11 @@ def _refuse_unknown(table: CsvTable, known: list[str]) -> None:
     for name in table.names:
         if name not in known:
             near = get_close_matches(name, known, n=1, cutoff=0.6)
-            remedy = f"Did you mean {near[0]}?" if near else f"Known are {', '.join(known)}; take the column out."
+            remedy = (
+                f"Did you mean {near[0]}?"
+                if near
+                else f"Known are {', '.join(known)}; take the column out, or use `boom_twin import`."
+            )
             raise BagError(f"{table.path}: unknown column {name!r} in its first line. {remedy}")
         if table.names.count(name) > 1:
             raise BagError(f"{table.path}: column {name} is there twice. Take one out.")

@@ -15,13 +15,16 @@ from ..config.yaml_text import plain
 from ..errors import BagError, Fault, SceneError, UsageError
 from ..messages.mapping import load_mapping, mapping_from
 from ..messages.topic_table import Topics
-from ..scene.load import DEFAULT_NAME, default_text, examine_text, read_text
+from ..scene.edit import anew
+from ..scene.load import DEFAULT_NAME, SceneSource, as_scene, default_text, examine_text, read_text
 from ..scene.schema import Scene
 from ..types import Stream, StrokeReading
 from .session_sheet import KeptText, kept, kept_parameters, rig_version, sha256
 
 DEFAULT_MAPPING = "default mapping"
 DEFAULT_PARAMETERS = "default parameters"
+GIVEN = "given as a Scene"
+"""Source of a scene that came by no file."""
 LENGTHS_SINCE = 0, 2  # first version of the virtual rig whose transducers read lengths
 
 
@@ -64,6 +67,16 @@ def scene_from(source: str | Path | None) -> SessionScene:
     text = default_text() if source is None else read_text(Path(source))
     scene, oddities = examine_text(text, name)
     return SessionScene(scene, text, name, tuple(oddities))
+
+
+def given_scene(source: SceneSource | SessionScene) -> SessionScene:
+    """Return a scene that is given by a program or a file, or that of the package for None, with its text."""
+    if isinstance(source, SessionScene):
+        return source
+    if source is None or isinstance(source, str | Path):
+        return scene_from(source)
+    scene = as_scene(source)
+    return SessionScene(scene, anew(scene), GIVEN)
 
 
 def scene_of(session: Path, given: str | Path | None = None) -> SessionScene:

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from difflib import get_close_matches
 from importlib import import_module
+from keyword import iskeyword
 from typing import NoReturn, Protocol, TextIO, cast
 
 from .. import __version__
@@ -30,6 +31,7 @@ use_one_blas_thread()
 COMMANDS: dict[str, str] = {
     "check": "validate a scene and tell what its model consists of",
     "init": "write a first scene from the dimensions of a drawing",
+    "import": "loggers' CSV, Parquet, TDMS, MDF as a session",
     "info": "what a recorded session holds and what it lacks",
     "monitor": "the live page, of the topics or of a recorded session",
     "play": "publish a recorded session over ROS 2",
@@ -56,6 +58,11 @@ COMMANDS: dict[str, str] = {
 
 EXAMPLES: dict[str, tuple[str, ...]] = {
     "check": ("check my_boom.yaml", "check my_boom.yaml --need tip=1mm"),
+    "import": (
+        "import cylinders.csv angles.csv imu.csv --scene my_boom.yaml --timezone Europe/Berlin --out bags/today",
+        "import cylinders.csv --propose > columns.yaml",
+        "import cylinders.csv --columns columns.yaml --out bags/today",
+    ),
     "info": ("info bags/arch_session", "info session.csv --mapping rig.yaml"),
     "monitor": ("monitor", "monitor --bag bags/arch_session --start 10"),
     "play": ("play bags/arch_session --rate 2 --loop --clock 100",),
@@ -191,7 +198,7 @@ def _run(arguments: Sequence[str]) -> int:
 
 
 def _command(name: str) -> Command:
-    return cast(Command, import_module(f".{name}", __package__))
+    return cast(Command, import_module(f".{name}_" if iskeyword(name) else f".{name}", __package__))
 
 
 def _parser(arguments: Sequence[str]) -> ArgumentParser:

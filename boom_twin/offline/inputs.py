@@ -11,6 +11,7 @@ from ..bag.reader import Session, scan
 from ..bag.session_model import (
     SessionScene,
     SessionStrokes,
+    given_scene,
     mapping_of,
     scene_of,
     settings_of,
@@ -20,15 +21,11 @@ from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..messages.topic_table import Topics
-from ..scene.edit import anew
-from ..scene.load import SceneSource, as_scene
+from ..scene.load import SceneSource
 from ..scene.schema import Scene
 from ..twin.twin import Twin
 from ..types import NANO, Stream
 from .progress import Progress
-
-GIVEN = "given as a Scene"
-"""Source of a scene that came by no file."""
 
 
 @dataclass(frozen=True)
@@ -145,9 +142,4 @@ def replay_inputs(
 
 def scene_for(session: Path, scene: SceneSource | SessionScene) -> SessionScene:
     """Return the scene to read a session with: `scene`, or if None that of `boom_twin.bag.session_model.scene_of`."""
-    if scene is None or isinstance(scene, str | Path):
-        return scene_of(session, scene)
-    if isinstance(scene, SessionScene):
-        return scene
-    given = as_scene(scene)
-    return SessionScene(given, anew(given), GIVEN)
+    return scene_of(session) if scene is None else given_scene(scene)

@@ -7,7 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +15,16 @@ import numpy as np
 
 from .. import __version__
 from ..bag.reader import Session
-from ..bag.session_model import SessionScene
+from ..bag.session_model import SessionScene, given_scene
 from ..bag.session_sheet import SessionSheet
 from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME
 from ..config.settings import Settings
 from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
+from ..loggers.column_file import ColumnFile
+from ..loggers.import_session import import_session
+from ..loggers.log_table import table_of_frame
 from ..messages.sample_decoder import ODDITIES
 from ..scene.load import SceneSource
 from ..system.atomic_files import write_atomic
@@ -41,6 +44,9 @@ from .sample_table import RowsInMemory, SampleTable, columns_of
 from .session_samples import SessionSamples
 from .summary import alarm_as_text, summary_of
 from .threads import quick_switches, read_ahead, result_bag
+
+SESSION = "session"
+"""Folder in a replay of a table, with the session that was made of it."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -100,7 +106,7 @@ class Replay(SummaryDisplay):
 
 
 def replay(
-    bag: str | Path,
+    bag: str | Path | Any,
     scene: SceneSource | SessionScene,
     out: str | Path,
     settings: Settings | None = None,
@@ -115,10 +121,14 @@ def replay(
 ) -> Replay:
     """Replay `bag` through a twin of `scene`; writes ``summary.json`` and ``bag/`` into `out`.
 
+    A table of readings is written as a session into ``session/`` of `out` first, as `boom_twin import` does.
+
     Parameters
     ----------
-    bag : path
-        A rosbag2 directory, a directory of its files, or one file: ``.mcap``, ``.db3``, ``.bag`` of ROS 1, ``.csv``.
+    bag : path, data frame or dict of ndarray, shape (k,)
+        A rosbag2 directory, a directory of its files, or one file: ``.mcap``, ``.db3``, ``.bag`` of ROS 1, ``.csv``. Or a table
+        with a column of times and one for each channel, NaN without a reading. Names are those of channels in SI units
+        (``stamp_ns``, ``cylinder_1``, ``joint_2``), or with units as in files (``Time [s]``, ``Cylinder 1 [mm]``).
     scene : Scene, SessionScene, path or mapping, optional
         As for `boom_twin.statics`; None: the one that the session was made with, else the package's own.
     out : path
@@ -153,14 +163,21 @@ def replay(
     Raises
     ------
     UsageError
-        The mapping or a setting cannot be used.
+        The mapping or a setting cannot be used, or `bag` is no table.
     BagError
         The session cannot be read, has no strokes, is of another boom than the scene, or gave no prediction; what it was
         recorded with cannot be used; or `out` cannot be written, or holds anything else than an earlier result.
     """
-    with result_folder(Path(out), REPLAY, [Path(bag)]) as building:
+    is_path = isinstance(bag, str | Path)
+    with result_folder(Path(out), REPLAY, [Path(bag)] if is_path else []) as building:
         options = ReplayOptions(progress, mapping, changes, health, window, namespace, with_bag, causes)
-        return replay_into(building, bag, scene, settings, options)
+        if is_path:
+            return replay_into(building, bag, scene, settings, options)
+        kept, place = given_scene(scene), building.inner(SESSION).folder
+        sheet, own = SessionSheet(__version__, kept.text), None if mapping is None else Path(mapping)
+        import_session([table_of_frame(bag)], place, ColumnFile(), sheet, len(kept.scene.joints), own)
+        found = replay_into(building, place, kept, settings, options)
+        return replace(found, session=replace(found.session, path=Path(out) / SESSION))
 
 
 def replay_into(

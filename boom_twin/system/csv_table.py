@@ -39,18 +39,20 @@ class CsvTable:
     """Line number of each row in the file, from 1."""
     error: type[BoomTwinError]
     """Type of the errors that are raised."""
+    is_ended: bool = True
+    """False if the last row is the last of the file, and has no line end."""
 
     def column(self, name: str, blank: float | None = None) -> list[float]:
         """Return the numbers of a column, with `blank` for an empty cell. Without `blank`, an empty cell raises `error`."""
         place = self.names.index(name)
         return [self._number(row, place, line, blank) for row, line in zip(self.rows, self.lines, strict=True)]
 
-    def require(self, names: Sequence[str]) -> None:
-        """Raise `error` unless the header has all `names`."""
+    def require(self, names: Sequence[str], also: str = "") -> None:
+        """Raise `error`, with another remedy in `also`, unless the header has all `names`."""
         if missing := [name for name in names if name not in self.names]:
             raise self.error(
                 f"{self.path}: no column {', '.join(missing)} in its first line. It needs {','.join(names)}, "
-                "with commas between the columns and points in the numbers."
+                f"with commas between the columns and points in the numbers.{also}"
             )
 
     def _number(self, row: list[str], place: int, line: int, blank: float | None) -> float:
@@ -68,6 +70,16 @@ class CsvTable:
             raise self.error(f"{self.path}, line {line}: {self.names[place]} = {text!r} is not a number.") from None
 
 
+@dataclass(frozen=True, slots=True)
+class CsvLayout:
+    """How a file is written: encoding, separator, names of its columns, and the line of its first row, from 1."""
+
+    encoding: str
+    separator: str
+    names: list[str]
+    first_line: int
+
+
 def read_csv(path: Path, error: type[BoomTwinError]) -> CsvTable:
     """Return the table in a file. Raise `error` if the file cannot be read or has no row below its header."""
     pieces = list(read_csv_pieces(path, error))
@@ -75,8 +87,12 @@ def read_csv(path: Path, error: type[BoomTwinError]) -> CsvTable:
     return CsvTable(path, pieces[0].names, rows, lines, error)
 
 
-def read_csv_pieces(path: Path, error: type[BoomTwinError], together: int = 4096) -> Iterator[CsvTable]:
+def read_csv_pieces(
+    path: Path, error: type[BoomTwinError], together: int = 4096, layout: CsvLayout | None = None
+) -> Iterator[CsvTable]:
     """Yield the table in a file, up to `together` rows at a time, so that a file of any size takes little memory.
+
+    Without a `layout` the names are in the first line, and columns are separated by commas.
 
     Raises
     ------
@@ -84,34 +100,51 @@ def read_csv_pieces(path: Path, error: type[BoomTwinError], together: int = 4096
         The type `error`: the file cannot be read, a line is longer than `LONGEST_LINE`, or there is no row below the header.
     """
     try:
-        with path.open("rb") as file:
-            head = file.read(3)
-        encoding = next((encoding for mark, encoding in _MARKS.items() if head.startswith(mark)), "utf-8")
+        encoding = layout.encoding if layout else marked_encoding(path) or "utf-8"
         with path.open(encoding=encoding, newline="") as file:
-            reader = csv.reader(_lines(file))
+            lines = _Lines(file)
+            reader = csv.reader(lines, delimiter=layout.separator if layout else ",", skipinitialspace=layout is not None)
             found = ((reader.line_num, row) for row in reader if row)
-            _, header = next(found, (1, []))
-            names, some = [name.strip() for name in header], list(islice(found, together))
-            if header and not some:
+            if layout is None:
+                _, header = next(found, (1, []))
+                names = [name.strip() for name in header]
+            else:
+                names, first = layout.names, layout.first_line
+                found = ((line, row) for line, row in found if line >= first)
+            some = list(islice(found, together))
+            if names and not some:
                 raise error(f"{path}: no rows below the header. Give at least one.")
-            yield CsvTable(path, names, [row for _, row in some], [line for line, _ in some], error)
+            yield CsvTable(path, names, [row for _, row in some], [line for line, _ in some], error, lines.is_ended)
             while some := list(islice(found, together)):
-                yield CsvTable(path, names, [row for _, row in some], [line for line, _ in some], error)
+                yield CsvTable(path, names, [row for _, row in some], [line for line, _ in some], error, lines.is_ended)
     except UnicodeError as reason:
         raise error(f"{path}: its encoding cannot be read ({reason}). Save it as UTF-8.") from None
     except (OSError, csv.Error) as reason:
         raise error(f"{path}: {getattr(reason, 'strerror', None) or reason}. Give a CSV file.") from None
 
 
-def _lines(file: TextIO) -> Iterator[str]:
-    number = 0
-    while line := file.readline(LONGEST_LINE):
-        number += 1
-        if "\0" in line:
-            raise UnicodeError(f"a NUL in line {number}: UTF-16 or UTF-32 without a byte order mark?")
-        if len(line) == LONGEST_LINE and not line.endswith("\n"):
-            raise csv.Error(f"line {number} is longer than {LONGEST_LINE} characters")
-        yield line
+def marked_encoding(path: Path) -> str:
+    """Return the encoding by the byte order mark of a file; empty without one."""
+    with path.open("rb") as file:
+        head = file.read(3)
+    return next((encoding for mark, encoding in _MARKS.items() if head.startswith(mark)), "")
+
+
+class _Lines:
+    """Iterator of the lines of a file; counts them and checks their lengths."""
+
+    def __init__(self, file: TextIO) -> None:
+        self._file, self.number, self.is_ended = file, 0, True
+
+    def __iter__(self) -> Iterator[str]:
+        while line := self._file.readline(LONGEST_LINE):
+            self.number += 1
+            self.is_ended = line.endswith(("\n", "\r"))
+            if "\0" in line:
+                raise UnicodeError(f"a NUL in line {self.number}: UTF-16 or UTF-32 without a byte order mark?")
+            if len(line) == LONGEST_LINE and not self.is_ended:
+                raise csv.Error(f"line {self.number} is longer than {LONGEST_LINE} characters")
+            yield line
 
 
 def columns_text(columns: Mapping[str, Array]) -> str:

@@ -56,10 +56,13 @@ def _folders(*names: str) -> list[str]:
 
 
 _SESSION = ("session_*.mcap", "metadata.yaml", "session.yaml", "truth.csv.gz")
-_RESULT_BAG = ("bag/session_0.mcap", "bag/metadata.yaml", "bag/session.yaml")
+_RESULT_BAG = tuple(
+    f"{bag}/{file}" for bag in ("bag", "session") for file in ("session_0.mcap", "metadata.yaml", "session.yaml")
+)
 _FIGURES = ("summary.json", "quantities.json", "*.png", "report.html", "samples.*")
 REPLAY = ResultKind("replay", (*_FIGURES, *_RESULT_BAG), is_replaced=True)
 RIG = ResultKind("rig", _SESSION, is_replaced=False)
+IMPORT = ResultKind("import", _SESSION, is_replaced=False)
 RECOVER = ResultKind("recover", _SESSION, is_replaced=False)
 ENVELOPE = ResultKind("envelope", ("envelope.csv", "envelope.json", "envelope.png"), is_replaced=True)
 COMPARE = ResultKind(

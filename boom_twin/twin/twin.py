@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from ..types import SECOND, Array, Health, Report, Sample, Stream
 from .block_update import CAPACITY
 from .blocks import CODES, STREAMS, ReportBlock, SampleBlock, block_of
 from .loaded_model import LoadedModel
+from .readings import check_units, merged, samples_of
 from .sample_taker import SampleTaker
 from .update import DONE, FAILED
 
@@ -160,16 +162,19 @@ class Twin(SampleTaker):
         if self.judge is not None:
             warm_up()
 
-    def update(self, sample: Sample, judged: bool = True) -> Report:
+    def update(self, sample: Sample | Mapping[str, Any], judged: bool = True, stamp_ns: int | None = None) -> Report:
         """Take one sample; see `Report` for what comes back. Whatever the rig measures, it never raises.
 
         Parameters
         ----------
-        sample : Sample
-            Values of one stream at one stamp, in the scene's order.
+        sample : Sample or mapping of str to float
+            Values of one stream at one stamp, in the scene's order; or readings in SI units by name, of any streams, as for
+            `boom_twin.twin.readings.samples_of`. Their reports are one.
         judged : bool
             With the judgement of the rig's health, where that is due. Without it the rest comes sooner, and `judge_health`
             is to be called next.
+        stamp_ns : int, optional
+            Time of readings by name, ns.
 
         Returns
         -------
@@ -182,6 +187,11 @@ class Twin(SampleTaker):
             A sample that no rig can give: a stream by another name, stamps that are not nanoseconds, values not one for each
             channel. Nothing has changed then.
         """
+        if isinstance(sample, Mapping):
+            samples = samples_of(sample, stamp_ns, self.plan.joints)
+            if self._run is None:
+                check_units(samples)
+            return merged([self.update(each, judged) for each in samples])
         sample, self._judged = self._edge.checked(sample), judged
         if self._fault_twins is not None:
             self._fault_twins.reach(sample.stamp, self._failing)

@@ -1,0 +1,168 @@
+"""Write a session from samples of a live source, without ROS."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from .. import __version__
+from ..errors import BagError
+from ..messages.mapping import load_mapping
+from ..messages.topic_table import Topics, factor
+from ..messages.type_store import jazzy
+from ..scene.load import SceneSource
+from ..twin.readings import samples_of
+from ..types import SECOND, SENSORS, Sample, Stream
+from .async_writer import FileSplit, Storage
+from .session_files import sensor_message
+from .session_model import given_scene
+from .session_sheet import SessionSheet
+from .writer import BagWriter, recorded
+
+CLOCK_SET = SECOND
+"""Nanoseconds by which stamps step back where a clock was set; less is one late row."""
+BY_NAME = "sensor_msgs/msg/JointState"
+CHECK_PERIOD = 0.5
+"""Seconds between two looks for a fault of the disk."""
+
+
+class LogTimes:
+    """Log times of rows that come with stamps: the order is that of the rows.
+
+    A row whose stamp steps back is logged with the row before. Where a clock was set back, the log goes on by a usual step.
+    """
+
+    def __init__(self) -> None:
+        self._last = self._stamp = self._shift = 0
+        self._step = 1
+
+    def at(self, stamp: int) -> int:
+        """Return the log time (ns) of the next row."""
+        if self._last and stamp + self._shift < self._last - CLOCK_SET:
+            self._shift = self._last + self._step - stamp
+        elif self._last and 0 < stamp - self._stamp < CLOCK_SET:
+            self._step = stamp - self._stamp
+        self._stamp = stamp
+        self._last = max(self._last, stamp + self._shift)
+        return self._last
+
+
+def named_message(sample: Sample, names: Sequence[str]) -> Any:
+    """Return the message of a sensor with the names of a mapping, or the axes of an Imu. A value without a name is left out."""
+    msg, kind = sensor_message(sample), SENSORS[sample.stream]
+    pairs = [(name, float(value)) for name, value in zip(names, sample.values, strict=True) if name]
+    if kind.message == BY_NAME:
+        msg.name = [name for name, _ in pairs]
+        setattr(msg, kind.field, np.array([value for _, value in pairs]))
+        return msg
+    for axis, value in [*((axis, 0.0) for axis in "xyz"), *pairs]:
+        setattr(msg.linear_acceleration, axis, value)
+    return msg
+
+
+class SessionWriter:
+    """Context manager that writes samples of a live source as a session, as `boom_twin record` does of topics.
+
+    Until the context ends, ``session.yaml`` marks the session as incomplete. It stays so after an exception or a kill, and
+    `boom_twin recover` saves what was written.
+
+    Parameters
+    ----------
+    out : path
+        New or empty folder.
+    scene : Scene, path or mapping, optional
+        Boom of the session, which it keeps. The default is the package's own.
+    mapping : path, optional
+        Names, units, signs and zeros of the rig's sensors, which the session keeps. Messages are as this rig publishes them, so
+        that a replay gives the samples that were written.
+    note, origin : str, optional
+        Note of the operator, and origin of the session.
+
+    Raises
+    ------
+    BagError
+        `out` holds anything, or cannot be written.
+    UsageError, SceneError
+        The mapping or the scene cannot be used.
+    """
+
+    def __init__(
+        self,
+        out: str | Path,
+        scene: SceneSource = None,
+        mapping: str | Path | None = None,
+        note: str | None = None,
+        origin: str | None = None,
+    ) -> None:
+        self._out, kept = Path(out), given_scene(scene)
+        self._joints = len(kept.scene.joints)
+        path = None if mapping is None else Path(mapping)
+        self._topics = load_mapping(path, self._joints)
+        text = None if path is None else path.read_text(encoding="utf-8-sig")
+        names = {self._topics.inputs[stream].absolute: self._topics.inputs[stream].type for stream in Stream}
+        self._sheet = SessionSheet(
+            __version__, kept.text, mapping=text, topics=names, note=note, origin=origin, started=datetime.now(UTC)
+        )
+        self._bag = BagWriter(self._out, {"origin": origin} if origin else None)
+        self._sheet.write(self._out)
+        self._storage = Storage(self._bag, FileSplit(), lambda _: None)
+        self._keys: dict[str, int] = {}
+        self._sensors = {stream: _Sensors(self._topics, stream, self._joints) for stream in Stream}
+        self._counts: Counter[str] = Counter()
+        self._log, self._due = LogTimes(), 0.0
+
+    def write(self, sample: Sample | Mapping[str, Any], stamp_ns: int | None = None) -> None:
+        """Append a sample, or readings by name in SI units as for `Twin.update`.
+
+        Raises
+        ------
+        BagError
+            The disk is full or fails, or does not keep up.
+        UsageError
+            Readings by name cannot be used, see `boom_twin.twin.readings.samples_of`.
+        """
+        samples = samples_of(sample, stamp_ns, self._joints) if isinstance(sample, Mapping) else [sample]
+        for each in samples:
+            topic, message = self._topics.inputs[each.stream], self._sensors[each.stream].message(each)
+            if topic.absolute not in self._keys:
+                self._keys[topic.absolute] = self._storage.add(recorded(topic))
+            self._counts[topic.absolute] += 1
+            data, log = bytes(jazzy().serialize_cdr(message, topic.type)), self._log.at(each.stamp)
+            self._storage.put(self._keys[topic.absolute], log, data, log, self._counts[topic.absolute])
+        if (now := time.monotonic()) > self._due:
+            self._due = now + CHECK_PERIOD
+            self._storage.check()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        written = self._storage.close()
+        if kind is None:
+            counts = {topic: written[key] for topic, key in self._keys.items()}
+            if counts != dict(self._counts):
+                raise BagError(f"{self._out}: {counts} messages of {dict(self._counts)} were written. Report this fault.")
+            self._sheet.write(self._out, [{"topic": topic, "written": count} for topic, count in counts.items()])
+
+
+class _Sensors:
+    """Sensors of one stream: what they read of quantities in SI units."""
+
+    def __init__(self, topics: Topics, stream: Stream, joints: int) -> None:
+        sensors = topics.sensors_of(stream, joints)
+        self._names = ["" if channel in topics.absent else sensor.name for channel, sensor in sensors.items()]
+        self._factors = np.array([factor(channel, sensor) for channel, sensor in sensors.items()])
+        self._zeros = np.array([sensor.zero for sensor in sensors.values()])
+        self._delay = topics.delay(stream)
+
+    def message(self, sample: Sample) -> Any:
+        """Return the message from which a decoder with the same mapping takes this sample."""
+        readings = np.asarray(sample.values, float) / self._factors + self._zeros
+        return named_message(Sample(sample.stream, sample.stamp + self._delay, readings), self._names)

@@ -1,0 +1,1 @@
+"""Tables of other programs (loggers, spreadsheets, data frames) as sessions."""

@@ -1,0 +1,167 @@
+"""Assign the columns of tables to channels: as given, else by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from ..errors import BagError
+from ..types import Stream, channels_of, sensor_kind
+from .column_file import ChannelColumn, ColumnFile
+from .headers import guess, unit_of
+from .log_table import LogTable
+from .times import time_places
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnUse:
+    """Use of one column: the channel and its unit; without a channel, the reason why it is not used."""
+
+    table: int
+    place: int
+    channel: str = ""
+    unit: str = ""
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """Columns of channels and unused ones, places of the times by table, and what keeps them from being read."""
+
+    tables: Sequence[LogTable]
+    used: list[ColumnUse]
+    unused: list[ColumnUse]
+    times: list[list[int]]
+    problems: list[str]
+
+    @property
+    def joints(self) -> int:
+        """Highest number of a cylinder or joint; 1 without any."""
+        ends = [use.channel.rpartition("_")[2] for use in self.used]
+        return max((int(end) for end in ends if end.isdigit()), default=1)
+
+    def header(self, use: ColumnUse) -> str:
+        """Return the header of a column with its file."""
+        return f"{self.tables[use.table].headers[use.place]!r} of {self.tables[use.table].source}"
+
+    def check(self, joints: int | None) -> None:
+        """Raise BagError for a column without unit, a cylinder without column, and a file without times or channels."""
+        problems, found = list(self.problems), {use.channel for use in self.used}
+        for number in sorted({use.table for use in self.used}):
+            if not self.times[number]:
+                table = self.tables[number]
+                told = ", ".join(header for header in table.headers if header)
+                problems.append(
+                    f"{table.source}: no column of times among {told}. Give time: {{column: NAME, unit: s}} in --columns FILE."
+                )
+        sources = {self.tables[use.table].source for use in self.used}
+        for source in dict.fromkeys(table.source for table in self.tables if table.source not in sources):
+            told = "; ".join(
+                f"{self.header(use)}: {use.reason}" for use in self.unused if self.tables[use.table].source == source
+            )
+            problems.append(f"{source}: no column of a channel ({told}). Leave it out, or give --column CHANNEL=NAME:UNIT.")
+        strokes = channels_of(joints or self.joints)[Stream.STROKES]
+        if missing := [channel for channel in strokes if channel not in found]:
+            free = "; ".join(f"{self.header(use)} ({use.reason})" for use in self.unused) or "none"
+            problems.append(
+                f"no column for {', '.join(missing)}. Not used: {free}. Give --column {missing[0]}=NAME:UNIT or --columns FILE."
+            )
+        if problems:
+            raise BagError("\n  ".join([f"{len(problems)} fault{'s' * (len(problems) > 1)} in the columns:", *problems]))
+
+
+def assign(tables: Sequence[LogTable], given: ColumnFile, joints: int | None) -> Assignment:
+    """Assign all columns of some tables.
+
+    Parameters
+    ----------
+    tables : sequence of LogTable
+    given : ColumnFile
+        Assignments that are given. Other columns are recognised by their names.
+    joints : int or None
+        Number of joints of the boom, if it is known.
+
+    Raises
+    ------
+    BagError
+        A given column is not there, or a table has no time.
+    """
+    for entry in given.time:
+        named = [table for table in tables if entry.is_of(table)]
+        if not any({*entry.names} <= {*table.headers, *table.names} for table in named):
+            there = ", ".join(repr(header) for table in named for header in table.headers if header)
+            raise BagError(f"time: no column {' and '.join(map(repr, entry.names))} in a file {entry.file}. There are {there}.")
+    found = Assignment(tables, [], [], [time_places(table, given.time_of(table)) for table in tables], [])
+    taken = _given(found, given)
+    for number, table in enumerate(tables):
+        uses = [
+            _recognised(table, number, place, joints)
+            for place in range(len(table.headers))
+            if table.headers[place] and place not in found.times[number] and (number, place) not in taken
+        ]
+        own = [use.channel for use in uses if use.channel]
+        here = {use.channel for use in found.used if use.table == number}
+        for use in uses:
+            if not use.channel:
+                found.unused.append(use)
+            elif use.channel in given.columns or use.channel in here:
+                found.unused.append(ColumnUse(number, use.place, reason=f"{use.channel} is given otherwise"))
+            elif own.count(use.channel) > 1:
+                found.unused.append(ColumnUse(number, use.place, reason=f"one of several columns that may be {use.channel}"))
+                header = table.headers[use.place]
+                found.problems.append(
+                    f"{use.channel}: it may be {header!r} of {table.source}, or another. "
+                    f"Give --column {use.channel}={header!r}, or in --columns FILE, columns: {{{use.channel}: none}}."
+                )
+            else:
+                _use(found, use)
+    return found
+
+
+def _given(found: Assignment, given: ColumnFile) -> set[tuple[int, int]]:
+    """Use the given columns; return their tables and places."""
+    taken: set[tuple[int, int]] = set()
+    for channel, column in given.columns.items():
+        if not isinstance(column, ChannelColumn):
+            continue
+        places = [
+            (number, place)
+            for number, table in enumerate(found.tables)
+            if column.is_of(table)
+            for place, names in enumerate(zip(table.headers, table.names, strict=True))
+            if column.column in (" ".join(names[0].split()), *names)
+        ]
+        if not places:
+            names = [header for table in found.tables if column.is_of(table) for header in table.headers if header]
+            near = get_close_matches(column.column, names, n=1, cutoff=0.4)
+            remedy = (
+                f"Did you mean {near[0]!r}?" if near else f"There are {', '.join(map(repr, names)) or 'no files of that name'}."
+            )
+            raise BagError(f"{channel}: no column {column.column!r}. {remedy}")
+        if len({number for number, _ in places}) < len(places):
+            raise BagError(f"{channel}: {found.tables[places[0][0]].source} has {column.column!r} twice. Rename one.")
+        for number, place in places:
+            unit = unit_of(column.unit or "") or found.tables[number].units[place]
+            _use(found, ColumnUse(number, place, channel, unit))
+            taken.add((number, place))
+    return taken
+
+
+def _recognised(table: LogTable, number: int, place: int, joints: int | None) -> ColumnUse:
+    by_name = guess(table.names[place], table.units[place], joints)
+    return ColumnUse(number, place, by_name.channel, by_name.unit, by_name.reason)
+
+
+def _use(found: Assignment, use: ColumnUse) -> None:
+    units = sensor_kind(use.channel).units
+    if use.unit not in units:
+        told = f"unit {use.unit} is unknown there" if use.unit else "no unit is given"
+        first = ", ".join(found.tables[use.table].first(use.place)[:3])
+        name = found.tables[use.table].headers[use.place]
+        found.problems.append(
+            f"{use.channel}: {told} ({found.header(use)}, first {first}). "
+            f"Write the unit behind the name, as {name + f' [{next(iter(units))}]'!r}, "
+            f"or give --column {use.channel}={name!r}:UNIT, with one of {', '.join(units)}."
+        )
+    found.used.append(use)

@@ -1,0 +1,173 @@
+"""Find out how a logger's CSV file is written: encoding, separator, preamble, header, units, decimal mark."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+
+from ..errors import BagError
+from ..system.csv_table import NOTHING, CsvLayout, marked_encoding
+from .headers import unit_of
+
+HEAD = 2**18  # bytes from which the layout is found
+SEPARATORS = {"\t": "tab", ";": ";", ",": ",", "|": "|"}
+"""Separators with their names, those first that are never a decimal mark."""
+BLANKS = NOTHING | {"--", "---", "-nan", "1.#qnan", "-1.#ind", "#nv", "#wert!", "#div/0!", "#num!", "#value!", "inf", "-inf"}
+"""Texts of cells without a value, in lower case."""
+NUMERIC_SHARE = 0.6  # share of a column's filled cells that are numbers or times, from which the column is one of numbers
+_NUMBER = re.compile(r"[+-]?(\d[\d'. ]*([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?", re.IGNORECASE)
+_MOMENT = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}.*|.*\d{1,2}:\d{2}.*")
+_GROUPING = re.compile(r"(?<=\d)[ '\u00a0\u202f](?=\d{3})")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+
+
+@dataclass(frozen=True, slots=True)
+class LoggerLayout(CsvLayout):
+    """Layout of a logger's file, with the units of its columns and its first rows."""
+
+    units: list[str]
+    """Units of the columns from a row of units, by the names in this package; unknown ones as they are; empty without one."""
+    is_comma: bool
+    """True if the decimal mark is a comma."""
+    samples: list[list[str]]
+    """First rows."""
+    header_line: int
+
+    @property
+    def text(self) -> str:
+        """Layout in words."""
+        mark = "decimal comma" if self.is_comma else "decimal point"
+        return f"{self.encoding}, separator {SEPARATORS[self.separator]}, {mark}, header in line {self.header_line}"
+
+
+def layout_of(path: Path) -> LoggerLayout:
+    """Return the layout of a file. Raise BagError if there is no table of numbers with a header in it."""
+    try:
+        encoding = _encoding(path)
+        with path.open("rb") as file:
+            data = file.read(HEAD)
+            is_whole = not file.read(1)
+    except OSError as error:
+        raise BagError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions.") from None
+    text = codecs.getincrementaldecoder(encoding)("replace").decode(data).removeprefix("\ufeff")
+    if not is_whole:
+        text = text[: text.rfind("\n") + 1]
+    for separator in SEPARATORS:
+        if (found := _table(path, text, separator, encoding)) is not None:
+            return found
+    first = next((line for line in text.splitlines() if line.strip()), "")[:60]
+    raise BagError(
+        f"{path}: no table is found in it, which begins with {first!r}. It needs a line with the names of the columns, "
+        "then rows of numbers, with tab, ; , or | between them."
+    )
+
+
+def _encoding(path: Path) -> str:
+    """Return the encoding by the mark of a file, else by its bytes."""
+    if marked := marked_encoding(path):
+        return marked
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+        if head.count(0) > len(head) // 4:
+            return "utf-16-le" if head[1::2].count(0) > head[::2].count(0) else "utf-16-be"
+        try:
+            block = head
+            while block:
+                decoder.decode(block)
+                block = file.read(2**20)
+            decoder.decode(b"", True)
+        except UnicodeDecodeError:
+            return "cp1252"
+    return "utf-8"
+
+
+def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout | None:
+    """Return the layout of a file by its first text, if its lines are a table with this separator."""
+    try:
+        reader = csv.reader(StringIO(text, newline=""), delimiter=separator, skipinitialspace=True)
+        rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(cell.strip() for cell in row)]
+    except csv.Error:
+        return None
+    tail = [row for _, row in rows[len(rows) // 2 :]]
+    width, count = Counter(map(len, tail)).most_common(1)[0] if tail else (0, 0)
+    if width < 2 or count < 0.5 * len(tail):
+        return None
+    numeric = [place for place in range(width) if _is_numeric([row[place] for row in tail if place < len(row)])]
+    first = len(rows)
+    while first and _is_data(rows[first - 1][1], numeric):
+        first -= 1
+    if len(numeric) < 2 or first == len(rows):
+        return None
+    if not first:
+        raise BagError(f"{path}: numbers stand in its first line. Write a line above with the names of the columns.")
+    above, units = [*rows[:first]], dict[int, str]()
+    for row in reversed(above):
+        if not units and (found := _units(row[1], numeric)):
+            units = found
+            if row is above[-1] and len(above) > 1:
+                above.remove(row)
+                break
+    line, names = above[-1]
+    if sum(place < len(names) and bool(names[place]) for place in numeric) < 2:
+        return None
+    samples = [row for _, row in rows[first:]]
+    begin = rows[first - 1][0] + 1
+    cells = [row[place] for row in samples for place in numeric if place < len(row) and not _MOMENT.fullmatch(row[place])]
+    given = [units.get(place, "") for place in range(len(names))]
+    return LoggerLayout(
+        encoding, separator, names, begin, given, _has_decimal_comma(path, cells, separator), samples[:200], line
+    )
+
+
+def _is_numeric(cells: list[str]) -> bool:
+    filled = [cell for cell in cells if cell.lower() not in BLANKS]
+    return bool(filled) and sum(map(_is_value, filled)) >= NUMERIC_SHARE * len(filled)
+
+
+def _is_value(cell: str) -> bool:
+    return bool(_NUMBER.fullmatch(cell) or _MOMENT.fullmatch(cell))
+
+
+def _is_data(row: Sequence[str], numeric: list[int]) -> bool:
+    """Return True for a row of values, of which a wrong one may be some text."""
+    filled = [row[place] for place in numeric if place < len(row) and row[place].lower() not in BLANKS]
+    return bool(filled) and sum(map(_is_value, filled)) > 0.5 * len(filled)
+
+
+def _units(row: Sequence[str], numeric: list[int]) -> dict[int, str]:
+    """Return the units of a row of units by their places; empty for another row."""
+    cells = {place: row[place] for place in range(len(row)) if row[place] not in ("", "-", "1", "[-]")}
+    own = {place: cell for place, cell in cells.items() if place in numeric[1:] or (place in numeric and unit_of(cell))}
+    known = {place: unit_of(cell) for place, cell in own.items() if unit_of(cell)}
+    return {place: unit_of(cell) or cell for place, cell in own.items()} if 2 * len(known) > len(own) else {}
+
+
+def _has_decimal_comma(path: Path, cells: Sequence[str], separator: str) -> bool:
+    """Return True if the decimal mark of the cells is a comma; BagError if it may be a separator of thousands, too."""
+    with_comma = [cell for cell in cells if "," in cell]
+    if both := [cell for cell in with_comma if "." in cell]:
+        return all(cell.rfind(",") > cell.rfind(".") for cell in both)
+    points = [cell for cell in cells if "." in cell]
+    if with_comma and points and all(map(_THOUSANDS.fullmatch, with_comma)):
+        told = f"the comma in {with_comma[0]!r} is a separator of thousands or a decimal mark, beside {points[0]!r}"
+        raise BagError(f"{path}: {told}. Export all numbers with one decimal mark.")
+    return bool(with_comma) or not (points or separator == ",")
+
+
+def number_in(cell: str, is_comma: bool) -> float:
+    """Return the number of a cell, NaN for a blank one. Raise ValueError for any other text, or one that may be two numbers."""
+    text = _GROUPING.sub("", cell.strip())
+    if text.lower() in BLANKS:
+        return float("nan")
+    if is_comma:
+        if "." in text and "," not in text and _THOUSANDS.fullmatch(text.replace(".", ",")):
+            raise ValueError("a separator of thousands or a decimal mark")
+        return float(text.replace(".", "").replace(",", ".") if "," in text else text)
+    return float(text.replace(",", "") if _THOUSANDS.fullmatch(text.partition(".")[0]) else text)

@@ -1,0 +1,272 @@
+"""Write tables of loggers as a session: the messages that the rig would have published.
+
+A reading is in the unit that the mapping names, SI units by default. Signs, zeros and mounts are in the mapping alone,
+which the session keeps.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import tzinfo
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..bag.metadata import dump
+from ..bag.session_sheet import SessionSheet
+from ..bag.session_writer import BY_NAME, LogTimes, named_message
+from ..bag.writer import SessionWriter
+from ..config.yaml_text import plain
+from ..errors import BagError
+from ..messages.cdr_encoder import STAMP, NumberFields, Template
+from ..messages.encoded_block import EncodedBlock, EncodedRows
+from ..messages.mapping import load_mapping, mapping_from
+from ..messages.topic_table import Topics
+from ..types import NANO, SECOND, SENSORS, Array, Sample, Stream, channels_of, sensor_kind, stream_of
+from .assignment import Assignment, assign
+from .column_file import ColumnFile
+from .log_table import LogRows, LogTable
+from .times import Stamps, TableTimes, read_times, zone_of
+
+TOGETHER = 4096  # messages that are encoded together
+WHOLE_SHARE = 0.5  # share of the rows with a value in all columns of a stream, below which its channels come row by row
+
+
+class ReadTable(NamedTuple):
+    """Rows of a table and their times."""
+
+    rows: LogRows
+    times: TableTimes
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """First and last stamp, ns."""
+        return int(self.times.stamps.min()), int(self.times.stamps.max())
+
+    @property
+    def span_text(self) -> str:
+        """First and last stamp in words."""
+        start, end = self.span
+        if not self.times.is_absolute:
+            return f"{start * NANO:g} to {end * NANO:g} s"
+        return " to ".join(f"{np.datetime64(stamp, 'ns').astype('datetime64[ms]')}" for stamp in (start, end)) + " UTC"
+
+
+@dataclass(frozen=True)
+class ImportedSession:
+    """What was imported.
+
+    Attributes
+    ----------
+    assignment : Assignment
+    read : dict of int to ReadTable
+        Rows of the tables with channels, by the numbers of the tables.
+    counts : dict of str to int
+        Messages by topic.
+    """
+
+    assignment: Assignment
+    read: dict[int, ReadTable]
+    counts: dict[str, int]
+
+
+class _Readings(NamedTuple):
+    """Readings of one stream in one table: log times and stamps (ns), values (rows, channels), and the channels it has.
+
+    `is_apart` is True if each row has some of the channels only, as signals of a bus come.
+    """
+
+    stream: Stream
+    logs: Stamps
+    stamps: Stamps
+    values: Array
+    own: NDArray[np.bool_]
+    is_apart: bool
+
+
+def import_session(
+    tables: Sequence[LogTable],
+    out: Path,
+    given: ColumnFile,
+    sheet: SessionSheet,
+    joints: int | None = None,
+    mapping: Path | None = None,
+) -> ImportedSession:
+    """Write the session of some tables into the new or empty folder `out`.
+
+    Parameters
+    ----------
+    tables : sequence of LogTable
+    out : Path
+    given : ColumnFile
+        Columns, times and time zone that the names do not tell.
+    sheet : SessionSheet
+        Version, scene and note that the session keeps.
+    joints : int, optional
+        Number of joints of the scene, if there is one.
+    mapping : Path, optional
+        Names, units, signs and zeros of the rig's sensors, kept in the session.
+
+    Raises
+    ------
+    BagError
+        A table cannot be read, a cylinder has no column, a column has no unit, or the tables have no time in common.
+    UsageError
+        The mapping or the time zone cannot be used.
+    """
+    assignment = assign(tables, given, joints)
+    assignment.check(joints)
+    joints = joints or assignment.joints
+    text, topics = _mapping(mapping, assignment, joints)
+    zone = zone_of(given.timezone) if given.timezone else None
+    read = _read(assignment, given, zone)
+    _check_spans(assignment, read)
+    shift = max(0, SECOND - min(each.span[0] for each in read.values()))
+    readings = [
+        found
+        for number, own in read.items()
+        for found in _readings(assignment, number, own.rows, own.times.stamps + shift, topics, joints)
+    ]
+    origin = f"imported from {', '.join(dict.fromkeys(Path(table.source).name for table in tables))}"
+    counts = _write(out, readings, topics, joints, origin)
+    replace(sheet, mapping=text or None, origin=origin).write(out)
+    return ImportedSession(assignment, read, counts)
+
+
+def _mapping(path: Path | None, assignment: Assignment, joints: int) -> tuple[str, Topics]:
+    """Return the mapping that the session keeps, in which channels without a column have no sensor."""
+    topics = load_mapping(path, joints)
+    text = "" if path is None else path.read_text(encoding="utf-8-sig")
+    there = {use.channel for use in assignment.used}
+    streams = {stream_of(channel) for channel in there}
+    lacking = [
+        channel
+        for stream, channels in channels_of(joints).items()
+        for channel in channels
+        if stream in streams and channel not in there
+    ]
+    if not set(lacking) - topics.absent:
+        return text, topics
+    document: dict[str, Any] = plain(text) or {}
+    document = {**document, "sensors": {**(document.get("sensors") or {}), **dict.fromkeys(lacking, "none")}}
+    return dump(document), mapping_from(document, str(path), joints)
+
+
+def _read(assignment: Assignment, given: ColumnFile, zone: tzinfo | None) -> dict[int, ReadTable]:
+    found: dict[int, ReadTable] = {}
+    for number in sorted({use.table for use in assignment.used}):
+        table, places = assignment.tables[number], assignment.times[number]
+        rows = table.read([use.place for use in assignment.used if use.table == number], places)
+        found[number] = ReadTable(rows, read_times(table, rows, places, given.time_of(table), zone))
+    return found
+
+
+def _check_spans(assignment: Assignment, read: dict[int, ReadTable]) -> None:
+    """Raise BagError for a channel twice at a time, and for a table without a time in common with the strokes."""
+    spans = {number: each.span for number, each in read.items()}
+    told = {number: f"{assignment.tables[number].source}: {each.span_text}" for number, each in read.items()}
+    if len({each.times.is_absolute for each in read.values()}) > 1:
+        remedy = "Choose the columns of dates: time in --columns FILE."
+        raise BagError(f"times since a start beside dates: {'; '.join(told.values())}. {remedy}")
+    by_channel: dict[str, list[tuple[int, int, int]]] = {}
+    for use in assignment.used:
+        by_channel.setdefault(use.channel, []).append((*spans[use.table], use.table))
+    for channel, parts in by_channel.items():
+        for (_, end, first), (start, _, second) in zip(sorted(parts), sorted(parts)[1:], strict=False):
+            if start <= end:
+                raise BagError(
+                    f"{channel}: {told[first]}, and {told[second]}, which overlap. Leave one out, or give column and file of "
+                    f"{channel} in --columns FILE."
+                )
+    strokes = {use.table for use in assignment.used if stream_of(use.channel) is Stream.STROKES}
+    for number, (start, end) in spans.items():
+        if not any(start <= spans[other][1] and spans[other][0] <= end for other in strokes):
+            raise BagError(
+                f"{told[number]}: no time in common with the strokes ({'; '.join(told[other] for other in strokes)}). "
+                "Check dates and time zones."
+            )
+
+
+def _readings(
+    assignment: Assignment, number: int, rows: LogRows, stamps: Stamps, topics: Topics, joints: int
+) -> list[_Readings]:
+    """Return the readings of one table in the units of the mapping."""
+    uses = {use.channel: use for use in assignment.used if use.table == number}
+    found, clock = list[_Readings](), LogTimes()
+    logs = np.array([clock.at(stamp) for stamp in stamps.tolist()])
+    for stream in Stream:
+        sensors = topics.sensors_of(stream, joints)
+        if not any(channel in uses for channel in sensors):
+            continue
+        values = np.full((len(stamps), len(sensors)), np.nan)
+        own = np.array([channel in uses for channel in sensors])
+        for column, (channel, sensor) in enumerate(sensors.items()):
+            if channel in uses:
+                units, unit = sensor_kind(channel).units, uses[channel].unit
+                readings = rows.numbers[uses[channel].place]
+                values[:, column] = readings if unit == sensor.unit else readings * (units[unit] / units[sensor.unit])
+        there = np.isfinite(values[:, own])
+        filled = there.any(axis=1)
+        is_apart = bool(there.all(axis=1).sum() < WHOLE_SHARE * filled.sum())
+        found.append(_Readings(stream, logs[filled], stamps[filled], values[filled], own, is_apart))
+    return found
+
+
+def _write(out: Path, readings: list[_Readings], topics: Topics, joints: int, origin: str) -> dict[str, int]:
+    """Write all messages in the order of log times, strokes first; return their counts by topic."""
+    kinds = [kind for each in readings for kind in _kinds(each, topics, joints)]
+    logs, stamps = (np.concatenate([getattr(kind, name) for kind in kinds]) for name in ("logs", "stamps"))
+    numbers = np.repeat(np.arange(len(kinds)), [len(kind.logs) for kind in kinds])
+    rows = np.concatenate([np.arange(len(kind.logs)) for kind in kinds])
+    ranks = np.array([kind.rank for kind in kinds])[numbers]
+    order = np.lexsort((np.concatenate([kind.places for kind in kinds]), ranks, logs))
+    counts: Counter[str] = Counter()
+    inputs = {topics.inputs[each.stream].absolute: topics.inputs[each.stream] for each in readings}
+    with SessionWriter(out, inputs, {"origin": origin}) as bag:
+        for first in range(0, len(order), TOGETHER):
+            part = order[first : first + TOGETHER]
+            encoded = []
+            for number in np.unique(numbers[part]).tolist():
+                places, kind = np.flatnonzero(numbers[part] == number), kinds[number]
+                own = part[places]
+                (data,) = kind.template.fill(stamps[own], kind.values[rows[own]])
+                encoded.append(EncodedRows(kind.topic, places, data))
+                counts[kind.topic] += len(places)
+            bag.write_block(EncodedBlock(logs[part], encoded))
+    return dict(counts)
+
+
+class _Kind(NamedTuple):
+    """Messages with the same names: places of their rows in the table, log times, stamps, values of the names."""
+
+    topic: str
+    rank: int
+    places: NDArray[np.int64]
+    logs: Stamps
+    stamps: Stamps
+    values: Array
+    template: Template
+
+
+def _kinds(readings: _Readings, topics: Topics, joints: int) -> list[_Kind]:
+    """Return the readings of a stream by the names that their messages have."""
+    stream, sensors = readings.stream, topics.sensors_of(readings.stream, joints)
+    named = np.array([channel not in topics.absent for channel in sensors]) & readings.own
+    masks = np.broadcast_to(named, readings.values.shape)
+    if readings.is_apart and SENSORS[stream].message == BY_NAME:
+        masks = masks & np.isfinite(readings.values)
+    patterns, kinds = np.unique(masks, axis=0, return_inverse=True)
+    found = []
+    for number, pattern in enumerate(patterns):
+        fields, places = NumberFields(), np.flatnonzero(kinds.ravel() == number)
+        blanks = np.array([fields.double() if is_there else 0.0 for is_there in pattern])
+        names = [sensor.name if is_there else "" for sensor, is_there in zip(sensors.values(), pattern, strict=True)]
+        message = SENSORS[stream].message, named_message(Sample(stream, STAMP * SECOND, blanks), names)
+        own = readings.logs[places], readings.stamps[places], readings.values[places][:, pattern]
+        template = Template([message], fields)
+        found.append(_Kind(topics.inputs[stream].absolute, [*Stream].index(stream), places, *own, template))
+    return found

@@ -1,0 +1,198 @@
+"""Tables of loggers: columns with names and units, in a CSV file or in memory."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import BagError, UsageError
+from ..system.csv_table import CsvTable, read_csv_pieces
+from ..types import Array
+from .csv_layout import layout_of, number_in
+from .headers import split_header, unit_of
+
+Times = list[str] | NDArray[Any]
+"""Cells of a column of times: texts, numbers in a unit, or `datetime64`."""
+
+
+@dataclass
+class LogRows:
+    """Rows of a table: numbers and times by the places of their columns; lines in the file, if it has lines."""
+
+    numbers: dict[int, Array]
+    times: dict[int, Times]
+    lines: list[int] = field(default_factory=list)
+    remark: str = ""
+
+    def place(self, row: int) -> str:
+        """Return the line or row for a message."""
+        return f"line {self.lines[row]}" if self.lines else f"row {row}"
+
+
+class LogTable(ABC):
+    """Table with rows of one clock.
+
+    Parameters
+    ----------
+    source : str
+        File, or what else the table comes from, for messages.
+    headers : sequence of str
+        Names of the columns as they are written.
+    units : sequence of str
+        Units that stand elsewhere than in the headers; empty without one.
+    layout : str
+        How the file is written, in words.
+    """
+
+    def __init__(self, source: str, headers: Sequence[str], units: Sequence[str], layout: str) -> None:
+        self.source, self.headers, self.layout = source, list(headers), layout
+        pairs = [split_header(header) for header in headers]
+        self.names = [name for name, _ in pairs]
+        self.units = [unit or unit_of(given) or given for (_, unit), given in zip(pairs, units, strict=True)]
+
+    @abstractmethod
+    def first(self, place: int) -> list[str]:
+        """Return the first cells of a column as texts, without empty ones."""
+
+    @abstractmethod
+    def read(self, numbers: Sequence[int], times: Sequence[int]) -> LogRows:
+        """Return all rows of some columns, NaN for an empty cell. Raise BagError for a cell that is no number."""
+
+
+class CsvLogTable(LogTable):
+    """Table of a CSV file, see `boom_twin.loggers.csv_layout.layout_of`."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._layout = path, layout_of(path)
+        super().__init__(str(path), self._layout.names, self._layout.units, self._layout.text)
+
+    def first(self, place: int) -> list[str]:
+        """See `LogTable`."""
+        return [row[place] for row in self._layout.samples if place < len(row) and row[place]]
+
+    def read(self, numbers: Sequence[int], times: Sequence[int]) -> LogRows:
+        """See `LogTable`. A last line that was cut off is left out, and a header that is repeated."""
+        parts: dict[int, list[Array]] = {place: [] for place in numbers}
+        found = LogRows({}, {place: [] for place in times})
+        for piece in read_csv_pieces(self._path, BagError, layout=self._layout):
+            rows, lines = self._usable(piece, found)
+            found.lines += lines
+            for place in numbers:
+                parts[place].append(self._column(rows, lines, place))
+            for place in times:
+                found.times[place] += [row[place].strip() for row in rows]
+        found.numbers = {place: np.concatenate(arrays) for place, arrays in parts.items()}
+        return found
+
+    def _usable(self, piece: CsvTable, found: LogRows) -> tuple[list[list[str]], list[int]]:
+        """Return rows as long as the header with their lines, blank at their end where a program leaves that out."""
+        width, rows, lines = len(piece.names), list[list[str]](), list[int]()
+        for row, line in zip(piece.rows, piece.lines, strict=True):
+            if not any(cell.strip() for cell in row) or [cell.strip() for cell in row] == piece.names[: len(row)]:
+                continue
+            if len(row) < width:
+                if not piece.is_ended and line == piece.lines[-1]:
+                    found.remark = f"line {line} was cut off ({len(row)} of {width} cells) and is left out"
+                    continue
+                row = [*row, *[""] * (width - len(row))]
+            elif len(row) > width and any(cell.strip() for cell in row[width:]):
+                told = f"{len(row)} cells, and the header has {width} names"
+                raise BagError(f"{self.source}, line {line}: {told}. Export with ; or tab if the numbers have decimal commas.")
+            rows.append(row)
+            lines.append(line)
+        return rows, lines
+
+    def _column(self, rows: list[list[str]], lines: list[int], place: int) -> Array:
+        is_comma, values = self._layout.is_comma, np.empty(len(rows))
+        for number, row in enumerate(rows):
+            try:
+                values[number] = number_in(row[place], is_comma)
+            except ValueError as reason:
+                told = "is a separator of thousands or a decimal mark" if "thousands" in str(reason) else "is not a number"
+                raise BagError(
+                    f"{self.source}, line {lines[number]}: {self.headers[place]} = {row[place].strip()!r} {told}. "
+                    "Correct the cell, or empty it if there is no value."
+                ) from None
+        return values
+
+
+class ArrayTable(LogTable):
+    """Table of arrays in memory, one for each column; a `datetime64` array holds times.
+
+    Raises
+    ------
+    UsageError
+        A column is no array of numbers or times, or has another length than the others.
+    """
+
+    def __init__(self, source: str, columns: Mapping[str, Any], units: Mapping[str, str], layout: str = "") -> None:
+        self._columns = {name: _array(source, name, values) for name, values in columns.items()}
+        lengths = {name: len(values) for name, values in self._columns.items()}
+        if len({*lengths.values()}) > 1:
+            told = ", ".join(f"{name} {length}" for name, length in lengths.items())
+            raise UsageError(f"{source}: columns of different lengths ({told}). Give one value for each time, NaN without one.")
+        super().__init__(source, list(columns), [units.get(name, "") for name in columns], layout)
+
+    def first(self, place: int) -> list[str]:
+        """See `LogTable`."""
+        values = [value for value in [*self._columns.values()][place][:200].tolist() if value == value]
+        return [f"{value:.9g}" if isinstance(value, float) else str(value) for value in values]
+
+    def read(self, numbers: Sequence[int], times: Sequence[int]) -> LogRows:
+        """See `LogTable`."""
+        arrays = [*self._columns.values()]
+        return LogRows(
+            {place: _numbers(self, place, arrays[place]) for place in numbers},
+            {place: _times(arrays[place]) for place in times},
+        )
+
+
+def _array(source: str, name: str, values: Any) -> NDArray[Any]:
+    array = np.ma.filled(values.astype(float), np.nan) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
+    if array.ndim != 1:
+        raise UsageError(f"{source}: {name} has shape {array.shape}. Give one number for each time: one column, one channel.")
+    return array
+
+
+def _numbers(table: ArrayTable, place: int, array: NDArray[Any]) -> Array:
+    try:
+        if array.dtype.kind not in "iufO":
+            raise TypeError
+        return (
+            np.array([np.nan if value is None else value for value in array], float)
+            if array.dtype.kind == "O"
+            else array.astype(float)
+        )
+    except (TypeError, ValueError):
+        told = f"{table.source}: {table.headers[place]} holds {array.dtype}, as {array[:1].tolist()}"
+        raise UsageError(f"{told}. Give numbers, NaN where there is none.") from None
+
+
+def _times(array: NDArray[Any]) -> Times:
+    return array if array.dtype.kind in "Miuf" else [str(value) for value in array.tolist()]
+
+
+def table_of_frame(frame: Any, source: str = "table") -> ArrayTable:
+    """Return the table of a data frame (pandas, polars) or of a dict of arrays. A pandas index of times is its first column."""
+    columns: dict[str, Any] = {}
+    if not (isinstance(frame, Mapping) or hasattr(frame, "columns")):
+        raise UsageError(
+            f"{source}: {type(frame).__name__} is no table. Give a path, a data frame, or a dict of arrays by name."
+        )
+    index = getattr(frame, "index", None)
+    if index is not None and (getattr(index, "name", None) or getattr(index, "dtype", np.dtype(int)).kind == "M"):
+        if getattr(index, "tz", None) is not None:
+            index = index.tz_convert("UTC").tz_localize(None)
+        columns[str(index.name or "time")] = index.to_numpy()
+    for name in getattr(frame, "columns", frame):
+        values = frame[name]
+        if getattr(getattr(values, "dt", None), "tz", None) is not None:
+            values = values.dt.tz_convert("UTC").dt.tz_localize(None)
+        columns[str(name)] = values.to_numpy() if hasattr(values, "to_numpy") else values
+    return ArrayTable(source, columns, {})
