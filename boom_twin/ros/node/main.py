@@ -78,7 +78,7 @@ def _live(node: TwinNode, stop: StopSignal) -> int:
     except STOPPED:
         pass
     stop.over()
-    if node.failed:
+    if node.failed and node.autostart:
         return 1
     if not node.finished:
         node.get_logger().info("stopping")
