@@ -24,6 +24,7 @@ setup(
     package_data={
         "boom_twin": [
             "py.typed",
+            "texts.json",
             *(f"msg_config/*.{end}" for end in ("yaml", "rviz", "json", "xml")),
             "examples/*.yaml",
             "monitor/page/*",

@@ -10,6 +10,7 @@ from math import pi
 from typing import TYPE_CHECKING, Any, Literal
 
 from .predictions import Estimate, Prediction
+from .texts import alarm_text
 
 if TYPE_CHECKING:  # commands that only look at a bag start without NumPy
     import numpy as np
@@ -279,10 +280,15 @@ class Alarm:
     """End, stamp in ns; None while it lasts."""
     cause: str | None
     """The scene's parameter or the sensor at fault; None if unknown."""
-    told: str
-    """Sentence for an operator."""
+    evidence: str
+    """Figures for whoever looks closer: how much, how sure."""
     ranked: tuple[Ranked, ...] = ()
     """Causes that may explain it, the most probable first; empty if the sensor itself shows it."""
+
+    @property
+    def told(self) -> str:
+        """Sentence for an operator: what is wrong, and what to do."""
+        return alarm_text(self.channel, self.kind, self.cause)
 
 
 @dataclass(frozen=True, slots=True)

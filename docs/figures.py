@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from boom_figure import boom_picture
 from dimensions import angle, dimension, frame, leader, mass_centre, name, span
+from page_figure import CHROMIUM, page_picture
 
 from boom_twin.analysis.equilibrium import statics
 from boom_twin.cli.main import main as command
@@ -285,6 +286,10 @@ def main() -> None:
     title = "Five-section Z-fold boom, posture arch: at rest under gravity"
     boom_picture(example, statics(example, posture="arch"), out / "z_fold_arch.png", title, "synthetic parameters")
     response_figures(out)
+    if CHROMIUM.is_file():
+        page_picture(out / "monitor.png")
+    else:
+        print("skipped: monitor.png, because chromium is not there (Debian: apt-get install chromium)", file=sys.stderr)
 
 
 if __name__ == "__main__":

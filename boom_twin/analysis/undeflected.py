@@ -23,6 +23,12 @@ class UndeflectedBoom:
         self._section = np.clip(np.searchsorted(self._reach, along, side="right") - 1, 0, len(self._lengths))
         self._beyond = np.where(self._section < len(self._lengths), np.maximum(along - self._reach[self._section], 0.0), 0.0)
 
+    @property
+    def middles(self) -> list[int]:
+        """Number of the point nearest to the middle of each section."""
+        along = self._reach[self._section] + self._beyond
+        return [int(np.argmin(np.abs(along - middle))) for middle in 0.5 * (self._reach[:-1] + self._reach[1:])]
+
     def at(self, angles: Array) -> Array:
         """Return points (.., k, 2), m, at relative joint `angles` (rad), shape (.., n)."""
         _, pivots = rigid_chain(self._pivot, self._lengths, angles)

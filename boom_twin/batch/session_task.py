@@ -178,7 +178,7 @@ def row_of(task: SessionTask) -> Row:
     with result_folder(Path(task.out), REPLAY, [session]) as building:
         found = evaluated_replay(building, session, scene, settings, options)
         if task.report:
-            draw(found.result, found.history, building.folder)
+            draw(found.result, found.history, found.scene, building.folder)
             write_report(found, building.folder)
         _, quantities = read(building.folder)
         if not task.keep_bag:

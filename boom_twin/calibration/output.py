@@ -138,12 +138,12 @@ SHOWN = {"rad": (180.0 / math.pi, "deg"), "m": (1e3, "mm")}
 
 
 def as_text(found: Calibration) -> list[str]:
-    """Return the lines of a table, of the unknowns that cannot be told apart, and of the residuals held out."""
+    """Return the lines of a summary, of a table, of the unknowns that cannot be told apart, and of the residuals held out."""
     rows = [("", "before", "now", "95 % interval", ""), *(_row(estimate) for estimate in found.estimates)]
     widths = [max(len(row[i]) for row in rows) for i in range(5)]
     lines = ["  ".join(f"{text:{width}}" for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    lines += [f"{group}" for group in found.groups]
-    lines += ["", f"held out: {found.held_out}; residual rms over what is expected (1 is right)"]
+    lines = [_summary(found), "", *lines, *(f"{group}" for group in found.groups)]
+    lines += ["", f"held out: {found.held_out}; residual rms in times the expected noise (1 is right)"]
     channels = zip(found.before.names, found.before.spread.tolist(), found.after.spread.tolist(), strict=True)
     lines += [f"  {name:10s} {before:8.2f} before  {after:6.2f} now" for name, before, after in channels]
     return [
@@ -151,6 +151,19 @@ def as_text(found: Calibration) -> list[str]:
         f"fit: innovations at most {found.misfit:.2f} times as large as noise explains, {found.passes} passes",
         *found.remarks,
     ]
+
+
+def _summary(found: Calibration) -> str:
+    """Return the result in one sentence."""
+    changed = [estimate for estimate in found.estimates if estimate.has_changed]
+    names = ", ".join(" ".join(part for part in (e.unknown.name, _row(e)[4].lstrip("* ")) if part) for e in changed)
+    untold = sum(not estimate.told for estimate in found.estimates)
+    before, after = (max(each.spread.tolist(), default=math.nan) for each in (found.before, found.after))
+    which = f": {names}" if names else ""
+    return (
+        f"{len(changed)} of {len(found.estimates)} parameters changed beyond their interval (*){which}; "
+        f"{untold} cannot be told; the worst residual held out was {before:.1f} times the expected noise and is {after:.1f}."
+    )
 
 
 def as_object(found: Calibration) -> dict[str, Any]:
@@ -165,6 +178,7 @@ def as_object(found: Calibration) -> dict[str, Any]:
         values |= {f"held_out_{kind}_{name}": value for name, value in spread}
     return values | {
         "told": [estimate.unknown.name for estimate in found.estimates if estimate.told],
+        "changed": [estimate.unknown.name for estimate in found.estimates if estimate.has_changed],
         "not_told": [str(group) for group in found.groups],
         "held_out": found.held_out,
         "misfit": found.misfit,
@@ -186,5 +200,6 @@ def _row(estimate: Estimate) -> tuple[str, str, str, str, str]:
     interval = f"{low:.4g} to {high:.4g} {unit}"
     if not estimate.told:
         return estimate.unknown.name, f"{before:.4g}", "as before", interval, "cannot be told"
-    change = f"{100.0 * (now / before - 1.0):+.1f} %" if estimate.unknown.kind.relative else ""
+    change = f"{100.0 * (now / before - 1.0):+.1f} %" if estimate.unknown.kind.relative else f"{now - before:+.3g} {unit}"
+    change = f"* {change}" if estimate.has_changed else change
     return estimate.unknown.name, f"{before:.4g}", f"{now:.4g}", interval, change

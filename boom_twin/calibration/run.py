@@ -55,6 +55,11 @@ class Estimate:
     high: float
     told: bool
 
+    @property
+    def has_changed(self) -> bool:
+        """Return True if the sessions determine it, and the present value is outside the interval."""
+        return self.told and not self.low <= self.unknown.present <= self.high
+
 
 @dataclass(frozen=True)
 class Calibration:

@@ -108,7 +108,6 @@ def _sessions(args: Namespace) -> SessionList:
         scene, settings = open_session_scene(path, args.scene), open_session_settings(path, args.params, args.namespace)
         return bag_feed(path, scene, settings, args.mapping, window, args.namespace)
 
-    tell("opening the session (compiles for up to a minute the first time) ..")
     return SessionList(sessions_in(args.bag), open_feed)
 
 

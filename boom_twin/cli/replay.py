@@ -119,7 +119,7 @@ def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
 
     files = [found.file]
     if not args.no_pictures:
-        files += draw(found.result, found.history, out)
+        files += draw(found.result, found.history, found.scene, out)
     if args.report:
         files.append(write_report(found, out))
     return files
@@ -144,9 +144,9 @@ def as_text(summary: dict[str, Any]) -> list[str]:
             lines.append(f"joint {i + 1} residual   not measured")
             continue
         ratio = hypot(summary["joint_residual_normalised_mean"][i], summary["joint_residual_normalised_std"][i])
-        lines.append(f"joint {i + 1} residual   {1e3 * value:.3f} mrad rms, {ratio:.2f} of what is expected")
+        lines.append(f"joint {i + 1} residual   {1e3 * value:.3f} mrad rms, {ratio:.1f} times the expected noise")
     for name, count in summary["events"].items():
-        lines.append(f"{name:18s} {count}")
+        lines.append(f"{name:18s} {count_as_text(name, count)}")
     if "tip_error_rms_m" in summary:
         lines += _errors(summary)
     if "tip_load" in summary:
@@ -156,6 +156,15 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         lines.append("result bag         not written (--no-bag)")
     alarms = summary["alarms"]
     return [*lines, f"alarms             {len(alarms) or 'none'}", *(f"  {alarm_as_text(alarm)}" for alarm in alarms)]
+
+
+def count_as_text(name: str, count: int) -> str:
+    """Return in words how often an irregularity was met."""
+    from ..messages.sample_decoder import ODDITIES
+    from ..twin.events import EVENTS
+
+    meaning = (EVENTS | ODDITIES).get(name, "").partition(";")[0]
+    return f"{count} time{'' if count == 1 else 's'}" + (f": {meaning}" if meaning else "")
 
 
 def _errors(summary: dict[str, Any]) -> list[str]:

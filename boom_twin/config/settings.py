@@ -134,6 +134,8 @@ class Thresholds(BaseModel):
     residual_window: float = setting(10.0, "s", POSITIVE, "time over which a residual is judged", True)
     residual_warn: float = setting(2.0, "1", POSITIVE, "root mean square of a normalised residual: warning", True)
     residual_error: float = setting(4.0, "1", POSITIVE, "root mean square of a normalised residual: error", True)
+    swing_warn: float = setting(0.15, "m", POSITIVE, "distance of the swinging tip from its mean: warning", True)
+    swing_error: float = setting(0.3, "m", POSITIVE, "distance of the swinging tip from its mean: error", True)
     load_warn: float = setting(0.5, "1", POSITIVE, "time of a step over the time between strokes: warning", True)
     load_error: float = setting(0.9, "1", POSITIVE, "time of a step over the time between strokes: error", True)
     unread_warn: float = setting(0.01, "1", SHARE, "share of messages lost, or given way to newer ones: warning", True)

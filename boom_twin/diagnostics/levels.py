@@ -87,7 +87,6 @@ class ComponentJudge:
     def __init__(self, name: str) -> None:
         self._name = name
         self._hysteresis: defaultdict[str, Hysteresis] = defaultdict(Hysteresis)
-        self._words: dict[str, str] = {}
         self.level: Level | None = None
         self._since = 0.0
 
@@ -103,14 +102,12 @@ class ComponentJudge:
     def check(self, key: str, value: float, bounds: Bounds, words: str, at_once: bool = False) -> None:
         """Judge a value, and report it with its bounds; with `at_once` a worse level needs no debounce time.
 
-        `words` say what is wrong if it is. While a level is held, the words that were true last are reported.
+        `words` say what is wrong if it is. They are constant: figures are in the values.
         """
         limits = {f"{key}_warn": bounds.warn, f"{key}_error": bounds.error}
         self._values |= {key: value} | {name: limit for name, limit in limits.items() if isfinite(limit)}
-        if bounds.level(value, Level.OK, 1.0) != Level.OK:
-            self._words[key] = words
         level = self._hysteresis[key].update(value, bounds, self.at.thresholds, self.at.now, at_once)
-        self.fault(level, self._words.get(key, words))
+        self.fault(level, words)
 
     def check_age(self, age: float, words: str) -> None:
         """Set the level STALE if nothing came for longer than `stale_after`. It ends with the next message."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Mapping
-from math import isfinite, nan
+from math import nan
 
 import numpy as np
 
@@ -144,12 +144,13 @@ class LoadWatch:
         if load is None:
             return None
         if load.is_there:
-            self.explanation = f"a load at the tip moves the boom: {load.text}"
+            self.explanation = "a load at the tip moves the boom"
         judge.note({"rms_N": load.rms})
         if (pulses := load.pulses) is not None:
             frequency = {"frequency_Hz": pulses.frequency, "frequency_sigma_Hz": pulses.frequency_sigma}
             judge.note({"pulses_N": pulses.height} | frequency)
-        return judge.finish(load.text)
+        found = "pump pulses at the tip" if pulses is not None else "a load at the tip that the model does not know"
+        return judge.finish(found if load.is_there else "no load at the tip beside the known one")
 
 
 class ResidualWindow:
@@ -216,7 +217,7 @@ class HealthWatch:
         ended = [alarm for alarm in self._alarms.all if alarm.until is not None]
         self._alarms.forget_ended()
         self._before.clear()
-        return "; ".join(f"{alarm.channel}: {alarm.told}" for alarm in ended) or "no alarm has ended"
+        return "; ".join(alarm.told for alarm in ended) or "no alarm has ended"
 
     def of(self, channel: str) -> tuple[Level, str] | None:
         """Return level and words of the active alarm of a channel; None without one."""
@@ -242,12 +243,12 @@ class HealthWatch:
         judge.note({"alarms": lasting, "not_acknowledged": len(alarms) - lasting + self._before.total()})
         for number, alarm in enumerate(alarms, 1):
             times = 1 + self._before[repeated(alarm)]
-            ended = f" (ended{f', {times} times' if times > 1 else ''}; not acknowledged)"
-            judge.fault(_level_of(alarm), f"{alarm.channel}: {alarm.told}{'' if alarm.until is None else ended}")
-            judge.note({f"{number} {key}": value for key, value in {"channel": alarm.channel, **values_of(alarm)}.items()})
+            judge.fault(_level_of(alarm), alarm.told if alarm.until is None else f"{alarm.told} (ended, not acknowledged)")
+            values: dict[str, Value] = {"channel": alarm.channel, **values_of(alarm), "times": times}
+            judge.note({f"{number} {key}": value for key, value in values.items()})
         judge.note(self._noise)
-        for told in noise_as_text(self._noise):
-            judge.fault(Level.WARN, told)
+        if noise_as_text(self._noise):
+            judge.fault(Level.WARN, "most sensors of a stream are noisier than its setting states")
         return judge.finish("no alarm")
 
 
@@ -275,7 +276,5 @@ def stress_status(
         megapascals = {f"{name}_MPa": float(stress) / MEGA, f"{name}_sigma_MPa": float(sigma) / MEGA}
         judge.note({f"{name}_Nm": float(moment)} | megapascals)
     most = int(abs(found.stresses).argmax())
-    sigma = float(found.stress_sigmas[most])
-    deviation = f" ± {sigma / MEGA:.2g}" if isfinite(sigma) else ""
-    largest = f"{found.stresses[most] / MEGA:.3g}{deviation} MPa"
-    return judge.finish(f"{largest} in {model.stations[most].name}, the most of all stations")
+    judge.note({"largest_MPa": float(found.stresses[most]) / MEGA, "largest_at": model.stations[most].name})
+    return judge.finish("bending stress of all stations")

@@ -8,8 +8,8 @@ from math import inf, isnan
 
 from ..config.settings import Settings
 from ..health.sensor_check import readings_of_frozen, sensor_ranges
-from ..health.sensor_monitor import TOLD
 from ..scene.schema import Scene
+from ..texts import alarm_text
 from ..types import SENSORS, Mount, Stream
 from .levels import Bounds, ComponentJudge, Status
 from .stream_stats import ChannelStats
@@ -72,9 +72,9 @@ def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats
     judge.check("missing_share", stats.missing, share, "messages without a value")
     if sensor.high < inf:
         judge.note({f"low_{unit}": sensor.low, f"high_{unit}": sensor.high})
-        judge.check("outside_share", stats.outside, share, TOLD["range"])
+        judge.check("outside_share", stats.outside, share, alarm_text(sensor.name, "range", None))
     period = 0.0 if isnan(stats.rate) else 1.0 / stats.rate
     needed = readings_of_frozen(sensor.sigma, sensor.resolution, thresholds.frozen_false_alarm)
     stuck, unchanged = Bounds(error=max(thresholds.frozen_after, needed * period)), stats.unchanged * period
-    judge.check("unchanged_s", unchanged, stuck, TOLD["stuck"])
+    judge.check("unchanged_s", unchanged, stuck, alarm_text(sensor.name, "stuck", None))
     return judge.finish("measuring" if stats.stamp else "waiting for a reading")

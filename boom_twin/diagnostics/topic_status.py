@@ -70,7 +70,7 @@ def topic_status(
         return judge.finish("not there; optional")
     told = "silent" if stream.newest is not None else "nothing received yet"
     if stream.newest is None and len(publishers.names) > len(publishers.incompatible):
-        told += f", though a publisher is there. {OTHER_USER}"
+        told += f"; though a publisher is there. {OTHER_USER}"
     judge.check_age(age, told)
     if stream.newest is not None:
         judge.note({"newest_stamp_s": seconds(stream.newest), "clock_minus_stamp_s": at.clock - stream.newest * NANO})

@@ -14,6 +14,7 @@ from .levels import ComponentJudge, Evaluation, Level, Status, Value
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, stress_status
 from .sensor_status import SensorSpec, sensor_status
 from .stream_stats import Rows, StreamWatch
+from .swing_status import SwingWatch
 from .topic_status import Peers, Reception, ReceptionWatch, outputs_status, publishers_status, seconds, topic_status
 
 
@@ -63,7 +64,7 @@ class TwinWatch:
             stream.begin()
         self._looked = self._monotonic()
         self._judges: dict[str, ComponentJudge] = {}
-        self._model, self._load = ModelWatch(self._looked), LoadWatch()
+        self._model, self._load, self._swing = ModelWatch(self._looked), LoadWatch(), SwingWatch()
         self._rows: dict[tuple[str, ...], Rows] = {}  # normalised residuals, by channels
         self._residuals: dict[str, ResidualWindow] = {}
         self._newest: Report | None = None  # that has a prediction
@@ -86,6 +87,7 @@ class TwinWatch:
                 rows.append(residuals.normalised)
             if each.prediction is not None:
                 self._newest = each
+                self._swing.took(each)
             if self._load.is_due(each.stamp) and each.estimate is not None:
                 self._load.took(each.estimate)
             self.judged(each.health, 0.0)
@@ -187,6 +189,8 @@ class TwinWatch:
             found.append(self.health.status(judge("health")))
         if (load := self._load.status(judge("tip load"))) is not None:
             found.append(load)
+        if self._newest is not None:
+            found.append(self._swing.status(judge("tip")))
         yield
         if self._stress is not None and self._newest is not None and self._newest.prediction is not None:
             bending = judge("bending")

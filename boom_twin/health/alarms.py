@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from math import nan
 
+from ..texts import likelihood
 from ..types import NANO, Alarm, Health, Ranked
 
 PROBABILITY = ": probability"
+UNKNOWN = "unknown"  # cause: something else, or nothing
 
 
 class Alarms:
@@ -70,6 +72,7 @@ def values_of(alarm: Alarm) -> dict[str, str]:
         "cause": alarm.cause or "",
         "from_s": f"{alarm.since * NANO:.3f}",
         "to_s": f"{nan if alarm.until is None else alarm.until * NANO:.3f}",
+        "evidence": alarm.evidence,
     }
     for rank in alarm.ranked:
         found[rank.cause + PROBABILITY] = f"{rank.probability:.4g}"
@@ -79,7 +82,7 @@ def values_of(alarm: Alarm) -> dict[str, str]:
     return found
 
 
-def alarm_of(channel: str, told: str, values: Mapping[str, str]) -> Alarm:
+def alarm_of(channel: str, values: Mapping[str, str]) -> Alarm:
     """Return an alarm from what `values_of` made of it: stamps to the millisecond, causes without what would be the matter.
 
     Raises
@@ -92,7 +95,17 @@ def alarm_of(channel: str, told: str, values: Mapping[str, str]) -> Alarm:
     ]
     since, end = _stamp(values["from_s"]), values["to_s"]
     until = None if end == "nan" else _stamp(end)
-    return Alarm(channel, values["kind"], since, until, values["cause"] or None, told, tuple(ranked))
+    return Alarm(channel, values["kind"], since, until, values["cause"] or None, values.get("evidence", ""), tuple(ranked))
+
+
+def evidence_with_cause(evidence: str, causes: Iterable[tuple[str, float]]) -> str:
+    """Return the evidence of an alarm with its two most probable causes in words."""
+    found = [
+        f"{'something else' if cause == UNKNOWN else cause} {likelihood(chance)}"
+        for cause, chance in list(causes)[:2]
+        if chance >= 0.005
+    ]
+    return "; ".join(part for part in (evidence, ", ".join(found)) if part)
 
 
 def _stamp(seconds: str) -> int:

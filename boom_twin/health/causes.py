@@ -23,6 +23,7 @@ from ..scene.edit import loaded, parameter, parameter_names, with_parameters
 from ..scene.schema import Scene
 from ..scene.summary import explain
 from ..types import Alarm, Array, Stream, channels_of
+from .alarms import UNKNOWN
 
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # shares: of k or EI, of k of all cylinders, of the boom's mass
 LATE = 0.02  # s
@@ -123,8 +124,8 @@ def possible_faults(scene: Scene) -> list[Fault]:
 class Verdict(NamedTuple):
     """Named fault.
 
-    place : of the fault among those compared. onset : stamp (ns) of the second from which on it gains. ranked : causes with
-    their posterior probabilities, the most probable first. All of them, and that nothing is wrong, add up to one.
+    place : of the fault among those compared. onset : stamp (ns) of the second from which on it gains. ranked : the
+    three most probable causes with their posterior probabilities, then `UNKNOWN`; together one.
     """
 
     place: int
@@ -168,7 +169,9 @@ class Evidence:
         if chances[self._faults[best].cause] < self._odds:
             return None
         ranked = sorted(((cause, chance) for cause, chance in chances.items() if cause), key=lambda each: -each[1])
-        return Verdict(best, self._stamps[min(onsets[best] + 1, len(self._stamps) - 1)], tuple(ranked[:3]))
+        shown = ranked[:3]
+        shown.append((UNKNOWN, max(0.0, 1.0 - sum(chance for _, chance in shown))))
+        return Verdict(best, self._stamps[min(onsets[best] + 1, len(self._stamps) - 1)], tuple(shown))
 
     def _rises(self) -> tuple[Array, list[int]]:
         """Return how much each fault has gained from its best onset on, and the place of that onset among the seconds kept."""
@@ -180,32 +183,21 @@ class Evidence:
         return np.maximum(rises.max(axis=0), 0.0), latest.tolist()
 
 
-def told(fault: Fault, spread: float) -> str:
-    """Return a fault with its standard deviation in words for an operator: what it is, and what to do."""
-    name = fault.channel.replace("_", " ")
+def evidence_of(fault: Fault, spread: float) -> str:
+    """Return size and standard deviation of a fault in figures."""
+    size = fault.size
     if fault.kind == "softer":
-        share = f"{100.0 * fault.size:.0f} % (+-{max(100.0 * spread, 1.0):.0f} %)"
-        if fault.cause.endswith(".k"):
-            what, do = f"oil spring of {name}", "Finish the move, then look for air in the oil and loose pins"
-        else:
-            what, do = name, "Stop, and look for cracks"
-        return f"{what} is very likely softer than the scene says, by {share}. {do}."
+        k = fault.cause.rpartition(".")[2]
+        low, high = max(size - 2.0 * spread, 0.0), size + 2.0 * spread
+        return f"{k} {100.0 * size:.0f} % lower ({100.0 * low:.0f} to {100.0 * high:.0f})"
     if fault.is_load:
-        unit, what = ("kg", "payload") if fault.cause == "tip.payload" else ("kg/m", "line fill")
-        size = f"{fault.size:.2g} {unit} (+-{max(spread, 0.1):.1g} {unit}) {fault.kind}"
-        return f"the boom very likely carries {size} than the {what} that is set. Look what hangs at the tip, then set {what}."
+        unit = "kg" if fault.cause == "tip.payload" else "kg/m"
+        return f"by {size:.2g} {unit} (+- {max(spread, 0.1):.1g})"
     if fault.kind == "late":
-        return (
-            f"stamps of {name} are very likely late by {1e3 * fault.size:.0f} ms (+-{max(1e3 * spread, 1.0):.0f} ms). "
-            f"Add that to the delay of {fault.channel} in the mapping."
-        )
+        return f"by {1e3 * size:.0f} ms (+- {max(1e3 * spread, 1.0):.0f})"
     if fault.channel.startswith("cylinder_force"):
-        return f"{name} very likely reads wrong by {fault.size:+.0f} N (+-{spread:.0f} N). Check the sensor's zero and scale."
-    number, size = fault.channel.rpartition("_")[2], f"{math.degrees(fault.size):+.2f} deg (+-{math.degrees(spread):.2f} deg)"
-    return (
-        f"the angle sensor of joint {number}, or the stroke transducer of its cylinder, very likely reads wrong, "
-        f"by {size} as an angle. Compare both at rest, then set the zero."
-    )
+        return f"by {size:+.0f} N (+- {spread:.0f})"
+    return f"by {math.degrees(size):+.2f} deg (+- {math.degrees(spread):.2f})"
 
 
 def explains(named: Alarm, stream: Stream, deviation: Alarm) -> bool:

@@ -78,8 +78,7 @@ class DelayMonitor:
         lag, sigma = next(clear, (0.0, math.inf))
         if self.alarm is None and abs(lag) >= max(LEAST, SURE * sigma):
             stream = Stream.ANGLES.value
-            told = f"{stream} late: {lag:+.3g} +- {sigma:.1g} s; if it stays, add it to `delay` of {stream} in the mapping"
-            self.alarm = Alarm(stream, "late", end, None, f"{stream}.delay", told)
+            self.alarm = Alarm(stream, "late", end, None, f"{stream}.delay", f"by {lag:+.3g} s (+- {sigma:.1g})")
             return [self.alarm]
         newest, spread, _ = estimates[-1]
         if self.alarm is not None and abs(newest) + SURE * spread < LEAST:

@@ -21,10 +21,6 @@ LAG = 0.4  # s; a residual explained by a smaller delay of stamps is no deviatio
 LASTING = 3_000_000_000  # ns, debounce time: in fast motion a mean is off for two seconds
 GONE = 0.5  # share of the limit below which a deviation ends
 SETTLED = 5_000_000_000  # ns below that share before it ends
-REMEDY = {
-    Stream.ANGLES: "its sensor, a stroke transducer, or the scene is off. Compare both at rest",
-    Stream.FORCES: "its sensor, the load, or the scene is off. Check payload and line fill, then the sensor's zero",
-}
 
 
 @dataclass
@@ -73,7 +69,7 @@ class DeviationMonitor:
         self._since = np.where(is_far, np.where(self._since < 0, block.start, self._since), -1)
         for i in np.flatnonzero(is_far & ~is_explained & (block.end - self._since >= LASTING)).tolist():
             if i not in self._last:
-                alarm = Alarm(self._names[i], KIND, int(self._since[i]), None, None, self._told(i, off[i]))
+                alarm = Alarm(self._names[i], KIND, int(self._since[i]), None, None, self._evidence(i, off[i]))
                 self._last[i] = _Deviation(alarm, block.end)
                 news.append(alarm)
         for i, each in list(self._last.items()):
@@ -83,9 +79,8 @@ class DeviationMonitor:
                 news.append(replace(self._last.pop(i).alarm, until=each.seen))
         return news
 
-    def _told(self, i: int, off: Array) -> str:
-        """Return the deviation of channel `i` and its possible reasons in words."""
+    def _evidence(self, i: int, off: Array) -> str:
+        """Return the deviation of channel `i` in figures."""
         factor, unit = SENSORS[self._stream].shown_unit
         tip = "" if self._reach is None else f", up to {1e3 * abs(off) * self._reach[i]:.0f} mm at the tip"
-        size = f"{float(f'{factor * off:.3g}'):+g} {unit}"
-        return f"{self._names[i]} reads {size} against the cylinder lengths{tip}: {REMEDY[self._stream]}"
+        return f"by {float(f'{factor * off:.3g}'):+g} {unit}{tip}"

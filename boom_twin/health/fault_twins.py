@@ -21,7 +21,7 @@ import numpy as np
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Change, Ranked, Stream
-from .causes import MEMORY, TEMPER, Evidence, Fault, Hypothesis, Verdict, hypothesis, possible_faults, told
+from .causes import MEMORY, TEMPER, Evidence, Fault, Hypothesis, Verdict, evidence_of, hypothesis, possible_faults
 from .sensor_check import Flags
 
 SIZES = 0.4, 0.7, 1.0, 1.4, 1.8  # times the size of a named fault, by which its true size is found
@@ -211,8 +211,8 @@ class FaultTwins:
             self._decision = Evidence(self._faults, self._odds)
             return []
         ranked = tuple(Ranked(cause, chance, ()) for cause, chance in verdict.ranked)
-        text = told(sized, spread) if fault.is_told else ""
-        alarm = Alarm(fault.channel, fault.kind, verdict.onset, None, fault.cause, text, ranked)
+        evidence = evidence_of(sized, spread) if fault.is_told else ""
+        alarm = Alarm(fault.channel, fault.kind, verdict.onset, None, fault.cause, evidence, ranked)
         self._named[sized] = alarm
         self._begin()
         return [alarm] if fault.is_told else []

@@ -15,22 +15,13 @@ from .sensor_check import MISSTATED, NOISE_OVER, Flags, SensorFindings
 SETTLED = 2_000_000_000  # ns without the fault after which it has ended
 CAME_BACK = 0.3  # of a jump, by which a sensor that came back may still be off
 MEASURED = 4.0  # times the stated noise, above which there may be more: a reading counts for so much at most
-TOLD = {
-    "stuck": "repeats one reading again and again",
-    "noise": "is noisier than its like and than stated",
-    "spikes": "has single readings far from their neighbours",
-    "jump": "jumped at once, which no boom can",
-    "dropout": "gives no readings",
-    "range": "reads out of its range",
-}
 
 
 def noise_as_text(figures: Mapping[str, Any]) -> list[str]:
     """Return a warning for every stream whose sensors are noisier than stated, by figures as in `Health.noise`."""
     found = {name.removeprefix(NOISE_OVER): times for name, times in figures.items() if name.startswith(NOISE_OVER)}
     return [
-        f"most sensors are {times:.1f} times {'or more ' if times > MEASURED else ''}as noisy as {name} states; judgement "
-        f"allows for it: set {name} to what they have"
+        f"most sensors are {times:.1f} times {'or more ' if times > MEASURED else ''}as noisy as {name} states; set it to that"
         for name, times in found.items()
         if times > MISSTATED
     ]
@@ -117,8 +108,8 @@ class SensorMonitor:
                 if kind == "jump" and self._is_wild(channel):
                     continue
                 jump = (float(findings.jumped[channel]), float(findings.level[channel])) if kind == "jump" else None
-                told = self._offset(float(findings.level[channel])) if kind == "range" else ""
-                news += self._seen(channel, kind, start, end, jump, told)
+                evidence = self._offset(float(findings.level[channel])) if kind == "range" else ""
+                news += self._seen(channel, kind, start, end, jump, evidence)
         for key, fault in list(self._faults.items()):
             off = abs(float(newest[key[0]])) if newest is not None and self._is_predicted else math.inf
             if key[1] == "jump" and not off < abs(fault.before) + CAME_BACK * abs(fault.offset):
@@ -149,9 +140,11 @@ class SensorMonitor:
         if not (self._is_predicted and math.isfinite(off)):
             return ""
         turned = f"{math.degrees(off):+.4g} deg, " if self._sensors.unit == "rad" else ""
-        return f": an offset of {turned}{off:+.4g} {self._sensors.unit}; if it stays, give the sensor's zero in the mapping"
+        return f"an offset of {turned}{off:+.4g} {self._sensors.unit}"
 
-    def _seen(self, channel: int, kind: str, start: int, end: int, jump: tuple[float, float] | None, more: str) -> list[Alarm]:
+    def _seen(
+        self, channel: int, kind: str, start: int, end: int, jump: tuple[float, float] | None, evidence: str
+    ) -> list[Alarm]:
         """Begin, keep or end a fault that was found again; of a jump its step, and how far the reading is off after it."""
         key = (channel, kind)
         fault = self._faults.get(key)
@@ -164,6 +157,9 @@ class SensorMonitor:
             fault.seen = end
             return []
         name = self._names[channel]
-        told = f"{name}.sensor {TOLD[kind]}" + (f": {size:+.3g} {self._sensors.unit}" if size else more)
-        self._faults[key] = _Fault(Alarm(name, kind, start, None, f"{name}.sensor", told), end, size, level - size)
+        if size:
+            evidence = (
+                f"by {math.degrees(size):+.3g} deg" if self._sensors.unit == "rad" else f"by {size:+.3g} {self._sensors.unit}"
+            )
+        self._faults[key] = _Fault(Alarm(name, kind, start, None, f"{name}.sensor", evidence), end, size, level - size)
         return [self._faults[key].alarm]

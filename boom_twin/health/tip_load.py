@@ -53,10 +53,7 @@ class TipLoadMonitor:
         if self.alarm is not None or stamp - self._since < AFTER:
             return []
         size, sigma = self._largest
-        told = (
-            f"{CAUSE} exceeded: {size:.0f} +- {sigma:.0f} N at the tip, above the limit of {self._limit:g} N (tip_load_limit); "
-            "stop the pump, free the end hose, and compare the posture of the boom with its readings"
-        )
+        evidence = f"{size:.0f} N (+- {sigma:.0f}), limit {self._limit:g} N (tip_load_limit)"
         ranked = (Ranked(CAUSE, 1.0, (("exceeded", size, sigma, "N"),)),)
-        self.alarm = Alarm("tip", "exceeded", self._since, None, CAUSE, told, ranked)
+        self.alarm = Alarm("tip", "exceeded", self._since, None, CAUSE, evidence, ranked)
         return [self.alarm]

@@ -41,7 +41,7 @@ def decode_health(msg: Any) -> tuple[Alarm, ...]:
     found = []
     for status in msg.status:
         try:
-            found.append(alarm_of(status.name, status.message, {pair.key: pair.value for pair in status.values}))
+            found.append(alarm_of(status.name, {"evidence": status.message} | {pair.key: pair.value for pair in status.values}))
         except (KeyError, ValueError, ArithmeticError):
             continue
     return tuple(found)

@@ -109,7 +109,7 @@ ODDITIES = {
     "unknown names only": "none of the scene's cylinders or joints is in the message, which is left out",
     "names of another boom": "cylinders or joints that the scene does not have; the message is left out",
     "too many names": f"more than {MOST_NAMES} in a message, which is left out",
-    "not finite": "NaN or infinity in a message; that value is left out",
+    "not finite": "a reading without a value (NaN or infinity); it is left out",
     "absurd magnitude": f"above {LIMIT:g} in a message; that value is left out",
     "no measurement": "an Imu says by linear_acceleration_covariance[0] = -1 that it has none (REP-145); it is left out",
     "no usable value": "nothing of a message could be used",

@@ -13,6 +13,7 @@ from unicodedata import category
 from ..bag.async_writer import PATIENCE
 from ..system.child_process import end_process, python_command
 from .data.feed import Feed
+from .data.status import MAX_ALARMS
 
 RECORDER_TIMEOUT = 2 * PATIENCE
 """Timeout (s) for the end of a recorder: longer than its wait for a slow disk, so that no messages are lost."""
@@ -111,14 +112,15 @@ class ViewerActions:
         return f"marked: {note}"
 
     def _acknowledge(self, request: dict[str, Any]) -> str:
-        alarm = self._feed.store.alarms.acknowledge(int(request["number"]))
-        if alarm is None:
+        known = (self._feed.store.alarms.acknowledge(int(number)) for number in request["numbers"][:MAX_ALARMS])
+        found = [alarm for alarm in known if alarm is not None]
+        if not found:
             return "that alarm is not kept any more"
-        if self._feed.end is None:
+        for alarm in found if self._feed.end is None else []:
             self._feed.publish(f"acknowledged: {alarm.name}: {alarm.reason}")
-        is_kept_by_node = bool(alarm.causes) and alarm.end is not None
+        is_kept_by_node = any(alarm.causes and alarm.end is not None for alarm in found)
         asked = f"; {self._feed.release_alarms()}" if is_kept_by_node and AT_NODE in self.permitted else ""
-        return f"acknowledged: {alarm.name}{asked}"
+        return f"acknowledged: {', '.join(alarm.name for alarm in found)}{asked}"
 
     def _record(self, request: dict[str, Any]) -> str:
         assert self._recording is not None

@@ -50,16 +50,35 @@ def pack(kind: int, table: int, times: NDArray[np.float64], values: NDArray[np.f
 def state(store: Store, now: float, time: float, dropped: DroppedMessages | None = None) -> dict[str, Any]:
     """Return the message ``state``: lamps at `now` (s, on the lamps' clock), time (s) of the newest data, dropped messages.
 
-    The level is at least WARN if messages were dropped, because they may have changed the lamps.
+    The level is at least WARN if messages were dropped, because they may have changed the lamps. `action` is what to do:
+    ``go``, ``look``, ``stop``, or ``unknown``. `alarm` is the number of the alarm that is the reason, if it is one.
     """
     groups = store.statuses(now).groups(now)
     groups["residuals"] = _with_alarms(groups["residuals"], list(store.alarms.lamps(time)))
     level, reason = overall(groups)
     losses = [] if dropped is None else dropped.losses()
     if losses and level == Severity.OK:
-        level, reason = Severity.WARN, f"messages dropped: {sum(loss['count'] for loss in losses)}, see below"
+        level, reason = Severity.WARN, "messages dropped"
+    alarm = next(iter(store.alarms.active(time)), None)
+    model = worst(groups["model"])
+    has_failed = model is not None and model.level == Severity.ERROR
+    if alarm is not None and alarm.level >= level and not (has_failed and not alarm.stops):
+        reason = alarm.reason
+    else:
+        alarm = None
+    is_swing = has_failed and model is not None and model.name == SWING
+    stops = level == Severity.ERROR and (is_swing if alarm is None else alarm.stops)
     told = [{"name": name, **_group(lamps)} for name, lamps in groups.items()]
-    return {"kind": "state", "time": time, "level": level.name, "reason": reason, "groups": told, "dropped": losses}
+    message = {"kind": "state", "time": time, "level": level.name, "action": "stop" if stops else ACTIONS[level]}
+    number = None if alarm is None else alarm.number
+    return message | {"reason": reason, "alarm": number, "groups": told, "dropped": losses}
+
+
+ACTIONS = {
+    Severity.OFF: "unknown", Severity.OK: "go", Severity.WARN: "look", Severity.STALE: "unknown", Severity.ERROR: "look",
+}  # fmt: skip
+SWING = "tip"
+"""Status whose error stops the boom."""
 
 
 def layout(store: Store) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from aiohttp import web
 
 from ..errors import BoomTwinError
+from ..texts import FILE as TEXTS
 from .access_control import POLICY, AccessControl
 from .actions import ViewerActions
 from .connections import Connection
@@ -62,7 +63,7 @@ class Server:
 
     async def _file(self, request: web.Request) -> web.FileResponse:
         """Return one of the page's own files. The name asked for is only compared with theirs; no path is made of it."""
-        file = next((file for file in PAGE.iterdir() if file.name == request.match_info["name"]), None)
+        file = next((file for file in (*PAGE.iterdir(), TEXTS) if file.name == request.match_info["name"]), None)
         if file is None:
             raise web.HTTPNotFound(text="there is no such file of the page")
         return web.FileResponse(file)

@@ -117,7 +117,7 @@ class Viewer:
         if play is not None:
             message |= {"position": play.position, "speed": play.speed, "is_held": play.is_held}
             message |= {"end": feed.end, "read": feed.store.newest}
-        message |= {"trouble": feed.trouble, "is_recording": self._actions.is_recording}
+        message |= {"trouble": feed.trouble, "phase": feed.phase, "is_recording": self._actions.is_recording}
         await self._send_text(message)
         told = dump(alarms(feed.store.alarms.all))
         if told != self._alarms:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.cylinder_drives import drives_as_read
+from ..analysis.posture_modes import ModeList
+from ..analysis.undeflected import UndeflectedBoom
 from ..compiler.compile import compile_scene
 from ..compiler.plan import Plan
 from ..deviation.estimate_row import VARIANCES
@@ -29,14 +31,27 @@ from .recording import Recording, ResidualRows, Stretch
 from .replay import Replay
 
 
-def draw(result: Replay, history: History, out: Path) -> list[Path]:
+def draw(result: Replay, history: History, scene: Scene, out: Path) -> list[Path]:
     """Draw the pictures of a replay, of which `history` is made, into `out`; returns their paths."""
+    middles = tuple(UndeflectedBoom(scene, compile_scene(scene)).middles)
+    history = replace(history, natural=_natural(history, scene), section_middles=middles)
     notes = result.session.notes
     note = notes.get("origin", "")
     truth = _truth(result.truth, history)
     return replay_pictures(out, history, truth, session=result.session.path.resolve().name, note=note)
 
 
+def _natural(history: History, scene: Scene) -> Array:
+    """Return the least and the largest of each natural frequency (Hz) over the session's postures, shape (modes, 2)."""
+    modes, count = ModeList(scene), len(history.stamps_s)
+    places = np.unique(np.linspace(0, count - 1, min(count, POSTURES)).astype(int))
+    rows = [found for place in places if (found := modes.at(history.strokes[place].tolist()))]
+    columns = list(zip(*rows, strict=False))
+    return np.array([(min(column), max(column)) for column in columns]).reshape(-1, 2)
+
+
+POSTURES = 9
+"""Postures of a session whose natural frequencies are computed."""
 MOST_ROWS = 2**15
 """Rows of predictions, and of each stream's residuals, beyond which they are thinned out: 2.7 min at 200 Hz."""
 MOST_SHAPES = 1024

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..deviation.load_spectrum import TipLoad
+from ..health.alarms import evidence_with_cause
 from ..system.received_files import sha256_of
 from ..types import NANO, Alarm, Stream
 from .recording import Recording
@@ -48,11 +49,11 @@ def summary_of(recording: Recording, counts: Counter[str], wall: float, file: Pa
 def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
     """Return gaps, clock steps and health alarms in the order of their beginning; seconds since the stamp `first`."""
     gaps = [
-        Alarm(Stream.STROKES.value, "gap", start, end, None, f"no strokes for {(end - start) * NANO:.2f} s")
+        Alarm(Stream.STROKES.value, "gap", start, end, None, f"for {(end - start) * NANO:.2f} s")
         for start, end in recording.gaps
     ]
     gaps += [
-        Alarm(Stream.STROKES.value, "clock", start, start, None, f"stamps went on at {(end - first) * NANO:.3f} s")
+        Alarm(Stream.STROKES.value, "clock", start, start, None, f"stamps go on at {(end - first) * NANO:.3f} s")
         for start, end in recording.clock_sets
     ]
     return [
@@ -63,6 +64,7 @@ def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
             "to_s": None if alarm.until is None else (alarm.until - first) * NANO,
             "cause": alarm.cause,
             "told": alarm.told,
+            "evidence": evidence_with_cause(alarm.evidence, ((rank.cause, rank.probability) for rank in alarm.ranked)),
             "ranked": [{"cause": rank.cause, "probability": rank.probability} for rank in alarm.ranked],
         }
         for alarm in sorted([*gaps, *recording.alarms()], key=lambda alarm: alarm.since)
@@ -72,7 +74,8 @@ def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
 def alarm_as_text(alarm: dict[str, Any]) -> str:
     """Return an alarm of ``summary.json`` in words."""
     end = "the end" if alarm["to_s"] is None else f"{alarm['to_s']:.2f} s"
-    return f"{alarm['channel']}, {max(0.0, alarm['from_s']):.2f} s to {end}: {alarm['told']}"
+    evidence = f" ({alarm['evidence']})" if alarm["evidence"] else ""
+    return f"{alarm['channel']}, {max(0.0, alarm['from_s']):.2f} s to {end}: {alarm['told']}{evidence}"
 
 
 def _load(load: TipLoad | None) -> dict[str, Any]:

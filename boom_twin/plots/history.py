@@ -127,3 +127,5 @@ class History:
     distributions: SessionDistributions | None = None
     estimate: EstimateTrace | None = None  # None where nothing but strokes was measured
     load_text: str = ""  # size and main frequency of its load, in words
+    natural: Array = field(default_factory=lambda: np.zeros((0, 2)))  # (modes, 2), Hz: least and largest over the postures
+    section_middles: tuple[int, ...] = ()  # points of `shapes` nearest to the middles of the sections

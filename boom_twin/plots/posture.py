@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..types import Array
 from .boom import draw_base
 from .history import History, Orbits
 from .style import GREEN, GREY, INK, ORANGE, TIME, broken, colours_of_times, picture, side_view
@@ -32,9 +33,23 @@ def posture_picture(path: Path, session: str, history: History, note: str) -> No
         for (stamp, line), colour, name in zip(chosen[:1] + chosen[-1:], (GREEN, INK), ("first", "last"), strict=False):
             axes.plot(*line.T, color=colour, linewidth=3.2, label=f"{name}, at {stamp:.1f} s")
             axes.plot(*line[-1], "o", color=colour, markersize=8)
+        for number, middle in enumerate(history.section_middles if chosen else (), 1):
+            _name_section(axes, chosen[-1][1], middle, number)
         draw_base(axes, chosen[0][1][0] if chosen else np.zeros(2), 0.45)
         axes.margins(0.06)
         axes.legend(loc="upper right")
+
+
+def _name_section(axes: Axes, line: Array, middle: int, number: int) -> None:
+    """Write the name of a section beside its middle point on a line (m), with a bright outline."""
+    from matplotlib.patheffects import withStroke
+
+    (x, y), along = line[middle], line[min(middle + 1, len(line) - 1)] - line[max(middle - 1, 0)]
+    across = np.array([along[1], -along[0]]) / max(float(np.hypot(*along)), 1e-9)
+    axes.annotate(
+        f"section {number}", (x, y), tuple(across * [42, 16]), textcoords="offset points", ha="center", va="center",
+        fontsize=12, color=INK, zorder=10, path_effects=[withStroke(linewidth=3.0, foreground="white")],
+    )  # fmt: skip
 
 
 def spread(count: int, most: int) -> list[int]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..types import Array, sensor_kind
 from .history import Density, History, ResidualDistribution
 from .session_distributions import EDGES, SEGMENT, distributions_of
-from .style import BLUE, GREY, INK, ORANGE, SKY, TIME, extent, legend_above, picture, shade_alarms, shade_gaps
+from .style import BLUE, GREY, INK, ORANGE, PURPLE, SKY, TIME, extent, legend_above, picture, shade_alarms, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -96,10 +96,22 @@ def spectrum_picture(path: Path, session: str, history: History, note: str) -> N
             axes.loglog(*_curve(found.predicted[i]), color=(BLUE, ORANGE)[i], linewidth=1.8, label="predicted")
             axes.set_title(f"{quantity[0].upper()}{quantity[1:]}, {names[i]}")
             axes.set_xlabel("frequency, Hz")
-            axes.legend(loc="upper right")
+            _modes(axes, history.natural)
+            legend_above(axes, 2)
         panels[0].set_ylabel("power spectral density, (m/s²)²/Hz")
         text = f"Welch, segments of {SEGMENT:g} s, Hann window, mean removed"
         panels[0].text(0.02, 0.02, text, transform=panels[0].transAxes, fontsize=11, color=GREY)
+
+
+def _modes(axes: Axes, natural: Array) -> None:
+    """Mark the natural frequencies (Hz), shape (modes, 2), each from its least to its largest; with their numbers."""
+    for number, (low, high) in enumerate(natural, 1):
+        axes.axvspan(low, max(high, 1.01 * low), color=PURPLE, alpha=0.25, linewidth=0, zorder=0.5)
+        place = np.sqrt(low * high), 0.99
+        axes.annotate(
+            f"mode {number}" if number == 1 else f"{number}", place, xycoords=axes.get_xaxis_transform(), ha="center", va="top",
+            fontsize=11, color=PURPLE,
+        )  # fmt: skip
 
 
 def has_spectrum(history: History) -> bool:

@@ -89,10 +89,29 @@ def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = 
         if note:
             figure.text(0.988, 1.0 - 0.16 / size[1], shorten(printable(note), NOTE, placeholder=" .."), **SMALL)
         yield figure
+        _part_titles_and_legends(figure)
         content = BytesIO()
         # `savefig` draws everything twice, the first time for its layout
         canvas.print_png(content, metadata={"Software": None}, pil_kwargs={"compress_level": 3})
     write_atomic(path, content.getvalue())
+
+
+def _part_titles_and_legends(figure: Figure) -> None:
+    """Raise every title that a legend would cover above that legend."""
+    from matplotlib.text import Text
+
+    figure.draw_without_rendering()
+    has_moved = False
+    for axes in figure.axes:
+        legend, text = axes.get_legend(), axes.get_title(loc="left")
+        titles = [each for each in axes.get_children() if isinstance(each, Text) and text and each.get_text() == text]
+        box = None if legend is None else legend.get_window_extent()
+        for title in titles:
+            if box is not None and box.overlaps(title.get_window_extent()):
+                axes.set_title(text, loc="left", pad=6.0 + 72.0 / DPI * (box.y1 - axes.get_window_extent().y1))
+                has_moved = True
+    if not has_moved:
+        figure.set_layout_engine("none")  # the layout is known
 
 
 def shade_gaps(axes: Axes, gaps: list[tuple[float, float]]) -> None:

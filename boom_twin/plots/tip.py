@@ -9,15 +9,16 @@ import numpy as np
 
 from ..types import Array
 from .history import History, Truth
-from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, TIME, broken, extent, legend_above, limits, picture, shade_gaps
+from .style import BLUE, GREY, INK, ORANGE, PALE, TIME, broken, extent, legend_above, limits, picture, shade_gaps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ENLARGED_SPAN = 6.0  # s shown enlarged
 TRUTH: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (3, 4))}
-PREDICTED, ESTIMATED = (BLUE, ORANGE), (GREEN, PURPLE)
-"""Colours of x and y."""
+COLOURS = (BLUE, ORANGE)
+"""Of x and y. A prediction is a broad pale line, an estimate a thin dark one over it."""
+BROAD: dict[str, Any] = {"linewidth": 3.2, "alpha": 0.4}
 BAND = 2.0  # standard deviations that are shaded, as their label says
 
 
@@ -88,15 +89,15 @@ def _over_session(axes: Axes, history: History, panel: Panel) -> None:
     extents, errors = [], []
     if panel.predicted is not None:
         stamps, drawn = broken(history.stamps_s, panel.predicted, history.gaps)
-        for name, column, colour in zip("xy", drawn.T, PREDICTED, strict=True):
-            axes.plot(stamps, column, color=colour, label=f"predicted {name}")
+        for name, column, colour in zip("xy", drawn.T, COLOURS, strict=True):
+            axes.plot(stamps, column, color=colour, label=f"predicted {name}", **BROAD)
         extents.append(panel.predicted)
         errors.append(("prediction", panel.predicted))
     if panel.estimated is not None:
         values, sigmas = panel.estimated
         stamps, drawn = broken(history.stamps_s, values, history.gaps)
         _, bands = broken(history.stamps_s, BAND * sigmas, history.gaps)
-        for i, colour in enumerate(ESTIMATED):
+        for i, colour in enumerate(COLOURS):
             label = f"estimated {'xy'[i]}{', ±2 sigma' if i else ''}"
             axes.plot(stamps, drawn[:, i], color=colour, linewidth=1.0, label=label)
             low, high = drawn[:, i] - bands[:, i], drawn[:, i] + bands[:, i]
@@ -141,10 +142,10 @@ def _enlarged(axes: Axes, history: History, truth: Truth | None, window: tuple[f
     if history.imu is not None:
         title, label = f"Specific force {('x, along the tip', 'z, across it')[i]}", "specific force, m/s²"
         curves.append(("measured", history.imu.stamps_s, history.imu.measured, {"color": GREY, "linewidth": 0.9}))
-        curves.append(("predicted", history.imu.stamps_s, history.imu.predicted, {"color": PREDICTED[i], "linewidth": 1.6}))
+        curves.append(("predicted", history.imu.stamps_s, history.imu.predicted, {"color": COLOURS[i], "linewidth": 1.6}))
     else:
         title, label = f"Tip acceleration {'xy'[i]}", "acceleration, m/s²"
-        curves.append(("predicted", history.stamps_s, history.tip_acceleration, {"color": PREDICTED[i]}))
+        curves.append(("predicted", history.stamps_s, history.tip_acceleration, {"color": COLOURS[i]}))
         if truth is not None:
             curves.append(("truth", truth.stamps_s, truth.tip_acceleration, TRUTH))
     shown = []

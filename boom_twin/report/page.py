@@ -18,7 +18,7 @@ from ..plots import AlarmSpan
 from ..plots.health import frequency_picture, moment_picture, timeline_picture
 from ..system.atomic_files import write_atomic
 from ..twin.events import EVENTS
-from ..types import NANO, SECOND, SENSORS, Alarm, Stream
+from ..types import SECOND, SENSORS, Stream
 from .evaluation import Evaluation
 from .fatigue import NOISE_RANGE
 from .html import heading, image, page, paragraph, table
@@ -27,7 +27,6 @@ from .vibration import MODE_DISTANCE, SHORTEST_REST, course
 
 FILE_NAME = "report.html"
 NO_JUDGE = "The rig's health was not judged."
-SHARES = "An estimate without unit is a share; of a stiffness (k, EI) by its compliance: 0.43 is 1.43 times as compliant."
 ASSUMED = f"Heights are not in the scene: assumed are {BOX:g} radii of gyration, as of thin-walled boxes; see --section-height."
 
 
@@ -75,7 +74,10 @@ def _head(found: Evaluation) -> list[str]:
         _verdict(found.result),
         table((), rows),
         heading("Joint angles", 3),
-        table(("joint", "residual, mrad rms", "mean / expected deviation", "spread / expected deviation"), _joints(summary)),
+        table(
+            ("joint", "residual, mrad rms", "mean, times the expected noise", "spread, times the expected noise"),
+            _joints(summary),
+        ),
     ]
 
 
@@ -97,9 +99,9 @@ def _uncertainty(recording: Recording) -> list[tuple[str, object]]:
 def _verdict(result: Replay) -> str:
     if not result.recording.is_judged:
         return paragraph(NO_JUDGE, "note")
-    count = len(result.recording.alarms())
+    count = len(result.summary["alarms"])
     if count:
-        return paragraph(f"{count} alarm{'s' if count > 1 else ''} of the rig's health.", "alarm")
+        return paragraph(f"{count} alarm{'s' if count > 1 else ''}.", "alarm")
     return paragraph("No alarm: no sensor gives itself away, and no residual is beyond its limit.", "well")
 
 
@@ -120,28 +122,19 @@ def _alarms(found: Evaluation, folder: Path) -> list[str]:
     spans = sorted([*gaps, *history.alarms], key=lambda alarm: alarm.start)
     path, end = folder / "timeline.png", float(history.stamps_s[-1])
     timeline_picture(path, found.name, end, spans, found.origin)
-    alarms = recording.alarms()
-    told = [_alarm(alarm, recording.first) for alarm in alarms] or [paragraph("None.")]
-    note = [paragraph(SHARES, "note")] if any(alarm.ranked for alarm in alarms) else []
-    return [heading("Alarms"), *told, *note, image(path, "alarms over time")]
+    told = [_alarm(alarm) for alarm in found.result.summary["alarms"]] or [paragraph("None.")]
+    return [heading("Alarms"), *told, image(path, "alarms over time")]
 
 
-def _alarm(alarm: Alarm, first: int) -> str:
-    """Return an alarm as HTML: text, times, causes with estimates."""
-    start = max(0.0, (alarm.since - first) * NANO)
-    end = "lasts to the end" if alarm.until is None else f"to {(alarm.until - first) * NANO:.2f} s"
-    rows = [
-        (rank.cause, rank.probability, kind, _number(value, unit), _number(sigma, unit))
-        for rank in alarm.ranked
-        for kind, value, sigma, unit in rank.parts or (("", float("nan"), float("nan"), ""),)
-    ]
-    causes = table(("possible cause", "probability", "what", "estimate", "standard deviation"), rows) if rows else ""
-    title = heading(f"{alarm.channel}: {alarm.cause or alarm.kind}", 3)
-    return f'<div class="block">{title}{paragraph(alarm.told)}{paragraph(f"From {start:.2f} s, {end}.", "note")}{causes}</div>'
-
-
-def _number(value: float, unit: str) -> str:
-    return "-" if not np.isfinite(value) else f"{value:.3g} {unit}".rstrip()
+def _alarm(alarm: dict[str, Any]) -> str:
+    """Return an alarm of ``summary.json`` as HTML: the sentence, its evidence, times, causes."""
+    end = "it lasts to the end" if alarm["to_s"] is None else f"to {alarm['to_s']:.2f} s"
+    evidence = f"{alarm['evidence']}; " if alarm["evidence"] else ""
+    rows = [(rank["cause"], f"{100.0 * rank['probability']:.0f} %") for rank in alarm["ranked"]]
+    causes = table(("possible cause", "probability"), rows) if len(rows) > 1 else ""
+    title = heading(f"{alarm['channel']}: {alarm['cause'] or alarm['kind']}", 3)
+    note = paragraph(f"{evidence}from {alarm['from_s']:.2f} s, {end}", "note")
+    return f'<div class="block">{title}{paragraph(alarm["told"])}{note}{causes}</div>'
 
 
 def _residuals(folder: Path) -> list[str]:

@@ -12,6 +12,7 @@ from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level
 from boom_twin.diagnostics.sensor_status import SensorSpec, sensor_status
 from boom_twin.diagnostics.stream_stats import Channel, ChannelStats
 from boom_twin.health.sensor_check import readings_of_frozen
+from boom_twin.texts import alarm_text
 
 SECOND = 1_000_000_000
 NOISE = np.random.default_rng(0).normal(0.0, 1.0, 200)
@@ -49,8 +50,7 @@ def test_a_reading_that_does_not_change_is_counted_over_looks() -> None:
 SENSOR = SensorSpec("joint_1", "rad", -4.0, 4.0, 1.0, 0.1)
 GOOD = ChannelStats(value=0.1, stamp=1, rate=200.0, gap=0.005, gaps=0, missing=0.0, outside=0.0, unchanged=1)
 OPTIONAL = SensorSpec("tip_imu_x", "m_s2", -inf, inf, 0.05, 0.0, False)
-STUCK = "repeats one reading again and again"
-RANGE = "reads out of its range"
+STUCK, RANGE = (alarm_text("joint_1", kind, None) for kind in ("stuck", "range"))
 
 
 @pytest.mark.parametrize(

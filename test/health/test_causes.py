@@ -117,7 +117,7 @@ def test_a_fault_comes_and_goes():
         found += twins.news(second * SECOND)
     begun, ended = found
     assert (begun.channel, begun.cause, begun.kind, begun.since) == ("cylinder_2", "cylinder_2.k", "softer", 20 * SECOND)
-    assert "by 30 %" in begun.told
+    assert "30 % lower" in begun.evidence
     assert (ended.cause, ended.since, ended.until) == ("cylinder_2.k", begun.since, 60 * SECOND)
     assert twins.alarms == []
 

@@ -47,7 +47,7 @@ def test_a_softer_part_is_named(tmp_path, capsys, cause):
     assert (alarm["cause"], alarm["kind"], alarm["channel"]) == (cause, "softer", cause.partition(".")[0])
     assert alarm["ranked"][0]["cause"] == cause and alarm["ranked"][0]["probability"] >= 0.95
     told = capsys.readouterr().out
-    size = float(told.partition("softer than the scene says, by ")[2].partition(" %")[0])
+    size = float(told.partition("k ")[2].partition(" % lower")[0])
     assert size == pytest.approx(100 * SOFTER, abs=10)
 
 

@@ -44,7 +44,7 @@ def test_two_encoders_that_are_swapped_are_told_as_that_until_they_are_right(i: 
     read[[i, j]] = expected[[j, i]]
     (alarm,) = told(judge, read, expected)
     assert (alarm.channel, alarm.kind, alarm.cause, alarm.since) == (f"joint_{i + 1}", "swapped", f"joint_{i + 1}.sensor", 0)
-    assert f"joint_{i + 1}.sensor and joint_{j + 1}.sensor read each other's angle" in alarm.told
+    assert f"joint_{i + 1}.sensor and joint_{j + 1}.sensor read each other's angle" in alarm.evidence
     assert np.flatnonzero(judge.masked).tolist() == [i, j] and not judge.has_wrong_strokes
     (ended,) = told(judge, expected, expected, first=60)
     assert ended.until is not None and not judge.masked.any() and judge.alarms == ()
@@ -62,7 +62,7 @@ def test_where_two_joints_stand_alike_the_exchange_lasts() -> None:
 def test_one_encoder_of_the_other_sign() -> None:
     judge, expected = AngleReading(SCENE, ENCODERS), angles(tuple(STROKES))
     (alarm,) = told(judge, expected * [1.0, 1.0, -1.0, 1.0], expected)
-    assert (alarm.kind, alarm.cause) == ("range", "joint_3.sensor") and "as if of the other sign" in alarm.told
+    assert (alarm.kind, alarm.cause) == ("range", "joint_3.sensor") and "as if of the other sign" in alarm.evidence
     assert judge.masked.tolist() == [False, False, True, False]
 
 
@@ -71,7 +71,7 @@ def test_all_encoders_in_degrees() -> None:
     judge, expected = AngleReading(SCENE, ENCODERS), angles(tuple(STROKES))
     alarms = told(judge, np.degrees(expected), expected)
     assert [alarm.channel for alarm in alarms] == ["joint_1", "joint_2", "joint_3", "joint_4"]
-    assert all(alarm.kind == "range" and "as if in degrees" in alarm.told for alarm in alarms)
+    assert all(alarm.kind == "range" and "as if in degrees" in alarm.evidence for alarm in alarms)
     assert judge.masked.all()
     ended = told(judge, expected, expected, first=60)
     assert len(ended) == 4 and all(alarm.until is not None for alarm in ended) and judge.alarms == ()
@@ -84,7 +84,7 @@ def test_two_strokes_that_are_swapped() -> None:
     judge, swapped = AngleReading(SCENE, ENCODERS), STROKES[SWAP_34]
     (alarm,) = told(judge, angles(tuple(STROKES)), angles(tuple(swapped)), swapped)
     assert (alarm.channel, alarm.kind, alarm.cause) == ("joint_3", "swapped", "cylinder_3.sensor")
-    assert "cylinder_3.sensor and cylinder_4.sensor read each other's stroke" in alarm.told
+    assert "cylinder_3.sensor and cylinder_4.sensor read each other's stroke" in alarm.evidence
     assert judge.has_wrong_strokes and judge.masked.all()
     right = angles(tuple(STROKES))
     (ended,) = told(judge, right, right, first=60)

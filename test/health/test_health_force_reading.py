@@ -39,14 +39,14 @@ def test_what_is_the_matter_is_told(reason: str) -> None:
     forces = ForceReading(NAMES)
     alarms = told(forces, WRONG[reason])
     assert [alarm.cause for alarm in alarms] == [f"{name}.sensor" for name in NAMES[:3]]
-    assert all(f", as if {reason}: not used" in alarm.told and alarm.since < 3e9 for alarm in alarms)
+    assert all(f", as if {reason}: not used" in alarm.evidence and alarm.since < 3e9 for alarm in alarms)
     assert forces.masked.all()
 
 
 def test_one_cylinder_of_the_other_sign_is_told_alone_until_it_reads_right() -> None:
     forces, wrong = ForceReading(NAMES), np.array([1.0, -1.0, 1.0, 1.0])
     (alarm,) = told(forces, wrong)
-    assert alarm.cause == "cylinder_force_2.sensor" and "reads -93" in alarm.told and "has +93" in alarm.told
+    assert alarm.cause == "cylinder_force_2.sensor" and "reads -93" in alarm.evidence and "has +93" in alarm.evidence
     assert forces.masked.tolist() == [False, True, False, False]
     (ended,) = told(forces, 1.0, first=60)
     assert ended.until is not None and not forces.masked.any() and forces.alarms == ()

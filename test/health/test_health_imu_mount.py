@@ -44,14 +44,14 @@ def told(mount: ImuMount, read: np.ndarray, expected: np.ndarray, seconds: float
 def test_what_is_the_matter_is_told(reason: str) -> None:
     (alarm,) = told(ImuMount(), TURNS[reason](EXPECTED), EXPECTED)
     assert alarm.cause == "tip_imu.sensor" and alarm.until is None and alarm.since < 3e9
-    assert f"as if {reason}: not used" in alarm.told
+    assert f"as if {reason}: not used" in alarm.evidence
 
 
 def test_gravity_taken_out_and_a_large_bias() -> None:
     (alarm,) = told(ImuMount(), np.zeros(2), EXPECTED)
-    assert f"as if {TAKEN_OUT}:" in alarm.told
+    assert f"as if {TAKEN_OUT}:" in alarm.evidence
     (alarm,) = told(ImuMount(), EXPECTED + np.array([0.0, 4.0]), EXPECTED)
-    assert "as if" not in alarm.told and "+13.3" in alarm.told
+    assert "as if" not in alarm.evidence and "+13.3" in alarm.evidence
 
 
 def test_a_working_imu_tells_nothing() -> None:

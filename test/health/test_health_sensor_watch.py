@@ -7,14 +7,17 @@ import math
 import numpy as np
 
 from boom_twin.health.sensor_check import SensorCheck, SensorFindings
-from boom_twin.health.sensor_monitor import SETTLED, TOLD, SensorMonitor
+from boom_twin.health.sensor_monitor import SETTLED, SensorMonitor
+from boom_twin.texts import alarm_text
 from boom_twin.types import SENSORS, Stream
 
 BLOCK, NAMES = 100_000_000, ("joint_1", "joint_2")
 
+KINDS = ("stuck", "noise", "spikes", "jump", "dropout", "range")
+
 
 def findings(channel: int | None = None, kind: str = "", jump: float = 0.0, level: float = math.nan) -> SensorFindings:
-    flags = {each: np.zeros(2, dtype=bool) for each in TOLD}
+    flags = {each: np.zeros(2, dtype=bool) for each in KINDS}
     jumped = np.zeros(2)
     if kind == "jump":
         jumped[channel] = jump
@@ -40,7 +43,7 @@ class Watched:
 
 
 def test_kinds_are_those_of_findings():
-    assert set(findings().by_kind()) == set(TOLD)
+    assert set(findings().by_kind()) == set(KINDS)
 
 
 def test_begins_once_lasts_and_ends():
@@ -49,7 +52,7 @@ def test_begins_once_lasts_and_ends():
         assert watched.take(findings()) == [] and watched.watch.alarms == ()
         (began,) = watched.take(findings(1, kind))
         assert (began.channel, began.kind, began.cause) == ("joint_2", kind, "joint_2.sensor")
-        assert (began.since, began.until) == (BLOCK, None) and TOLD[kind] in began.told
+        assert (began.since, began.until) == (BLOCK, None) and began.told == alarm_text(began.channel, kind, began.cause)
         assert watched.watch.masked.tolist() == [False, True]
         assert [alarm for _ in range(30) for alarm in watched.take(findings(1, kind))] == []
         assert watched.watch.alarms == (began,)
@@ -61,7 +64,7 @@ def test_begins_once_lasts_and_ends():
 
 def test_a_range_alarm_tells_the_offset():
     (began,) = Watched().take(findings(1, "range", level=3.14159))
-    assert "an offset of +180 deg, +3.142 rad" in began.told and "zero in the mapping" in began.told
+    assert began.evidence == "an offset of +180 deg, +3.142 rad" and "zero in the mapping" in began.told
 
 
 def test_nothing_is_found_of_a_sensor_that_is_not_there():
@@ -79,7 +82,7 @@ def test_spikes_do_not_mask():
 def test_a_jump_lasts_until_it_jumps_back():
     watched = Watched()
     (began,) = watched.take(findings(0, "jump", 0.01))
-    assert "+0.01" in began.told and watched.watch.masked.tolist() == [True, False]
+    assert began.evidence == "by +0.573 deg" and watched.watch.masked.tolist() == [True, False]
     assert watched.rest(5 * SETTLED) == [] and watched.watch.masked[0]
     assert watched.take(findings(0, "jump", 0.02)) == [], "further away"
     watched.rest(SETTLED)

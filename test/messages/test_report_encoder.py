@@ -53,7 +53,7 @@ ALARM = Alarm(
     since=STAMP - 2_000_000_000,
     until=None,
     cause="cylinder_2.k",
-    told="cylinder_2.k is 29 % softer",
+    evidence="k 29 % lower (27 to 31)",
     ranked=(
         Ranked("cylinder_2.k", 0.97, (("softer", 0.41, 0.02, ""),)),
         Ranked("joint_2.sensor", 0.03, (("bias", 0.0031, 0.0001, "rad"), ("drift", 0.0, 1e-5, "rad/s"))),
@@ -143,12 +143,13 @@ def test_an_estimate_tells_velocity_and_modes_along_the_axes_of_the_base() -> No
 def test_an_alarm_is_told_in_words_and_numbers() -> None:
     msg = filled(judged(ALARM))[Output.HEALTH]
     (status,) = msg.status
-    assert (status.name, status.level, status.message) == ("joint_2", 2, "cylinder_2.k is 29 % softer")
+    assert (status.name, status.level, status.message) == ("joint_2", 2, ALARM.told)
     assert {pair.key: pair.value for pair in status.values} == {
         "kind": "softer",
         "cause": "cylinder_2.k",
         "from_s": "1699999998.123",
         "to_s": "nan",
+        "evidence": "k 29 % lower (27 to 31)",
         "cylinder_2.k: probability": "0.97",
         "cylinder_2.k: softer": "0.41",
         "cylinder_2.k: sigma of softer": "0.02",

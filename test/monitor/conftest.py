@@ -31,10 +31,11 @@ OFFSET = 0.02  # rad, by which joint 3's encoder is wrong from WRONG_FROM on
 @pytest.fixture(scope="session")
 def faulty(made_once: MadeOnce, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the bundled session's first 40 s; an encoder jumps at 15 s, everything is silent from 30 to 30.6 s."""
-    return made_once.folder("faulty_session", _spoilt, tmp_path_factory.mktemp("faulty") / "faulty_session")
+    return made_once.folder("faulty_session", spoil, tmp_path_factory.mktemp("faulty") / "faulty_session")
 
 
-def _spoilt(path: Path) -> None:
+def spoil(path: Path) -> None:
+    """Write that session."""
     topics, decoder = load_topics().inputs, SampleDecoder(4)
     topics = {stream: topics[stream] for stream in (Stream.STROKES, Stream.ANGLES, Stream.IMU)}
     values: dict[Stream, list[Any]] = {stream: [] for stream in topics}

@@ -20,6 +20,7 @@ from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.monitor.data.feed import Feed, Playback
 from boom_twin.monitor.data.status import Severity, overall
 from boom_twin.monitor.protocol import state
+from boom_twin.texts import alarm_text
 from boom_twin.types import StrokeReading
 
 ALL = 10**6
@@ -98,7 +99,7 @@ def test_alarms_are_those_of_the_summary_and_of_the_result_bag(feed: Feed, publi
         assert alarm.begin == pytest.approx(told["from_s"], abs=2e-3) == pytest.approx(15.0, abs=0.1)
         assert alarm.level == Severity.ERROR and alarm.causes[0][0] == told["cause"]
         shown = state(each.store, 25.0, 25.0)
-        assert (shown["level"], shown["reason"]) == ("ERROR", f"joint_3: {alarm.reason}")
+        assert (shown["level"], shown["reason"]) == ("ERROR", alarm.reason) and shown["action"] == "look"
     gaps = [(alarm.begin, alarm.end) for alarm in feed.store.alarms.all if alarm.name == "cylinder_strokes"]
     assert gaps == [pytest.approx((each["from_s"], each["to_s"])) for each in summary["alarms"] if each["kind"] == "gap"]
     assert gaps == [pytest.approx(GAP, abs=0.02)]
@@ -107,9 +108,10 @@ def test_alarms_are_those_of_the_summary_and_of_the_result_bag(feed: Feed, publi
 def test_the_lamps_tell_of_the_wrong_encoder_and_of_nothing_before_it(feed: Feed) -> None:
     assert overall(feed.store.statuses(14.0).groups(14.0))[0] == Severity.OK == Severity[state(feed.store, 14.0, 14.0)["level"]]
     level, reason = overall(feed.store.statuses(25.0).groups(25.0))
-    assert level == Severity.ERROR and reason.startswith("health: joint_3")
-    alarm = next(alarm for alarm in feed.store.alarms.all if alarm.name == "residual joint_3")
-    assert 15.0 < alarm.begin < 20.0 and alarm.level == Severity.ERROR
+    sentence = alarm_text("joint_3", "jump", "joint_3.sensor")  # one sentence on /diagnostics, page, summary: one alarm
+    assert level == Severity.ERROR and reason == f"health: {sentence}"
+    (alarm,) = [each for each in feed.store.alarms.all if "joint_3" in each.name]
+    assert alarm.reason == sentence and alarm.evidence.startswith("by +1.14 deg")
 
 
 def test_a_result_bag_is_shown_as_it_was_published(feed: Feed, published: Feed) -> None:

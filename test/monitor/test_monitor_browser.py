@@ -19,6 +19,7 @@ from matplotlib.image import imread
 from monitor.conftest import MonitorProcess, monitoring
 
 from boom_twin.monitor.data.feed import Feed
+from boom_twin.texts import FILE, LANGUAGES
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install .[test]")
 CHROMIUM = Path("/usr/bin/chromium")
@@ -94,19 +95,18 @@ def test_the_first_glance_says_what_is_wrong_in_word_shape_and_reason(page: Any,
 
     def the_fault() -> None:
         assert page.locator("#dropped").is_hidden()
-        assert overall.get_attribute("data-level") == "ERROR" and overall.locator(".word").inner_text() == "FAULT"
-        assert overall.locator(".reason").inner_text().startswith("joint_3: joint_3.sensor jumped")
+        assert overall.get_attribute("data-level") == "ERROR" and overall.locator(".word").inner_text() == "LOOK"
+        assert overall.locator(".reason").inner_text().startswith("Angle sensor of joint 3 jumped")
         assert overall.locator(".sign").inner_text() == "✖"
         expected = {"sensors": "OK", "model": "OK", "residuals": "ERROR", "timing": "OK", "recorder": "OFF"}
         assert {name: page.locator(f"#group-{name}").get_attribute("data-level") for name in expected} == expected
-        assert page.locator("#group-residuals .detail").inner_text() == "for 10 s"
-        assert re.fullmatch(r"gap s [\d.]+, limit 0.1, for \d+ s", page.locator("#group-sensors .detail").inner_text())
+        assert re.search(r"; gap s [\d.]+, limit 0.1$", page.locator("#group-sensors").get_attribute("title"))
 
     eventually(the_fault)
     assert page.locator("#mark").is_disabled() and page.locator("#record").is_hidden() and page.locator("#pause").is_hidden()
     assert len(page.asked) > 10 and all(url.startswith((monitor.url, "data:", "ws://127.0.0.1")) for url in page.asked)
     go(page, 10.0)
-    wait(page, "document.querySelector('#overall .word').innerText === 'ALL WELL'")
+    wait(page, "document.querySelector('#overall .word').innerText === 'GO ON'")
 
 
 def test_figures_table_and_picture_are_those_of_the_rows_that_are_shown(page: Any, feed: Feed) -> None:
@@ -158,18 +158,20 @@ ALARM_BAR = """moments => {
     return moments.map(moment => [...context.getImageData(scale * at(moment), y, 1, 1).data]) }"""
 
 
-def test_alarms_are_told_in_words_as_bars_on_the_time_line_and_in_a_list(page: Any, feed: Feed, replayed: Path) -> None:
+def test_an_alarm_is_told_once_with_what_to_do_as_a_bar_and_in_the_log(page: Any, feed: Feed, replayed: Path) -> None:
     alarm = next(alarm for alarm in feed.store.alarms.all if alarm.name == "joint_3")
     gap = next(each for each in json.loads((replayed / "summary.json").read_text())["alarms"] if each["kind"] == "gap")
+    height = "document.querySelector('#charts').getBoundingClientRect().height"
+    before = page.evaluate(height)
 
     def words_bars_and_marks() -> None:
-        words = page.locator("#during").inner_text()
-        assert words.startswith(f"✖ joint_3: {alarm.reason}, since 15.0 s") and "✖ residual joint_3: " in words
-        before, during = page.evaluate(ALARM_BAR, [alarm.begin - 2.0, alarm.begin + 2.0])
-        assert before[:3] != during[:3] and during[0] > 150 > during[2]
+        assert page.locator("#overall .word").inner_text() == "LOOK"
+        assert page.locator("#overall .reason").inner_text() == alarm.reason
+        assert page.locator("#overall .detail").inner_text().endswith("since 15.00 s")
+        without, during = page.evaluate(ALARM_BAR, [alarm.begin - 2.0, alarm.begin + 2.0])
+        assert without[:3] != during[:3] and during[0] > 150 > during[2]
         titles = page.locator("#marks i").evaluate_all("marks => marks.map(mark => mark.title)")
-        assert any("residual joint_3" in title for title in titles)
-        assert any(title.startswith("cylinder_strokes: gap of 0.6") and f"{gap['from_s']:.2f} s" in title for title in titles)
+        assert any(title.startswith(f"cylinder_strokes: {gap['told']} {gap['from_s']:.2f} s") for title in titles)
 
     eventually(words_bars_and_marks)
     page.keyboard.press("5")
@@ -178,17 +180,54 @@ def test_alarms_are_told_in_words_as_bars_on_the_time_line_and_in_a_list(page: A
     def lists() -> None:
         lamps = cells(page, "#lamps")
         assert {row[1] for row in lamps[1:]} == {lamp.name for group in groups for lamp in group} - {"health"} | {"joint_3"}
-        judged = next(row for row in cells(page, "#alarms") if row[0] == "joint_3")
-        assert judged[1] == "✖ ERROR" and judged[3:6] == ["joint_3.sensor", "15.00", "lasts"]
+        (judged,) = [row for row in cells(page, "#alarms") if "joint_3" in row[0]]
+        assert judged[1] == "✖ ERROR" and judged[3:6] == ["joint_3.sensor", "15.00 s", "lasts"]
 
     eventually(lists)
-    row = page.locator("#alarms tr", has_text="residual joint_3")
-    row.locator("button").click()
-    row.get_by_text("acknowledged").wait_for()
-    wait(page, "document.querySelector('#answer').innerText === 'acknowledged: residual joint_3'")
+    page.locator("#acknowledge", has_text="Acknowledge (1)").click()
+    wait(page, "document.querySelector('#answer').innerText === 'acknowledged: joint_3'")
+    page.locator("#acknowledge").wait_for(state="hidden")
     page.keyboard.press("1")
     go(page, 10.0)
-    wait(page, "document.querySelector('#during').innerText === ''")
+    wait(page, "document.querySelector('#overall .word').innerText === 'GO ON'")
+    assert page.evaluate(height) == before, "the traces keep their height"
+
+
+def test_tip_and_pump_are_shown_against_what_they_may_be(page: Any, feed: Feed) -> None:
+    lamp = next(lamp for lamp in feed.store.statuses(FAULT).groups(FAULT)["model"] if lamp.name == "tip")
+
+    def told() -> None:
+        swing, limit = page.locator("#tip-now b").inner_text(), page.locator("#tip-now span").inner_text()
+        assert abs(float(swing.split()[2]) - 1e3 * lamp.value) <= 1.0 and limit == "limit 300 mm"
+        assert page.locator("#tip-now").get_attribute("data-level") == "OK"
+        assert page.locator("#pump-now b").inner_text() == "no pump pulses"
+        assert re.fullmatch("avoid [\\d.\\u2013, ]+ Hz", page.locator("#pump-now span").inner_text())
+
+    eventually(told)
+
+
+@pytest.mark.parametrize(("language", "go_on"), [("de", "WEITER"), ("zh", "继续")])
+def test_the_page_speaks_the_language_of_its_viewer(
+    browser: Any, monitor: MonitorProcess, feed: Feed, language: str, go_on: str
+) -> None:
+    alarm = next(alarm for alarm in feed.store.alarms.all if alarm.name == "joint_3")
+    page = opened(browser, monitor, 1280, 720, locale=language)
+    wait(page, f"document.querySelector('#overall .reason').innerText === {json.dumps(alarm.words[language])}")
+    go(page, 10.0)
+    wait(page, f"document.querySelector('#overall .word').innerText === '{go_on}'")
+    table = json.loads(FILE.read_text(encoding="utf-8"))
+    at = LANGUAGES.index(language) - 1
+    assert [tab.strip() for tab in page.locator("#tabs span").all_inner_texts()] == [
+        table[name][at] for name in ("Traces", "Spectrum", "Spectrogram", "Shape", "Alarms", "Path", "Response")
+    ]
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    with page.expect_navigation():
+        page.locator("#language").select_option("en")
+    wait(page, "document.querySelector('#overall .word').innerText === 'GO ON'")
+    page.goto(monitor.url + f"?lang={language}")
+    wait(page, f"document.documentElement.lang === '{language}'")
+    assert not page.errors
+    page.context.close()
 
 
 def test_time_is_chosen_by_dragging_by_span_by_marks_and_by_playing(page: Any) -> None:
@@ -220,7 +259,7 @@ def test_time_is_chosen_by_dragging_by_span_by_marks_and_by_playing(page: Any) -
     assert re.fullmatch(r"[\d.]+ of 40\.00 s", page.locator("#position").inner_text())
 
 
-SIZES = {(1280, 720): 0.62, (2560, 1440): 0.78, (1024, 768): 0.66, (834, 1112): 0.62, (390, 844): 0.3}
+SIZES = {(1280, 720): 0.62, (2560, 1440): 0.78, (1024, 768): 0.66, (820, 1180): 0.7, (390, 844): 0.4}
 """Sizes of screens, and what share of the height the tabs have at least."""
 
 
@@ -295,7 +334,8 @@ def test_shape_and_path_are_drawn_and_told_in_figures(page: Any, feed: Feed) -> 
         assert page.locator("#height").inner_text() == f"height {values[f'line_{last}_z_m']:.3f} m"
         assert f"{strongest / 1e3:.1f} kN" in page.locator("#forces").inner_text()
 
-    for factor in (1, 10, 50):
+    eventually(partial(drawn, 1))  # true to scale at first
+    for factor in (10, 50, 1):
         page.locator(f"#factors button[data-factor='{factor}']").click()
         eventually(partial(drawn, factor))
     eventually(told)
@@ -315,7 +355,7 @@ def test_the_page_says_that_the_monitor_is_gone_and_comes_back(browser: Any, rep
         page.goto(monitor.url)
         wait(page, "twin.connection.table('displacement')?.count > 0")
         assert page.locator("#notice").is_hidden()
-        assert page.locator("#overall .word").inner_text() == "STALE"  # no node is in a result bag
+        assert page.locator("#overall .word").inner_text() == "NOT KNOWN"  # no node is in a result bag
         assert monitor.stop() == 0
     page.locator("#notice", has_text="NO CONNECTION").wait_for(timeout=PATIENCE)
     assert {lamp.get_attribute("data-level") for lamp in page.locator(".lamp").all()} == {"STALE"}

@@ -67,14 +67,15 @@ def judge(alarms: AlarmList, time: float, *told: Alarm) -> None:
 def test_a_judged_alarm_is_one_from_the_first_suspicion_to_its_end() -> None:
     alarms, ranked = AlarmList(), (Ranked("a.k", 0.6, ()), Ranked("b.k", 0.4, ()))
     unknown = Alarm("joint_2", "residual", 2 * 10**9, None, None, "cannot be told apart", ranked)
-    named = replace(unknown, cause="b.k", told="b.k off", ranked=(Ranked("b.k", 0.97, ()),))
+    named = replace(unknown, cause="b.k", ranked=(Ranked("b.k", 0.97, ()),))
     judge(alarms, 3.0, unknown)
     (found,) = alarms.all
-    assert (found.name, found.reason, found.begin) == ("joint_2", "cannot be told apart", 2.0)
+    assert (found.name, found.reason, found.begin) == ("joint_2", unknown.told, 2.0)
+    assert found.evidence == "cannot be told apart; a.k possible, b.k possible" and set(found.words) == {"en", "de", "zh"}
     assert found.causes == (("a.k", 0.6), ("b.k", 0.4))
     assert alarms.acknowledge(found.number) is found
     judge(alarms, 4.0, unknown)
-    assert found.is_acknowledged and [lamp.reason for lamp in alarms.lamps(3.5)] == ["cannot be told apart"]
+    assert found.is_acknowledged and [lamp.reason for lamp in alarms.lamps(3.5)] == [unknown.told]
     assert found.level == Severity.WARN
     judge(alarms, 5.0, named)
     assert found.level == Severity.ERROR and not found.is_acknowledged and found.causes == (("b.k", 0.97),)
@@ -98,7 +99,7 @@ def test_all_is_not_well_where_messages_were_dropped() -> None:
         with dropped.guard("/diagnostics"):
             raise MalformedError("no stamp")
     found = state(store, 0.0, 0.0, dropped)
-    assert (found["level"], found["reason"]) == ("WARN", "messages dropped: 2, see below")
+    assert (found["level"], found["reason"]) == ("WARN", "messages dropped")
     assert found["dropped"] == [{"topic": "/diagnostics", "count": 2, "reason": "no stamp"}]
     store.set_statuses(0.0, table(status("n: model", ERROR)))
     assert state(store, 0.0, 0.0, dropped)["reason"].startswith("model: ")
@@ -124,3 +125,39 @@ def test_alarms_that_are_kept_are_bounded_and_the_newest() -> None:
         alarms.follow(time, table(status("n: model", WARN if time % 2 else OK)))
         alarms.add("event", Severity.OK, "", time, time)
     assert len(alarms.all) <= MAX_ALARMS and alarms.all[-1].begin == 2 * MAX_ALARMS - 1
+
+
+def test_sensors_that_fail_together_are_one_alarm() -> None:
+    alarms, names = AlarmList(), [f"sensor joint_{i}" for i in range(1, 4)]
+    for time, levels in ((1.0, (OK, OK, OK)), (2.0, (WARN, WARN, OK)), (3.0, (OK, WARN, OK)), (4.0, (OK, OK, OK))):
+        alarms.follow(time, table(*(status(f"n: {name}", level) for name, level in zip(names, levels, strict=True))))
+        assert [each.end for each in alarms.all] == ([] if time < 2.0 else [4.0 if time == 4.0 else None])
+    assert [each.name for each in alarms.all] == ["sensor joint_1, joint_2"]
+
+
+def test_an_alarm_of_health_is_the_only_one_of_its_channel() -> None:
+    alarms, lamp = AlarmList(), status("n: sensor joint_3", ERROR, "stuck")
+    alarms.follow(1.0, table(lamp))
+    judge(alarms, 2.0, Alarm("joint_3", "stuck", 10**9, None, "joint_3.sensor", ""))
+    alarms.follow(3.0, table(lamp, status("n: residual joint_3", WARN)))
+    assert [(each.name, each.end) for each in alarms.all] == [("joint_3", None)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "cause", "swing", "action"),
+    [
+        ("stuck", "joint_3.sensor", OK, "look"), ("softer", "section_2.EI", OK, "stop"), ("exceeded", "tip.load", OK, "stop"),
+        (None, None, OK, "go"), (None, None, WARN, "look"), (None, None, ERROR, "stop"),
+    ],
+)  # fmt: skip
+def test_what_to_do_follows_from_alarms_and_the_swing_of_the_tip(
+    kind: str | None, cause: str | None, swing: int, action: str
+) -> None:
+    store = Store(10)
+    store.set_statuses(0.0, table(status("n: model"), status("n: tip", swing, "the tip swings too far", swing_m=0.4)))
+    if kind is not None:
+        judge(store.alarms, 0.0, Alarm("joint_3", kind, 0, None, cause, ""))
+    found = state(store, 0.0, 0.0)
+    assert found["action"] == action and (found["alarm"] is None) == (kind is None)
+    assert found["groups"][1]["lamps"][1]["figures"] == {"swing_m": 0.4}
+    assert state(store, 10.0, 10.0)["action"] in ("unknown", "look", "stop"), "a silent node is never well"

@@ -205,7 +205,7 @@ async def ask(url: str, path: str, header: str = "X: y") -> str:
 async def test_nothing_is_done_that_was_not_permitted(feed: Made, session: ClientSession, url: str) -> None:
     async with connect(session, url) as socket:
         assert (await until(socket, "hello"))["permitted"] == []
-        for request in ({"do": "mark", "note": "x"}, {"do": "record", "on": True}, {"do": "acknowledge", "number": 1}):
+        for request in ({"do": "mark", "note": "x"}, {"do": "record", "on": True}, {"do": "acknowledge", "numbers": [1]}):
             await socket.send_json(request)
             assert not (await until(socket, "answer"))["done"]
     assert feed.published == []
@@ -218,7 +218,7 @@ async def test_a_mark_and_an_acknowledgement_are_published(feed: Made, session: 
         number = (await until(socket, "alarms", lambda found: found["alarms"]))["alarms"][0]["number"]
         await socket.send_json({"do": "mark", "note": "hose moved"})
         assert (await until(socket, "answer"))["done"]
-        await socket.send_json({"do": "acknowledge", "number": number})
+        await socket.send_json({"do": "acknowledge", "numbers": [number]})
         assert await until(socket, "alarms", lambda found: found["alarms"][0]["is_acknowledged"])
     assert feed.published == ["mark: hose moved", "acknowledged: sensor joint_1: frozen"]
 

@@ -43,7 +43,7 @@ def test_a_cylinder_without_a_single_value_is_named(tmp_path):
 def test_a_constant_residual_is_not_said_to_be_as_expected(tmp_path):
     result = replay(session(tmp_path / "bag"), load_scene(), tmp_path / "out")  # all angles recorded are 0: none is right
     mean = np.abs(result.summary["joint_residual_normalised_mean"])
-    told = [line for line in as_text(result.summary) if line.endswith("of what is expected")]
+    told = [line for line in as_text(result.summary) if line.endswith("times the expected noise")]
     ratios = [float(line.split("rms, ")[1].split()[0]) for line in told]
     assert len(ratios) == 4 and (mean > 100).any()
     np.testing.assert_array_less(mean, np.array(ratios) + 0.01)

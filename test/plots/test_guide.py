@@ -127,7 +127,7 @@ def test_table_of_what_leaving_out_does(boom: Path) -> None:
 @pytest.mark.slow
 def test_the_pictures_of_the_guide_are_drawn(tmp_path: Path) -> None:
     subprocess.run([sys.executable, DOCS / "figures.py", tmp_path], check=True)
-    drawn = {path.name for path in tmp_path.glob("*.png")}
+    drawn = {path.name for path in tmp_path.glob("*.png")} - {"monitor.png"}  # which needs a browser
     symbols = {f"symbols_{part}.png" for part in ("b1", "b2", "b3", "joint_a", "section", "side")}
     responses = {"response.png", "response_steady_state.png", "response_map.png"}
     assert drawn == {"boom.png", "z_fold_arch.png", "lengths_and_drives.png", *symbols, *responses}

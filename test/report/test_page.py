@@ -10,6 +10,8 @@ from command import main
 from health.recorded import written
 from page_outline import outline
 
+from boom_twin.texts import alarm_text
+
 TITLES = ("Alarms", "Residuals", "Natural frequencies and damping", "Tip", "Bending of the sections", "Gaps and events")
 
 
@@ -27,8 +29,9 @@ def test_the_page_has_every_part_and_needs_nothing_but_itself(replays: tuple[Pat
 def test_a_fault_is_named_with_its_time(replays: tuple[Path, Path]) -> None:
     healthy, faulty = (outline(folder / "report.html").text for folder in replays)
     assert "No alarm: no sensor gives itself away" in healthy and "Heights are not in the scene: assumed are 2.4" in healthy
-    assert "1 alarm of the rig's health." in faulty and "joint_3: joint_3.sensor" in faulty
-    began = re.search(r"From ([0-9.]+) s, lasts to the end", faulty)
+    assert "1 alarm." in faulty and "joint_3: joint_3.sensor" in faulty
+    assert alarm_text("joint_3", "jump", "joint_3.sensor") in faulty
+    began = re.search(r"from ([0-9.]+) s, it lasts to the end", faulty)
     assert began is not None and float(began[1]) == pytest.approx(12.0, abs=1.0)
 
 

@@ -17,6 +17,7 @@ from ros_rig import Rig, joint_state
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 
+from boom_twin.texts import alarm_text
 from boom_twin.types import SECOND
 
 OK, WARN, ERROR, STALE = range(4)
@@ -73,7 +74,7 @@ def test_faults_of_sensors_are_told_and_taken_back(rig: Rig) -> None:
     frozen = rig.values("sensor cylinder_2")
     assert float(frozen["unchanged_s"]) >= float(frozen["unchanged_s_error"]) == 1.0
     assert 0.0 < float(rig.values("sensor cylinder_3")["missing_share"]) < 0.5
-    assert "reads out of its range" in rig.words("sensor cylinder_4")
+    assert rig.words("sensor cylinder_4") == alarm_text("cylinder_4", "range", None)
     rig.until(lambda: levels() == [OK] * 4, lambda: send(False))
 
 

@@ -103,7 +103,7 @@ def test_alarms_come_from_their_topic_and_the_node_lets_go_of_what_ended_with_pe
 
     service = rig.node.create_service(Trigger, "/boom_twin/acknowledge", acknowledge)
     usual, permitted = ViewerActions(feed, frozenset({"acknowledge"})), ViewerActions(feed, frozenset({AT_NODE}))
-    request = {"do": "acknowledge", "number": alarm.number}
+    request = {"do": "acknowledge", "numbers": [alarm.number]}
     assert usual.act(request)["words"] == permitted.act(request)["words"] == "acknowledged: joint_3"
     rig.send(Output.HEALTH, 80_000_000, partial(tell, END))
     until(feed, lambda: judged(feed).end is not None)

@@ -11,7 +11,9 @@ import numpy as np
 
 from ...analysis.frequency_response import UPWARD, linearised_boom
 from ...analysis.posture_modes import MOVED, ModeList, PresentPosture
+from ...analysis.resonance_map import TOO_MUCH
 from ...errors import BoomTwinError
+from ...scene.pump_pulses import CHANGE_OVER
 from ...scene.schema import Scene
 from ...types import Array
 from ..protocol import RESPONSE, SPECTROGRAM, SPECTRUM, pack
@@ -49,6 +51,7 @@ class TipResponses:
     loads: tuple[str, ...] = ()  # in words
     frequencies: Array = field(default_factory=lambda: np.zeros(0))  # (k,), Hz
     accelerations: Array = field(default_factory=lambda: np.zeros((0, 0)))  # (k, loads), both directions together, m/s^2
+    avoid: tuple[tuple[float, float], ...] = ()  # pump rates from and to (Hz) at which the tip swings too much
     trouble: str = ""  # why there are none
 
 
@@ -68,7 +71,32 @@ class ResponseList(PresentPosture[TipResponses]):
         except BoomTwinError as error:
             return TipResponses(trouble=str(error))
         names = ("1 N at the tip, up", *(f"1 mm of cylinder {i + 1}" for i in drives))
-        return TipResponses(names, RESPONSE_FREQUENCIES, np.column_stack(columns))
+        return TipResponses(names, RESPONSE_FREQUENCIES, np.column_stack(columns), rates_to_avoid(columns[0]))
+
+
+PUMP_RATES = np.linspace(0.2, 1.2, 201)
+"""Rates of a pump, Hz."""
+HARMONICS = np.arange(1, 16, 2)
+"""Harmonics of pump pulses that are on for half a period; there are no even ones."""
+
+
+def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
+    """Return the ranges of pump rates (Hz) at which the tip swings `TOO_MUCH` times as far as at the median rate.
+
+    It is the rule of `boom_twin.analysis.resonance_map`, on a response that is known: root mean square for peak to peak.
+
+    Parameters
+    ----------
+    accelerations : ndarray, shape (k,)
+        Amplitude of the tip's acceleration (m/s^2) by 1 N at `RESPONSE_FREQUENCIES`.
+    """
+    swings = accelerations / (2.0 * np.pi * RESPONSE_FREQUENCIES) ** 2
+    at = HARMONICS * PUMP_RATES[:, None]
+    force = np.sinc(at * CHANGE_OVER) / HARMONICS
+    swing = np.sqrt(np.square(force * np.interp(at, RESPONSE_FREQUENCIES, swings)).sum(axis=1))
+    above = np.concatenate([[False], swing > TOO_MUCH * np.median(swing), [False]])
+    starts, stops = np.flatnonzero(above[1:] & ~above[:-1]), np.flatnonzero(above[:-1] & ~above[1:]) - 1
+    return tuple((float(PUMP_RATES[a]), float(PUMP_RATES[b])) for a, b in zip(starts, stops, strict=True))
 
 
 UNKNOWN_SCENE = TipResponses(trouble="the model is not known: give --scene")
@@ -182,5 +210,5 @@ class Analyst:
 
 def response_messages(found: TipResponses) -> tuple[dict[str, Any], bytes]:
     """Return text message ``loads`` and binary block of a response; the block is empty if there is no response."""
-    text = {"kind": "loads", "names": found.loads, "trouble": found.trouble}
+    text = {"kind": "loads", "names": found.loads, "trouble": found.trouble, "avoid": found.avoid}
     return text, pack(RESPONSE, 0, found.frequencies, found.accelerations.astype("f4")) if found.loads else b""

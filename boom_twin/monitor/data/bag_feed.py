@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from itertools import chain
 from pathlib import Path
+from threading import Thread
 from time import perf_counter
 from types import SimpleNamespace
 from typing import Any
@@ -33,6 +34,7 @@ DIAGNOSIS_PERIOD = 1.0
 """Seconds between two diagnoses of the twin, as of the node."""
 PUBLISHED_OUTPUT = Output.TIP_ACCELERATION
 """A session with this output is shown as its node published it."""
+COMPILING = "compiling the model (up to a minute the first time)"
 READING_TIME = 0.04
 """Seconds of reading at a time, after which the pages have their turn."""
 
@@ -132,6 +134,13 @@ def _take_published(
 
 def _take_predicted(feed: BagFeed, topics: Topics, given: ReplayInputs, twin: _Twin) -> Generator[None]:
     """Run a twin on the recorded inputs and store its predictions, one sample a step."""
+    feed.phase = COMPILING
+    compiling = Thread(target=twin.twin.warm_up, name="compile", daemon=True)
+    compiling.start()
+    while compiling.is_alive():
+        compiling.join(READING_TIME)
+        yield
+    feed.phase = ""
     samples = SessionSamples(given.session, topics, given.wanted, twin.twin.plan.joints, given.window).samples()
     for step in drive(twin.twin, samples):
         if step is not None:
@@ -157,7 +166,6 @@ class _Twin:
         self._other_boom = OtherBoom()
         self._peers = {stream: Peers(topic.absolute) for stream, topic in topics.inputs.items()}
         self._looked: float | None = None
-        self.twin.warm_up()
 
     def took(self, step: Step) -> None:
         """Show the results of one sample."""

@@ -42,6 +42,7 @@ class Feed:
         self.title, self.store, self.end = title, store, end
         self.topic_rows = TopicRows(store, topics)
         self.trouble = ""  # why there is not more to be had
+        self.phase = ""  # what is done before data can be shown, in words
         self._scene, self._reads = scene, topics.stroke_reading
         self._plan: Plan | None = None
 

@@ -9,6 +9,8 @@ from math import inf, isfinite, isnan, nan
 from typing import Any
 
 from ...diagnostics.recorder_status import ENDED
+from ...health.alarms import evidence_with_cause
+from ...texts import LANGUAGES, alarm_sentence, alarm_text
 from ...types import Alarm
 from .received_messages import text
 
@@ -19,6 +21,10 @@ MAX_NODES, FORGET_AFTER = 200, 60.0
 GROUPS = ("sensors", "model", "residuals", "timing", "recorder")
 HEALTH = "health"
 """The status that stands for all alarms of the rig's health."""
+SENSOR_GROUPS = ("sensor", "residual")
+"""Kinds of statuses that speak of one channel, as an alarm of the rig's health does."""
+WITH_FIGURES = ("tip", "tip load")
+"""Statuses whose values the page shows."""
 _LIMITS = ("_error", "_warn", "_stale")
 
 
@@ -49,6 +55,13 @@ class StatusLamp:
     limit: float = nan
     age: float = nan  # seconds that the level had lasted when it was reported
     is_last: bool = False  # its node said that no further one comes
+    figures: Mapping[str, float] = field(default_factory=dict)  # its values, of some
+
+    @property
+    def channel(self) -> str:
+        """Channel that it speaks of; empty if of none."""
+        kind, _, channel = self.name.partition(" ")
+        return channel if kind in SENSOR_GROUPS else ""
 
 
 @dataclass(frozen=True)
@@ -103,14 +116,15 @@ def _lamp(name: str, status: Any, clock: float) -> StatusLamp:
     values = {pair.key: _number(pair.value) for pair in status.values}
     quantity, limit = _judged(values, level)
     age = clock - values["since_s"] if isfinite(values.get("since_s", nan)) else nan
-    is_last = values.get(ENDED) == 1.0
+    figures = {key: value for key, value in values.items() if isfinite(value)} if name in WITH_FIGURES else {}
     return StatusLamp(
-        name, _group(name), level, text(status.message), text(quantity), values.get(quantity, nan), limit, age, is_last
-    )
+        name, _group(name), level, text(status.message), text(quantity), values.get(quantity, nan), limit, age,
+        values.get(ENDED) == 1.0, figures,
+    )  # fmt: skip
 
 
 def _group(name: str) -> str:
-    if name == "model":
+    if name in ("model", "tip", "tip load", "bending"):
         return "model"
     kind = name.split(" ")[0]
     return {"sensor": "sensors", "residual": "residuals", HEALTH: "residuals", "recording": "recorder"}.get(kind, "timing")
@@ -137,6 +151,8 @@ def _number(text: str) -> float:
         return nan
 
 
+LONGEST_NAME = 100
+"""Characters beyond which an alarm names no more sensors."""
 MAX_ALARMS = 500
 """Alarms that are kept."""
 
@@ -146,7 +162,7 @@ class ListedAlarm:
     """Alarm in the list: a lamp that was not well, or an alarm of the health monitor.
 
     Only the health monitor's have `causes`, the most probable first, each with its probability (NaN where the sensor itself
-    gives it away).
+    gives it away), `words` by language, and `stops` if the boom is to be stopped.
     """
 
     number: int  # by which it is acknowledged
@@ -157,6 +173,9 @@ class ListedAlarm:
     end: float | None = None  # None while it lasts
     is_acknowledged: bool = False
     causes: tuple[tuple[str, float], ...] = ()
+    evidence: str = ""
+    words: dict[str, str] = field(default_factory=dict)
+    stops: bool = False
 
 
 class AlarmList:
@@ -171,13 +190,19 @@ class AlarmList:
     def follow(self, time: float, statuses: StatusTable) -> None:
         """Update the alarms to the lamps at `time` (s), except the lamp of the rig's health, see `judge`."""
         told = ((f"{node}: {lamp.name}", lamp) for node, (_, lamps) in statuses.nodes.items() for lamp in lamps)
-        lamps = {key: lamp for key, lamp in told if lamp.name != HEALTH}
+        judged = {channel for channel, _ in self._judged}
+        lamps = {key: lamp for key, lamp in told if lamp.name != HEALTH and lamp.channel not in judged}
         for key in [key for key in self._open if key not in lamps or lamps[key].level <= Severity.OK]:
-            self._open.pop(key).end = time
+            gone = self._open.pop(key)
+            gone.end = None if any(gone is each for each in self._open.values()) else time
+        begun: dict[tuple[str, Severity], ListedAlarm] = {}  # sensors that fall silent together are one alarm
         for key, lamp in lamps.items():
             alarm = self._open.get(key)
             if alarm is None and lamp.level > Severity.OK:
-                self._open[key] = self.add(lamp.name, lamp.level, lamp.reason, time)
+                same = (lamp.reason, lamp.level)
+                if same in begun and len(begun[same].name) < LONGEST_NAME:
+                    begun[same].name += f", {lamp.channel or lamp.name}"
+                self._open[key] = begun.setdefault(same, begun.get(same) or self.add(lamp.name, lamp.level, lamp.reason, time))
             elif alarm is not None and lamp.level > alarm.level:
                 alarm.level, alarm.reason, alarm.is_acknowledged = lamp.level, lamp.reason, False
 
@@ -192,17 +217,42 @@ class AlarmList:
             key = found.channel, found.since
             alarm = self._judged.pop(key, None) or self.add(text(found.channel), Severity.WARN, "", 0.0)
             _renew(alarm, found, time)
+            self._fold(found.channel)
             if found.until is None:
                 lasting[key] = alarm
         for alarm in self._judged.values():
             alarm.end, alarm.is_acknowledged = now, False
         self._judged = lasting
 
+    def _fold(self, channel: str) -> None:
+        """Take the alarms of lamps about a channel out, because health tells of it: one fault is one alarm."""
+        same = {
+            key: alarm for key, alarm in self._open.items() if alarm.name in [f"{kind} {channel}" for kind in SENSOR_GROUPS]
+        }
+        for key, alarm in same.items():
+            del self._open[key]
+            self.all = [each for each in self.all if each is not alarm]
+
+    def active(self, time: float) -> list[ListedAlarm]:
+        """Return the health alarms that were active at `time` (s), the gravest first."""
+        found = [each for each in self.all if each.causes and each.begin <= time and (each.end is None or time < each.end)]
+        return sorted(found, key=lambda alarm: (not alarm.stops, -alarm.level))
+
     def lamps(self, time: float) -> Iterable[StatusLamp]:
         """Yield the health alarms that were active at `time` (s), as lamps."""
+        for alarm in self.active(time):
+            yield StatusLamp(alarm.name, "residuals", alarm.level, alarm.reason, age=time - alarm.begin)
+
+    def shift(self, seconds: float) -> None:
+        """Move all times by so much, because the origin of times has moved."""
         for alarm in self.all:
-            if alarm.causes and alarm.begin <= time and (alarm.end is None or time < alarm.end):
-                yield StatusLamp(alarm.name, "residuals", alarm.level, alarm.reason, age=time - alarm.begin)
+            alarm.begin += seconds
+            alarm.end = None if alarm.end is None else alarm.end + seconds
+
+    def add_gap(self, channel: str, begin: float, end: float) -> None:
+        """Add a gap between two stamps of a channel."""
+        alarm = self.add(channel, Severity.WARN, alarm_text(channel, "gap", None), begin, end)
+        alarm.words, alarm.evidence = _words(channel, "gap", None), f"for {end - begin:.2f} s"
 
     def add(self, name: str, level: Severity, reason: str, begin: float, end: float | None = None) -> ListedAlarm:
         """Add an alarm, with its end (s) if it is over, such as a gap."""
@@ -224,6 +274,11 @@ class AlarmList:
             alarm.is_acknowledged |= bool(alarm.causes) and alarm.end is not None
 
 
+def _words(channel: str, kind: str, cause: str | None) -> dict[str, str]:
+    """Return the sentence about an alarm by language."""
+    return {language: text(alarm_text(channel, kind, cause, language)) for language in LANGUAGES}
+
+
 def _renew(alarm: ListedAlarm, found: Alarm, time: Callable[[int], float]) -> None:
     """Update `alarm` to the present state of `found`, an alarm of the health monitor."""
     causes = tuple((text(each.cause), each.probability) for each in found.ranked) or ((text(found.cause or "not known"), nan),)
@@ -231,4 +286,7 @@ def _renew(alarm: ListedAlarm, found: Alarm, time: Callable[[int], float]) -> No
     alarm.is_acknowledged &= is_same and found.until is None
     alarm.level = Severity.WARN if found.cause is None else Severity.ERROR
     alarm.reason, alarm.begin, alarm.causes = text(found.told), time(found.since), causes
+    alarm.evidence = text(evidence_with_cause(found.evidence, causes))
+    alarm.words = _words(found.channel, found.kind, found.cause)
+    alarm.stops = alarm_sentence(found.channel, found.kind, found.cause).stops
     alarm.end = None if found.until is None else time(found.until)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...types import NANO
 from .received_messages import MalformedError
-from .status import AlarmList, Severity, StatusTable
+from .status import AlarmList, StatusTable
 
 FIRST_ROOM = 1024
 """Initial capacity of a table, rows."""
@@ -74,7 +74,7 @@ class Store:
     def __init__(self, capacity: int, keeps_statuses: bool = False) -> None:
         self._capacity, self._keeps_statuses = capacity, keeps_statuses
         self.generation = 0  # incremented when a clock set back deletes all rows
-        self.epoch = 0  # first stamp (ns), origin of times
+        self.epoch = self._before = 0  # first stamp (ns), origin of times; the one before all rows were deleted
         self.newest = 0.0  # newest time of all tables, s
         self.tables: dict[str, Table] = {}  # in the order of their first row
         self.alarms = AlarmList()
@@ -85,12 +85,15 @@ class Store:
     def clear(self) -> None:
         """Delete all rows and the epoch; keep the lamps."""
         self.generation += 1
-        self.epoch, self.newest = 0, 0.0
+        self._before, self.epoch, self.newest = self.epoch or self._before, 0, 0.0
         self.tables, self._last, self._held = {}, {}, {}
 
     def time(self, stamp: int) -> float:
         """Return the seconds since the epoch, which the first stamp (ns) sets."""
-        self.epoch = self.epoch or stamp
+        if not self.epoch:
+            self.epoch = stamp
+            if self._before:
+                self.alarms.shift((self._before - stamp) * NANO)
         return (stamp - self.epoch) * NANO
 
     def receive(self, name: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
@@ -130,7 +133,7 @@ class Store:
             self.tables[name] = Table(name, columns, self._capacity)
         table, time = self.tables[name], self.time(stamp)
         if name == EVERY_STROKE and table.count and time - table.newest > GAP:
-            self.alarms.add("cylinder_strokes", Severity.WARN, f"gap of {time - table.newest:.2f} s", table.newest, time)
+            self.alarms.add_gap("cylinder_strokes", table.newest, time)
         table.append(time, values)
         self.newest = max(self.newest, time)
 

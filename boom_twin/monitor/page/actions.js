@@ -1,6 +1,7 @@
 // What one does with the page: mark, acknowledge, record, export.
 
 import { themeColour } from "./colours.js";
+import { t, words } from "./i18n.js";
 
 const TABLES = ["displacement", "position", "acceleration", "force", "joints", "uncertainty"];
 
@@ -14,14 +15,14 @@ export class Actions {
     mark.onclick = () => { text.value = ""; dialog.showModal(); };
     dialog.onclose = () => { if (dialog.returnValue === "ok") connection.send({ do: "mark", note: text.value }); dialog.returnValue = ""; };
     this.record.onclick = () => connection.send({ do: "record", on: !this.isRecording });
-    document.getElementById("alarms").onclick = event => { if (event.target.dataset.number) connection.send({ do: "acknowledge", number: Number(event.target.dataset.number) }); };
+    document.getElementById("alarms").onclick = event => { if (event.target.dataset.number) connection.send({ do: "acknowledge", numbers: [Number(event.target.dataset.number)] }); };
     document.getElementById("picture").onclick = () => this.savePicture();
     document.getElementById("csv").onclick = () => this.saveTable();
     connection.addEventListener("hello", event => this.permit(event.detail.permitted));
-    connection.addEventListener("answer", event => { this.answer.textContent = event.detail.words; });
+    connection.addEventListener("answer", event => { this.answer.textContent = words(event.detail.words); });
     connection.addEventListener("state", event => {
       this.isRecording = event.detail.is_recording;
-      this.record.textContent = this.isRecording ? "■ Stop recording" : "● Record";
+      this.record.textContent = this.isRecording ? `■ ${t("Stop recording")}` : `● ${t("Record")}`;
     });
   }
 
@@ -47,8 +48,9 @@ export class Actions {
     picture.toBlob(blob => save(blob, "boom_twin.png"));
   }
 
-  // Every row of the span that is shown, by stamp; empty where a table has none at that stamp.
+  // Every row of the span that is shown, by stamp; empty where a table has none at that stamp. Of the alarms their log.
   saveTable() {
+    if (document.querySelector("#state.open")) return saveRows([...document.querySelectorAll("#alarms tr")].map(row => [...row.cells].slice(0, 6).map(cell => `"${cell.innerText.replaceAll('"', '""')}"`).join(",")), "boom_twin_alarms.csv");
     const [from, to] = this.view.span, rows = new Map(), heads = ["t_s"];
     const others = this.connection.residualTables.filter(({ name }) => !TABLES.includes(name));
     for (const table of [...TABLES.map(name => this.connection.table(name)).filter(Boolean), ...others]) {
@@ -62,9 +64,11 @@ export class Actions {
     }
     const line = ([time, values]) => [time, ...Array.from({ length: heads.length - 1 }, (_, i) => values[i] === undefined || Number.isNaN(values[i]) ? "" : Number(values[i].toPrecision(8)))].join(",");
     const sorted = [...rows].sort(([a], [b]) => a - b);
-    save(new Blob([[heads.join(","), ...sorted.map(line)].join("\n") + "\n"], { type: "text/csv" }), "boom_twin.csv");
+    saveRows([heads.join(","), ...sorted.map(line)], "boom_twin.csv");
   }
 }
+
+const saveRows = (rows, name) => save(new Blob([rows.join("\n") + "\n"], { type: "text/csv" }), name);
 
 function save(blob, name) {
   const anchor = document.createElement("a");

@@ -4,20 +4,22 @@ import uPlot from "/page/uplot.js";
 import { lineColour, themeColour } from "./colours.js";
 import { formatNumber } from "./html_table.js";
 
+const FONT = "12px system-ui", LABEL = 15; // px for the label of an axis
+
 export class Chart {
-  // series: [{ label, colour: number or name, dash, width, show, scale }], bands: [[high, low, colour]] by place in series
+  // series: [{ label, colour: number or name, isFaint, dash, width, show, scale }], bands: [[high, low, colour]] by place in series
   constructor(element, { title, series, bands = [], scales = {}, axes = [{}, {}], hooks = {}, cursor = {} }) {
     this.element = element;
     element.replaceChildren();
     const colour = c => typeof c === "number" ? lineColour(c) : themeColour(c);
-    const axis = { stroke: themeColour("soft"), grid: { stroke: themeColour("grid"), width: 1 }, ticks: { stroke: themeColour("grid"), width: 1 } };
+    const axis = { font: FONT, labelFont: FONT, stroke: themeColour("soft"), grid: { stroke: themeColour("grid"), width: 1 }, ticks: { stroke: themeColour("grid"), width: 1 } };
     this.plot = new uPlot({
       width: 300, height: 100,
       pxAlign: 0,
       scales: { x: { time: false, auto: false }, ...scales },
-      axes: [{ ...axis, ...axes[0] }, { ...axis, size: 56, values: (_, ticks) => ticks.map(formatNumber), ...axes[1] }, ...axes.slice(2).map(own => ({ ...axis, ...own }))],
+      axes: [{ ...axis, ...axes[0] }, { ...axis, size: 56, labelSize: LABEL, values: (_, ticks) => ticks.map(formatNumber), ...axes[1] }, ...axes.slice(2).map(own => ({ ...axis, ...own }))],
       series: [{ label: title, value: (_, v) => v == null ? "" : v.toFixed(3) }, ...series.map(s => ({
-        stroke: colour(s.colour), width: s.width ?? 1, points: { show: false }, show: s.show ?? true, class: s.class ?? null, dash: s.dash, label: s.label, scale: s.scale ?? "y",
+        stroke: colour(s.colour) + (s.isFaint ? "70" : ""), width: s.width ?? 1, points: { show: false }, show: s.show ?? true, class: s.class ?? null, dash: s.dash, label: s.label, scale: s.scale ?? "y",
         value: (_, v) => v == null ? "–" : v.toPrecision(4),
       }))],
       bands: bands.map(([high, low, c]) => ({ series: [high, low], fill: colour(c) + "38" })),

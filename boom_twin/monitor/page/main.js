@@ -1,7 +1,9 @@
 // Puts the page together: connection, lamps, tabs, keys, and the loop that draws.
 
 import { theme } from "./colours.js";
+import { choose, language, LANGUAGES, t, translatePage } from "./i18n.js";
 import { Lamps } from "./lamps.js";
+import { Now } from "./now.js";
 import { Connection } from "./connection.js";
 import { Path } from "./path.js";
 import { ResponseTab } from "./response.js";
@@ -17,8 +19,10 @@ const IDLE_RATIO = 2; // least time between two drawings, as a multiple of what 
 const LONGEST = 60, SLOW = 45, FAST = 55; // ms between drawings at most, and the frames/s below and above which that changes
 const get = id => document.getElementById(id);
 
+translatePage();
 const connection = new Connection(), view = new View(connection), timeline = new Timeline(connection), lamps = new Lamps(connection);
 new Actions(connection, view);
+new Now(connection);
 const spectrum = new SpectrumTab(connection, new HtmlTable("peaks")), response = new ResponseTab(connection);
 const tabs = { traces: new Traces(connection, view, new HtmlTable("figures")), spectrum, spectrogram: spectrum, shape: new Shape(connection, view), path: new Path(connection, view), response, state: null };
 let open = "traces", drawn = "", due = 0, frames = 0, second = performance.now(), shown = NaN, pace = 0;
@@ -38,7 +42,7 @@ function selectTab(tab) {
 function setTheme(name) {
   document.documentElement.dataset.theme = name;
   localStorage.setItem("theme", name);
-  get("theme").textContent = name === "dark" ? "Light" : "Dark";
+  get("theme").textContent = t(name === "dark" ? "Light" : "Dark");
   tabs.traces.rebuild();
   spectrum.rebuild();
   response.rebuild();
@@ -47,12 +51,14 @@ function setTheme(name) {
 
 function pause() {
   if (timeline.isReplay) timeline.hold(!timeline.isHeld);
-  else { view.hold(!view.isHeld); get("pause").textContent = view.isHeld ? "Go on" : "Pause"; }
+  else { view.hold(!view.isHeld); get("pause").textContent = t(view.isHeld ? "Go on" : "Pause"); }
 }
 
 for (const button of document.querySelectorAll("#tabs button")) button.onclick = () => selectTab(button.dataset.tab);
 get("window").onchange = event => view.set({ window: Number(event.target.value), zoom: null });
 get("pause").onclick = pause;
+get("language").replaceChildren(...Object.entries(LANGUAGES).map(([name, label]) => new Option(label, name, name === language, name === language)));
+get("language").onchange = event => choose(event.target.value);
 get("sessions").onchange = event => connection.send({ do: "session", value: Number(event.target.value) });
 
 function showSessions({ sessions, session }) {
@@ -73,7 +79,7 @@ addEventListener("keydown", event => {
 });
 
 connection.addEventListener("hello", event => {
-  get("title").textContent = event.detail.title;
+  get("title").textContent = t(event.detail.title);
   showSessions(event.detail);
   get("pause").hidden = timeline.isReplay;
   view.set({ end: null, zoom: null });
@@ -91,6 +97,9 @@ function draw(now) {
   if (now < due || `${state} ${tabs[open]?.isNew}` === drawn || document.hidden) return;
   const began = performance.now();
   tabs[open]?.draw(open);
+  const missing = tabs[open]?.missing?.(open) ?? "";
+  get("empty").hidden = !missing;
+  get("empty").textContent = t(missing);
   drawn = `${state} ${tabs[open]?.isNew}`; // as it is now: what comes before the next frame is new again
   due = now + Math.max(pace, IDLE_RATIO * (performance.now() - began));
   shown = view.newest;
@@ -103,14 +112,14 @@ function recordDelay() {
 
 function showRate(now) {
   const rate = 1000 * frames / (now - second);
-  get("fps").textContent = `${Math.round(rate)} frames/s`;
+  get("fps").textContent = t("{rate} frames/s", { rate: Math.round(rate) });
   if (rate < SLOW) pace = Math.min(pace + 20, LONGEST); // a machine that does not keep up draws less often
   if (rate > FAST) pace = Math.max(pace - 5, 0);
   frames = 0;
   second = now;
   lamps.watch(timeline.isReplay);
   const sorted = delays.splice(0).sort((a, b) => a - b), delay = sorted[sorted.length >> 1];
-  get("connection").textContent = !connection.isOpen ? "not connected" : timeline.isReplay ? "recorded session" : delay > -0.5 && delay < 60 ? `live, ${Math.round(1000 * delay)} ms behind the sensors` : "live";
+  get("connection").textContent = t(!connection.isOpen ? "not connected" : timeline.isReplay ? "recorded session" : delay > -0.5 && delay < 60 ? "live, {delay} ms behind the sensors" : "live", { delay: Math.round(1000 * delay) });
 }
 
 setInterval(() => lamps.watch(timeline.isReplay), 500);

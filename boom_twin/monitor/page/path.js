@@ -2,6 +2,7 @@
 
 import { lineColour, themeColour } from "./colours.js";
 import { formatNumber } from "./html_table.js";
+import { t } from "./i18n.js";
 
 const POINTS = 2000; // of a line, at most
 const LEFT = 64, BELOW = 40, MARGIN = 16; // px around the plot
@@ -23,8 +24,11 @@ export class Path {
     this.drawAxes(frame);
     lines.forEach((line, i) => this.drawLine(frame, line, lineColour(i ? 2 : 0)));
     const last = lines.map(line => line.at(-1)), [x, z] = last[0] ?? last[1];
-    document.getElementById("way-words").textContent = `tip, ${(to - from).toFixed(0)} s: predicted${lines[1].length ? ", and estimated from all sensors (dashed)" : ""}; now ${x.toFixed(3)} m forward, ${z.toFixed(3)} m up`;
+    document.getElementById("way-words").textContent = t(lines[1].length ? "tip, {span} s: predicted, and estimated from all sensors (dashed); now {x} m forward, {z} m up" : "tip, {span} s: predicted; now {x} m forward, {z} m up", { span: (to - from).toFixed(0), x: x.toFixed(3), z: z.toFixed(3) });
+    if (this.canvas.clientHeight !== frame.height) this.view.version++;
   }
+
+  missing() { return this.connection.table("position")?.count ? "" : "No position of the tip yet: it comes with the first prediction."; }
 
   rows(table, from, to) {
     const first = table.from(from), end = table.from(to + 1e-9), step = Math.max(1, Math.ceil((end - first) / POINTS));
@@ -73,9 +77,9 @@ export class Path {
       }
     }
     context.textAlign = "center";
-    context.fillText("forward, m", width / 2, height - 8);
+    context.fillText(t("forward, m"), width / 2, height - 8);
     context.textAlign = "left";
-    context.fillText("up, m", 6, 12);
+    context.fillText(t("up, m"), 6, 12);
   }
 
   drawLine({ context, at }, points, colour) {
@@ -95,7 +99,7 @@ export class Path {
 const finite = points => points.filter(point => point.every(Number.isFinite));
 
 // 1, 2 or 5 times a power of ten, at least so much.
-function niceStep(least) {
+export function niceStep(least) {
   const power = 10 ** Math.floor(Math.log10(least));
   return power * [1, 2, 5, 10].find(factor => factor * power >= least);
 }

@@ -1,12 +1,13 @@
 // How the tip answers to a force and to every cylinder's drive in the present posture, and the measured spectrum over it.
 
 import { Chart } from "./chart.js";
+import { t, words } from "./i18n.js";
 import { markFrequencies, oneDigit } from "./spectrum.js";
 
 export class ResponseTab {
   constructor(connection) {
     this.lines = { natural: [], source: "" };
-    this.loads = { names: [], trouble: "waiting for the model (the first time on a computer, half a minute)" };
+    this.loads = { names: [], trouble: "waiting for the model" };
     connection.addEventListener("lines", event => { if (event.detail.source !== this.lines.source) this.rebuild(); this.lines = event.detail; this.isNew = true; });
     connection.addEventListener("loads", event => { if (event.detail.names.length !== this.loads.names.length) this.rebuild(); this.loads = event.detail; this.isNew = true; });
     connection.addEventListener("response", event => { this.response = event.detail; this.isNew = true; });
@@ -25,10 +26,10 @@ export class ResponseTab {
     if (!isKnown) return;
     const { times, values, rows, columns } = this.response, frequencies = Array.from(times);
     this.chart ??= new Chart(document.getElementById("answers"), {
-      title: "m/s² of the tip by",
-      series: [...this.loads.names.map((label, i) => ({ label, colour: i })), { label: `${this.lines.source || "nothing measured"}, m/s²/√Hz`, colour: "ink", width: 2, dash: [2, 3], scale: "measured" }],
+      title: t("m/s² of the tip by"),
+      series: [...this.loads.names.map((label, i) => ({ label: label.startsWith("1 mm") ? t("1 mm of cylinder {n}", { n: i }) : t(label), colour: i })), { label: `${t(this.lines.source || "nothing measured")}, m/s²/√Hz`, colour: "ink", width: 2, dash: [2, 3], scale: "measured" }],
       scales: { x: { time: false, auto: false, distr: 3, range: (_, low, high) => [low, high] }, y: { distr: 3 }, measured: { distr: 3 } },
-      axes: [{ label: "frequency, Hz", labelSize: 18, size: 44 }, { size: 72, values: oneDigit }, { scale: "measured", side: 1, size: 72, grid: { show: false }, values: oneDigit }],
+      axes: [{ label: t("frequency, Hz"), labelSize: 18, size: 44 }, { label: "m/s²", size: 62, values: oneDigit }, { label: "m/s²/√Hz", labelSize: 15, scale: "measured", side: 1, size: 62, grid: { show: false }, values: oneDigit }],
       hooks: { draw: [plot => markFrequencies(plot, this.lines.natural)] },
     });
     const curves = Array.from({ length: columns }, (_, c) => Array.from(values.subarray(c * rows, (c + 1) * rows)));
@@ -36,10 +37,10 @@ export class ResponseTab {
   }
 
   get words() {
-    if (this.loads.trouble) return `no response: ${this.loads.trouble}`;
-    const moved = this.lines.moved > 0 ? `; THE BOOM MOVED within them, a cylinder by ${(1000 * this.lines.moved).toFixed(0)} mm: the spectrum is not of this posture` : "";
-    const measured = this.spectrum ? `; dotted, right: root of the density of the acceleration ${this.lines.source}, last 40 s${moved}` : "; no spectrum yet, which needs 8 s";
-    return `amplitude of the tip's acceleration, both directions, by each load in this posture; dashed: natural frequencies${measured}`;
+    if (this.loads.trouble) return t("no response: {why}", { why: words(this.loads.trouble) });
+    const moved = this.lines.moved > 0 ? t("; THE BOOM MOVED within them, a cylinder by {size} mm: the spectrum is not of this posture", { size: (1000 * this.lines.moved).toFixed(0) }) : "";
+    const measured = this.spectrum ? t("; dotted, right: root of the density of the acceleration {source}, last 40 s", { source: t(this.lines.source) }) + moved : t("; no spectrum yet, which needs 8 s");
+    return t("amplitude of the tip's acceleration, both directions, by each load in this posture; dashed: natural frequencies") + measured;
   }
 
   // Root of the density of both directions, brought to the frequencies of the response.

@@ -2,6 +2,8 @@
 
 import { lineColour, themeColour } from "./colours.js";
 import { formatNumber } from "./html_table.js";
+import { t, words as translated } from "./i18n.js";
+import { niceStep } from "./path.js";
 
 const TRACE = 5; // s
 const FULL = 1e5; // N that has the full colour
@@ -14,10 +16,9 @@ export class Shape {
   constructor(connection, view) {
     this.connection = connection;
     this.view = view;
-    this.factor = 10;
     this.canvas = document.getElementById("boom");
     for (const button of document.querySelectorAll("#factors button")) button.onclick = () => this.choose(Number(button.dataset.factor));
-    this.choose(10);
+    this.choose(1);
     connection.addEventListener("reset", () => { this.box = null; });
     connection.addEventListener("state", event => showLoad(event.detail.groups));
   }
@@ -37,15 +38,19 @@ export class Shape {
     const straight = points(read("straight_")), bent = points(read("line_"));
     const large = bent.map(([x, z], i) => [straight[i][0] + this.factor * (x - straight[i][0]), straight[i][1] + this.factor * (z - straight[i][1])]);
     const pins = points(read("pins_")), forces = read("force_"), trace = this.trace();
-    const frame = this.frame([...straight, ...large, ...pins, ...trace]);
+    const frame = this.frame([...straight, ...large, ...pins, ...trace, [straight[0][0], 0]]);
+    drawMetres(frame);
     this.drawLine(frame, straight, { colour: themeColour("off"), width: 2, dash: [7, 6] });
     this.drawLine(frame, large, { colour: themeColour("ink"), width: 5 });
     this.drawLine(frame, trace, { colour: lineColour(2), width: 2 });
-    forces.forEach((force, i) => this.drawLine(frame, pins.slice(2 * i, 2 * i + 2), { colour: colourOf(force), width: 8, label: `${i + 1}: ${Math.abs(force / 1000).toFixed(1)} kN ${force < 0 ? "push" : "pull"}` }));
+    forces.forEach((force, i) => this.drawLine(frame, pins.slice(2 * i, 2 * i + 2), { colour: colourOf(force), width: 8, label: `${i + 1}: ${Math.abs(force / 1000).toFixed(1)} kN ${t(force < 0 ? "push" : "pull")}` }));
     this.drawLoad(frame, large.at(-1));
     this.drawn = { boxes: placeLabels(frame), segments: frame.segments };
     this.describe(bent.at(-1), straight.at(-1), bent, forces);
+    if (this.canvas.clientHeight !== frame.height) this.view.version++; // the words below took another line
   }
+
+  missing() { return this.connection.table("shape")?.count ? "" : "No shape of the boom yet: it comes with the first prediction."; }
 
   // The tip's way of the last seconds, exaggerated as the boom is.
   trace() {
@@ -68,7 +73,7 @@ export class Shape {
     context.setTransform(scale, 0, 0, scale, 0, 0);
     context.clearRect(0, 0, width, height);
     const across = (width - unit * (right - left)) / 2, down = (height - unit * (top - bottom)) / 2;
-    return { context, width, height, segments: [], labels: [], at: ([x, z]) => [across + unit * (x - left), height - down - unit * (z - bottom)] };
+    return { context, width, height, unit, segments: [], labels: [], at: ([x, z]) => [across + unit * (x - left), height - down - unit * (z - bottom)], to: ([x, y]) => [left + (x - across) / unit, bottom + (height - down - y) / unit] };
   }
 
   // The load that the model does not know, as an arrow that ends at the tip.
@@ -101,11 +106,30 @@ export class Shape {
 
   describe([x, z], [x0, z0], bent, forces) {
     const words = (id, text) => { document.getElementById(id).textContent = text; };
-    words("exaggeration", `displacements drawn x${this.factor}; dashed: undeflected`);
-    words("reach", `reach ${x.toFixed(3)} m`);
-    words("height", `height ${z.toFixed(3)} m`);
-    words("forces", `tip ${formatNumber(1000 * (x - x0))} mm forward, ${formatNumber(1000 * (z - z0))} mm up; most loaded cylinder ${(Math.max(...forces.map(Math.abs)) / 1000).toFixed(1)} kN`);
+    words("exaggeration", t("displacements drawn x{factor}; dashed: undeflected", { factor: this.factor }));
+    words("reach", t("reach {reach} m", { reach: x.toFixed(3) }));
+    words("height", t("height {height} m", { height: z.toFixed(3) }));
+    words("forces", t("tip {x} mm forward, {z} mm up; most loaded cylinder {force} kN", { x: formatNumber(1000 * (x - x0)), z: formatNumber(1000 * (z - z0)), force: (Math.max(...forces.map(Math.abs)) / 1000).toFixed(1) }));
   }
+}
+
+// Metres as thin lines with figures at two sides, and the ground: the height of `base_link`.
+function drawMetres({ context, at, to, unit, width, height }) {
+  const step = niceStep(70 / unit), [left, top] = to([0, 0]), [right, bottom] = to([width, height]), text = value => formatNumber(Number(value.toFixed(6)));
+  Object.assign(context, { strokeStyle: themeColour("grid"), fillStyle: themeColour("soft"), lineWidth: 1, font: "12px system-ui", textAlign: "left" });
+  context.setLineDash([]);
+  const line = (a, b) => { context.beginPath(); context.moveTo(...a); context.lineTo(...b); context.stroke(); };
+  for (let x = Math.ceil(left / step) * step; x < right; x += step) { const [px] = at([x, 0]); line([px, 0], [px, height]); if (px < width - 90) context.fillText(text(x), px + 3, height - 4); }
+  for (let z = Math.ceil(bottom / step) * step; z < top; z += step) { const [, py] = at([0, z]); line([0, py], [width, py]); if (py < height - 26) context.fillText(text(z), 3, py - 3); }
+  context.fillText(t("up, m"), 3, 12);
+  context.textAlign = "right";
+  context.fillText(t("forward, m"), width - 4, height - 4);
+  context.textAlign = "left";
+  const [, ground] = at([0, 0]);
+  Object.assign(context, { strokeStyle: themeColour("soft"), lineWidth: 2 });
+  line([0, ground], [width, ground]);
+  context.lineWidth = 1;
+  for (let x = 10; x < width; x += 14) line([x, ground], [x - 7, ground + 7]);
 }
 
 // Every label as near to the middle of its line as there is room, over no line and no other label; far ones with a thin pointer.
@@ -161,5 +185,5 @@ function colourOf(force) {
 // What /diagnostics says of the load at the tip.
 function showLoad(groups) {
   const status = groups.flatMap(group => group.lamps).find(({ name, level }) => name === "tip load" && level === "OK");
-  document.getElementById("load").textContent = status ? `load at the tip: ${status.reason}` : "";
+  document.getElementById("load").textContent = status ? translated(status.reason) : "";
 }

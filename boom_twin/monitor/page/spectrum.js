@@ -2,6 +2,8 @@
 
 import { Chart } from "./chart.js";
 import { lineColour, themeColour } from "./colours.js";
+import { t } from "./i18n.js";
+import { niceStep } from "./path.js";
 
 const LOWEST = 0.25, HIGHEST = 50; // Hz
 const COLUMNS = 300; // of the spectrogram
@@ -45,10 +47,10 @@ export class SpectrumTab {
     if (!this.density) return;
     if (tab === "spectrogram") return this.drawSpectrogram();
     this.chart ??= new Chart(document.getElementById("density"), {
-      title: `density, ${this.lines.source}, (m/s²)²/Hz`,
-      series: this.lines.axes.map((label, i) => ({ label, colour: i })),
+      title: `${t("density")}, ${t(this.lines.source)}`,
+      series: this.lines.axes.map((label, i) => ({ label: t(label), colour: i })),
       scales: { x: { time: false, auto: false, distr: 3 }, y: { distr: 3 } },
-      axes: [{ label: "frequency, Hz", labelSize: 18, size: 44 }, { size: 72, values: oneDigit }],
+      axes: [{ label: t("frequency, Hz"), labelSize: 18, size: 44 }, { label: "(m/s²)²/Hz", size: 62, values: oneDigit }],
       hooks: { draw: [plot => this.drawModes(plot)] },
     });
     this.chart.draw(this.density, LOWEST, Math.min(HIGHEST, this.density[0].at(-1)));
@@ -67,21 +69,23 @@ export class SpectrumTab {
     ctx.restore();
   }
 
+  missing(tab) { return (tab === "spectrogram" ? this.history.length : this.density) ? "" : "No spectrum yet: it needs 8 s of data."; }
+
   fillPeaks() {
     const { natural, peaks } = this.lines;
     const percent = share => share === null ? NaN : 100 * share;
     const rows = peaks.map(({ frequency, damping, mode, deviation, drift }) =>
       [frequency.toFixed(3), percent(damping), mode === null ? "–" : `${mode}`, mode === null ? NaN : natural[mode - 1], percent(deviation), percent(drift)]);
-    const others = natural.map((frequency, i) => [`mode ${i + 1}`, frequency]).filter((_, i) => !peaks.some(peak => peak.mode === i + 1));
-    const moved = this.lines.moved > 0 ? `THE BOOM MOVED within them, a cylinder by ${(1000 * this.lines.moved).toFixed(0)} mm: the frequencies changed, "off by" means nothing; ` : "";
-    const words = natural.length ? "dashed: the model's natural frequencies in this posture" : "the model's frequencies are not known: give --scene";
-    this.htmlTable.fill(["peak, Hz", "damping, %", "mode", "model, Hz", "off by, %", "drift, %"], [...rows, ...others.map(([name, value]) => ["", NaN, name, value, NaN, NaN])], `${this.lines.source}, last 40 s, segments of 8 s; ${moved}${words}`);
+    const others = natural.map((frequency, i) => [`${t("mode")} ${i + 1}`, frequency]).filter((_, i) => !peaks.some(peak => peak.mode === i + 1));
+    const moved = this.lines.moved > 0 ? t("THE BOOM MOVED within them, a cylinder by {size} mm: the frequencies changed, \"off by\" means nothing; ", { size: (1000 * this.lines.moved).toFixed(0) }) : "";
+    const words = t(natural.length ? "dashed: the model's natural frequencies in this posture" : "the model's frequencies are not known: give --scene");
+    this.htmlTable.fill(["peak, Hz", "damping, %", "mode", "model, Hz", "off by, %", "drift, %"].map(head => t(head)), [...rows, ...others.map(([name, value]) => ["", NaN, name, value, NaN, NaN])], `${t("{source}, last 40 s, segments of 8 s; ", { source: t(this.lines.source) })}${moved}${words}`);
   }
 
   // Whose density it is, in the order of time.
   sources() {
     const changes = this.history.filter(({ source }, i) => i === 0 || source !== this.history[i - 1].source);
-    return changes.map(({ source, time }, i) => i === 0 ? SOURCES[source] : `from ${time.toFixed(0)} s ${SOURCES[source]}`).join(", ");
+    return changes.map(({ source, time }, i) => i === 0 ? t(SOURCES[source]) : t("from {time} s {source}", { time: time.toFixed(0), source: t(SOURCES[source]) })).join(", ");
   }
 
   // One pixel for every cell, drawn large.
@@ -96,16 +100,28 @@ export class SpectrumTab {
       if (Number.isFinite(level)) image.data.set(viridis(1 + (level - top) / RANGE), 4 * ((cells - 1 - c) * count + i));
     }));
     picture.getContext("2d").putImageData(image, 0, 0);
-    const context = canvas.getContext("2d"), left = 44, right = width - 60, bottom = height - 24, highest = (cells - 1) * HEIGHT;
+    const context = canvas.getContext("2d"), left = 44, right = width - 128, bottom = height - 34, highest = (cells - 1) * HEIGHT;
     context.imageSmoothingEnabled = false;
     context.drawImage(picture, left, 0, right - left, bottom);
     context.fillStyle = themeColour("ink");
     context.font = "13px system-ui";
-    for (let f = 0; f <= highest; f += 5) context.fillText(`${f} Hz`, 2, Math.max(12, bottom * (1 - f / highest)));
-    this.lines.natural.forEach((f, i) => f < highest && context.fillText(`◂ mode ${i + 1}`, right + 2, bottom * (1 - f / highest) + 5));
-    context.fillText(`${(this.history[0].time - WIDTH).toFixed(0)} s`, left, height - 6);
-    context.fillText(`${this.history.at(-1).time.toFixed(0)} s`, right - 30, height - 6);
-    document.getElementById("waterfall-words").textContent = `density of the tip's acceleration, ${this.sources()}, both directions; bright: ${top.toFixed(0)} dB of 1 (m/s²)²/Hz, dark: ${RANGE} dB below`;
+    for (let f = 0; f <= highest; f += 5) context.fillText(`${f}`, 20, Math.max(12, bottom * (1 - f / highest)));
+    this.lines.natural.forEach((f, i) => f < highest && context.fillText(`◂ ${t("mode")} ${i + 1}`, right + 2, bottom * (1 - f / highest) + 5));
+    const began = this.history[0].time - WIDTH, ended = this.history.at(-1).time, step = niceStep((ended - began) / 8);
+    for (let s = Math.ceil(began / step) * step; s <= ended; s += step) context.fillText(`${Number(s.toFixed(3))}`, left + (right - left) * (s - began) / (ended - began) - 8, bottom + 15);
+    context.fillText(t("time, s"), (left + right) / 2 - 20, height - 4);
+    context.save();
+    context.rotate(-Math.PI / 2);
+    context.fillText(t("frequency, Hz"), -bottom / 2 - 40, 13);
+    context.restore();
+    const ramp = context.createLinearGradient(0, bottom, 0, 20);
+    for (let i = 0; i <= 8; i++) ramp.addColorStop(i / 8, `rgb(${viridis(i / 8).slice(0, 3)})`);
+    context.fillStyle = ramp;
+    context.fillRect(width - 48, 20, 12, bottom - 20);
+    context.fillStyle = themeColour("ink");
+    for (const part of [0, 0.5, 1]) context.fillText((top - RANGE * (1 - part)).toFixed(0), width - 32, bottom - part * (bottom - 20) + (part === 1 ? 10 : 0));
+    context.fillText("dB", width - 48, 13);
+    document.getElementById("waterfall-words").textContent = t("density of the tip's acceleration, {source}, both directions; bright: {top} dB of 1 (m/s²)²/Hz, dark: {range} dB below", { source: this.sources(), top: top.toFixed(0), range: RANGE });
   }
 }
 

@@ -1,6 +1,7 @@
 // Where one is in a recorded session: scrubber, speed, marks.
 
-import { RANKS } from "./lamps.js";
+import { t } from "./i18n.js";
+import { alarmWords, RANKS } from "./lamps.js";
 
 export class Timeline {
   constructor(connection) {
@@ -34,9 +35,9 @@ export class Timeline {
     this.isRead = read >= end;
     this.isHeld = isHeld;
     this.position = position;
-    this.play.textContent = isHeld ? "Play" : "Pause";
+    this.play.textContent = t(isHeld ? "Play" : "Pause");
     if (document.activeElement !== this.scrubber || !this.scrubber.matches(":active")) this.scrubber.value = position;
-    document.getElementById("position").textContent = `${position.toFixed(2)} of ${end.toFixed(2)} s` + (this.isRead ? "" : `, read to ${read.toFixed(0)} s`);
+    document.getElementById("position").textContent = t("{position} of {end} s", { position: position.toFixed(2), end: end.toFixed(2) }) + (this.isRead ? "" : `, ${t("reading: {share} %", { share: (100 * read / end).toFixed(0) })}`);
   }
 
   drawMarks(alarms) {
@@ -46,7 +47,7 @@ export class Timeline {
     document.getElementById("marks").replaceChildren(...alarms.toSorted((a, b) => RANKS.indexOf(a.level) - RANKS.indexOf(b.level)).map(alarm => {
       const mark = document.createElement("i"), end = alarm.end ?? this.end;
       mark.dataset.level = alarm.level;
-      mark.title = `${alarm.name}: ${alarm.reason}, ${alarm.begin.toFixed(2)} s`;
+      mark.title = `${alarm.name}: ${alarmWords(alarm)} ${alarm.begin.toFixed(2)} s`;
       mark.style.left = `${100 * alarm.begin / this.end}%`;
       mark.style.width = `${100 * (end - alarm.begin) / this.end}%`;
       return mark;

@@ -2,8 +2,8 @@
 
 import { Chart } from "./chart.js";
 import { themeColour } from "./colours.js";
-import { RANKS, SIGNS } from "./lamps.js";
-import { escapeHtml, fixed } from "./html_table.js";
+import { t } from "./i18n.js";
+import { RANKS } from "./lamps.js";
 import uPlot from "/page/uplot.js";
 import { decimate, statistics } from "./decimation.js";
 
@@ -20,21 +20,21 @@ const normalised = table => range(table.columns.length / 2, table.columns.length
 const channels = table => normalised(table).map(column => table.columns[column].replace("_normalised", ""));
 
 // Every chart: table, columns (a function of the table), their labels, a factor of the unit. Further streams of residuals follow.
-const residualChart = (name, table, title) => ({ name, table, title, factor: 1, columns: normalised, labels: channels, isResidual: true });
+const residualChart = (name, table, title) => ({ name, table, title, unit: "σ", factor: 1, columns: normalised, labels: channels, isResidual: true });
 const CHARTS = [
-  { name: "displacement", table: "displacement", title: "displacement, mm", factor: 1000, columns: () => [0, 1], isUncertain: true, estimate: [0, 1, 2, 3] },
-  { name: "acceleration", table: "acceleration", title: "acceleration, m/s²", factor: 1, columns: () => [0, 1], labels: ["tip forward", "tip up"], estimate: [4, 5, 6, 7] },
-  { name: "force", table: "force", title: "IMU, m/s²", factor: 1, columns: () => [1, 3, 5, 0, 2, 4], isBanded: true },
-  residualChart("residuals", "joints", "residual, σ"),
+  { name: "displacement", table: "displacement", title: "displacement", unit: "mm", factor: 1000, columns: () => [0, 1], isUncertain: true, estimate: [0, 1, 2, 3] },
+  { name: "acceleration", table: "acceleration", title: "acceleration", unit: "m/s²", factor: 1, columns: () => [0, 1], labels: ["predicted →", "predicted ↑"], estimate: [4, 5, 6, 7] },
+  { name: "force", table: "force", title: "IMU", unit: "m/s²", factor: 1, columns: () => [1, 3, 5, 0, 2, 4], isBanded: true },
+  residualChart("residuals", "joints", "residual"),
 ];
 
 // Every quantity of the table of statistics: table, number of columns, their names, factor and unit. Those of residuals follow.
 const QUANTITIES = [
-  { table: "displacement", count: 2, label: column => `displ. ${NAMES[column[0]]}`, factor: 1000, unit: "mm" },
-  { table: "acceleration", count: 2, label: column => `accel. ${NAMES[column[0]]}`, factor: 1, unit: "m/s²" },
+  { table: "displacement", count: 2, label: column => `${t("displ.")} ${t(NAMES[column[0]])}`, factor: 1000, unit: "mm" },
+  { table: "acceleration", count: 2, label: column => `${t("accel.")} ${t(NAMES[column[0]])}`, factor: 1, unit: "m/s²" },
   { table: "force", count: 4, label: column => `IMU ${column.replace("_m_s2", "").replace("_", " ")}`, factor: 1, unit: "m/s²" },
 ];
-const residualQuantity = table => ({ table: table.name, count: table.columns.length / 2, label: (_, i) => `resid. ${channels(table)[i]}`, ...table.residuals });
+const residualQuantity = table => ({ table: table.name, count: table.columns.length / 2, label: (_, i) => `${t("resid.")} ${channels(table)[i]}`, ...table.residuals });
 
 export class Traces {
   constructor(connection, view, htmlTable) {
@@ -69,7 +69,7 @@ export class Traces {
     const [from, to] = this.view.span;
     if (!Number.isFinite(to)) return;
     const further = this.connection.residualTables.filter(({ name }) => !this.kinds.some(kind => kind.table === name));
-    if (further.length) this.add(further.map(({ name, residuals }) => residualChart(`residuals-${name}`, name, `${residuals.title}, σ`)));
+    if (further.length) this.add(further.map(({ name, residuals }) => residualChart(`residuals-${name}`, name, residuals.title)));
     if (this.hasEstimate !== Boolean(this.estimate?.count)) { this.hasEstimate = !this.hasEstimate; this.rebuild(); }
     const filled = this.kinds.filter(kind => this.connection.table(kind.table)?.count);
     if (filled.at(-1) !== this.lowest) { this.lowest = filled.at(-1); this.rebuild(); } // it has the axis of time
@@ -82,6 +82,8 @@ export class Traces {
       chart.draw(kind.estimate && this.hasEstimate ? uPlot.join([data, this.estimated(kind, from, to, slots)]) : data, from, to);
     }
   }
+
+  missing() { return this.connection.table("displacement")?.count ? "" : "Nothing is predicted yet: cylinder lengths are needed."; }
 
   get estimate() { return this.connection.table("estimate"); }
 
@@ -103,12 +105,12 @@ export class Traces {
 
   build(kind, table) {
     const labels = typeof kind.labels === "function" ? kind.labels(table) : kind.labels;
-    const plain = () => labels.map((label, i) => ({ label, colour: i }));
+    const plain = () => labels.map((label, i) => ({ label: t(label), colour: i }));
     const plainOptions = kind.isBanded ? BANDED : kind.isUncertain ? UNCERTAIN : { series: plain() };
     const options = kind.estimate && this.hasEstimate ? withEstimate(plainOptions) : plainOptions;
     return new Chart(document.getElementById(`chart-${kind.name}`), {
-      title: kind.title,
-      axes: [kind === this.lowest ? { size: 32 } : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, kind.isResidual ? { space: 14, incrs: POWERS } : { space: 20 }],
+      title: `${t(kind.title)}, ${kind.unit}`,
+      axes: [kind === this.lowest ? { size: 28, label: t("time, s"), labelSize: 15 } : { values: (_, ticks) => ticks.map(() => ""), size: 6 }, { label: kind.unit, ...(kind.isResidual ? { space: 14, incrs: POWERS } : { space: 20 }) }],
       ...options,
       scales: kind.isResidual ? { y: { range: (_, low, high) => [Math.min(low, -4), Math.max(high, 4)] } } : {},
       cursor: { sync: { key: "time" }, drag: { x: true, y: false, setScale: false } },
@@ -139,19 +141,11 @@ export class Traces {
     ctx.restore();
   }
 
-  // In words, the worst first.
-  listAlarms(from, to) {
-    const words = this.alarmsBetween(from, to).reverse().map(({ name, reason, level, begin, end }) =>
-      `<span data-level=${level}>${SIGNS[level]} ${escapeHtml(name)}</span>: ${escapeHtml(reason)}, ${end === null ? `since ${fixed(begin, 1)} s` : `${fixed(begin, 1)} to ${fixed(end, 1)} s`}`);
-    document.getElementById("during").innerHTML = words.join(" &nbsp; ");
-  }
-
   // The table of statistics of what is shown.
   fillStatistics() {
     const [from, to] = this.view.span, span = `${from} ${to} ${this.connection.lastRows} ${this.view.version}`;
     if (span === this.span || !Number.isFinite(to) || !this.htmlTable.element.offsetParent) return;
     this.span = span;
-    this.listAlarms(from, to);
     const rows = [];
     for (const { table: name, count, label, factor, unit } of [...QUANTITIES, ...this.connection.residualTables.map(residualQuantity)]) {
       const table = this.connection.table(name);
@@ -161,29 +155,29 @@ export class Traces {
         rows.push([`${label(table.columns[column], column)}, ${unit}`, ...["mean", "rms", "peak", "range"].map(key => found[key] * factor), found.crest]);
       }
     }
-    this.htmlTable.fill(["", "mean", "rms", "peak", "p-p", "crest"], rows, `of the ${(to - from).toFixed(1)} s shown; rms and peak about the mean`);
+    this.htmlTable.fill(["", "mean", "rms", "peak", "p-p", "crest"].map(head => head && t(head)), rows, t("of the {span} s shown; rms and peak about the mean", { span: (to - from).toFixed(1) }));
   }
 }
 
 const BANDED = {
   series: [
-    { label: "measured z", colour: "soft", width: 1 }, { label: "predicted z", colour: 0, width: 1 },
+    { label: t("measured z"), colour: "soft", width: 1 }, { label: t("predicted z"), colour: 0, width: 1 },
     { label: "+2σ", colour: 0, width: 0, class: "quiet" }, { label: "−2σ", colour: 0, width: 0, class: "quiet" },
-    { label: "measured x", colour: "soft", width: 1, show: false }, { label: "predicted x", colour: 1, width: 1, show: false },
+    { label: t("measured x"), colour: "soft", width: 1, show: false }, { label: t("predicted x"), colour: 1, width: 1, show: false },
   ],
   bands: [[3, 4, 0]],
 };
 
 const UNCERTAIN = {
-  series: [{ label: "tip forward", colour: 0 }, { label: "tip up", colour: 1 }, ...[0, 0, 1, 1].map((colour, i) => ({ label: i % 2 ? "−2σ" : "+2σ", colour, width: 0, class: "quiet" }))],
+  series: [{ label: t("predicted →"), colour: 0 }, { label: t("predicted ↑"), colour: 1 }, ...[0, 0, 1, 1].map((colour, i) => ({ label: i % 2 ? "−2σ" : "+2σ", colour, width: 0, class: "quiet" }))],
   bands: [[3, 4, 0], [5, 6, 1]],
 };
 
-// The same chart with the lines of the estimate and their bands.
+// The same chart with the lines of the estimate and their bands; the prediction lies under them, broad and faint.
 function withEstimate({ series, bands = [] }) {
-  const first = series.length + 1, lines = ["est. forward", "est. up"].map((label, i) => ({ label, colour: 2 + i }));
-  const edges = [2, 2, 3, 3].map((colour, i) => ({ label: i % 2 ? "−2σ" : "+2σ", colour, width: 0, class: "quiet" }));
-  return { series: [...series, ...lines, ...edges], bands: [...bands, [first + 2, first + 3, 2], [first + 4, first + 5, 3]] };
+  const first = series.length + 1, lines = ["estimated →", "estimated ↑"].map((label, i) => ({ label: t(label), colour: i }));
+  const edges = [0, 0, 1, 1].map((colour, i) => ({ label: i % 2 ? "−2σ" : "+2σ", colour, width: 0, class: "quiet" }));
+  return { series: [...series.map(each => ({ ...each, isFaint: true, width: each.width ?? 4 })), ...lines, ...edges], bands: [...bands, [first + 2, first + 3, 0], [first + 4, first + 5, 1]] };
 }
 
 // Times, and all values in the unit that is shown.

@@ -1,0 +1,123 @@
+"""One table of alarm sentences, and one table of translations (``texts.json``) of all that an operator reads.
+
+`/diagnostics`, the live page, report, ``summary.json`` and command line take their sentences about alarms from here. Sentences
+are constant: figures stand beside them, as evidence.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+LANGUAGES = ("en", "de", "zh")
+FILE = Path(__file__).parent / "texts.json"
+"""English text to the texts in the other `LANGUAGES`. The live page reads the same file."""
+
+THINGS = {
+    "joint": "angle sensor of joint {n}",
+    "cylinder": "length transducer of cylinder {n}",
+    "cylinder_force": "force sensor of cylinder {n}",
+    "tip_imu": "tip IMU",
+    "joint_angles": "joint angles",
+    "cylinder_strokes": "cylinder lengths",
+    "cylinder_forces": "cylinder forces",
+    "tip": "tip",
+    "k": "oil spring of cylinder {n}",
+    "EI": "section {n}",
+}
+"""Names of channels, and of parameters by their last part."""
+
+
+class Sentence(NamedTuple):
+    """Sentence about an alarm: what is wrong, and what to do. `stops`: the boom is to be stopped at once."""
+
+    what: str
+    remedy: str
+    stops: bool = False
+
+
+SENTENCES = {
+    "stuck": Sentence("{thing} repeats one reading again and again", "Check its cable and supply"),
+    "noise": Sentence("{thing} is much noisier than its like", "Check its cable, shield and mount"),
+    "spikes": Sentence("{thing} gives single readings far from their neighbours", "Check its cable and plug"),
+    "jump": Sentence("{thing} jumped at once, as no boom can", "Check its mount; if it stays, set its zero"),
+    "dropout": Sentence("{thing} gives no readings", "Check its cable, supply and driver"),
+    "range": Sentence("{thing} reads what it cannot", "Check its unit, sign and zero in the mapping"),
+    "swapped": Sentence("{thing} and another one are exchanged", "Exchange their names in the mapping, or their cables"),
+    "late": Sentence("stamps of {thing} are late", "Correct their delay in the mapping"),
+    "deviation": Sentence("{thing} does not fit the cylinder lengths", "Compare both at rest, then set the zero"),
+    "deviation cylinder_force": Sentence(
+        "{thing} does not fit the model", "Check payload and line fill, then the sensor's zero"
+    ),
+    "exceeded": Sentence(
+        "the force at the tip is above its limit",
+        "Stop the pump, free the end hose, see if the boom touches anything",
+        True,
+    ),
+    "softer k": Sentence(
+        "{thing} is softer than the scene says", "Finish the move, then look for air in the oil and loose pins"
+    ),
+    "softer EI": Sentence("{thing} is softer than the scene says", "Stop, and look for cracks", True),
+    "more payload": Sentence("the boom carries more than the payload that is set", "Look what hangs at the tip, then set it"),
+    "less payload": Sentence("the boom carries less than the payload that is set", "Look what hangs at the tip, then set it"),
+    "more line_fill": Sentence("the pipe line holds more than the line fill that is set", "Set the line fill"),
+    "less line_fill": Sentence("the pipe line holds less than the line fill that is set", "Set the line fill"),
+    "off": Sentence("{thing}, or the length transducer beside it, reads wrong", "Compare both at rest, then set the zero"),
+    "off cylinder_force": Sentence("{thing} reads wrong", "Check the sensor's zero and scale"),
+    "gap": Sentence("cylinder lengths were missing", "Check cable and driver of the length transducers"),
+    "clock": Sentence("a clock was set", "Nothing, if it was on purpose"),
+    "": Sentence("{thing} does not behave as the model", "Look at it"),
+}
+"""Sentences by kind of alarm, some of them by the kind of channel or parameter too; the last one is for kinds not known."""
+LIKELY = ((0.99, "almost certain"), (0.9, "very likely"), (0.66, "likely"), (0.33, "possible"), (0.0, "unlikely"))
+"""Words for probabilities from these on."""
+
+_TRANSLATIONS: dict[str, list[str]] = {}
+
+
+def translations() -> Mapping[str, list[str]]:
+    """Return the texts in German and Chinese by their English text."""
+    if not _TRANSLATIONS:
+        _TRANSLATIONS.update(json.loads(FILE.read_text(encoding="utf-8")))
+    return _TRANSLATIONS
+
+
+def translated(english: str, language: str = "en") -> str:
+    """Return a text in a language; in English where the table does not have it."""
+    others = None if language == "en" else translations().get(english)
+    return english if others is None else others[LANGUAGES.index(language) - 1]
+
+
+def likelihood(probability: float) -> str:
+    """Return a probability in words."""
+    return next(words for least, words in LIKELY if probability >= least)
+
+
+def alarm_sentence(channel: str, kind: str, cause: str | None) -> Sentence:
+    """Return the entry of an alarm in `SENTENCES`."""
+    keys = (f"{kind} {(cause or '').rpartition('.')[2]}", f"{kind} {_parts(channel)[0]}", kind, "")
+    return next(SENTENCES[key] for key in keys if key in SENTENCES)
+
+
+def alarm_text(channel: str, kind: str, cause: str | None, language: str = "en") -> str:
+    """Return what an operator is told of an alarm: what is wrong, and what to do."""
+    sentence = alarm_sentence(channel, kind, cause)
+    last, place = (cause or "").rpartition(".")[2], channel
+    if last in THINGS:
+        place = last
+    name = THINGS.get(_parts(place)[0])
+    thing = place if name is None else translated(name, language).format(n=_parts(channel)[1])
+    what = translated(sentence.what, language).format(thing=thing)
+    stop = "。" if language == "zh" else "."
+    space = "" if language == "zh" else " "
+    return f"{what[:1].upper()}{what[1:]}{stop}{space}{translated(sentence.remedy, language)}{stop}"
+
+
+def _parts(channel: str) -> tuple[str, str]:
+    """Return kind and number of a channel: ``joint_3`` is a joint, 3; the axes of an IMU are one thing."""
+    if channel.startswith("tip_imu"):
+        return "tip_imu", ""
+    kind, _, number = channel.rpartition("_")
+    return (kind, number) if number.isdigit() else (channel, "")
