@@ -41,8 +41,11 @@ def texts_of_the_page() -> set[str]:
 
 
 def diagnostics() -> set[str]:
+    """Return the constant words of statuses, in the parts that the page looks up."""
     sources = "".join(path.read_text() for path in (Path(boom_twin.__file__).parent / "diagnostics").glob("*_status.py"))
-    return set(re.findall(r'judge\.finish\("([^"{]+)"', sources))
+    calls = re.findall(r"(?:judge\.(?:finish|fault|check|check_age)\(|told = )([^\n]+)", sources)
+    found = {words for call in calls for words in re.findall(r'"([a-z][^"{}]* [^"{}]*)"', call)}
+    return {part for words in found for part in ([words] if words in translations() else re.split("; |: ", words))}
 
 
 def alarms() -> set[str]:

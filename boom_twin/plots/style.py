@@ -101,6 +101,7 @@ def _part_titles_and_legends(figure: Figure) -> None:
     from matplotlib.text import Text
 
     figure.draw_without_rendering()
+    has_moved = False
     for axes in figure.axes:
         legend, text = axes.get_legend(), axes.get_title(loc="left")
         titles = [each for each in axes.get_children() if isinstance(each, Text) and text and each.get_text() == text]
@@ -108,6 +109,9 @@ def _part_titles_and_legends(figure: Figure) -> None:
         for title in titles:
             if box is not None and box.overlaps(title.get_window_extent()):
                 axes.set_title(text, loc="left", pad=6.0 + 72.0 / DPI * (box.y1 - axes.get_window_extent().y1))
+                has_moved = True
+    if not has_moved:
+        figure.set_layout_engine("none")  # the layout is known
 
 
 def shade_gaps(axes: Axes, gaps: list[tuple[float, float]]) -> None:

@@ -65,7 +65,7 @@ def test_a_fault_shows(replays: tuple[Path, Path], capsys: pytest.CaptureFixture
     lines = capsys.readouterr().out.splitlines()
     differing = {line.split()[0] for line in lines if line.endswith(" differs")}
     assert differing <= {"residual_mean_joint_3", "residual_rms_joint_3"} and differing
-    assert any("joint_3.sensor" in line for line in lines)
+    assert any("Angle sensor of joint 3" in line for line in lines)
 
 
 def test_what_is_no_session_and_no_whole_replay_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
