@@ -69,8 +69,8 @@ class SourceFeed(Feed):
 class LivePage:
     """Context manager that serves the live page of a twin from a thread, see `boom_twin monitor`. It needs aiohttp.
 
-    Give samples to `update` of the page in place of that of the twin. The page takes computing time of the same process: a
-    source above 200 Hz is better recorded than shown.
+    Give samples to `update` of the page in place of that of the twin. The page takes about three times the computing time of the
+    twin itself, in the same process. The context begins when the model is compiled.
 
     Parameters
     ----------
