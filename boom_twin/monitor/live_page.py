@@ -69,7 +69,7 @@ class SourceFeed(Feed):
 class LivePage:
     """Context manager that serves the live page of a twin from a thread, see `boom_twin monitor`. It needs aiohttp.
 
-    Give samples to `update` of the page in place of that of the twin. The page takes about three times the computing time of the
+    Give samples to `update` of the page in place of that of the twin. It takes about three times the computing time of the
     twin itself, in the same process. The context begins when the model is compiled.
 
     Parameters
