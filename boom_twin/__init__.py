@@ -10,6 +10,7 @@ The stable API, imported when first used::
     Twin(scene, settings=None).update(sample)           sample by sample: prediction, residuals
     replay(bag, scene, out)                             a recorded session or a table of readings through the twin
     SessionWriter(out, scene).write(sample)             a session from samples of a live source
+    LivePage(twin).update(sample)                       the live page of a twin in this process
     TimeWindow(start, duration)                         a part of a session, for replay
     BoomTwinError                                       every error of the package, and its kinds
 
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from .bag.time_window import TimeWindow
     from .config.settings import Settings, load_settings
     from .errors import BagError, BoomTwinError, SceneError, SceneWarning, SolverError, UsageError
+    from .monitor.live_page import LivePage
     from .offline.replay import replay
     from .scene import Scene, load_scene
     from .twin.twin import Twin
@@ -40,6 +42,7 @@ __version__ = "0.2.0"
 _HOMES = {
     "BagError": "errors",
     "BoomTwinError": "errors",
+    "LivePage": "monitor.live_page",
     "Report": "types",
     "Sample": "types",
     "Scene": "scene",
@@ -64,6 +67,7 @@ _HOMES = {
 __all__ = [
     "BagError",
     "BoomTwinError",
+    "LivePage",
     "Report",
     "Sample",
     "Scene",

@@ -7,13 +7,12 @@ import sys
 from argparse import SUPPRESS, ArgumentParser, Namespace
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from errno import EADDRINUSE
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
+from ..monitor import PORT
 from .arguments import add_mapping, add_params, add_ros_args, add_session_scene, add_window, ros_arguments, window_of
 from .output import open_scene, open_session_scene, open_session_settings, tell, warn_incomplete
 
@@ -21,13 +20,9 @@ if TYPE_CHECKING:
     from ..monitor.data.feed import Feed, SessionList
 
 
-PORT = 8420
 ACTS = ("mark", "acknowledge", "acknowledge-at-node", "record")
 NICE = 5
 """Nice value of the monitor, by which it gives way to the node on the same machine."""
-
-BACKLOG = 128
-"""Connections that may wait to be taken; the kernel turns away more."""
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -135,18 +130,15 @@ def _serve(args: Namespace, feed: Feed, actions: Any, sessions: SessionList | No
 
     access = AccessControl(args.host)
     try:
-        asyncio.run(_run(args, Server(feed, actions, access, sessions), access.token))
+        asyncio.run(_run(args, Server(feed, actions, access, sessions), access))
     except OSError as error:
         raise BoomTwinError(f"cannot listen on {args.host}:{args.port}: {error.strerror}. Choose another --port.") from None
 
 
-async def _run(args: Namespace, server: Any, token: str) -> None:
+async def _run(args: Namespace, server: Any, access: Any) -> None:
     import asyncio
 
-    from aiohttp import web
-
-    from ..monitor.access_control import in_address
-    from ..monitor.connections import Connections
+    from ..monitor.serving import serving
     from ..ros.startup import stop_signals
 
     stopped = asyncio.Event()
@@ -154,28 +146,6 @@ async def _run(args: Namespace, server: Any, token: str) -> None:
         asyncio.get_running_loop().add_signal_handler(number, stopped.set)
     if args.until_stdin_ends:
         asyncio.get_running_loop().add_reader(sys.stdin, stopped.set)
-    runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=1.0)
-    await runner.setup()
-    assert runner.server is not None
-    try:
-        listener = await _listen(Connections(runner.server), args.host, args.port)
-        port = listener.sockets[0].getsockname()[1]
-        address = f"http://{in_address(args.host)}:{port}/" + (f"?token={token}" if token else "")
+    async with serving(server, access, args.host, args.port) as address:
         tell(f"open {address}   (Ctrl-C ends it)")
         await stopped.wait()
-        listener.close()
-    finally:
-        await runner.cleanup()
-
-
-async def _listen(connections: Any, host: str, port: int | None) -> Any:
-    """Listen at `port`; without one at the usual port, or at any free port if that is taken."""
-    import asyncio
-
-    listen = partial(asyncio.get_running_loop().create_server, connections, host, backlog=BACKLOG)
-    try:
-        return await listen(PORT if port is None else port)
-    except OSError as error:
-        if port is not None or error.errno != EADDRINUSE:
-            raise
-        return await listen(0)

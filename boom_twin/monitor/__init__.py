@@ -1,1 +1,3 @@
 """The live page: server, viewers, protocol."""
+
+PORT = 8420

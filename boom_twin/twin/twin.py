@@ -188,10 +188,7 @@ class Twin(SampleTaker):
             channel. Nothing has changed then.
         """
         if isinstance(sample, Mapping):
-            samples = samples_of(sample, stamp_ns, self.plan.joints)
-            if self._run is None:
-                check_units(samples)
-            return merged([self.update(each, judged) for each in samples])
+            return merged([self.update(each, judged) for each in self.samples(sample, stamp_ns)])
         sample, self._judged = self._edge.checked(sample), judged
         if self._fault_twins is not None:
             self._fault_twins.reach(sample.stamp, self._failing)
@@ -201,6 +198,31 @@ class Twin(SampleTaker):
         if reason == DONE:
             return self._told(sample, self._compiled.report(sample.stamp, (), judged))
         return self._told(sample, self._fail(sample, []) if reason == FAILED else self._look_at(sample))
+
+    def samples(self, readings: Mapping[str, Any], stamp_ns: int | None) -> list[Sample]:
+        """Return the samples of readings by name in SI units.
+
+        Parameters
+        ----------
+        readings : mapping of str to float or sequence
+            As for `boom_twin.twin.readings.samples_of`.
+        stamp_ns : int
+            Time of the readings, ns.
+
+        Returns
+        -------
+        list of Sample
+            One for each stream, strokes first.
+
+        Raises
+        ------
+        UsageError
+            A name, a value or the stamp cannot be used; or the first readings are in other units.
+        """
+        found = samples_of(readings, stamp_ns, self.plan.joints)
+        if self._run is None:
+            check_units(found)
+        return found
 
     def _told(self, sample: Sample, report: Report) -> Report:
         """Return the report of a sample, after the fault twins are given both."""

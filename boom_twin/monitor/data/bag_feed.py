@@ -26,6 +26,7 @@ from ...offline.inputs import ReplayInputs, ReplayOptions, replay_inputs
 from ...offline.session_samples import SessionSamples
 from ...scene.schema import Scene
 from ...twin.driver import Step, drive
+from ...twin.twin import Twin
 from ...types import NANO, Stream
 from .feed import Feed
 from .store import Store
@@ -105,7 +106,7 @@ def bag_feed(
     if is_published:
         feed.begin(_take_published(session, feed, topics, counts, window))
     else:
-        feed.begin(_take_predicted(feed, topics, given, _Twin(feed, topics, given)))
+        feed.begin(_take_predicted(feed, topics, given, TwinView(feed, topics, given.twin())))
     return feed
 
 
@@ -132,7 +133,7 @@ def _take_published(
         yield
 
 
-def _take_predicted(feed: BagFeed, topics: Topics, given: ReplayInputs, twin: _Twin) -> Generator[None]:
+def _take_predicted(feed: BagFeed, topics: Topics, given: ReplayInputs, twin: TwinView) -> Generator[None]:
     """Run a twin on the recorded inputs and store its predictions, one sample a step."""
     feed.phase = COMPILING
     compiling = Thread(target=twin.twin.warm_up, name="compile", daemon=True)
@@ -151,12 +152,12 @@ def _take_predicted(feed: BagFeed, topics: Topics, given: ReplayInputs, twin: _T
         raise BagError(f"{given.session.path}: no stroke could be used; they need names cylinder_1 .. in m, or a mapping.")
 
 
-class _Twin:
-    """Twin that is run on a session and diagnosed as a live node diagnoses its own. Its time is that of the stamps."""
+class TwinView:
+    """View of a twin without a node, which is diagnosed as a live node diagnoses its own. Its time is that of the stamps."""
 
-    def __init__(self, feed: Feed, topics: Topics, given: ReplayInputs) -> None:
-        self._feed, self._time, self.twin = feed, 0.0, given.twin()
-        scene, settings, mounts = given.scene, given.settings, self.twin.mounts
+    def __init__(self, feed: Feed, topics: Topics, twin: Twin) -> None:
+        self._feed, self._time, self.twin = feed, 0.0, twin
+        scene, settings, mounts = twin.scene, twin.settings, twin.mounts
         self._encoder = ReportEncoder(scene, settings)
         self._names = {key: topic.absolute for key, topic in topics.outputs.items() if topic.absolute in feed.topic_rows.names}
         required = {stream: topic.required for stream, topic in topics.inputs.items()}

@@ -1,0 +1,140 @@
+"""Live page of a twin that runs in this process, without ROS."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Collection, Mapping
+from concurrent.futures import Future
+from threading import Thread
+from types import TracebackType
+from typing import Any, Self
+
+from ..errors import BoomTwinError
+from ..messages.topic_table import Topics, load_topics
+from ..twin.driver import Step
+from ..twin.readings import merged
+from ..twin.twin import Twin
+from ..types import Report, Sample
+from . import PORT
+from .access_control import AccessControl
+from .actions import ViewerActions
+from .data.bag_feed import TwinView
+from .data.feed import Feed
+from .data.received_messages import text
+from .data.status import Severity
+from .data.store import Store
+from .server import Server
+from .serving import serving
+
+CAPACITY = 150_000
+"""Rows kept of every table: twelve minutes at 200 Hz."""
+MOST_WAITING = 20_000
+"""Samples that may wait for the page; the oldest make room."""
+MOST_AT_ONCE = 200
+"""Samples shown in one look, so that the pages have their turn."""
+
+
+class SourceFeed(Feed):
+    """Feed from a twin in this process: another thread calls `put`, the server `poll`."""
+
+    def __init__(self, twin: Twin, topics: Topics) -> None:
+        super().__init__("live", Store(CAPACITY), topics, twin.scene)
+        self._view = TwinView(self, topics, twin)
+        self._waiting: deque[Step] = deque(maxlen=MOST_WAITING)
+
+    def put(self, step: Step) -> None:
+        """Show a sample and its report at the next look."""
+        self._waiting.append(step)
+
+    def poll(self) -> None:
+        """Show the samples that wait."""
+        for _ in range(min(len(self._waiting), MOST_AT_ONCE)):
+            self._view.took(self._waiting.popleft())
+
+    def now(self) -> float:
+        """Return the time (s) of a clock that only goes forward."""
+        return time.monotonic()
+
+    def publish(self, words: str) -> None:
+        """Show an event at the newest sample."""
+        self.store.alarms.add("event", Severity.OK, text(words), self.store.newest, self.store.newest)
+
+    def release_alarms(self) -> str:
+        """Return that there is no node to ask."""
+        return "there is no node to let go of it"
+
+
+class LivePage:
+    """Context manager that serves the live page of a twin from a thread, see `boom_twin monitor`. It needs aiohttp.
+
+    Give samples to `update` of the page in place of that of the twin. It takes about three times the computing time of the
+    twin itself, in the same process. The context begins when the model is compiled.
+
+    Parameters
+    ----------
+    twin : Twin
+    host : str
+        Address to listen at. Elsewhere than at 127.0.0.1 viewers need the token in `address`.
+    port : int, optional
+        0 is any free port. The default is 8420, or any free port if that is taken.
+    allow : collection of str
+        What viewers may do: ``mark``, ``acknowledge``.
+
+    Attributes
+    ----------
+    address : str
+        Address of the page within the context.
+
+    Raises
+    ------
+    BoomTwinError
+        The port is taken.
+    """
+
+    def __init__(
+        self, twin: Twin, host: str = "127.0.0.1", port: int | None = None, allow: Collection[str] = ("mark", "acknowledge")
+    ) -> None:
+        self._twin, self._host, self._port, self.address = twin, host, port, ""
+        self._feed = SourceFeed(twin, load_topics().reading(twin.reads))
+        self._actions = ViewerActions(self._feed, frozenset(allow))
+        self._begun: Future[str] = Future()
+        self._thread = Thread(target=self._run, name="live page", daemon=True)
+
+    def update(self, sample: Sample | Mapping[str, Any], stamp_ns: int | None = None) -> Report:
+        """Update the twin as `Twin.update` does, and show the result."""
+        reports = []
+        for each in self._twin.samples(sample, stamp_ns) if isinstance(sample, Mapping) else [sample]:
+            reports.append(self._twin.update(each))
+            self._feed.put(Step(each, reports[-1], 0.0))
+        return reports[0] if len(reports) == 1 else merged(reports)
+
+    def __enter__(self) -> Self:
+        self._twin.warm_up()
+        self._thread.start()
+        try:
+            self.address = self._begun.result()
+        except OSError as error:
+            where = f"{self._host}:{PORT if self._port is None else self._port}"
+            raise BoomTwinError(f"cannot listen on {where}: {error.strerror}. Choose another port.") from None
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._loop.call_soon_threadsafe(self._stopped.set)
+        self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            asyncio.run(self._serve())
+        except BaseException as error:
+            if self._begun.done():
+                raise
+            self._begun.set_exception(error)
+
+    async def _serve(self) -> None:
+        self._loop, self._stopped = asyncio.get_running_loop(), asyncio.Event()
+        access = AccessControl(self._host)
+        async with serving(Server(self._feed, self._actions, access), access, self._host, self._port) as address:
+            self._begun.set_result(address)
+            await self._stopped.wait()
