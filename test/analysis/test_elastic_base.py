@@ -6,20 +6,17 @@ import json
 
 import numpy as np
 import pytest
-from boom_twin.analysis.energy_balance import energy_balance
-from boom_twin.analysis.momentum_balance import momentum_balance
+from command import main
+from default_boom import anew, strokes_of_posture
 from oracle import booms
 from oracle.clearance.scenes import with_pins
 from oracle.oscillation import mean_frequency
 
-from boom_twin import load_scene, simulate, statics
+from boom_twin import UsageError, load_scene, simulate, statics
+from boom_twin.analysis.balances import energy_balance, momentum_balance
 from boom_twin.analysis.methods import Method, integrate_with
 from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import course_of
-from boom_twin.cli.main import main
-from boom_twin.errors import UsageError
-from boom_twin.scene.edit import anew
-from boom_twin.scene.kinematics import strokes_of_posture
 
 STIFFNESS, DAMPING = 5.0e6, 5.0e4  # N m/rad, N m s/rad
 RIGID = load_scene()

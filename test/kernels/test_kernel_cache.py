@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from command import main
 
-from boom_twin.cli.main import main
 from boom_twin.kernels import compiled_cache as kernel_cache
 from boom_twin.kernels.compiled_cache import ROOT, cache_folder, fault_of, read_checked, source_hash, write_checked
 
