@@ -1,13 +1,14 @@
-"""Texts of the package's scenes, postures of a boom as strokes and angles, scenes with other parameters."""
+"""Texts of the package's scenes, postures and moves of a boom as strokes and angles, scenes with other parameters."""
 
 from __future__ import annotations
 
+from boom_twin.analysis.motions import motion_of
 from boom_twin.scene.edit import anew, loaded, parameter, with_parameters, with_rigid_cylinders
 from boom_twin.scene.kinematics import joint_angles_of_strokes, posture_angles, skeleton, strokes_of_angles, strokes_of_posture
 from boom_twin.scene.load import clearance_text, default_text, examine, examine_text, example_text, with_end_mark
 
 __all__ = [
     "anew", "clearance_text", "default_text", "examine", "examine_text", "example_text", "joint_angles_of_strokes", "loaded",
-    "parameter", "posture_angles", "skeleton", "strokes_of_angles", "strokes_of_posture", "with_end_mark", "with_parameters",
-    "with_rigid_cylinders",
+    "motion_of", "parameter", "posture_angles", "skeleton", "strokes_of_angles", "strokes_of_posture", "with_end_mark",
+    "with_parameters", "with_rigid_cylinders",
 ]  # fmt: skip

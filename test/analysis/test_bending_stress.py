@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from analysis.resting import at_rest
-from default_boom import strokes_of_posture
+from default_boom import motion_of, strokes_of_posture
 from drive_twin import drive_twin
 
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.analysis.bending_moments import increments_by_tip_force, moments_by_unknowns, stations
 from boom_twin.analysis.bending_stress import BendingStressModel
-from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import course_of
 from boom_twin.deviation.estimate_row import WIDTH
 from boom_twin.twin.blocks import estimate_of

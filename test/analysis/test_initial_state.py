@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from command import main
-from default_boom import posture_angles, strokes_of_posture
+from default_boom import motion_of, posture_angles, strokes_of_posture
 from published import scenes
 
 from boom_twin import UsageError, load_scene, simulate, undeflected
 from boom_twin.analysis.initial_state import read_state, write_state
-from boom_twin.analysis.motions import motion_of
 
 SCENE = load_scene()
 QUIET = {"estimate_errors": False}

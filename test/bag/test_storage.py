@@ -15,14 +15,13 @@ from threading import Event
 
 import pytest
 from mcap.writer import CompressionType
-from recordings import read, recover, scan
+from recordings import read, read_metadata, recover, scan
 from ros_messages import encoded, joint_state, load_topics
 from rosbags.highlevel import AnyReader
 
 from boom_twin import BagError, Stream
 from boom_twin.bag import async_writer as module
 from boom_twin.bag.async_writer import FileSplit, Storage
-from boom_twin.bag.metadata import read_metadata
 from boom_twin.bag.writer import BagWriter, recorded
 
 TOPIC = load_topics().inputs[Stream.STROKES]

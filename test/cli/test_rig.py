@@ -16,9 +16,7 @@ pytest.importorskip("exudyn")
 
 from command import main
 from default_boom import default_text
-from recordings import read, scan
-
-from boom_twin.offline.ground_truth import load_truth
+from recordings import load_truth, read, scan
 
 SECTION = {"length": 3.0, "root": {"mass": 40.0, "com": [1.4, 0.1], "inertia": 30.0}, "rod_pin": [0.60, -0.12]}
 CYLINDER = {"k": 2.0e6, "closed_length": 1.08, "max_stroke": 0.79}

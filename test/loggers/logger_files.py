@@ -9,8 +9,8 @@ from pathlib import Path
 from zoneinfo import ZoneInfo
 
 import numpy as np
+from recordings import read, scan
 
-from boom_twin.bag.reader import read, scan
 from boom_twin.types import SECOND, G
 
 SESSION = Path(__file__).parents[2] / "bags" / "arch_session"

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command import main
 from loggers.logger_files import readings
+from recordings import scan
 
-from boom_twin import Sample, SessionWriter, Stream, Twin, load_scene, replay, statics
-from boom_twin.bag.reader import scan
-from boom_twin.cli.main import main
-from boom_twin.errors import BagError, BoomTwinError, UsageError
+from boom_twin import BagError, BoomTwinError, Sample, SessionWriter, Stream, Twin, UsageError, load_scene, replay, statics
 
 Rows = list[tuple[int, dict[str, np.ndarray]]]
 MAPPING = """

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drive_twin import PUMP_DRIVES
-from recordings import scan
+from recordings import load_truth, scan
 
 from boom_twin import Stream, replay
-from boom_twin.offline.ground_truth import load_truth
 
 SESSION = Path(__file__).parents[2] / "bags" / "pump_session"
 BOTH = pytest.mark.parametrize("session", [SESSION, PUMP_DRIVES], ids=["lengths", "drives"])

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from default_boom import motion_of
 from oracle import booms
 
 from boom_twin import statics
 from boom_twin.analysis.methods import integrate_with
-from boom_twin.analysis.motions import motion_of
 from boom_twin.reduction.deviation import answer, course_of
 
 PLAY_OF_0 = [{"at": at, "pin_radius": 0.02, "radial_clearance": 0.0} for at in ("cylinder_2.rod", "joint_3.link_L")]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from default_boom import motion_of
 
 from boom_twin import Scene
-from boom_twin.analysis.motions import motion_of
 from boom_twin.scene.pump_pulses import ease
 from boom_twin.validation.study.stability.cases import FULL_STROKE, ease_integral
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import motion_of
 from studies.papers import low_speed
 
 from boom_twin import load_scene
-from boom_twin.analysis.motions import motion_of
 
 SCENE = load_scene()
 

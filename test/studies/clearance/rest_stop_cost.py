@@ -6,13 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from default_boom import posture_angles, strokes_of_posture
+from default_boom import motion_of, posture_angles, strokes_of_posture
 from studies.stops import StopMotion, halt
 
 from boom_twin import Scene, statics
 from boom_twin.analysis.equilibrium import rest_at
 from boom_twin.analysis.methods import MethodRun, integrate_with
-from boom_twin.analysis.motions import motion_of
 from boom_twin.compiler.plan import first_row, taken_apart
 from boom_twin.scene.schema import IDEAL_BELOW
 

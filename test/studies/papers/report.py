@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from default_boom import posture_angles, skeleton, strokes_of_posture
+from default_boom import motion_of, posture_angles, skeleton, strokes_of_posture
 from studies.clearance.scenes import ideal
 
 from boom_twin import Scene, simulate, statics, undeflected
 from boom_twin.analysis.equilibrium import settle
 from boom_twin.analysis.modal import natural_modes
-from boom_twin.analysis.motions import motion_of
 from boom_twin.compiler.compile import BasisName, compile_scene
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.validation.study.report import page, table

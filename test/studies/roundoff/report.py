@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from default_boom import motion_of
 
 from boom_twin import Scene
 from boom_twin.analysis.methods import integrate_with
-from boom_twin.analysis.motions import motion_of
 from boom_twin.analysis.simulate import RHO
 from boom_twin.system.atomic_files import write_atomic
 from boom_twin.validation.study import scene_changes as made

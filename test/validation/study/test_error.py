@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import main
+from default_boom import motion_of
 from oracle import booms
 
 from boom_twin import load_scene
 from boom_twin.analysis.methods import Method
-from boom_twin.analysis.motions import motion_of
 from boom_twin.validation.study.error import problem as error_problem
 from boom_twin.validation.study.error import report as error
 from boom_twin.validation.study.error import runner as error_run

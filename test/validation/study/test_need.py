@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import main
+from default_boom import motion_of
 from oracle import booms
 from ruamel.yaml import YAML
 
 from boom_twin import Scene, UsageError, load_scene, simulate, statics
-from boom_twin.analysis.motions import motion_of
 from boom_twin.reduction.search import Proposal, propose
 from boom_twin.scene.edit import edited
 

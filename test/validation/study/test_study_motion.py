@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from default_boom import joint_angles_of_strokes, strokes_of_posture
+from default_boom import joint_angles_of_strokes, motion_of, strokes_of_posture
 from oracle import booms
 from oracle.conftest import random_scene
 
 from boom_twin import load_scene
-from boom_twin.analysis.motions import TURN, motion_of
+from boom_twin.analysis.motions import TURN
 
 
 def test_default_boom_moves_as_in_the_documentation():
