@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from recordings import SessionSheet
 
 from boom_twin import Twin, __version__
-from boom_twin.bag.session_sheet import SessionSheet
 from boom_twin.types import Array, StrokeReading
 
 if TYPE_CHECKING:

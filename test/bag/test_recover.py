@@ -21,12 +21,11 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.writer import CompressionType, IndexType, Writer
-from recordings import FILE_NAME, recover, scan
+from recordings import FILE_NAME, Recovery, recover, scan
 from rosbags.highlevel import AnyReader
 
 from boom_twin import BagError
 from boom_twin.bag import mcap_records as content
-from boom_twin.bag.recovery.recover import Recovery
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 Row = tuple[str, str, int, int, int, bytes]

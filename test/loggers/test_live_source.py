@@ -15,8 +15,7 @@ import pytest
 from aiohttp import ClientSession
 from loggers.logger_files import readings
 
-from boom_twin import LivePage, Sample, Stream, Twin, load_scene, replay
-from boom_twin.errors import BoomTwinError
+from boom_twin import BoomTwinError, LivePage, Sample, Stream, Twin, load_scene, replay
 
 CHANNELS = {"cylinder_strokes": "cylinder_{}", "joint_angles": "joint_{}", "tip_imu": "tip_imu_{}"}
 
