@@ -49,8 +49,13 @@ class Assignment:
         """Raise BagError for a column without unit, a cylinder without column, and a file without times or channels."""
         problems, found = list(self.problems), {use.channel for use in self.used}
         for number in sorted({use.table for use in self.used}):
-            if not self.times[number]:
-                table = self.tables[number]
+            table, times = self.tables[number], self.times[number]
+            if times and [table.names.count(table.names[place]) for place in times] != [1] * len(times):
+                name = table.headers[times[0]]
+                problems.append(
+                    f"{table.source}: several columns {name!r}. Export each time with its channels as a file of its own."
+                )
+            if not times:
                 told = ", ".join(header for header in table.headers if header)
                 problems.append(
                     f"{table.source}: no column of times among {told}. Give time: {{column: NAME, unit: s}} in --columns FILE."
@@ -62,7 +67,7 @@ class Assignment:
             )
             problems.append(f"{source}: no column of a channel ({told}). Leave it out, or give --column CHANNEL=NAME:UNIT.")
         strokes = channels_of(joints or self.joints)[Stream.STROKES]
-        if missing := [channel for channel in strokes if channel not in found]:
+        if (missing := [channel for channel in strokes if channel not in found]) and self.used:
             free = "; ".join(f"{self.header(use)} ({use.reason})" for use in self.unused) or "none"
             problems.append(
                 f"no column for {', '.join(missing)}. Not used: {free}. Give --column {missing[0]}=NAME:UNIT or --columns FILE."

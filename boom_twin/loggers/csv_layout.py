@@ -6,14 +6,14 @@ import codecs
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 
 from ..errors import BagError
 from ..system.csv_table import NOTHING, CsvLayout, marked_encoding
-from .headers import unit_of
+from .headers import guess, is_time, split_header, unit_of
 
 HEAD = 2**18  # bytes from which the layout is found
 SEPARATORS = {"\t": "tab", ";": ";", ",": ",", "|": "|"}
@@ -107,14 +107,9 @@ def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout
         return None
     if not first:
         raise BagError(f"{path}: numbers stand in its first line. Write a line above with the names of the columns.")
-    above, units = [*rows[:first]], dict[int, str]()
-    for row in reversed(above):
-        if not units and (found := _units(row[1], numeric)):
-            units = found
-            if row is above[-1] and len(above) > 1:
-                above.remove(row)
-                break
-    line, names = above[-1]
+    units = next((found for _, row in reversed(rows[:first]) if (found := _units(row, numeric))), {})
+    above = [row for row in rows[:first] if not _units(row[1], numeric)] or rows[:first]
+    line, names = max(_headers(above), key=lambda header: _recognised(header[1], units))
     if sum(place < len(names) and bool(names[place]) for place in numeric) < 2:
         return None
     samples = [row for _, row in rows[first:]]
@@ -124,6 +119,23 @@ def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout
     return LoggerLayout(
         encoding, separator, names, begin, given, _has_decimal_comma(path, cells, separator), samples[:200], line
     )
+
+
+def _headers(above: list[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
+    """Yield lines and names that may be a header: the nearest to the data first, names joined of two lines last."""
+    yield from reversed(above)
+    for (_, groups), (line, names) in zip(reversed(above[:-1]), reversed(above), strict=False):
+        group, joined = "", []
+        for place, name in enumerate(names):
+            group = (groups[place] if place < len(groups) else "") or group
+            joined.append(f"{group} {name}".strip())
+        yield line, joined
+
+
+def _recognised(names: list[str], units: Mapping[int, str]) -> int:
+    """Return the number of names that are those of channels or times."""
+    pairs = [(*split_header(name), place) for place, name in enumerate(names)]
+    return sum(is_time(name) or bool(guess(name, unit or units.get(place, ""), None).channel) for name, unit, place in pairs)
 
 
 def _is_numeric(cells: list[str]) -> bool:

@@ -25,7 +25,9 @@ STEPS = 1e-4, 0.2  # s from row to row of a rig's logger, by which the unit of t
 LATE_1904, EXCEL_DAYS = 3.0e9, (3.0e4, 8.0e4)  # s since 1904 (LabVIEW), days since 1899 (spreadsheets) of this century
 SINCE_1904, SINCE_1899 = 2_082_844_800 * SECOND, 25_569 * 86_400 * SECOND  # ns from these days to 1970
 QUARTER = 900 * SECOND  # ns; offsets of time zones change at quarters of an hour
-_DATE = r"(?P<a>\d{1,4})(?P<mark>[-./])(?P<b>\d{1,2})[-./](?P<c>\d{1,4})"
+_DATE = r"(?P<a>\d{1,4})(?P<mark>[-./ ])(?P<b>\d{1,2}|[A-Za-zÄä]{3,9}\.?)[-./ ](?P<c>\d{1,4})"
+_MONTHS = ("jan", "feb", "mar mär mrz", "apr", "may mai", "jun", "jul", "aug", "sep", "oct okt", "nov", "dec dez")
+"""Beginnings of the names of months, English and German."""
 _CLOCK = r"(?P<h>\d{1,2}):(?P<min>\d{2})(?::(?P<s>\d{2})(?:[.,:](?P<part>\d+))?)?\s*(?P<half>[AaPp]\.?[Mm]\.?)?"
 _MOMENT = re.compile(rf"(?:{_DATE})?[T ,;]*(?:{_CLOCK})?\s*(?P<zone>Z|UTC|[+-]\d{{2}}:?\d{{2}})?")
 
@@ -203,7 +205,7 @@ def _order(table: LogTable, matches: list[re.Match[str]], header: str) -> str:
     """Return the order of day, month and year; BagError if nothing tells it."""
     if len(matches[0]["a"]) == 4:
         return "ymd"
-    if matches[0]["mark"] == ".":
+    if matches[0]["mark"] == "." or matches[0]["b"][0].isalpha():
         return "dmy"
     if any(int(match["a"]) > 12 for match in matches):
         return "dmy"
@@ -218,6 +220,8 @@ def _day(a: str | None, b: str, c: str, order: str) -> int:
     """Return the ns from 1970 to the begin of a date; 0 without a date."""
     if a is None:
         return 0
+    if b[0].isalpha():
+        b = str(next((number for number, names in enumerate(_MONTHS, 1) if b[:3].lower() in names.split()), 13))
     part = dict(zip(order, (int(a), int(b), int(c)), strict=True))
     year = part["y"] + 2000 * (part["y"] < 100)
     return (date(year, part["m"], part["d"]) - date(1970, 1, 1)).days * 86_400 * SECOND

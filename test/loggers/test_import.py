@@ -120,7 +120,29 @@ FRAME = table(
     numbers(digits=6, factor=1e-3),
     ",",
 )
+CATMAN = table(
+    [
+        "catman\t",
+        "Zeit  1 - Standardmessrate\tZyl_1\tZyl_2\tZyl_3\tZyl_4",
+        "s\tmm\tmm\tmm\tmm",
+        "S1\tWA/500\tWA/500\tWA/500\tWA/500",
+    ],
+    lambda row: f"{0.01 * row:.4f}".replace(".", ","),
+    numbers(",", 4),
+    "\t",
+)
+GROUPED_HEADER = table(
+    ["Messung 12;;;;", "Zeit;Zylinder;;;", "[s];1 [mm];2 [mm];3 [mm];4 [mm]"],
+    lambda row: f"{0.01 * row:.2f}".replace(".", ","),
+    numbers(",", 4),
+)
+MATLAB = table(
+    ["Time," + ",".join(f"cyl_len_{i}_mm" for i in range(1, 5))], lambda row: f"27-Nov-2026 13:03:{clock(row)}", numbers(), ","
+)
 STYLES = {
+    "catman": (CATMAN.encode("utf-16"), 10**9, []),
+    "grouped header": (GROUPED_HEADER.encode("cp1252"), 10**9, []),
+    "matlab": (MATLAB.encode(), AT_14, ["--timezone", "UTC"]),
     "excel": (EXCEL.encode("cp1252"), AT_14, ["--timezone", "Europe/Berlin"]),
     "labview": (LABVIEW.encode(), 10**9, []),
     "units row": (UNITS_ROW.encode("utf-8-sig"), 10**9, []),
@@ -256,9 +278,10 @@ FAULTS = {
     "thousands or decimals": (GROUPED, "the comma in '628,800' is a separator of thousands or a decimal mark, beside '0.00'"),
     "grouped or not": (GOOD.replace("658,8000", "1.250"), "'1.250' is a separator of thousands or a decimal mark"),
     "no unit": (GOOD.replace(" [mm]", ""), "cylinder_1: no unit is given ('Zylinder 1' of"),
-    "unknown unit": (GOOD.replace("[mm]", "[inkr]"), "(unit inkr, not m, cm, mm, um, in)"),
+    "unknown unit": (GOOD.replace("[mm]", "[inkr]"), "unit inkr, not m, cm, mm, um, in)"),
     "two for one": (GOOD.replace("Zylinder 4", "Hub 3"), "cylinder_3: it may be 'Hub 3 [mm]' of"),
     "one is missing": (GOOD.replace("Zylinder 3", "Kran"), "no column for cylinder_3. Not used: 'Kran [mm]'"),
+    "two times": (GOOD.replace("Zylinder 4 [mm]", "Zeit [s]"), "several columns 'Zeit [s]'"),
     "no header": (GOOD.partition("\n")[2], "numbers stand in its first line"),
     "no table": ("nothing\nto see", "no table is found in it, which begins with 'nothing'"),
     "no time": (GOOD.replace("Zeit", "Nr"), "no column of times among"),
