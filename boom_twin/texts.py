@@ -26,6 +26,7 @@ THINGS = {
     "tip": "tip",
     "k": "oil spring of cylinder {n}",
     "EI": "section {n}",
+    "stiffness": "base",
 }
 """Names of channels, and of parameters by their last part."""
 
@@ -60,6 +61,9 @@ SENTENCES = {
         "{thing} is softer than the scene says", "Finish the move, then look for air in the oil and loose pins"
     ),
     "softer EI": Sentence("{thing} is softer than the scene says", "Stop, and look for cracks", True),
+    "softer stiffness": Sentence(
+        "{thing} is softer than the scene says", "Stop, and look for outriggers that sink and loose bolts", True
+    ),
     "more payload": Sentence("the boom carries more than the payload that is set", "Look what hangs at the tip, then set it"),
     "less payload": Sentence("the boom carries less than the payload that is set", "Look what hangs at the tip, then set it"),
     "more line_fill": Sentence("the pipe line holds more than the line fill that is set", "Set the line fill"),

@@ -109,7 +109,8 @@ def possible_faults(scene: Scene) -> list[Fault]:
     leaves out; and the zero of the IMU, for errors of the model in fast moves look like it.
     """
     mass, sections = explain(scene).mass, [name for name in parameter_names(scene) if name.endswith(".EI")]
-    found = [Fault(name, "softer", LOSS, name != sections[-1]) for name in [*_springs(scene), *sections]]
+    base = [name for name in parameter_names(scene) if name == "base.stiffness"]
+    found = [Fault(name, "softer", LOSS, name != sections[-1]) for name in [*_springs(scene), *sections, *base]]
     found.append(Fault("oil.k", "softer", OIL_LOSS, False))
     for cause, size in (("tip.payload", LOAD * mass), ("line_fill", LOAD * mass / scene.reach)):
         found.append(Fault(cause, "more", size))

@@ -4,10 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from oracle import booms
 
 from boom_twin import load_scene
 from boom_twin.health.causes import HEAD_START, MOST_GAIN, TEMPER, Evidence, Fault, hypothesis, possible_faults
 from boom_twin.health.fault_twins import FaultTwins
+from boom_twin.texts import alarm_text
 from boom_twin.twin.blocks import SampleBlock
 from boom_twin.types import SECOND, Change
 
@@ -72,6 +74,15 @@ def test_a_hypothesis_is_the_scene_with_its_faults():
     (oil,) = (fault for fault in possible_faults(scene) if fault.cause == "oil.k")
     for before, warm in zip(scene.joints, hypothesis(scene, [oil]).scene.joints, strict=True):
         assert warm.cylinder.k == pytest.approx(0.9 * before.cylinder.k)
+
+
+def test_a_softer_base_is_told_of_scenes_with_an_elastic_one():
+    """Its hypothesis has a fourth less of the stiffness; a scene with a rigid base has none."""
+    elastic = booms.on_elastic_base(load_scene())
+    (base,) = set(possible_faults(elastic)) - {fault for fault in possible_faults(load_scene())}
+    assert (base.cause, base.kind, base.channel) == ("base.stiffness", "softer", "base")
+    assert hypothesis(elastic, [base]).scene.base.stiffness == 0.75 * elastic.base.stiffness
+    assert "outriggers" in alarm_text(base.channel, base.kind, base.cause)
 
 
 class Follower:

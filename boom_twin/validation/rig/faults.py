@@ -40,6 +40,7 @@ _WITHOUT_RAMP = ("drift", "stuck", "play")
 _CAUSES: dict[str, dict[str, str | None]] = {
     r"cylinder_([1-9]\d*)\.k": {"softer": _LOSS},
     r"section_([1-9]\d*)\.EI": {"softer": _LOSS},
+    r"base\.stiffness": {"softer": _LOSS},
     r"tip\.payload": {"more": _MORE, "less": _MORE},
     r"line_fill": {"more": _MORE, "less": _MORE},
     r"cylinder_([1-9]\d*)\.rod\.clearance": {"play": _PLAY},
