@@ -79,7 +79,7 @@ def test_a_hypothesis_is_the_scene_with_its_faults():
 def test_a_softer_base_is_told_of_scenes_with_an_elastic_one():
     """Its hypothesis has a fourth less of the stiffness; a scene with a rigid base has none."""
     elastic = booms.on_elastic_base(load_scene())
-    (base,) = set(possible_faults(elastic)) - {fault for fault in possible_faults(load_scene())}
+    (base,) = set(possible_faults(elastic)) - set(possible_faults(load_scene()))
     assert (base.cause, base.kind, base.channel) == ("base.stiffness", "softer", "base")
     assert hypothesis(elastic, [base]).scene.base.stiffness == 0.75 * elastic.base.stiffness
     assert "outriggers" in alarm_text(base.channel, base.kind, base.cause)
