@@ -60,6 +60,7 @@ SLIPS = [
     ("sections[0].beam", [0.6, 3.0], "length of the beam, then x1 = 3.6"),
     ("gravity", [0.5, -9.797], "-y", "base.inclination"),
     ("base.inclination", 0.25, "0.2 rad"),
+    ("base -> base.damping", {"pivot": [0.0, 0.0], "cylinder_pin": [0.45, -1.25], "stiffness": 5e6, "damping": 5e8}, "zeta"),
     ("base.stiffness", 5e3, "kN m/rad?", "5e+06"),
     ("material.E", 7e10, "1.7e+11 to 2.3e+11", "density of steel"),
     ("line_fill", 400.0, "whole load"),

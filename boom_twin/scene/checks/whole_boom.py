@@ -90,12 +90,7 @@ def _damping(draft: Draft, scene: Scene, found: StraightBoom) -> Findings:
         low, high = (limit * value / (each * delay or TINY) for limit, each in zip(PART_DAMPING, (first, second), strict=True))
         damped = f"a mode of {pace / math.pi:.2g} Hz by {100 * pace * delay:.2g} %"
         bound = f"alone it would damp {damped}; expected {low:.2g} to {high:.2g}"
-        remedy = (
-            "beta is 2 zeta / omega in s, d is 2 zeta k / omega in N s/m, damping 2 zeta stiffness / omega in N m s/rad, "
-            "zeta being the damping ratio."
-            if place[0] == "base"
-            else "beta is 2 zeta / omega in s, d is 2 zeta k / omega in N s/m, zeta being the damping ratio."
-        )
+        remedy = "beta is 2 zeta / omega (s), zeta the damping ratio; d, and damping of a base, are that times the stiffness."
         yield draft.warning(place, value, bound, remedy)
     if parts and not odd:
         yield from _damping_of_all(draft, scene, found, parts[0])
