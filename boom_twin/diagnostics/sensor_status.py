@@ -65,8 +65,8 @@ def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats
     if not stats.stamp and not sensor.required:
         return judge.finish("not there; optional")
     judge.note({f"value_{unit}": stats.value, "rate_Hz": stats.rate})
-    judge.check_age(age, "no readings" if stats.stamp else "no reading yet")
-    judge.check("gap_s", stats.gap, Bounds(thresholds.gap_warn), "a gap in the readings", at_once=True)
+    judge.check_age(age, "no reading" if stats.stamp else "no reading yet")
+    judge.check("gap_s", stats.gap, Bounds(thresholds.gap_warn), "gap between readings", at_once=True)
     judge.note({"gaps": stats.gaps})
     share = Bounds(thresholds.unusable_warn, thresholds.unusable_error)
     judge.check("missing_share", stats.missing, share, "messages without a value")

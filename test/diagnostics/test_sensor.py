@@ -57,11 +57,11 @@ STUCK, RANGE = (alarm_text("joint_1", kind, None) for kind in ("stuck", "range")
     ("changes", "age", "level", "words", "sensor"),
     [
         ({}, 0.0, Level.OK, "measuring", SENSOR),
-        ({}, 2.5, Level.STALE, "no readings", SENSOR),
+        ({}, 2.5, Level.STALE, "no reading", SENSOR),
         ({"stamp": 0}, 2.5, Level.STALE, "no reading yet", SENSOR),
         ({"stamp": 0}, 0.5, Level.OK, "waiting for a reading", SENSOR),
         ({"stamp": 0}, 99.0, Level.OK, "not there; optional", OPTIONAL),
-        ({"gap": 0.2}, 0.0, Level.WARN, "a gap in the readings", SENSOR),
+        ({"gap": 0.2}, 0.0, Level.WARN, "gap between readings", SENSOR),
         ({"missing": 0.05}, 0.0, Level.WARN, "messages without a value", SENSOR),
         ({"missing": 0.8}, 0.0, Level.ERROR, "messages without a value", SENSOR),
         ({"outside": 0.8, "value": 7.0}, 0.0, Level.ERROR, RANGE, SENSOR),

@@ -42,7 +42,7 @@ def test_a_stuck_sensor_is_in_the_summary(result):
     alarms = result.summary["alarms"]
     assert [alarm["from_s"] for alarm in alarms] == sorted(alarm["from_s"] for alarm in alarms)
     stuck = next(alarm for alarm in alarms if alarm["channel"] == "joint_3" and alarm["kind"] == "stuck")
-    assert stuck.keys() == {"channel", "kind", "from_s", "to_s", "cause", "told", "ranked"}
+    assert stuck.keys() == {"channel", "kind", "from_s", "to_s", "cause", "told", "evidence", "ranked"}
     assert stuck["cause"] == "joint_3.sensor" and stuck["to_s"] is None and 2.9 < stuck["from_s"] < 4.0
     assert alarm_as_text(stuck) == f"joint_3, {stuck['from_s']:.2f} s to the end: {stuck['told']}"
 
