@@ -32,8 +32,11 @@ SECOND = 1_000_000_000
 HELD = frozenset({"leap", "late", "second source"})
 """Events of samples that were left out, unless a later report gives them as `Report.earlier`."""
 
-Mount = Literal["root", "head"]
-"""Place of an inclinometer on its section; the two places differ by the bending of the section."""
+Mount = Literal["root", "head", "root_compensated", "head_compensated"]
+"""Place of an inclinometer on its section; the two places differ by the bending of the section.
+
+It finds the vertical by its acceleration and errs while its place accelerates, unless it is compensated by a gyro.
+"""
 
 
 class Stream(Enum):
@@ -48,10 +51,26 @@ class Stream(Enum):
 
 
 class StrokeReading(StrEnum):
-    """Quantity that stroke transducers read: the cylinder's length with its oil compressed, or that with the oil unloaded."""
+    """Quantity whose readings drive the model: lengths of cylinders, with the oil compressed or unloaded, or joint angles."""
 
     LENGTH = "length"
     DRIVE = "drive"
+    ANGLE = "angle"
+
+    @property
+    def named(self) -> str:
+        """Name of these readings for people."""
+        return "angles" if self is StrokeReading.ANGLE else "strokes"
+
+    @property
+    def text(self) -> str:
+        """Clause on the strokes of a session, for people."""
+        return "are not read: angles drive the model" if self is StrokeReading.ANGLE else f"are {self}s of the cylinders"
+
+    @property
+    def stream(self) -> Stream:
+        """Stream of these readings: every prediction has the stamp of one of its samples."""
+        return Stream.ANGLES if self is StrokeReading.ANGLE else Stream.STROKES
 
 
 G = 9.80665
@@ -219,8 +238,8 @@ class Sample:
 class Residuals:
     """Residuals at the stamp of one sample: measured minus predicted.
 
-    The prediction is that of the strokes up to this stamp. Residuals of strokes are innovations: the prediction, its mean over
-    the filter's models by their probabilities, is that of the strokes before them.
+    The prediction is that of the strokes up to this stamp. Residuals of strokes, or of the angles that drive the model in their
+    place, are innovations: the prediction, its mean over the filter's models by their probabilities, is that before them.
     """
 
     stream: Stream

@@ -1,9 +1,9 @@
 """Balances of energy and momentum along a motion.
 
-Energy: work of the drives = change of energy + what damping and contact take. Coriolis and centrifugal forces do no work, and
+Energy: work of the drives and of a force at the tip = change of energy + what damping and contact take. Coriolis and centrifugal forces do no work, and
 neither do pins and links.
 
-Momentum and its moment: change = impulse of weight and of what holds the boom. The base holds it in two pins, the pivot of
+Momentum and its moment: change = impulse of weight, tip force and of what holds the boom. The base holds it in two pins, the pivot of
 section 1 and the barrel pin of cylinder 1. Their forces are what is left when all forces and inertia are swept from the tip to
 the base. All other pins, drives, beams, oil and contacts act between parts of the boom and cancel; a force that had no opposite
 would show here, though energy may balance. Linear momentum is of all mass points, moment of momentum of these about the pivot
@@ -158,13 +158,13 @@ class Energies:
 class EnergyBalance:
     """Energy balance of a motion; energies in J."""
 
-    work: float  # done by the drives
+    work: float  # done by the drives and by a force at the tip
     change: float  # kinetic and potential energy at the last row less that at the first
     damping: float  # taken by beams, oil dampers and the base's hinge
     contact: float  # taken by contacts
     gap: float  # largest of work - change - damping - contact at any step, in magnitude
     left: float  # that difference at the end: what time integration took, negative if it gave
-    moved: float  # measure of `gap`: the largest of the drives' work, kinetic energy, and change of the weight's energy
+    moved: float  # measure of `gap`: the largest of that work, kinetic energy, and change of the weight's energy
     step: float  # longest step, s
 
     @property
@@ -174,7 +174,8 @@ class EnergyBalance:
 
     def __str__(self) -> str:
         return (
-            f"energy: the drives did {self.work:.6g} J; kinetic and potential energy changed by {self.change:.6g} J, "
+            f"energy: drives and force at the tip did {self.work:.6g} J; kinetic and potential energy changed by "
+            f"{self.change:.6g} J, "
             f"damping took {self.damping:.4g} J, contact {self.contact:.4g} J. "
             f"The balance is open by {self.gap:.3g} J at most, {100.0 * self.share:.2g} % of {self.moved:.4g} J moved; "
             f"in the end time integration (steps of {self.step:.3g} s) took {self.left:.3g} J"
@@ -188,10 +189,11 @@ def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
     """
     energies, start = Energies(course.plan), course.start
     first, heavy = energies.total(start), energies.weight(start)
-    before, sums = energies.powers(start), np.zeros(3)
+    course.work.load[:] = course.first_load
+    before, sums = energies.powers(start) + tip_power(course, start), np.zeros(3)
     gap, left, moved, longest = 0.0, 0.0, energies.kinetic(start), 0.0
     for step, state in states_of(course, dt):
-        now = energies.powers(state)
+        now = energies.powers(state) + tip_power(course, state)
         sums += 0.5 * step * (before + now)
         before, longest = now, max(longest, step)
         left = float(sums[0] - sums[1] - sums[2] - (energies.total(state) - first))
@@ -199,6 +201,12 @@ def energy_balance(course: DriveCourse, dt: float) -> EnergyBalance:
         moved = max(moved, abs(sums[0]), energies.kinetic(state), abs(energies.weight(state) - heavy))
     work, damping, lost = sums.tolist()
     return EnergyBalance(work, work - damping - lost - left, damping, lost, gap, left, float(moved), longest)
+
+
+def tip_power(course: DriveCourse, state: State) -> Array:
+    """Return the power of the force at the tip, as a summand of `Energies.powers`."""
+    tip = course.plan.tables.tip
+    return np.array([course.work.load[1] @ state.history[V, tip : tip + 2], 0.0, 0.0])
 
 
 def states_of(course: DriveCourse, dt: float) -> Iterator[tuple[float, State]]:
@@ -229,9 +237,12 @@ class Momenta:
         found[2] += impulses[self._turns].sum()
         return found
 
-    def forces(self, state: State) -> Array:
-        """Return force and moment of weight and base, N, N, N m; shape (3,)."""
-        return self._wrench(state, self._plan.weights) + self._base(state)
+    def forces(self, state: State, load: Array) -> Array:
+        """Return force and moment of weight, of the force `load` (2,) at the tip, and of the base, N, N, N m; shape (3,)."""
+        tip = self._plan.tables.tip
+        x, y = state.history[X, tip : tip + 2] - self._pivot
+        pushed = np.array([*load, x * load[1] - y * load[0]])
+        return np.asarray(self._wrench(state, self._plan.weights) + pushed + self._base(state, load))
 
     def _wrench(self, state: State, forces: Array) -> Array:
         """Sum and moment of `forces` (histories,) at all mass points."""
@@ -244,13 +255,14 @@ class Momenta:
         joint = self._plan.tables.joints[0]
         return float(joint.x), float(joint.y)
 
-    def _base(self, state: State) -> Array:
+    def _base(self, state: State, load: Array) -> Array:
         """Return force and moment of the base: at the pivot and the barrel pin of cylinder 1, with friction torques there."""
         t, work = self._plan.tables, self._work
         place(t, state, work)
         motion = Motion(1.0, 0.0, work.position - state.history[A], state.history[V].copy())
         load_pins(t, state, work, motion)
         clear_cut(work, FREE)
+        work.p[:2] -= load
         drive, rate, last = state.drives[0], state.drives[1], np.int64(len(t.operations))
         sweep_in(t, state, work, motion, drive, rate, BEHIND_PIVOT, last, FREE, work.condensed)
         barrel, pin = work.own_g[END_C : END_C + 2], state.pins[0, END_C : END_C + 2] - self._pivot
@@ -289,10 +301,10 @@ class MomentumBalance:
 def momentum_balance(course: DriveCourse, dt: float) -> MomentumBalance:
     """Return the balance along a motion, in the steps of `boom_twin.analysis.balances.energy_balance`."""
     momenta = Momenta(course.plan, course.plan.work())
-    first, before, impulse = momenta.momentum(course.start), momenta.forces(course.start), np.zeros(3)
+    first, before, impulse = momenta.momentum(course.start), momenta.forces(course.start, course.first_load), np.zeros(3)
     rows, gaps = [first], [np.zeros(3)]
     for step, state in states_of(course, dt):
-        now = momenta.forces(state)
+        now = momenta.forces(state, course.work.load[1])
         impulse += 0.5 * step * (before + now)
         before = now
         rows.append(momenta.momentum(state))

@@ -33,7 +33,7 @@ def drives_as_read(plan: Plan, strokes: Array, forces: Array, reads: StrokeReadi
     The oil's damping is left out: its lag is some milliseconds.
     """
     drives = np.array(strokes)
-    if reads is StrokeReading.LENGTH:
+    if reads is not StrokeReading.DRIVE:
         write_drives(
             plan.tables.cylinders, plan.tables.oils, np.ascontiguousarray(np.atleast_2d(forces)), np.atleast_2d(drives)
         )

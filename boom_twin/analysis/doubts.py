@@ -9,7 +9,7 @@ II.4). The step is halved. With clearance it is divided by eight, because a jour
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +17,11 @@ from numpy.typing import NDArray
 
 from ..config.settings import STROKE_RATE
 from ..errors import UsageError
+from ..kernels.elements.linkage import cylinder_length
 from ..kernels.result_row import Results
 from ..kernels.tables import OK
-from ..scene.kinematics import joint_angles_of_strokes, skeleton
+from ..scene.checks.geometry import LEVER, TRANSMISSION_DEG
+from ..scene.kinematics import RANGE_SAMPLES, joint_angles_of_strokes, linkage, skeleton, transmission_angles
 from ..scene.schema import Scene
 from ..types import Array
 from .drive import DriveCourse, Run
@@ -151,6 +153,42 @@ def differences(times: Array, found: Results, other: Results, factor: float) -> 
 
 def _lengths(vectors: Array) -> Array:
     return np.asarray(np.hypot(vectors[:, 0], vectors[:, 1]))
+
+
+BEYOND = 1e-3  # rad beyond range_deg that are not reported
+
+
+def joint_doubts(scene: Scene, times: Array, joints: Array) -> Iterator[str]:
+    """Yield warnings of joints that leave their range_deg or come next to a dead centre.
+
+    `joints` (m, n) are angles at `times` (m,), rad and s.
+    """
+    for i, (joint, angles) in enumerate(zip(scene.joints, joints.T, strict=True)):
+        low, high = np.radians(joint.range_deg)
+        beyond = np.maximum(low - angles, angles - high)
+        if beyond.max() > BEYOND:
+            row = int(beyond.argmax())
+            yield (
+                f"joint_{i + 1} is at {math.degrees(angles[row]):.4g} deg at t = {times[row]:g} s, outside its range_deg "
+                f"{joint.range_deg[0]:g} to {joint.range_deg[1]:g}; give strokes that keep it inside"
+            )
+        row_of, degrees = linkage(scene, i), np.linspace(*joint.range_deg, RANGE_SAMPLES)
+        with np.errstate(invalid="ignore"):
+            largest = float(np.nanmax(np.abs(cylinder_length(row_of, np.radians(degrees))[1])))
+            levers = np.abs(cylinder_length(row_of, angles)[1])
+        between = np.full(len(angles), 90.0) if i == 0 else np.degrees(transmission_angles(row_of, angles))
+        if np.nanmin(between) < TRANSMISSION_DEG:
+            row = int(np.nanargmin(between))
+            yield (
+                f"joint_{i + 1} is next to a dead centre of its links at t = {times[row]:g} s: they meet at "
+                f"{between[row]:.2g} deg (bound {TRANSMISSION_DEG:g}); forces of links and pins grow as 1/sin of that"
+            )
+        if np.nanmin(levers) < LEVER * largest:
+            row = int(np.nanargmin(levers))
+            yield (
+                f"joint_{i + 1} is next to a dead centre of its cylinder at t = {times[row]:g} s: the lever is "
+                f"{levers[row]:.3g} m (bound {LEVER * largest:.3g} m); its force grows as one over that"
+            )
 
 
 VALID_DEFLECTION = 0.5  # validity limit of the tip deflection, as a fraction of the boom's reach

@@ -1,4 +1,4 @@
-"""Stroke histories as smooth drives: monotone cubic interpolation between rows, and simulation along it in any step.
+"""Histories of strokes and of a force as smooth curves: monotone cubics between rows, and simulation along them in any step.
 
 The slopes follow Fritsch and Butland (SIAM J. Sci. Stat. Comput. 5, 1984). At inner rows they are a weighted harmonic mean of
 both neighbouring secants, or zero if the secants differ in sign. At the ends they are those of a parabola through three rows,
@@ -84,6 +84,20 @@ class Run(NamedTuple):
     end: State
 
 
+NO_FORCE = np.zeros((0, 3))
+
+
+def force_at(force: Array, times: Array) -> Array:
+    """Return the force at the tip (N), shape (k, 2), at `times` (k,), s.
+
+    `force` has rows of time (s), x and y (N). They are joined as those of a drive are; before and behind them it is constant.
+    """
+    if len(force) < 2:
+        return np.tile(force[:, 1:] if len(force) else np.zeros(2), (len(times), 1))
+    found, _ = pchip(force[:, 0], force[:, 1:], np.clip(times, force[0, 0], force[-1, 0]))
+    return found
+
+
 @dataclass(frozen=True)
 class DriveCourse:
     """Rows of a drive, and the state of the boom at the first row."""
@@ -94,16 +108,18 @@ class DriveCourse:
     times: Array  # (m,), s
     strokes: Array  # (m, n), m; between rows they follow a monotone cubic
     rho: float  # spectral radius of generalised-alpha at infinite frequency
+    force: Array  # (k, 3), see `force_at`
 
     def stepped(self, rows: NDArray[np.int64], dt: float, finer: int = 1) -> Run:
         """Simulate through `rows` in steps of at most `dt` (s), each divided by `finer`. Steps end on the rows."""
         plan, state = self.plan, State(*(array.copy() for array in self.start))
         out = np.empty((len(rows), width_of(plan)))
         out[0] = first_row(plan, state)
-        steps, counts, drives, rates = self._drive(self.times[rows], self.strokes[rows], dt, finer)
+        steps, counts, drives, rates, loads = self._drive(self.times[rows], self.strokes[rows], dt, finer)
+        self.work.load[:] = self.first_load
         status, row, passes, jolt, shake = run(
-            plan.tables, state, self.work, steps, counts, drives, rates, GENERALISED_ALPHA, self.rho, STEP_TOLERANCE, PASSES,
-            None, out[1:],
+            plan.tables, state, self.work, steps, counts, drives, rates, loads, GENERALISED_ALPHA, self.rho, STEP_TOLERANCE,
+            PASSES, None, out[1:],
         )  # fmt: skip
         at_rows = np.vstack([self.start.drives[1], rates[np.cumsum(counts) - 1]])
         return Run(
@@ -114,13 +130,17 @@ class DriveCourse:
     def states(self, dt: float, finer: int = 1) -> Iterator[tuple[float, State]]:
         """Simulate through all rows in the steps of `stepped`; yield each step (s) and the state after it.
 
-        The same state object is yielded each time and changes with the next step. SolverError if a step fails.
+        The same state object is yielded each time and changes with the next step; ``work.load[1]`` is its force at the tip.
+        SolverError if a step fails.
         """
         plan, work, state, row = self.plan, self.work, State(*(array.copy() for array in self.start)), 0
-        steps, counts, drives, rates = self._drive(self.times, self.strokes, dt, finer)
+        steps, counts, drives, rates, loads = self._drive(self.times, self.strokes, dt, finer)
+        work.load[:] = self.first_load
         for span, count in zip(steps.tolist(), counts.tolist(), strict=True):
             scheme = prepare(GENERALISED_ALPHA, self.rho, span, work.weights)
             for _ in range(count):
+                if len(loads):
+                    work.load[:] = work.load[1], loads[row]
                 status, _, _ = advance(
                     plan.tables, state, work, scheme, drives[row], rates[row], STEP_TOLERANCE, PASSES, LONGEST_INCREMENT, None,
                     ANEW,
@@ -130,15 +150,25 @@ class DriveCourse:
                 row += 1
                 yield span, state
 
-    def _drive(self, times: Array, strokes: Array, dt: float, finer: int) -> tuple[Array, NDArray[np.int64], Array, Array]:
-        """Return step size and count before every row but the first, and drive lengths and rates after each step."""
+    @property
+    def first_load(self) -> Array:
+        """Force at the tip at the first row, N, shape (2,)."""
+        return np.asarray(force_at(self.force, self.times[:1])[0])
+
+    def _drive(
+        self, times: Array, strokes: Array, dt: float, finer: int
+    ) -> tuple[Array, NDArray[np.int64], Array, Array, Array]:
+        """Return step size and count before every row but the first; drive lengths, rates and tip forces after each step.
+
+        Without a force, the last have no rows.
+        """
         spans = np.diff(times)
         counts = finer * np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
         if len(spans) == 0:
             empty = np.zeros((0, self.plan.joints))
-            return spans, counts, empty, empty
+            return spans, counts, empty, empty, np.zeros((0, 2))
         steps = spans / counts
         inside = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts) + 1
         at = np.repeat(times[:-1], counts) + inside * np.repeat(steps, counts)
         lengths, rates = pchip(times, self.plan.closed_lengths + strokes, np.minimum(at, times[-1]))
-        return steps, counts, lengths, rates
+        return steps, counts, lengths, rates, force_at(self.force, at) if len(self.force) else np.zeros((0, 2))

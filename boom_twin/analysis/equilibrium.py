@@ -250,10 +250,14 @@ def travel_words(i: int, most: float) -> str:
     return f"cylinder {i + 1} travels 0 to {most:g} m. Give in m by how much it is longer than closed_length."
 
 
-def rest_at(scene: Scene, strokes: Array, angles: Array) -> tuple[Plan, State, Work]:
-    """Compile a scene and solve its equilibrium at `strokes` (m) near joint `angles` (rad), both (n,); see `settle`."""
+def rest_at(scene: Scene, strokes: Array, angles: Array, load: ArrayLike = 0.0) -> tuple[Plan, State, Work]:
+    """Compile a scene and solve its equilibrium at `strokes` (m) near joint `angles` (rad), both (n,); see `settle`.
+
+    `load` is a force at the tip, x and y, N.
+    """
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
+    work.load[:] = load
     settle(plan, state, work, strokes, angles)
     return plan, state, work
 

@@ -126,13 +126,18 @@ def state_now(plan: Plan, state: State) -> InitialState:
     return InitialState(plan.names, state.z.copy(), rates, state.contacts.copy())
 
 
-def started(scene: Scene, initial: InitialState, times: Array, strokes: Array) -> tuple[Plan, State, Work]:
+def started(
+    scene: Scene, initial: InitialState, times: Array, strokes: Array, load: ArrayLike = 0.0
+) -> tuple[Plan, State, Work]:
     """Compile a scene and set it in motion; the curve through the drives' first rows (s, m) gives length and rate at the start.
+
+    `load` is the force at the tip then, x and y, N.
 
     UsageError for coordinates of another boom, or that leave loops open; SolverError if no accelerations balance the forces.
     """
     plan = compile_scene(scene)
     state, work = plan.state(), plan.work()
+    work.load[:] = load
     _check(plan, initial)
     state.contacts[:] = initial.contacts
     state.contacts[:, LOST] = 0.0

@@ -106,8 +106,8 @@ def integrate_with(
     steps, counts = np.full(rows, step), np.full(rows, every, dtype=np.int64)
     begun = time.process_time()
     status, row, passes, jolt, shake = run(
-        plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, FAMILIES[method.integrator],
-        method.parameter, method.tolerance, np.int64(method.passes), product, out[1:],
+        plan.tables, state, work, steps, counts, plan.closed_lengths + strokes, rates, np.zeros((0, 2)),
+        FAMILIES[method.integrator], method.parameter, method.tolerance, np.int64(method.passes), product, out[1:],
     )  # fmt: skip
     seconds, found, is_done = time.process_time() - begun, taken_apart(plan, out), int(status) == OK
     tip = found.tip

@@ -91,10 +91,11 @@ def simulate_samples(
     dt: float = 1e-3,
     angles: Array | None = None,
     tell: Callable[[int], object] = lambda done: None,
+    force: Array | None = None,
 ) -> SampledMotions:
     """Follow the strokes with `count` booms (2 at least) that differ in parameters drawn at random, on all cores.
 
-    `scene`, `times`, `strokes`, `dt` and `angles` are as for `boom_twin.simulate`, and every boom begins at rest; for
+    `scene`, `times`, `strokes`, `dt`, `angles` and `force` are as for `boom_twin.simulate`, and every boom begins at rest; for
     `deviations` see `drawn`. The same `seed` gives the same samples, whatever the number of cores. `tell` is called with 1
     whenever a sample is done. UsageError as `drawn` and `boom_twin.simulate` raise it, and for motions that take too much
     memory. SolverError if fewer than two samples could be computed.
@@ -112,7 +113,7 @@ def simulate_samples(
     def follow(i: int) -> tuple[dict[str, Array], bool] | str:
         mine = {name: float(column[i]) for name, column in values.items()}
         try:
-            found = simulate(with_parameters(scene, mine), times, strokes, dt, angles, estimate_errors=False)
+            found = simulate(with_parameters(scene, mine), times, strokes, dt, angles, estimate_errors=False, force=force)
         except BoomTwinError as error:
             return f"{', '.join(f'{name} = {value:.6g}' for name, value in mine.items())}: {error}"
         return _kept(found), bool(found.doubts)

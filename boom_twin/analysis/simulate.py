@@ -20,10 +20,20 @@ from ..scene.schema import Scene
 from ..system.summary_display import SummaryDisplay, data_frame, numbers
 from ..types import Array
 from .cylinder_drives import drives_of
-from .doubts import EstimatedError, motion_beyond_validity, ringing, row_errors, step_errors, too_fast, warnings_of
-from .drive import DriveCourse, Run
+from .doubts import (
+    EstimatedError,
+    joint_doubts,
+    motion_beyond_validity,
+    ringing,
+    row_errors,
+    step_errors,
+    too_fast,
+    warnings_of,
+)
+from .drive import NO_FORCE, DriveCourse, Run, force_at
 from .equilibrium import rest_at, travel_words
 from .initial_state import InitialState, started, state_now
+from .steady_state import LARGEST_FORCE
 
 RHO = 0.8
 CLOSEST = 1e-6  # s, between rows: rounding of positions over the square of a shorter step is more than 0.01 m/s^2
@@ -52,7 +62,7 @@ class Simulation(SummaryDisplay):
         where they were not asked for.
     doubts : tuple of str
         What gives reason to doubt the motion, one sentence each: errors beyond their bounds, ringing, strokes too fast,
-        deflections that the model is not meant for.
+        joints out of their range or next to a dead centre, deflections that the model is not meant for.
     pin_names : tuple of str
         Pins with clearance.
     pins : ndarray, shape (m, k, 4)
@@ -131,6 +141,7 @@ def simulate(
     estimate_errors: bool = True,
     start: InitialState | None = None,
     lengths: Array | None = None,
+    force: Array | None = None,
 ) -> Simulation:
     """Start at rest in the equilibrium of the first row, or from a given state, and follow the drives or the lengths.
 
@@ -158,6 +169,10 @@ def simulate(
         Where the boom is and how it moves at the first row, instead of at rest: `boom_twin.undeflected`, or `Simulation.end`.
     lengths : ndarray, shape (m, n), optional
         Lengths of the cylinders less `closed_length`, m, instead of `strokes`; what stroke transducers read.
+    force : ndarray, shape (m, 2) or (k, 3), optional
+        Force at the tip, x and y in the axes of the base, N, at the rows of `times`; or rows of its own time (s), x and y.
+        Between rows it follows the same curve as strokes. Before its first and after its last row it is constant. The first
+        equilibrium is under the force at the first row of `times`.
 
     Returns
     -------
@@ -167,16 +182,16 @@ def simulate(
     Raises
     ------
     UsageError
-        Rows that do not increase, values that are not finite or out of the cylinders' travel, dt not positive; a state of
-        another boom, or one that leaves loops open; not exactly one of strokes and lengths.
+        Rows that do not increase, values that are not finite or out of the cylinders' travel, forces above 1e7 N, dt not
+        positive; a state of another boom, or one that leaves loops open; not exactly one of strokes and lengths.
     SolverError
         No equilibrium at the first row, or a step that failed; says when.
     """
     scene = as_scene(scene)
     if lengths is None and strokes is not None:
-        course = course_of(scene, times, strokes, dt, angles, rho, start)
+        course = course_of(scene, times, strokes, dt, angles, rho, start, force=force)
     elif lengths is not None and strokes is None:
-        course = course_of(with_rigid_cylinders(scene), times, lengths, dt, angles, rho, start, "length")
+        course = course_of(with_rigid_cylinders(scene), times, lengths, dt, angles, rho, start, "length", force)
     else:
         raise UsageError("give either strokes or lengths, not both and not neither.")
     times, strokes, plan = course.times, course.strokes, course.plan
@@ -187,6 +202,7 @@ def simulate(
     tip = own.rows.tip
     doubts = (
         *_doubts(times, dt, own, by_steps, by_rows),
+        *joint_doubts(scene, times, own.rows.joints),
         *motion_beyond_validity(scene, strokes, tip[:, 0, :2], angles),
     )
     if lengths is not None:
@@ -207,18 +223,37 @@ def course_of(
     rho: float = RHO,
     start: InitialState | None = None,
     name: str = "stroke",
+    force: Array | None = None,
 ) -> DriveCourse:
     """Return the checked drive and the boom at its first row, for `simulate` to step through; arguments and errors as there.
 
     Errors call the strokes by `name`.
     """
     times, strokes = _checked(scene, times, strokes, dt, name)
+    force = NO_FORCE if force is None else _checked_force(times, np.asarray(force, float))
+    load = force_at(force, times[:1])[0]
     plan, begin, work = (
-        rest_at(scene, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles, name=name))
+        rest_at(scene, strokes[0], joint_angles_of_strokes(scene, strokes[0], near=angles, name=name), load)
         if start is None
-        else started(scene, start, times, strokes)
+        else started(scene, start, times, strokes, load)
     )
-    return DriveCourse(plan, begin, work, times, strokes, rho)
+    return DriveCourse(plan, begin, work, times, strokes, rho, force)
+
+
+def _checked_force(times: Array, force: Array) -> Array:
+    """Return rows of time (s), x and y (N); UsageError as for `simulate`."""
+    if force.shape == (len(times), 2):
+        force = np.column_stack([times, force])
+    if force.ndim != 2 or force.shape[1] != 3 or not len(force):
+        raise UsageError(f"force = array of shape {force.shape}: give x and y at every row of times, or rows of t_s, x, y.")
+    for row in np.flatnonzero(~(np.isfinite(force[:, 0]) & (np.abs(force[:, 1:]) <= LARGEST_FORCE).all(axis=1))):
+        at, x, y = force[row]
+        told = f"row {row + 1} of the force: t_s = {at:g}, tip_fx_N = {x:g}, tip_fy_N = {y:g}"
+        raise UsageError(f"{told}: a time must be finite, a force at most {LARGEST_FORCE:g} N. Put it right.")
+    for row in np.flatnonzero(np.diff(force[:, 0]) <= 0.0):
+        told = f"t_s = {force[row + 1, 0]:.9g} s in row {row + 2} of the force"
+        raise UsageError(f"{told}: not after row {row + 1}. Sort the rows.")
+    return force
 
 
 def _doubts(

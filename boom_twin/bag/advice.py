@@ -11,7 +11,7 @@ from ..errors import BagError
 from ..messages.topic_table import Qos, Topic, Topics
 from ..types import SENSORS, Stream
 from .inspect import BagInfo, Tally
-from .joint_names import other_names
+from .joint_names import missing_drive, other_names
 from .metadata import profiles
 from .reader import Session, TopicInfo, check_topic, clocks_set_back, readable
 from .session_file import CDR
@@ -63,7 +63,7 @@ def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list
         Source of the scene, named in the sentences.
     """
     names = {stream: [name for names in tally.names for name in names] for stream, tally in _joint_states(info, topics)}
-    found = list(other_names(topics, names, joints, scene))
+    found = [*missing_drive(info.session, topics), *other_names(topics, names, joints, scene)]
     for stream, topic in topics.inputs.items():
         if not SENSORS[stream].lack and info.session.find(topic.name) is None:
             continue
@@ -136,7 +136,8 @@ def _stamps(tally: Tally) -> Iterator[str]:
 
 def _joint_states(info: BagInfo, topics: Topics) -> Iterator[tuple[Stream, Tally]]:
     for stream in JOINT_STATES:
-        if (tally := info.tally(topics.inputs[stream].name)) is not None and tally.named:
+        topic = topics.inputs.get(stream)
+        if topic is not None and (tally := info.tally(topic.name)) is not None and tally.named:
             yield stream, tally
 
 
@@ -179,7 +180,7 @@ def _inputs(session: Session, topics: Topics) -> dict[str, TopicInfo]:
     found: dict[str, TopicInfo] = {}
     for stream, topic in topics.inputs.items():
         info = session.find(topic.name)
-        if stream is Stream.STROKES or (info is not None and info.count):
+        if stream is topics.stroke_reading.stream or (info is not None and info.count):
             found[topic.name] = check_topic(session, topic.name, topic.type)
     return found
 

@@ -1,6 +1,7 @@
 """Read a session from a CSV file: a row for every stamp, a column for every sensor, in SI units.
 
 ``t_s,stroke_1_m,..[,joint_1_rad,..][,imu_x_m_s2,imu_z_m_s2][,cylinder_force_1_N,..]``, an empty cell where there is no value.
+Strokes may be missing where there are angles: for a mapping with ``drive: angles``.
 The file may be of any size: it is read some thousand rows at a time. It is read once to check and count, and once more for its
 messages.
 """
@@ -86,9 +87,9 @@ def _samples(path: Path) -> Iterator[Sample]:
             for stream, names in columns.items()
             if any(name in piece.names for name in names)
         }
-        angles, imu, forces = (values.get(stream) for stream in (Stream.ANGLES, Stream.IMU, Stream.FORCES))
+        strokes, angles, imu, forces = (values.get(stream) for stream in Stream)
         shifted = np.array(stamps, np.int64) + shift
-        yield from samples_of(shifted, values[Stream.STROKES], angles, imu, forces=forces)
+        yield from samples_of(shifted, strokes, angles, imu, forces=forces)
 
 
 def _columns_of(table: CsvTable) -> dict[Stream, list[str]]:
@@ -102,7 +103,9 @@ def _columns_of(table: CsvTable) -> dict[Stream, list[str]]:
         Stream.IMU: ["imu_x_m_s2", "imu_z_m_s2"],
         Stream.FORCES: [f"{name}_N" for name in channels[Stream.FORCES]],
     }
-    table.require([TIME, *columns[Stream.STROKES]], " `boom_twin import` reads files with other headers.")
+    has_strokes = any(name in table.names for name in columns[Stream.STROKES])
+    is_by_angles = not has_strokes and any(name in table.names for name in columns[Stream.ANGLES])
+    table.require([TIME, *columns[Stream.ANGLES if is_by_angles else Stream.STROKES]], " `boom_twin import` reads files with other headers.")
     _refuse_unknown(table, [TIME, *(name for names in columns.values() for name in names)])
     return columns
 

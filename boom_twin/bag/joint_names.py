@@ -35,21 +35,46 @@ def refuse_other_names(session: Session, topics: Topics, joints: int, scene: str
         raise BagError(f"{session.path}: {sentence}")
 
 
+DRIVE_REMEDY = (
+    "If this boom has no stroke transducers, write `drive: angles` in a mapping (--mapping; the node: parameter mapping)."
+)
+
+
+def refuse_missing_drive(session: Session, topics: Topics) -> None:
+    """Raise BagError if a session has no strokes to drive the model, but angles that could."""
+    for sentence in missing_drive(session, topics):
+        raise BagError(f"{session.path}: {sentence}")
+
+
+def missing_drive(session: Session, topics: Topics) -> Iterator[str]:
+    """Yield a sentence if a session has no strokes to drive the model, but angles that could."""
+    strokes = topics.inputs.get(Stream.STROKES)
+    found = [session.find(topic.name) for topic in (strokes, topics.inputs[Stream.ANGLES]) if topic is not None]
+    counts = [0 if topic is None else topic.count for topic in found]
+    if strokes is not None and counts[0] == 0 < counts[1]:
+        name = topics.inputs[Stream.ANGLES].absolute
+        yield f"no strokes ({strokes.absolute}), but {counts[1]} messages of {name}. {DRIVE_REMEDY}"
+
+
 def other_names(topics: Topics, names: Mapping[Stream, Collection[str]], joints: int, scene: str) -> Iterator[str]:
     """Yield a sentence for each conflict of a session's names, by stream, with a scene of `joints` joints.
 
-    No cylinder or joint beyond them may be named. Every cylinder must be named at some time: a boom may lack an encoder, but
-    without a stroke there is no prediction. Other names are ignored.
+    No cylinder or joint beyond them may be named. Every sensor that drives the model must be named at some time: a boom may
+    lack an encoder, but without a stroke there is no prediction. Other names are ignored.
     """
     for stream, found in names.items():
         if beyond := topics.beyond(stream, joints, found):
             yield extra_names_message(topics.inputs[stream].absolute, beyond, stream, joints, scene)
-    found = names.get(Stream.STROKES, ())
-    lacking = [sensor.name for sensor in topics.sensors_of(Stream.STROKES, joints).values() if sensor.name not in found]
+    drive = topics.stroke_reading.stream
+    found = names.get(drive, ())
+    lacking = [sensor.name for sensor in topics.sensors_of(drive, joints).values() if sensor.name not in found]
     if found and lacking:
+        angles = {sensor.name for sensor in topics.sensors_of(Stream.ANGLES, joints).values()}
+        is_alone = topics.is_shared and len(lacking) == joints and angles.issubset(found)
         yield (
-            f"{topics.inputs[Stream.STROKES].absolute} never names {_listed(lacking)}, but {_listed(found)}; "
-            f"{_scene(scene)} has {_counted(joints, 'cylinder')}. Give that of this boom by --scene, or its names by --mapping."
+            f"{topics.inputs[drive].absolute} never names {_listed(lacking)}, but {_listed(found)}; "
+            f"{_scene(scene)} has {_counted(joints, KINDS[drive])}. Give that of this boom by --scene, or its names by "
+            "--mapping." + (f" {DRIVE_REMEDY}" if is_alone else "")
         )
 
 
@@ -84,19 +109,20 @@ def _counted(number: int, kind: str) -> str:
 
 
 def _names(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[str, None]]:
-    """Return the names in messages of strokes and angles, read for `NAMING_TIME` and on until every cylinder was named."""
+    """Return the names in messages of strokes and angles, read for `NAMING_TIME` and on until all that drives was named."""
     heard = {name: [stream for stream in streams if stream in KINDS] for name, streams in topics.heard.items()}
     present = {name: streams for name, streams in heard.items() if streams and (t := session.find(name)) and t.count}
     if not present:
         return {}
     found: dict[Stream, dict[str, None]] = {stream: {} for streams in present.values() for stream in streams}
-    needed = {sensor.name for sensor in topics.sensors_of(Stream.STROKES, joints).values()}
+    drive = topics.stroke_reading.stream
+    needed = {sensor.name for sensor in topics.sensors_of(drive, joints).values()}
     first: int | None = None
     for name, log, message in read(session, {name: topics.inputs[streams[0]].type for name, streams in present.items()}):
         first = log if first is None else first
         for stream in present[name]:
             if len(found[stream]) < MOST_NAMES:
                 found[stream].update(dict.fromkeys(message.name[:MOST_NAMES]))
-        if log - first > NAMING_TIME and needed <= found.get(Stream.STROKES, {}).keys():
+        if log - first > NAMING_TIME and needed <= found.get(drive, {}).keys():
             break
     return found

@@ -76,7 +76,7 @@ def write_samples(
 
 def samples_of(
     stamps_ns: NDArray[np.int64],
-    strokes: Array,
+    strokes: Array | None,
     joints: Array | None,
     imu: Array | None,
     angle_stamps_ns: NDArray[np.int64] | None = None,

@@ -167,20 +167,22 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
 
 @dataclass(frozen=True, slots=True)
 class SessionStrokes:
-    """Quantity that the stroke transducers of a session read, and the source of this."""
+    """Quantity that drives the model in a session, and the source of this."""
 
     reading: StrokeReading
     source: str
 
 
 def strokes_of(session: Path | None, mapped: Mapped) -> SessionStrokes:
-    """Return the quantity that the stroke transducers of a session read. `session` is None for a running rig.
+    """Return the quantity that drives the model in a session. `session` is None for a running rig.
 
-    The mapping's ``reads`` comes first, then ``strokes`` of ``session.yaml``. The default is lengths. It is drives for the
-    virtual rig before version 0.2.
+    It is angles if the mapping says so, else what stroke transducers read. The mapping's ``reads`` comes first, then
+    ``strokes`` of ``session.yaml``. The default is lengths. It is drives for the virtual rig before version 0.2.
     """
+    if mapped.topics.drive == "angles":
+        return SessionStrokes(StrokeReading.ANGLE, f"{mapped.source}, drive")
     if told := mapped.topics.inputs[Stream.STROKES].reads:
-        return SessionStrokes(told, f"{mapped.source}, inputs.cylinder_strokes.reads")
+        return SessionStrokes(StrokeReading(told), f"{mapped.source}, inputs.cylinder_strokes.reads")
     if session is not None and (own := kept(session, "strokes", "--mapping")):
         try:
             return SessionStrokes(StrokeReading(own.text), own.source)

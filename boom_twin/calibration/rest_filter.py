@@ -12,7 +12,7 @@ from ..deviation.kalman import FAST, correct, free_sensors, make_transition, tra
 from ..deviation.rows import (
     about_rest,
     acceleration_row,
-    angle_row,
+    add_sway,
     column_row,
     force_row,
     length_of,
@@ -95,9 +95,10 @@ def filter_rest(p, f, loads, zero2, gravity, inclination, times, channels, value
             length_row(p, c, f.row)
             innovation = values[r] - length_of(p, c, f.row, x, size)
         elif c < 2 * n:
-            angle_row(p, c - n, f.row)
+            column_row(p, p.readings, c - n, 1.0, f.row)
             at = zero + 4 + c - n
             innovation = values[r] - p.read[c - n] - about_rest(p, f.row, x, size) - x[at]
+            innovation -= add_sway(p, f, c - n, x, f.row)
             f.row[at] = 1.0
             if p.absolute[c - n]:
                 innovation -= inclination
@@ -133,8 +134,8 @@ def weigh_and_correct(f, x, covariance, innovation, variance, size):
 def expect_imu(p, f, axis, x, size, gravity):
     """Write the row of an axis of the IMU at the state `x`; return the expected reading."""
     n, zero = p.drives.shape[0], zero_place(p)
-    acceleration_row(p, 0, f.rows[2])
-    acceleration_row(p, 1, f.rows[3])
+    acceleration_row(p, n, f.rows[2])
+    acceleration_row(p, n + 1, f.rows[3])
     column_row(p, p.readings, n + 2, 1.0, f.rows[4])
     angle = p.read[n + 2] + about_rest(p, f.rows[4], x, size)
     c, s = math.cos(angle), math.sin(angle)

@@ -181,6 +181,10 @@ def _tell_pass(progress: Progress, number: int) -> None:
 def common_reading(paths: Sequence[Path], mapped: Mapped) -> StrokeReading:
     """Return what the stroke transducers of all sessions read; UsageError if it differs."""
     found = [strokes_of(path, mapped).reading for path in paths]
+    if StrokeReading.ANGLE in found:
+        raise UsageError(
+            f"{mapped.source}: drive: angles. calibrate needs strokes. Give sessions that have them, and their mapping."
+        )
     for path, reading in zip(paths, found, strict=True):
         if reading is not found[0]:
             raise UsageError(

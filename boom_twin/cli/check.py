@@ -8,7 +8,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import BoomTwinError, Fault, SceneError
+from ..errors import BoomTwinError, Fault, SceneError, UsageError
 from ..scene import Scene
 from ..scene.kinematics import strokes_of_posture
 from ..scene.load import DEFAULT_NAME, examine
@@ -17,6 +17,7 @@ from ..scene.schema import Base, Clearance
 from ..scene.segmentation import LEAST_PARTS
 from ..scene.summary import UNKNOWNS_BASE, UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from ..system.atomic_files import check_target
+from ..types import StrokeReading
 from . import reduce as need
 from .arguments import SENSORS, add_file, add_json, add_scene, files_of, sensors_of
 from .output import columns, open_scene, print_result, tell
@@ -43,6 +44,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         help=f"also tell how accurate the estimate of the tip is with these and with fewer, at every posture of the scene: "
         f"{', '.join(SENSORS)}; a name given twice is two such sensors (example: angles,imu,imu)",
     )
+    driven = "what the sensors are beside: strokes (the default), or angles on a boom without stroke transducers"
+    parser.add_argument("--drive", choices=["strokes", "angles"], default="strokes", help=driven)
 
 
 def run(args: Namespace) -> int:
@@ -51,6 +54,8 @@ def run(args: Namespace) -> int:
     if args.picture is not None:
         check_target(args.picture, files_of(args, "scene"), PNG)
     sensors = None if args.sensors is None else sensors_of(args.sensors)
+    if args.drive == "angles" and sensors is not None and "angles" in sensors:
+        raise UsageError("--sensors angles: they drive the model. Name the sensors beside them.")
     scene, oddities = examine(args.scene)
     name = args.scene or DEFAULT_NAME
     drawn = [] if args.picture is None else [f"Written: {_draw(args.picture, scene, name)}"]
@@ -68,7 +73,7 @@ def run(args: Namespace) -> int:
             need.write(args.scene, scene, result, args.need, args.out)
             lines.append(f"Written: {args.out}")
     if sensors is not None:
-        accuracy, rows = _accuracy(scene, sensors)
+        accuracy, rows = _accuracy(scene, sensors, args.drive)
         values |= accuracy
         lines += rows
     print_result(args.json, values, lines + drawn)
@@ -269,21 +274,23 @@ def _table(rows: list[list[str]], left: int = 1) -> list[str]:
     return [f"  {line}" for line in columns(rows, range(left))] if rows else []
 
 
-def _accuracy(scene: Scene, sensors: list[str]) -> tuple[dict[str, Any], list[str]]:
+def _accuracy(scene: Scene, sensors: list[str], drive: str) -> tuple[dict[str, Any], list[str]]:
     """Return the accuracy at every posture with every selection of `sensors`, as values for ``--json`` and as lines."""
     from ..deviation.accuracy import accuracy_at
 
+    reads = StrokeReading.ANGLE if drive == "angles" else StrokeReading.LENGTH
     values: dict[str, Any] = {}
     sets = dict.fromkeys(chosen for count in range(len(sensors) + 1) for chosen in combinations(sensors, count))
     acting = "an unknown load of 0.25 % of the boom's weight comes and goes at the tip"
     lines = ["", f"Accuracy of the estimate at rest, while {acting} (standard deviations)"]
     titles = f"{'tip x, y mm':>16} {'pitch mrad':>11} {'acceleration':>13} {'load N':>14}"
-    lines.append(f"  {'posture':12} {'sensors beside strokes':24} {titles}")
+    lines.append(f"  {'posture':12} {f'sensors beside {drive}':24} {titles}")
     for posture in scene.postures:
         for chosen in sets:
-            name = ",".join(chosen) or "strokes only"
+            name = ",".join(chosen) or f"{drive} only"
             try:
-                result = accuracy_at(scene, strokes_of_posture(scene, posture), tuple(SENSORS[sensor] for sensor in chosen))
+                beside = tuple(SENSORS[sensor] for sensor in chosen)
+                result = accuracy_at(scene, strokes_of_posture(scene, posture), beside, reads=reads)
             except BoomTwinError as error:
                 lines.append(f"  {posture:12} {name:24} {error}")
                 continue

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..system.terminal_text import printable
-from ..types import NANO
+from ..types import NANO, StrokeReading
 from .arguments import SESSION, add_json, add_mapping, add_session_scene, add_window, window_of
 from .output import columns, open_session_scene, print_result
 
@@ -107,7 +107,7 @@ def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[
         f"made by    {values['origin'] or 'origin not noted'} ({made})",
         f"scene      {values['scene']}, sha256 {values['scene_sha256'][:12]}.., {len(scene.scene.sections)} sections",
         f"mapping    {values['mapping']}",
-        f"strokes    are {values['strokes']}s of the cylinders ({values['strokes_source']})",
+        f"strokes    {StrokeReading(values['strokes']).text} ({values['strokes_source']})",
         f"lasts      {values['duration_s']:.3f} s, {values['messages']} messages{_part(info, values)}",
         "",
         *_table(info),

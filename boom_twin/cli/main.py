@@ -78,6 +78,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "init": ("init --example-table > boom_table.yaml", "init --table boom_table.yaml --out my_boom.yaml"),
     "simulate": (
         "simulate my_boom.yaml --drive examples/strokes.csv --out motion.csv",
+        "simulate --drive examples/strokes.csv --force examples/tip_force.csv --out pushed.csv",
         "simulate --drive examples/strokes.csv --out spread.csv --samples 100 --vary cylinder_2.k=0.1",
     ),
     "replay": (

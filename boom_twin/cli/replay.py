@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..offline.progress import progress_of
+from ..types import StrokeReading
 from .arguments import (
     SESSION,
     add_json,
@@ -136,7 +137,7 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         f"left out           {summary['dropped']}",
         f"scene              {summary['scene']}",
         f"mapping            {summary['mapping']}",
-        f"strokes            are {summary['strokes']}s of the cylinders ({summary['strokes_source']})",
+        f"strokes            {StrokeReading(summary['strokes']).text} ({summary['strokes_source']})",
         f"tip acceleration   {summary['tip_acceleration_max_m_s2']:.2f} m/s^2 at most",
     ]
     for i, value in enumerate(summary["joint_residual_rms_rad"]):

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import UsageError
 from ..scene import Scene
 from ..system.atomic_files import check_new, check_target, write_atomic
-from ..system.csv_table import columns_text, read_csv
+from ..system.csv_table import CsvTable, columns_text, read_csv
 from ..system.summary_display import numbers
 from ..types import Array
 from .arguments import add_json, add_scene, files_of, not_negative, refuse_given
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 POSTURE_DEVIATION = 1e-3  # m, largest deviation of the first row from the posture's strokes
 FASTEST_CYLINDER = 0.5  # m/s, speed above which a warning comes; booms stay below 0.3
+FORCE_COLUMNS = ("t_s", "tip_fx_N", "tip_fy_N")
 SPARSE_ROWS = 1.0  # s between rows, above which a warning comes
 
 
@@ -39,6 +40,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     followed.add_argument("--drive", metavar="IN.csv", help="t_s,stroke_1_m,.. (absolute strokes of the drives)")
     lengths = "t_s,length_1_m,.. or, as in a session, stroke_1_m,..: cylinder lengths, as transducers read them"
     followed.add_argument("--lengths", metavar="IN.csv", help=lengths)
+    pushed = "t_s,tip_fx_N,tip_fy_N: a force at the tip, in the axes of the base; constant before and after its rows"
+    parser.add_argument("--force", metavar="IN.csv", help=pushed)
     parser.add_argument("--out", required=True, metavar="OUT.csv", help="results, one row per row of IN.csv")
     parser.add_argument("--dt", type=float, default=1e-3, metavar="S", help="longest step, s (default 0.001)")
     add_json(parser)
@@ -79,21 +82,22 @@ def run(args: Namespace) -> int:
     _check_sampling(args)
     if args.orbits and not compile_scene(scene).pins:
         raise UsageError("--orbits: the scene has no pin with clearance. `boom_twin scene --clearance` prints one that has.")
-    sources = files_of(args, "drive", "lengths", "scene")
+    sources = files_of(args, "drive", "lengths", "force", "scene")
     check_target(Path(args.out), sources, _is_earlier)
     for picture_or_state in filter(None, (args.orbits, args.save_state)):
         check_new(Path(picture_or_state), sources)
     _check_targets({"--out": args.out, "--orbits": args.orbits, "--save-state": args.save_state})
     times, strokes, stem = read_history(sources[0], len(scene.joints), ("length", "stroke") if args.lengths else ("stroke",))
+    pushed = None if args.force is None else _columns(read_csv(Path(args.force), UsageError), FORCE_COLUMNS)
     for oddity in odd_in_drive(times, strokes, stem):
         warn(f"{sources[0]}: {oddity}")
     angles = None if args.posture is None else _angles_near(scene, args.posture, strokes[0], bool(args.lengths))
     if args.samples is not None:
-        return _sample(args, scene, times, strokes, angles)
+        return _sample(args, scene, times, strokes, angles, pushed)
     moving = with_rigid_cylinders(scene) if args.lengths else scene
     start = _start(args, moving, strokes[0], angles)
     rho = RHO if args.rho is None else args.rho
-    followed = {"lengths" if args.lengths else "strokes": strokes}
+    followed = {"lengths" if args.lengths else "strokes": strokes, "force": pushed}
     result = simulate(
         scene, times, dt=args.dt, angles=angles, rho=rho, estimate_errors=not args.no_error_estimate, start=start, **followed
     )
@@ -104,7 +108,7 @@ def run(args: Namespace) -> int:
         write_state(Path(args.save_state), result.end)
     balances = None
     if args.check:
-        course = course_of(moving, times, strokes, args.dt, angles, rho, start)
+        course = course_of(moving, times, strokes, args.dt, angles, rho, start, force=pushed)
         balances = energy_balance(course, args.dt), momentum_balance(course, args.dt)
     print_result(args.json, as_json(result, args.out, balances), as_text(result, args.out, args.start, balances))
     if args.orbits:
@@ -130,17 +134,19 @@ def _check_sampling(args: Namespace) -> None:
     refuse_given(args, "--samples draws booms that follow drives. Give --drive instead.", "lengths")
 
 
-def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles: Array | None) -> int:
+def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles: Array | None, force: Array | None) -> int:
     """Simulate many booms; write their statistics and the samples."""
     from ..analysis.monte_carlo import simulate_samples
     from ..offline.progress import progress_of
 
     out = Path(args.out)
     table = out.with_name(f"{out.stem}_samples.csv")
-    check_new(table, files_of(args, "drive", "lengths", "scene"))
+    check_new(table, files_of(args, "drive", "force", "scene"))
     progress = progress_of(args.samples, "samples", "simulate")
     deviations = dict(map(_deviation, args.vary or ()))
-    found = simulate_samples(scene, times, strokes, deviations, args.samples, args.seed, args.dt, angles, progress.update)
+    found = simulate_samples(
+        scene, times, strokes, deviations, args.samples, args.seed, args.dt, angles, progress.update, force
+    )
     progress.close()
     for failure in found.failures:
         warn(f"left out: {failure}")
@@ -257,9 +263,14 @@ def read_history(path: Path, n: int, stems: Sequence[str]) -> tuple[Array, Array
     """
     table = read_csv(path, UsageError)
     stem = next((stem for stem in stems if f"{stem}_1_m" in table.names), stems[0])
-    names = [f"{stem}_{i + 1}_m" for i in range(n)]
-    table.require(["t_s", *names])
-    return np.array(table.column("t_s")), np.column_stack([table.column(name) for name in names]), stem
+    found = _columns(table, ("t_s", *(f"{stem}_{i + 1}_m" for i in range(n))))
+    return found[:, 0], found[:, 1:], stem
+
+
+def _columns(table: CsvTable, names: Sequence[str]) -> Array:
+    """Return columns of a table, shape (rows, len(names)); UsageError if one is missing or holds no number."""
+    table.require(names)
+    return np.column_stack([table.column(name) for name in names])
 
 
 def odd_in_drive(times: Array, strokes: Array, stem: str = "stroke") -> list[str]:

@@ -131,7 +131,7 @@ class Plan:
             condensed=condensed, hold=np.zeros((pins, contact.HOLD_COLUMNS)),
             apart=np.zeros((2, LOOP + 1)), rho=np.zeros((beams, points, 2)), drho=np.zeros((beams, points, shapes, 2)),
             turn=np.zeros((beams, TURN_ROWS, points)), local=np.zeros((LOCAL_ROWS, points)), drive=np.zeros(n),
-            drive_rate=np.zeros(n), dz=np.zeros(len(self.names)), guess=np.zeros(len(self.names)),
+            drive_rate=np.zeros(n), load=np.zeros((2, 2)), dz=np.zeros(len(self.names)), guess=np.zeros(len(self.names)),
             corrections=np.zeros((CORRECTIONS, len(self.names))), kept_z=np.zeros(len(self.names)), kept=np.zeros(4),
             cut=np.zeros(SLOTS),
         )  # fmt: skip

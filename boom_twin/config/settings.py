@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
 from ..errors import UsageError
-from ..types import SensorKind
+from ..types import SensorKind, StrokeReading
 from .yaml_text import read_plain
 
 Table = TypeVar("Table", bound=BaseModel)
@@ -175,6 +175,7 @@ class Settings(BaseModel):
     payload: float = setting(-1.0, "kg", LOAD, "mass at the tip; below 0: that of the scene", True)
     line_fill: float = setting(-1.0, "kg/m", LOAD, "concrete in the pipe line; below 0: that of the scene", True)
     stroke_rate: float = setting(STROKE_RATE, "m/s", LIMIT, "maximum speed of a cylinder; faster strokes are left out", True)
+    angle_rate: float = setting(1.0, "rad/s", LIMIT, "maximum rate of an angle that drives the model")
     gap: float = setting(0.1, "s", LIMIT, "pause between strokes above which it is flagged", True)
     restart_gap: float = setting(5.0, "s", LIMIT, "pause above which the model restarts from rest", True)
     jump_back: float = setting(1.0, "s", LIMIT, "step back of a stamp below which the sample may be late", True)
@@ -222,10 +223,9 @@ class Settings(BaseModel):
         sigma, resolution = self.noise(kind)
         return sigma**2 + resolution**2 / 12.0
 
-    @property
-    def stroke_variance(self) -> float:
-        """Variance of a stroke reading (noise and rounding), m^2."""
-        return self.stroke_sigma**2 + self.stroke_resolution**2 / 12.0
+    def rate(self, reads: StrokeReading) -> float:
+        """Return the maximum rate of what drives the model, m/s or rad/s."""
+        return self.angle_rate if reads is StrokeReading.ANGLE else self.stroke_rate
 
 
 def load_settings(path: Path | None = None, namespace: str = "") -> Settings:

@@ -16,7 +16,7 @@ from ..config.settings import Settings
 from ..kernels.jit import kernel
 from ..kernels.result_row import results_in
 from ..scene.schema import Scene
-from ..types import SECOND, Array, Mount, Stream, channels_of
+from ..types import SECOND, Array, Mount, Stream, StrokeReading, channels_of
 from .estimate_row import ACCELERATION_COVARIANCE, FORCE_VARIANCE, TIP_COVARIANCE, VARIANCES, WIDTH
 from .predictor import BoomPredictor
 from .sensors import take_sensor
@@ -40,6 +40,7 @@ def accuracy_at(
     settings: Settings | None = None,
     mounts: Sequence[Mount | None] = (),
     rate: float = 200.0,
+    reads: StrokeReading = StrokeReading.LENGTH,
 ) -> TipAccuracy:
     """Return the accuracy of the estimate at rest, `SETTLED` s after nothing was known.
 
@@ -50,17 +51,20 @@ def accuracy_at(
     drives : ndarray, shape (n,)
         Strokes of the drives, m.
     sensors : sequence of Stream
-        Beside lengths of the cylinders; one that is named twice is there twice.
+        Beside what drives the model; one that is named twice is there twice.
     rate : float
         Of all of them, Hz.
+    reads : StrokeReading
+        What drives the model.
 
     Raises
     ------
     UsageError, SolverError
         Strokes out of reach; no equilibrium there.
     """
-    boom, lengths = BoomPredictor(scene, settings or Settings(), mounts), statics(scene, drives).lengths
-    boom.start(lengths)
+    boom = BoomPredictor(scene, settings or Settings(), mounts, reads)
+    driving = boom.readings_at(statics(scene, drives).lengths)
+    boom.start(driving)
     widths = [len(names) for stream, names in channels_of(boom.plan.joints).items() if stream is not Stream.STROKES]
     counts = np.array([sum(each is stream for each in sensors) for stream in Stream])
     first, zeros, out = np.cumsum([0, 0, *widths]), np.zeros(max(widths)), np.zeros(WIDTH)
@@ -68,7 +72,7 @@ def accuracy_at(
     filters.load2[:] = filters.noise.usual_load**2
     span, steps, gravity = round(SECOND / rate), round(SETTLED * rate), np.array(boom.plan.tables.gravity)
     settle_covariance(
-        tables, anchor, live, work, posture, filters, row, lengths, gravity, counts, first, zeros, span, steps, out
+        tables, anchor, live, work, posture, filters, row, driving, gravity, counts, first, zeros, span, steps, out
     )
     tip, acceleration = (out[first + np.array(VARIANCES)] for first in (TIP_COVARIANCE, ACCELERATION_COVARIANCE))
     return TipAccuracy(np.sqrt(tip), np.sqrt(acceleration[:2]), np.sqrt(out[FORCE_VARIANCE:]))

@@ -1,4 +1,4 @@
-"""Kalman filters on cylinder lengths: the prediction from lengths alone, and the estimate from all sensors.
+"""Kalman filters on cylinder lengths or joint angles: the prediction from these alone, and the estimate from all sensors.
 
 A transducer reads the length of its cylinder, oil compressed. Its drive, the length with unloaded oil, is a state:
 
@@ -7,7 +7,8 @@ A transducer reads the length of its cylinder, oil compressed. Its drive, the le
 with the oil's compression x_i (tension positive), the elastic force E_i, linear in drives, load and modes (`posture`), and the
 force F_i on the pins, which has that of the damping d_i = k_i tau_i too.
 
-Recordings of drives themselves are the case c_i = 0 of that reading; the boom keeps its oil.
+Recordings of drives themselves are the case c_i = 0 of that reading; the boom keeps its oil. Where angles drive the model,
+a row of an angle stands in the place of that of a length: by the linkage, an encoder reads the length of its cylinder.
 
 States: modal coordinates and rates of the vibration about static equilibrium; a fast and a slow part of the force at the tip
 that the model does not know (Gauss-Markov, `FAST` and `SLOW` seconds); length, rate and acceleration of the drives. The
@@ -30,7 +31,7 @@ from ..kernels.jit import inner, kernel
 from .kalman import ANGLE_ZERO, FAST, IMU_ZERO, correct, free_sensors, make_transition, transit
 from .learning import learn_jerk, learn_length_noise, learn_load, watch_valves
 from .mixture import copy_model, interact, mix, weigh_models
-from .rows import clear, column_row, length_of, length_row, read, variance_of
+from .rows import clear, column_row, drive_row, read, variance_of
 from .states import (
     ALL_OPEN,
     ALL_VALVES,
@@ -50,6 +51,7 @@ JERK = 3e-3  # m^2/s^5, density of the jerk of a drive that begins to move
 CLOSED_RATE, CLOSED_ACCELERATION = 1e-5, 1e-3  # m/s, m/s^2, noise of the reading that a closed valve's drive stands still
 LONGEST_STEP = 0.02  # s of one transition
 CONTRADICTION = 8.0  # standard deviations of the predicted tip, by which the estimate may be off it
+SWAY_SHARE = 0.3  # share of the error of an inclinometer by its acceleration that is not known
 MOST_EXCESS = 1e6  # times the variance that a channel is stated to have
 
 
@@ -79,7 +81,7 @@ def start_models(p, f, speed, swing):
         covariance[j, j], covariance[m + j, m + j] = off2, omega2 * off2
     for i in range(n):
         x[drive + i] = p.drives[i]
-        covariance[drive + i, drive + i] = f.noise.length2
+        covariance[drive + i, drive + i] = f.noise.length2 * first_scale(p, i)
         covariance[drive + n + i, drive + n + i] = CLOSED_RATE * CLOSED_RATE + speed * speed
         f.jerk[i], f.is_open[i], f.still[i] = JERK, 1 if speed > 0.0 else 0, 0.0
         f.length2[i], f.pulls[i] = noise.length2, p.pulled[i]
@@ -88,14 +90,23 @@ def start_models(p, f, speed, swing):
     copy_model(f, VALVES, BURST, size)
     f.chances[VALVES], f.chances[OPEN], f.chances[BURST] = 0.8, 0.1, 0.1
     f.excess[:], f.ratio[:], f.shaking[0] = 1.0, 1.0, 0.0
+    f.bends[:], f.sway2[:] = 0.0, 0.0
     mix(f, PREDICTION, zero_place(p))
     follow_prediction(p, f)
     f.status[FED] = 0
 
 
+@inner
+def first_scale(p, i):
+    """Return the variance of drive `i` over that of what drives the model; an inclinometer needs its neighbour's reading."""
+    if not p.reads_angle:
+        return 1.0
+    return (2.0 if p.absolute[i] else 1.0) / (p.slope[i] * p.slope[i])
+
+
 @kernel
 def step_models(p, f, h, y):
-    """Step all models by `h` (s) to lengths `y` (n, m; NaN = missing)."""
+    """Step all models by `h` (s) to readings `y` that drive the model (n; lengths in m or angles in rad; NaN = missing)."""
     size, every = zero_place(p), all_states(p)
     learn_length_noise(f, h, y)
     burst2 = f.noise.burst_load * f.noise.burst_load
@@ -151,29 +162,33 @@ def hold_still(p, f, k, size):
 
 @inner
 def note_innovations(p, f, y):
-    """Write lengths `y` less their mean predicted by the mixture, and the variances of the difference."""
+    """Write readings `y` less their mean predicted by the mixture, and the variances of the difference."""
     n = y.shape[0]
-    size = drive_place(p) + n  # a length does not depend on the states behind
+    size = zero_place(p) if p.reads_angle else drive_place(p) + n  # a length does not depend on the states behind
     for i in range(n):
         mean = square = 0.0
-        length_row(p, i, f.row)
-        first = length_of(p, i, f.row, f.x[VALVES], size)
+        first = drive_row(p, f, i, f.x[VALVES], f.row, size)
         for k in range(BURST + 1):
-            apart = length_of(p, i, f.row, f.x[k], size) - first
+            apart = drive_row(p, f, i, f.x[k], f.row, size) - first
             mean += f.chances[k] * apart
             square += f.chances[k] * (apart * apart + variance_of(f.row, f.p[k], f.gain, size))
-        f.innovations[i, 0], f.innovations[i, 1] = y[i] - first - mean, square - mean * mean + f.length2[i]
+        f.innovations[i, 0], f.innovations[i, 1] = y[i] - first - mean, square - mean * mean + drive_noise2(p, f, i)
+
+
+@inner
+def drive_noise2(p, f, i):
+    """Return the variance of the noise of sensor `i` of those that drive the model."""
+    return f.length2[i] + SWAY_SHARE * SWAY_SHARE * f.sway2[i] if p.reads_angle else f.length2[i]
 
 
 @inner
 def take_lengths(p, f, k, size, y):
-    """Correct model `k` by lengths `y` (n, m; NaN = missing); return their log likelihood."""
+    """Correct model `k` by readings `y` (n; NaN = missing); return their log likelihood."""
     total = 0.0
     for i in range(y.shape[0]):
         if math.isfinite(y[i]) and not f.deaf[i]:
-            length_row(p, i, f.row)
-            innovation = y[i] - length_of(p, i, f.row, f.x[k], size)
-            expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, f.length2[i], size)
+            innovation = y[i] - drive_row(p, f, i, f.x[k], f.row, size)
+            expected = correct(f.x[k], f.p[k], f.row, f.gain, innovation, drive_noise2(p, f, i), size)
             total -= 0.5 * (innovation * innovation / expected + math.log(expected))
     return total
 

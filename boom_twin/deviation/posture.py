@@ -31,7 +31,7 @@ from ..kernels.transfer.forward_kinematics import place
 from ..kernels.transfer.natural_frequency import condense
 from ..kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from ..kernels.transfer.time_step import ANEW, advance
-from ..types import Array
+from ..types import Array, StrokeReading
 from .sensor_model import Mounting
 
 FORCE_SIZE = 1.0  # N
@@ -52,13 +52,14 @@ class Posture(NamedTuple):
 
     modes : (1,) how many. drives : (n,) strokes of the drives at rest, m. angles : (n,) of the rigid boom there, rad.
     rest : (u,) unknowns at rest. columns : (c, u) their changes. motions : (m, h) of every mass point.
-    readings : (c, 2 n + 3) changes of what angle sensors read (rad), of x, y, angle of the tip, and of the angles of the
-    sections' chords, from pivot to pivot. forces : (c, n) of the
-    cylinders, N. read, pulled : (2 n + 3,), (n,) the same at rest.
+    readings : (c, w) changes of what angle sensors read (n, rad), of x, y, angle of the tip, and of the angles of the sections'
+    chords (n), from pivot to pivot; if any `sways`, then of x, y of the angle sensors' places (2 n). forces : (c, n) of the
+    cylinders, N. read, pulled : (w,), (n,) the same at rest; angles against the base.
     omega, decay : (m,) rad/s and 2 zeta omega, 1/s. compliance, lag : (n,) 1/k (m/N; 0 if rigid) and d/k (s).
-    oil_read : (n,) the compliance where stroke transducers read lengths (`reads_length`), 0 where they read drives.
+    oil_read : (n,) the compliance where stroke transducers read lengths, 0 where they read drives (`reads_drive`).
+    reads_angle : whether the model is driven by angles. tilt : (n,) angle of the base, for inclinometers. gravity : (2,) m/s^2.
     slope, curvature : (n,) change of a joint's angle by its stroke, rad/m, and of that, rad/m^2.
-    frames : (n,) of the chain that inclinometers are fixed to. absolute : (n,) which angle sensors are such. roots : (n + 1,)
+    frames, pivots, absolute, sways : (n,) of angle sensors, see `Mounting`. roots : (n + 1,)
     frames of the pivots and of the tip. masses : (h,) kg, kg m^2. lengths : (n,) of the sections, m. closed : (n,) m.
     The other fields are scratch; `rate` (n,) stays zero.
     """
@@ -78,11 +79,16 @@ class Posture(NamedTuple):
     compliance: Array
     lag: Array
     oil_read: Array
-    reads_length: bool
+    reads_drive: bool
+    reads_angle: bool
+    tilt: Array
+    gravity: Array
     slope: Array
     curvature: Array
     frames: NDArray[np.int64]
+    pivots: NDArray[np.int64]
     absolute: NDArray[np.bool_]
+    sways: NDArray[np.bool_]
     roots: NDArray[np.int64]
     masses: Array
     lengths: Array
@@ -98,23 +104,27 @@ class Posture(NamedTuple):
     rate: Array
 
 
-def new_posture(plan: Plan, most: int, lengths: Array, mounting: Mounting, reads_length: bool) -> Posture:
+def new_posture(plan: Plan, most: int, lengths: Array, mounting: Mounting, reads: StrokeReading, inclination: float) -> Posture:
     """Return room for a boom whose sections are `lengths` (m) long, with `most` modes at most.
 
-    `mounting` is that of the angle sensors; `reads_length`: see `Posture`.
+    `mounting` is that of the angle sensors. `reads` is the quantity that drives the model, `inclination` (rad) is the base's.
     """
     n, unknowns, histories = plan.joints, len(plan.names), len(plan.masses)
     kinds, columns = plan.tables.operations.kind, 2 + n + most
     roots = np.append(np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1, len(kinds))
+    width = 2 * n + TIP + (2 * n if mounting.sways.any() else 0)
     return Posture(
         modes=np.zeros(1, np.int64), drives=np.full(n, np.inf), angles=np.zeros(n), rest=np.zeros(unknowns),
-        columns=np.zeros((columns, unknowns)), motions=np.zeros((most, histories)), readings=np.zeros((columns, 2 * n + TIP)),
-        forces=np.zeros((columns, n)), read=np.zeros(2 * n + TIP), pulled=np.zeros(n), omega=np.zeros(most),
+        columns=np.zeros((columns, unknowns)), motions=np.zeros((most, histories)), readings=np.zeros((columns, width)),
+        forces=np.zeros((columns, n)), read=np.zeros(width), pulled=np.zeros(n), omega=np.zeros(most),
         decay=np.zeros(most), compliance=np.zeros(n), lag=np.zeros(n),
-        oil_read=np.zeros(n), reads_length=reads_length, slope=np.zeros(n), curvature=np.zeros(n),
-        frames=mounting.frames.astype(np.int64), absolute=mounting.absolute, roots=roots.astype(np.int64), masses=plan.masses,
+        oil_read=np.zeros(n), reads_drive=reads is StrokeReading.DRIVE, reads_angle=reads is StrokeReading.ANGLE,
+        tilt=np.where(mounting.absolute, inclination, 0.0), gravity=np.array(plan.tables.gravity), slope=np.zeros(n),
+        curvature=np.zeros(n),
+        frames=mounting.frames.astype(np.int64), pivots=mounting.pivots.astype(np.int64), absolute=mounting.absolute,
+        sways=mounting.sways, roots=roots.astype(np.int64), masses=plan.masses,
         lengths=lengths, closed=plan.closed_lengths, still=np.zeros(histories), position=np.zeros(histories),
-        hat=np.zeros(histories), response=np.zeros((most, unknowns)), sides=np.zeros((2, 2 * n + TIP)),
+        hat=np.zeros(histories), response=np.zeros((most, unknowns)), sides=np.zeros((2, width)),
         shifted=np.zeros((most, histories)), small=np.zeros((4, most, most)), target=np.zeros(n), rate=np.zeros(n),
     )  # fmt: skip
 
@@ -155,7 +165,7 @@ def linearise(t, boom, work, p, drives, follow):
         cylinder = t.cylinders[i]
         p.pulled[i] = boom.z[cylinder.z]
         p.compliance[i], p.lag[i] = compliance_and_lag(cylinder, t.oils, p.closed[i] + drives[i])
-        p.oil_read[i] = p.compliance[i] if p.reads_length else 0.0
+        p.oil_read[i] = 0.0 if p.reads_drive else p.compliance[i]
     note_linkages(t, p)
     respond_statically(t, boom, work, p)
     if follow:
@@ -246,7 +256,7 @@ def change_readings(t, boom, work, p, k):
 
 @inner
 def read_sensors(boom, p, found):
-    """Write what angle sensors read (n, rad; to the base if absolute), x, y (m) and angle of the tip, angles of chords (n)."""
+    """Write what angle sensors read, x, y, angle of the tip, angles of chords, and places; see `Posture.readings`."""
     n, last = p.frames.shape[0], boom.frames.shape[0] - 1
     for i in range(n):
         root = p.roots[i]
@@ -262,6 +272,8 @@ def read_sensors(boom, p, found):
         # against the root's own angle, so that the difference of two is never near a whole turn
         c, s = one[FRAME_COS], one[FRAME_SIN]
         found[n + 3 + i] = one[FRAME_ANGLE] + math.atan2(c * y - s * x, c * x + s * y)
+    for k in range(found.shape[0] - 2 * n - TIP):
+        found[2 * n + TIP + k] = boom.frames[p.frames[k // 2], FRAME_X if k % 2 == 0 else FRAME_Y]
 
 
 @inner

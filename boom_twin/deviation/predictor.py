@@ -1,4 +1,4 @@
-"""Predict a boom by its stroke transducers and estimate its tip by all sensors: the filters of `models` in a run."""
+"""Predict a boom by what drives it and estimate its tip by all sensors: the filters of `models` in a run."""
 
 from __future__ import annotations
 
@@ -18,23 +18,24 @@ from ..analysis.undeflected import UndeflectedBoom
 from ..compiler.compile import compile_scene
 from ..compiler.plan import first_row, taken_apart
 from ..config.settings import Settings
-from ..errors import SolverError
+from ..errors import SolverError, UsageError
 from ..kernels.jit import hold
 from ..kernels.result_row import PIN, places_in, prediction_width
-from ..kernels.tables import OK, SENTENCES, State, Tables, Work
+from ..kernels.tables import FRAME_ANGLE, OK, SENTENCES, State, Tables, Work
 from ..predictions import Outline, Prediction
 from ..scene.edit import with_rigid_cylinders
-from ..scene.kinematics import joint_angles_of_strokes
+from ..scene.kinematics import joint_angles_of_strokes, strokes_of_angles
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
-from ..types import SENSORS, Array, Mount, Stream, StrokeReading, channels_of
+from ..types import GIVE, SENSORS, Array, Mount, Stream, StrokeReading, channels_of
 from .estimate_row import MODES
 from .models import start_models
 from .posture import Posture, linearise, new_posture
-from .sensor_model import mounting_of
+from .sensor_model import TURN, mounting_of
 from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, Filters, SensorNoise, drive_place, new_filters, zero_place
 
 HIGHEST = 25.0  # Hz; what is faster follows load and drives without vibration of its own
+PASSES, SAME = 20, 1e-10  # passes for the boom at rest by its angle sensors, until they read the same, rad
 WIDTH = 1e-6  # relative accuracy of natural frequencies
 USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD = 2.5e-3, 1e-4, 2e-3, 2e-2  # shares of the boom's weight, see `SensorNoise`
 DOUBTED_DRIFT = 1000.0  # times the usual variance of the drift of a zero, of a sensor in doubt
@@ -73,7 +74,7 @@ class CompiledBoom(NamedTuple):
 
 
 class BoomPredictor:
-    """Predictor of a boom by its stroke transducers, and estimator of its tip by all sensors.
+    """Predictor of a boom by its stroke transducers or its angle sensors, and estimator of its tip by all sensors.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ class BoomPredictor:
     mounts : sequence of Mount or None
         Of the angle sensors.
     reads : StrokeReading
-        What the stroke transducers read.
+        What drives the model.
 
     Attributes
     ----------
@@ -113,16 +114,17 @@ class BoomPredictor:
         n, self.pins, weight = self.plan.joints, len(self.plan.pins), weight_of(scene)
         self._row, self.places = np.zeros(prediction_width(n, self.pins)), places_in(n, self.pins)
         self._bending = moments_by_unknowns(self.plan)
-        lengths, self._reads_length = np.array([each.length for each in scene.sections]), reads is StrokeReading.LENGTH
-        self.posture = new_posture(self.plan, MODES, lengths, mounting_of(self.plan, mounts), self._reads_length)
+        lengths, self._reads = np.array([each.length for each in scene.sections]), reads
+        own = self.plan, MODES, lengths, mounting_of(self.plan, mounts), reads, scene.base.inclination
+        self.posture = new_posture(*own)
         sizes = (USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)
-        used = Stream.STROKES, Stream.ANGLES, Stream.IMU, Stream.FORCES
+        used = reads.stream, Stream.ANGLES, Stream.IMU, Stream.FORCES
         variances = (settings.variance(SENSORS[stream]) for stream in used)
         channels = sum(len(names) for stream, names in channels_of(n).items() if stream is not Stream.STROKES)
         self.filters = new_filters(n, MODES, channels, SensorNoise(*variances, *(size * weight for size in sizes)))
         self._struts = compile_scene(with_rigid_cylinders(scene))
-        own = self.plan.tables, self._anchor, self.live, self._work, self.posture, self.filters, self._bending, self._row
-        self.compiled = CompiledBoom(*own)
+        tables, boom = self.plan.tables, (self._anchor, self.live, self._work)
+        self.compiled = CompiledBoom(tables, *boom, self.posture, self.filters, self._bending, self._row)
 
     @cached_property
     def held(self) -> tuple[Any, ...]:
@@ -146,11 +148,13 @@ class BoomPredictor:
 
     @property
     def variances(self) -> Array:
-        """Variances of the strokes as predicted, m^2, shape (n,)."""
+        """Variances of what drives the model, as predicted, m^2 or rad^2, shape (n,)."""
         return self._row[self.places.variances]
 
-    def start(self, strokes: Array, may_move: bool = False) -> None:
-        """Reset to rest in equilibrium where transducers read `strokes` (m), shape (n,).
+    def start(self, readings: Array, may_move: bool = False) -> Array:
+        """Reset to rest in equilibrium where what drives the model reads `readings` (m or rad), shape (n,); return these.
+
+        Whole turns of inclinometers are left out of what is returned.
 
         Parameters
         ----------
@@ -160,15 +164,19 @@ class BoomPredictor:
         Raises
         ------
         UsageError, SolverError
-            Lengths out of reach; no equilibrium there.
+            Lengths or angles out of reach; no equilibrium there.
         """
         p, f, boom, held = self.posture, self.filters, self._anchor, self._struts.state()
-        rigid = joint_angles_of_strokes(self._scene, strokes)
-        drives = strokes
-        if self._reads_length:
-            settle(self._struts, held, self._struts.work(), strokes, rigid)
+        drives = readings
+        if self._reads is StrokeReading.ANGLE:
+            drives, rigid = self._held_by_angles(held, readings)
+        else:
+            rigid = joint_angles_of_strokes(self._scene, readings)
+        if self._reads is StrokeReading.LENGTH:
+            settle(self._struts, held, self._struts.work(), readings, rigid)
+        if self._reads is not StrokeReading.DRIVE:
             forces = taken_apart(self._struts, first_row(self._struts, held)).cylinder_forces
-            drives = spring_free(self.plan, strokes, forces)
+            drives = spring_free(self.plan, drives, forces)
         settle(self.plan, boom, self._work, drives, rigid)
         p.angles[:] = rigid
         modes = natural_modes(self.plan, boom, self._work, MODES, WIDTH, 2.0 * math.pi * HIGHEST)
@@ -182,28 +190,74 @@ class BoomPredictor:
             raise SolverError(SENTENCES[int(status)])
         sag = float(np.hypot(*(boom.frames[-1, :2] - self._undeflected.at(rigid)[-1])))
         start_models(p, f, SPEED if may_move else 0.0, SWING * sag if may_move else 0.0)
+        if self._reads is not StrokeReading.ANGLE:
+            return readings
+        return readings - TURN * np.rint((readings - self._angles_in(held)) / TURN) * p.absolute
+
+    def _held_by_angles(self, held: State, readings: Array) -> tuple[Array, Array]:
+        """Settle `held` on rigid cylinders where angle sensors read `readings` (rad); return lengths and angles of joints.
+
+        The angle of a joint with an encoder is its reading. Inclinometers read the bending inboard, too, which is subtracted.
+        """
+        p, work = self.posture, self._struts.work()
+        joints, off = np.zeros(len(readings)), readings - p.tilt
+        for _ in range(PASSES):
+            turned = 0.0
+            for i, joint in enumerate(self._scene.joints):
+                low, high = np.radians(joint.range_deg)
+                step = off[i] - (turned if p.absolute[i] else 0.0)
+                step -= TURN * np.rint((joints[i] + step - 0.5 * (low + high)) / TURN) if p.absolute[i] else 0.0
+                joints[i], turned = joints[i] + step, turned + step
+                if not low - GIVE <= joints[i] <= high + GIVE:
+                    raise UsageError(
+                        f"joint_{i + 1} = {math.degrees(joints[i]):.4g} deg: its range_deg is {joint.range_deg[0]:g} to "
+                        f"{joint.range_deg[1]:g}. Check its sensor's unit, sign and zero in the mapping."
+                    )
+            lengths = strokes_of_angles(self._scene, joints)
+            settle(self._struts, held, work, lengths, joints)
+            off = readings - self._angles_in(held)
+            off -= TURN * np.rint(off / TURN) * p.absolute
+            if np.abs(off).max() < SAME:
+                break
+        return lengths, joints
+
+    def readings_at(self, lengths: Array) -> Array:
+        """Return what drives the model reads at rest with cylinder `lengths` (m), shape (n,)."""
+        if self._reads is not StrokeReading.ANGLE:
+            return lengths
+        held = self._struts.state()
+        settle(self._struts, held, self._struts.work(), lengths, joint_angles_of_strokes(self._scene, lengths))
+        return self._angles_in(held)
+
+    def _angles_in(self, state: State) -> Array:
+        """Return what angle sensors read of a boom at rest, rad, shape (n,)."""
+        p, angles = self.posture, state.frames[:, FRAME_ANGLE]
+        return np.where(p.absolute, angles[p.frames], angles[p.roots[:-1]] - angles[p.roots[:-1] - 1]) + p.tilt
 
     @property
     def angles(self) -> Array:
-        """Joint angles (rad) of the rigid boom at the newest lengths, shape (n,)."""
-        return joint_angles_of_strokes(self._scene, self.estimate, near=self.posture.angles)
+        """Joint angles (rad) of the rigid boom at the newest lengths, shape (n,); those before if one is out of reach."""
+        try:
+            return joint_angles_of_strokes(self._scene, self.estimate, near=self.posture.angles)
+        except UsageError:
+            return self.posture.angles.copy()
 
     def slope(self, joint: int) -> float:
         """Return stroke over angle of joint `joint` (0-based), m/rad, by rigid geometry."""
         return 1.0 / float(self.posture.slope[joint])
 
     def extrapolated(self, span: float) -> Array:
-        """Return strokes (m) `span` s after the newest sample; shape (n,)."""
+        """Return what drives the model (m or rad) `span` s after the newest sample; shape (n,)."""
         x = self.filters.strokes
         return np.asarray(x[:, 0] + span * (x[:, 1] + 0.5 * span * x[:, 2]))
 
     @property
     def speeds(self) -> Array:
-        """Rates of the lengths at the newest sample, as estimated, m/s, shape (n,)."""
+        """Rates of what drives the model at the newest sample, as estimated, m/s or rad/s, shape (n,)."""
         return np.asarray(self.filters.strokes[:, 1])
 
     def least_way(self, span: float, sure: float) -> float:
-        """Return how far (m) the fastest drive goes on for `span` s at least, unless it brakes harder than it now does.
+        """Return how far (m or rad) the fastest drive goes on for `span` s at least, unless it brakes harder than it now does.
 
         Speeds and braking are taken `sure` deviations to the safe side.
         """
@@ -213,7 +267,8 @@ class BoomPredictor:
         rates, accelerations = slice(first, first + n), slice(first + n, first + 2 * n)
         speeds = np.maximum(np.abs(mean[rates]) - sure * deviations[rates], 0.0)
         braking = np.maximum(-mean[accelerations] * np.sign(mean[rates]), 0.0) + sure * deviations[accelerations]
-        return float(np.minimum(speeds * span, speeds**2 / (2.0 * np.maximum(braking, 1e-12))).max())
+        ways = np.minimum(speeds * span, speeds**2 / (2.0 * np.maximum(braking, 1e-12)))
+        return float((ways * np.abs(self.posture.slope)).max() if self._reads is StrokeReading.ANGLE else ways.max())
 
     # -- changes by the twin
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from ..kernels.jit import inner
-from .states import all_states, drive_place, force_place, zero_place
+from .states import PREDICTION, all_states, drive_place, force_place, zero_place
+
+TIP = 3  # x, y and angle of the tip, behind the n angles in a row of `Posture.readings`
 
 
 @inner
@@ -89,49 +93,80 @@ def length_of(p, i, row, x, size):
 
 
 @inner
-def rate_row(p, a, row):
-    """Write the row of the velocity of the tip (x, y, angle: `a`)."""
+def drive_row(p, f, i, x, row, size):
+    """Write the row at state `x` of sensor `i` of those that drive the model; return what it reads."""
+    if p.reads_angle:
+        column_row(p, p.readings, i, 1.0, row)
+        found = p.read[i] + p.tilt[i] + about_rest(p, row, x, size)
+        return found + add_sway(p, f, i, x, row)
+    length_row(p, i, row)
+    return length_of(p, i, row, x, size)
+
+
+@inner
+def add_sway(p, f, i, x, row):
+    """Add the error of inclinometer `i` by its acceleration at state `x` to its row; return that error, rad."""
+    if not p.sways[i]:
+        return 0.0
+    n, size = p.drives.shape[0], zero_place(p)
+    at, g = 2 * n + TIP + 2 * i, math.hypot(p.gravity[0], p.gravity[1])
+    up_x, up_y = -p.gravity[0] / g, -p.gravity[1] / g
+    acceleration_row(p, at, f.rows[0])
+    acceleration_row(p, at + 1, f.rows[1])
+    ax, ay = f.bends[i, 0] + read(f.rows[0], x, size), f.bends[i, 1] + read(f.rows[1], x, size)
+    level, lift = up_y * ax - up_x * ay, g + up_x * ax + up_y * ay
+    square = level * level + lift * lift
+    by_x, by_y = (lift * up_y - level * up_x) / square, -(lift * up_x + level * up_y) / square
+    for k in range(size):
+        row[k] += by_x * f.rows[0, k] + by_y * f.rows[1, k]
+    return math.atan2(level, lift)
+
+
+@inner
+def rate_row(p, at, row):
+    """Write the row of the rate of the reading in column `at` of `Posture.readings`."""
     n, m = p.drives.shape[0], p.modes[0]
     clear(row, all_states(p))
     drive = drive_place(p)
     for j in range(m):
-        row[m + j] = p.readings[2 + n + j, n + a]
+        row[m + j] = p.readings[2 + n + j, at]
     for i in range(n):
-        row[drive + n + i] = p.readings[2 + i, n + a]
+        row[drive + n + i] = p.readings[2 + i, at]
 
 
 @inner
-def acceleration_row(p, a, row):
-    """Write the row of the acceleration of the tip (x, y, angle: `a`), less what its curved way needs at its speed."""
+def acceleration_row(p, at, row):
+    """Write the row of the second derivative of that reading, less what its curved way needs at its speed."""
     n, m = p.drives.shape[0], p.modes[0]
     clear(row, all_states(p))
     load, drive = force_place(p), drive_place(p)
     for i in range(n):
-        row[drive + 2 * n + i] = p.readings[2 + i, n + a]
+        row[drive + 2 * n + i] = p.readings[2 + i, at]
     for j in range(m):
-        at, omega2 = 2 + n + j, p.omega[j] * p.omega[j]
-        motion = p.readings[at, n + a]
+        mode, omega2 = 2 + n + j, p.omega[j] * p.omega[j]
+        motion = p.readings[mode, at]
         row[j], row[m + j] = -omega2 * motion, -p.decay[j] * motion
         for b in range(2):
-            share = motion * p.readings[at, n + b]
+            share = motion * p.readings[mode, n + b]
             row[load + b] += share
             row[load + 2 + b] += share
         for i in range(n):
-            row[drive + 2 * n + i] -= motion * p.forces[at, i] / omega2
+            row[drive + 2 * n + i] -= motion * p.forces[mode, i] / omega2
 
 
 @inner
-def angle_row(p, i, row):
-    """Write the row of angle sensor `i`."""
+def angle_row(p, f, i, row):
+    """Write the row of angle sensor `i` at the prediction; return its error by acceleration, rad."""
     column_row(p, p.readings, i, 1.0, row)
+    return add_sway(p, f, i, f.mean[PREDICTION], row)
 
 
 @inner
 def specific_force_row(p, f, axis, c, s, row):
     """Write the row of the IMU's x or z (`axis` 0 or 1) at a tip whose angle has cosine `c` and sine `s`."""
     n = p.drives.shape[0]
-    acceleration_row(p, 0, f.rows[0])
-    acceleration_row(p, 1, f.rows[1])
+    acceleration_row(p, n, f.rows[0])
+    acceleration_row(p, n + 1, f.rows[1])
     column_row(p, p.readings, n + 2, f.felt[1] if axis == 0 else -f.felt[0], row)
     along, across = (c, s) if axis == 0 else (-s, c)
     zero = zero_place(p)

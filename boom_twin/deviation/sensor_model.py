@@ -15,6 +15,7 @@ from ..kernels.tables import JOINT_A, JOINT_B
 from ..types import Mount
 
 TURN = 2.0 * np.pi
+MOUNTS = "root", "head", "root_compensated", "head_compensated"  # of inclinometers
 
 
 @inner
@@ -36,19 +37,24 @@ class Mounting(NamedTuple):
 
     An encoder reads the angle of its joint. An inclinometer reads the angle of the root, or of the head, of its section to
     the horizontal, and is compared with just that: nothing measured by another sensor enters, so a fault of one inclinometer
-    stays in its own residual. Readings of an inclinometer may differ by whole turns. It is taken as ideal: a real one that
-    finds the horizontal by its acceleration is wrong while its section accelerates.
+    stays in its own residual. Readings of an inclinometer may differ by whole turns. It finds the vertical by its own
+    acceleration, so it reads atan2(level, g + lift) too much while its place accelerates along the level and upwards, unless
+    it is compensated.
 
     Attributes
     ----------
     frames : ndarray of int, shape (n,)
         Frames of the chain that the sensors are fixed to if they are inclinometers.
-    absolute : ndarray of bool, shape (n,)
-        True for an inclinometer.
+    pivots : ndarray of int, shape (n,)
+        Pivots in these frames, counted from the base; the tip is the last.
+    absolute, sways : ndarray of bool, shape (n,)
+        True for an inclinometer, and for one that is not compensated.
     """
 
     frames: NDArray[np.int64]
+    pivots: NDArray[np.int64]
     absolute: NDArray[np.bool_]
+    sways: NDArray[np.bool_]
 
 
 def mounting_of(plan: Plan, mounts: Sequence[Mount | None]) -> Mounting:
@@ -65,5 +71,9 @@ def mounting_of(plan: Plan, mounts: Sequence[Mount | None]) -> Mounting:
     kinds = plan.tables.operations.kind
     roots = np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1
     heads = np.append(roots[1:] - 1, len(kinds))
-    frames = np.where([mount == "head" for mount in mounts], heads, roots)
-    return Mounting(frames, np.array([mount is not None for mount in mounts]))
+    is_head = np.array([str(mount).startswith("head") for mount in mounts])
+    absolute, sways = (
+        np.array([mount is not None for mount in mounts]),
+        np.array([mount in ("root", "head") for mount in mounts]),
+    )
+    return Mounting(np.where(is_head, heads, roots), np.arange(plan.joints) + is_head, absolute, sways)

@@ -8,6 +8,7 @@ from ..kernels.jit import inner, kernel
 from .kalman import ANGLE_ZERO, correct
 from .learning import SURPRISE
 from .mixture import mix, weigh_models
+from .models import SWAY_SHARE
 from .rows import angle_row, force_row, specific_force_row, variance_of
 from .states import (
     ALL_OPEN,
@@ -62,8 +63,9 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         if f.masked[first + i]:
             continue
         if stream == ANGLES:
-            angle_row(p, i, f.row)
-            take_reading(p, f, first + i, residuals[i], zero + 4 + i, f.noise.angle2, age)
+            angle_row(p, f, i, f.row)
+            inexact2 = SWAY_SHARE * SWAY_SHARE * f.sway2[i]
+            take_reading(p, f, first + i, residuals[i], zero + 4 + i, f.noise.angle2 + inexact2, age)
             if f.deaf[i] and math.isfinite(residuals[i]):
                 replace_length(p, f, i, residuals[i])
         elif stream == IMU:
@@ -84,7 +86,7 @@ def replace_length(p, f, i, residual):
     The mean stays that of the prediction which the residual was taken against, until the next step.
     """
     size = zero_place(p)
-    angle_row(p, i, f.row)
+    angle_row(p, f, i, f.row)
     for k in range(ALL_VALVES):
         innovation = residual
         for j in range(size):

@@ -18,7 +18,10 @@ FED, FED_STAMP = range(2)  # of `status`
 
 
 class SensorNoise(NamedTuple):
-    """Variances of sensors, and sizes of loads (N): usual, least, at the start of a session, just come."""
+    """Variances of sensors, and sizes of loads (N): usual, least, at the start of a session, just come.
+
+    length2 : of what drives the model, lengths or angles.
+    """
 
     length2: float
     angle2: float
@@ -43,10 +46,13 @@ class Filters(NamedTuple):
     excess : (c,) times the variance that channels are stated to have. ratio : (c,) mean square of their normalised innovations.
     drift : (z,) times the usual variance of the random walk of sensors' zeros. length2 : (n,) variances of lengths as learnt,
     m^2. before, interval : (n, 3), (1,) the three lengths before (m), and the time between the newest two, s.
+    bends : (n, 2) accelerations of the angle sensors' places on curved ways, m/s^2. sway2 : (n,) square of the largest angle by
+    which an inclinometer lately erred, rad^2.
     places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
     felt : (2,) specific force predicted at the tip, m/s^2. shaking : (1,) mean square of its acceleration, m^2/s^4.
     angle : (1,) of the tip, rad. strokes : (n, 3) predicted lengths (m), their rates and accelerations.
     innovations : (n, 2) newest lengths less what the prediction's mixture expected before them (m), and their variances.
+    Where angles drive the model, length2, before, strokes and innovations are of angles, in rad.
     pulls : (n,) predicted forces, N. evidence : (1,) logarithm of the likelihood of all that was read, up to a constant.
     The others are scratch.
     """
@@ -69,6 +75,8 @@ class Filters(NamedTuple):
     length2: Array
     before: Array
     interval: Array
+    bends: Array
+    sway2: Array
     noise: SensorNoise
     places: NDArray[np.int64]
     weights: Array
@@ -100,7 +108,8 @@ def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> F
         spread=np.zeros((2, states, states)), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
         still=np.zeros(n), status=np.zeros(2, np.int64), masked=np.zeros(channels, np.bool_),
         deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(4 + 2 * joints),
-        length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(1), noise=noise,
+        length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(1), bends=np.zeros((n, 2)),
+        sway2=np.zeros(n), noise=noise,
         places=np.zeros((states, 8 + n), np.int64), weights=np.zeros((states, 8 + n)), counts=np.zeros(states, np.int64),
         variances=np.zeros(states), felt=np.zeros(2), pulls=np.zeros(n), evidence=np.zeros(1), half=np.zeros((states, states)),
         turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)), mixed_p=np.zeros((3, states, states)),

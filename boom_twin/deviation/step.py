@@ -1,4 +1,4 @@
-"""Step of the filters on cylinder lengths, and its results: prediction, expected readings, estimate of the tip."""
+"""Step of the filters on what drives the model, and its results: prediction, expected readings, estimate of the tip."""
 
 from __future__ import annotations
 
@@ -23,13 +23,14 @@ from .estimate_row import (
     VELOCITY_COVARIANCE,
 )
 from .estimate_row import TIP as TIP_AT
-from .models import step_models
+from .models import SWAY_SHARE, step_models
 from .posture import WIDEST, linearise
 from .rows import (
     about_rest,
     acceleration_row,
     angle_row,
     column_row,
+    drive_row,
     force_row,
     length_of,
     length_row,
@@ -49,7 +50,7 @@ ANGLE_STEP = 0.01  # rad that a joint turns by before the boom is linearised ane
 
 @kernel
 def step_lengths(t, boom, live, work, p, f, h, stamp, y, gravity, out):
-    """Take lengths and write the prediction.
+    """Take lengths or angles and write the prediction.
 
     Parameters
     ----------
@@ -57,11 +58,11 @@ def step_lengths(t, boom, live, work, p, f, h, stamp, y, gravity, out):
         `boom` is at rest at the posture; `live` becomes the boom as predicted.
     p, f : Posture, Filters
     h : float
-        Time since the lengths before, s; 0 for the first.
+        Time since those before, s; 0 for the first.
     stamp : int
         ns.
     y : ndarray, shape (n,)
-        Lengths of the cylinders less their closed lengths, m; NaN where missing.
+        Lengths of the cylinders less their closed lengths, m; or readings of angle sensors, rad. NaN where missing.
     gravity : ndarray, shape (2,)
         m/s^2.
     out : ndarray, shape (prediction_width,)
@@ -140,10 +141,11 @@ def write_prediction(t, live, p, f, h, gravity, out):
         f.pulls[i] = found.cylinder_forces[i] = p.pulled[i] + about_rest(p, f.row, f.mean[PREDICTION], size)
         length_row(p, i, f.row)
         estimates.strokes[i] = length_of(p, i, f.row, f.mean[PREDICTION], size)
-        estimates.variances[i] = variance_of(f.row, f.spread[PREDICTION], f.gain, size)
-        f.strokes[i, 0], f.strokes[i, 1] = estimates.strokes[i], stroke_rate(p, f, i)
         found.lengths[i] = estimates.strokes[i] + (p.compliance[i] - p.oil_read[i]) * elastic
-        f.strokes[i, 2] = f.mean[PREDICTION, drive_place(p) + 2 * n + i]
+        if not p.reads_angle:
+            estimates.variances[i] = variance_of(f.row, f.spread[PREDICTION], f.gain, size)
+            f.strokes[i, 0], f.strokes[i, 1] = estimates.strokes[i], stroke_rate(p, f, i)
+            f.strokes[i, 2] = f.mean[PREDICTION, drive_place(p) + 2 * n + i]
     for k in range(pins):
         row = t.clearances[k]
         found.pins[k, 0], found.pins[k, 1] = live.z[row.z], live.z[row.z + 1]
@@ -151,10 +153,12 @@ def write_prediction(t, live, p, f, h, gravity, out):
     found.tip[0, 0], found.tip[0, 1] = live.frames[last, FRAME_X], live.frames[last, FRAME_Y]
     found.tip[0, 2] = live.frames[last, FRAME_ANGLE]
     write_bend(live, p, f, found.tip[2])
+    if p.reads_angle:
+        write_driving_angles(p, f, estimates)
     for a in range(3):
-        rate_row(p, a, f.row)
+        rate_row(p, n + a, f.row)
         found.tip[1, a] = read(f.row, f.mean[PREDICTION], size)
-        acceleration_row(p, a, f.row)
+        acceleration_row(p, n + a, f.row)
         found.tip[2, a] += read(f.row, f.mean[PREDICTION], size)
     angle = f.angle[0] = found.tip[0, 2]
     f.felt[0], f.felt[1] = specific_force(
@@ -163,6 +167,19 @@ def write_prediction(t, live, p, f, h, gravity, out):
     size2 = found.tip[2, 0] * found.tip[2, 0] + found.tip[2, 1] * found.tip[2, 1]
     f.shaking[0] += min(h / SHAKEN_TIME, 1.0) * (size2 - f.shaking[0])
     estimates.rigid_tip[0], estimates.rigid_tip[1] = rigid_tip(t, p, estimates.strokes)
+
+
+@inner
+def write_driving_angles(p, f, estimates):
+    """Write the predicted readings of the angle sensors that drive the model, with variances, rates and accelerations."""
+    size = zero_place(p)
+    for i in range(p.drives.shape[0]):
+        f.strokes[i, 0] = drive_row(p, f, i, f.mean[PREDICTION], f.row, size)
+        estimates.variances[i] = variance_of(f.row, f.spread[PREDICTION], f.gain, size)
+        rate_row(p, i, f.row)
+        f.strokes[i, 1] = read(f.row, f.mean[PREDICTION], size)
+        acceleration_row(p, i, f.row)
+        f.strokes[i, 2] = read(f.row, f.mean[PREDICTION], size)
 
 
 @inner
@@ -182,7 +199,7 @@ def write_bend(live, p, f, found):
     """Write the acceleration (x, y, angle) that the tip's curved way needs at constant rates of drives and modes.
 
     With the turning rate w_i of the chord r_i of section i, and what w_i changes by the geometry of the linkages, a_i,
-    the tip has sum_i (a_i e_z x r_i - w_i^2 r_i).
+    the tip has sum_i (a_i e_z x r_i - w_i^2 r_i), and every pivot the sum of the sections inboard.
     """
     n, m, drive, change = p.drives.shape[0], p.modes[0], drive_place(p), 0.0
     found[0], found[1], found[2] = 0.0, 0.0, 0.0
@@ -197,6 +214,9 @@ def write_bend(live, p, f, found):
         x, y = other[FRAME_X] - one[FRAME_X], other[FRAME_Y] - one[FRAME_Y]
         found[0] -= rate * rate * x + change * y
         found[1] += change * x - rate * rate * y
+        for k in range(n):
+            if p.sways[k] and p.pivots[k] == i + 1:
+                f.bends[k, 0], f.bends[k, 1] = found[0], found[1]
     found[2] = change
 
 
@@ -213,23 +233,25 @@ def rigid_tip(t, p, lengths):
 
 
 @inner
-def write_expected_readings(p, f, live, results, inclination, values, sigmas):
+def write_expected_readings(p, f, live, results, h, values, sigmas):
     """Write the expected readings of all sensors for the newest prediction, and the residuals' standard deviations.
 
     Parameters
     ----------
     results : Results
         Of the prediction.
-    inclination : float
-        Of the base, rad.
+    h : float
+        Time since the prediction before, s.
     values, sigmas : ndarray, shape (measured channels,)
         Angles (rad), then the tip IMU's x and z (m/s^2), then the cylinders' forces (N).
     """
     n, size = p.drives.shape[0], zero_place(p)
     for i in range(n):
-        values[i] = live.frames[p.frames[i], FRAME_ANGLE] + inclination if p.absolute[i] else results.joints[i]
-        angle_row(p, i, f.row)
-        sigmas[i] = math.sqrt(f.noise.angle2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
+        sway = angle_row(p, f, i, f.row)
+        values[i] = live.frames[p.frames[i], FRAME_ANGLE] + p.tilt[i] + sway if p.absolute[i] else results.joints[i]
+        f.sway2[i] = max(f.sway2[i] * max(1.0 - h / SHAKEN_TIME, 0.0), sway * sway)
+        noise2 = f.noise.angle2 + SWAY_SHARE * SWAY_SHARE * f.sway2[i]
+        sigmas[i] = math.sqrt(noise2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
     at, angle = n, results.tip[0, 2]
     for axis in range(2):
         values[at + axis] = f.felt[axis]
@@ -247,8 +269,8 @@ def write_tip_estimate(p, f, results, out):
     n, m, size, load = p.drives.shape[0], p.modes[0], zero_place(p), force_place(p)
     for a in range(3):
         column_row(p, p.readings, n + a, 1.0, f.rows[a])
-        rate_row(p, a, f.rows[3 + a])
-        acceleration_row(p, a, f.rows[6 + a])
+        rate_row(p, n + a, f.rows[3 + a])
+        acceleration_row(p, n + a, f.rows[6 + a])
         out[TIP_AT + a] = results.tip[0, a] + difference(f, f.rows[a], size)
         out[VELOCITY + a] = results.tip[1, a] + difference(f, f.rows[3 + a], size)
         out[ACCELERATION + a] = results.tip[2, a] + difference(f, f.rows[6 + a], size)

@@ -27,9 +27,13 @@ MEGA = 1e6
 
 
 class ModelWatch:
-    """Counts of the model's predictions and failures from `now` on, s of a clock that only goes forward."""
+    """Counts of the model's predictions and failures from `now` on, s of a clock that only goes forward.
 
-    def __init__(self, now: float) -> None:
+    `drive` names what drives it.
+    """
+
+    def __init__(self, now: float, drive: str = "strokes") -> None:
+        self._drive = drive
         self._predictions = self._failures = self._broken = 0
         self._predicted_at = self._unfed_at = now  # newest looks with a prediction, and without strokes
         self._counts: Mapping[str, Value] = {}  # of that with a prediction
@@ -82,15 +86,15 @@ class ModelWatch:
         elif now - self._failed_at <= FAILURE_SHOWN:
             judge.fault(Level.ERROR, self._failure)
         elif not is_fed or (not self._predictions and silent <= stale_after):
-            judge.fault(Level.WARN, "waiting for strokes")
+            judge.fault(Level.WARN, f"waiting for {self._drive}")
         elif silent > stale_after:
             judge.note({"no_prediction_s": silent})
-            judge.fault(Level.ERROR, f"no prediction, though strokes come{self._why(counts, words)}")
+            judge.fault(Level.ERROR, f"no prediction, though {self._drive} come{self._why(counts, words)}")
         elif self._is_deflected:
             judge.fault(Level.WARN, f"deflected: {words.get('deflected', '')}")
         if self._predicted_at == now:
             self._counts = dict(counts)
-        return judge.finish("following the strokes")
+        return judge.finish(f"following the {self._drive}")
 
     def _why(self, counts: Mapping[str, Value], words: Mapping[str, str]) -> str:
         """Return in words what was counted most since the newest prediction; empty if nothing was."""

@@ -40,12 +40,14 @@ def sensors_of(
 ) -> dict[Stream, list[SensorSpec]]:
     """Return the sensors of every stream, in the order of a sample's values.
 
-    Ranges are those of `boom_twin.health.sensor_check.sensor_ranges`. `required` says which streams the twin needs, `absent`
-    which channels have no sensor.
+    Ranges are those of `boom_twin.health.sensor_check.sensor_ranges`. `required` says which streams the twin reads and needs,
+    `absent` which channels have no sensor.
     """
     found = {}
     ranges = sensor_ranges(scene, mounts)
     for stream, kind in SENSORS.items():
+        if stream not in required:
+            continue
         sigma, resolution = settings.noise(kind)
         unit, over = kind.unit_suffix, RANGE_MARGIN * sigma
         bounds = zip(kind.channels(len(scene.joints)), *(bound.tolist() for bound in ranges[stream]), strict=True)

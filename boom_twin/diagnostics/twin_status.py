@@ -33,7 +33,7 @@ class TwinWatch:
     Parameters
     ----------
     sensors : dict of Stream to sequence of SensorSpec
-        In the order of a sample's values; empty before the node is configured.
+        In the order of a sample's values, first those that drive the model; empty before the node is configured.
     names : dict of Stream to str
         Names of the input topics.
     thresholds : Thresholds
@@ -54,6 +54,7 @@ class TwinWatch:
     ) -> None:
         self._monotonic, self._stress, self.thresholds = monotonic, stress, thresholds
         self._sensors, self._names, self._reception = sensors, names, ReceptionWatch()
+        self._drive = next(iter(sensors), Stream.STROKES)
         ranges = {stream: np.array([(sensor.low, sensor.high) for sensor in each]) for stream, each in sensors.items()}
         self._streams = {stream: StreamWatch(each, monotonic) for stream, each in ranges.items()}
         self.begin()
@@ -64,7 +65,8 @@ class TwinWatch:
             stream.begin()
         self._looked = self._monotonic()
         self._judges: dict[str, ComponentJudge] = {}
-        self._model, self._load, self._swing = ModelWatch(self._looked), LoadWatch(), SwingWatch()
+        drive = "strokes" if self._drive is Stream.STROKES else "angles"
+        self._model, self._load, self._swing = ModelWatch(self._looked, drive), LoadWatch(), SwingWatch()
         self._rows: dict[tuple[str, ...], Rows] = {}  # normalised residuals, by channels
         self._residuals: dict[str, ResidualWindow] = {}
         self._newest: Report | None = None  # that has a prediction
@@ -111,8 +113,8 @@ class TwinWatch:
 
     @property
     def newest(self) -> int | None:
-        """Stamp of the newest stroke, ns."""
-        return self._streams[Stream.STROKES].newest
+        """Stamp of the newest sample that drives the model, ns."""
+        return self._streams[self._drive].newest
 
     def is_urgent(self) -> bool:
         """Return True if the model failed, an alarm began, or a stream fell silent or is heard again.
@@ -163,7 +165,7 @@ class TwinWatch:
         def judge(name: str, key: str = "") -> ComponentJudge:
             return self._judges.setdefault(key or name, ComponentJudge(name)).begin(at)
 
-        is_fed = not idle and not self._is_silent(self._streams[Stream.STROKES], at.now)
+        is_fed = not idle and not self._is_silent(self._streams[self._drive], at.now)
         found = [self._model.status(judge("model"), counts, idle, is_fed, words or {})]
         if idle:
             return found
@@ -175,7 +177,7 @@ class TwinWatch:
                 sensors.append(sensor_status(judge(f"sensor {sensor.name}"), sensor, stats, watch.age_of(stats, at.now)))
         yield
         at = Evaluation(self.thresholds, self._monotonic(), clock)
-        strokes = self._streams[Stream.STROKES].lag
+        strokes = self._streams[self._drive].lag
         for stream, watch in self._streams.items():
             topic, wrong = judge(self._names[stream], f"topic {stream.value}"), (wrong_names or {}).get(stream)
             is_required = self._sensors[stream][0].required

@@ -22,7 +22,7 @@ import numpy as np
 from ..scene.edit import loaded, parameter, parameter_names, with_parameters
 from ..scene.schema import Scene
 from ..scene.summary import explain
-from ..types import Alarm, Array, Stream, channels_of
+from ..types import Alarm, Array, Stream, StrokeReading, channels_of
 from .alarms import UNKNOWN
 
 LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # shares: of k or EI, of k of all cylinders, of the boom's mass
@@ -102,8 +102,8 @@ def _springs(scene: Scene) -> list[str]:
     return [name for name in parameter_names(scene) if name.endswith(".k")]
 
 
-def possible_faults(scene: Scene) -> list[Fault]:
-    """Return every single fault that is compared for a boom.
+def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
+    """Return every single fault that is compared for a boom. Angles that drive the model have no zeros and no delay in it.
 
     Not told are warm oil, which softens all cylinders; the outermost section, which bends mostly in modes that the filter
     leaves out; and the zero of the IMU, for errors of the model in fast moves look like it.
@@ -117,9 +117,11 @@ def possible_faults(scene: Scene) -> list[Fault]:
         if parameter(scene, cause) > 0.0:
             found.append(Fault(cause, "less", size))
     names_of = channels_of(len(scene.joints))
-    sensors = [*names_of[Stream.ANGLES], "tip_imu", *names_of[Stream.FORCES]]
-    found += [Fault(f"{name}.sensor", "off", is_told=name != "tip_imu") for name in sensors]
-    return [*found, Fault(f"{Stream.ANGLES.value}.delay", "late", LATE)]
+    angles = () if reads is StrokeReading.ANGLE else names_of[Stream.ANGLES]
+    found += [
+        Fault(f"{name}.sensor", "off", is_told=name != "tip_imu") for name in (*angles, "tip_imu", *names_of[Stream.FORCES])
+    ]
+    return [*found, Fault(f"{Stream.ANGLES.value}.delay", "late", LATE)] if angles else found
 
 
 class Verdict(NamedTuple):

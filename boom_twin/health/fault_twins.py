@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import BoomTwinError
 from ..scene.schema import Scene
-from ..types import SECOND, Alarm, Array, Change, Ranked, Stream
+from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
 from .causes import MEMORY, TEMPER, Evidence, Fault, Hypothesis, Verdict, evidence_of, hypothesis, possible_faults
 from .sensor_check import Flags
 
@@ -75,9 +75,19 @@ class FaultTwins:
         Posterior probability from which on a cause is named.
     is_live : bool
         True if nobody may wait for a verdict: on a busy processor it is given later than `DELAY`.
+    reads : StrokeReading
+        What drives the model.
     """
 
-    def __init__(self, scene: Scene, make: Callable[[Hypothesis], Follower], odds: float, is_live: bool = False) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        make: Callable[[Hypothesis], Follower],
+        odds: float,
+        is_live: bool = False,
+        reads: StrokeReading = StrokeReading.LENGTH,
+    ) -> None:
+        self._reads = reads
         self._scene, self._make, self._odds, self._is_live = scene, make, odds, is_live
         self._lasting: dict[str, Alarm] = {}
         self._pending: list[Any] = []
@@ -161,7 +171,7 @@ class FaultTwins:
         known = tuple(self._named)
         causes = {fault.cause for fault in known}
         fewer = [(fault, tuple(each for each in known if each is not fault)) for fault in known if fault.kind != "off"]
-        more = [(fault, (*known, fault)) for fault in possible_faults(self._scene) if fault.cause not in causes]
+        more = [(fault, (*known, fault)) for fault in possible_faults(self._scene, self._reads) if fault.cause not in causes]
         self._faults, self._hypotheses, self._twins = list[Fault](), list[Hypothesis](), list[Follower]()
         for fault, faults in [(None, known), *fewer, *more]:
             try:

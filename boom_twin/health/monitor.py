@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
+from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, StrokeReading, channels_of
 from .angle_reading import AngleReading
 from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows, PredictionRows
 from .causes import explains
@@ -40,6 +40,8 @@ class HealthMonitor:
         Mounts of the angle sensors.
     absent : collection of str
         Channels without a sensor, see `boom_twin.Twin`.
+    reads : StrokeReading
+        What drives the model. Angles that do are not compared with it.
 
     Attributes
     ----------
@@ -48,18 +50,26 @@ class HealthMonitor:
     """
 
     def __init__(
-        self, scene: Scene, settings: Settings, mounts: tuple[Mount | None, ...], absent: Collection[str] = ()
+        self,
+        scene: Scene,
+        settings: Settings,
+        mounts: tuple[Mount | None, ...],
+        absent: Collection[str] = (),
+        reads: StrokeReading = StrokeReading.LENGTH,
     ) -> None:
+        self._reads, self._drive = reads, reads.stream
         self.fault_twins: FaultTwins | None = None
         self._settings, self._channels = settings, channels_of(len(scene.joints))
         self._ranges = sensor_ranges(scene, mounts)
-        self._uncertain = UNCERTAIN * settings.stroke_variance
+        self._uncertain = UNCERTAIN * settings.variance(SENSORS[self._drive])
         self._sensors = {
-            stream: SensorMonitor(names, SENSORS[stream], stream is not Stream.STROKES, absent)
+            stream: SensorMonitor(names, SENSORS[stream], stream is not self._drive, absent)
             for stream, names in self._channels.items()
+            if stream is not Stream.STROKES or stream is self._drive
         }
         self._delay = DelayMonitor()
-        self._deviations = {stream: DeviationMonitor(stream, scene, settings) for stream in SIGMAS}
+        compared = [stream for stream in SIGMAS if stream is not self._drive]
+        self._deviations = {stream: DeviationMonitor(stream, scene, settings) for stream in compared}
         self._mount, self._forces = ImuMount(), ForceReading(self._channels[Stream.FORCES])
         self._angles, self._load = AngleReading(scene, mounts), TipLoadMonitor(settings.tip_load_limit)
         self._told = 0
@@ -69,10 +79,11 @@ class HealthMonitor:
         """Restart with the boom at rest; alarms of sensors last."""
         settings = self._settings
         self._blocks = BlockBuilder()
-        fastest = {Stream.STROKES: settings.stroke_rate}
+        fastest = {self._drive: settings.rate(self._reads)}
         self._checks = {
             stream: SensorCheck(*settings.noise(kind), *self._ranges[stream], fastest.get(stream, 0.0))
             for stream, kind in SENSORS.items()
+            if stream in self._sensors
         }
         self._surveys: dict[Stream, StreamSurvey] = {
             stream: StreamSurvey(settings.variance(SENSORS[stream]), len(names))
@@ -106,8 +117,8 @@ class HealthMonitor:
 
     @property
     def failing_strokes(self) -> NDArray[np.bool_]:
-        """Return which stroke transducers are known to fail, each by itself, shape (n,)."""
-        return self._sensors[Stream.STROKES].masked
+        """Return which sensors of those that drive the model are known to fail, each by itself, shape (n,)."""
+        return self._sensors[self._drive].masked
 
     def _masked(self, stream: Stream) -> NDArray[np.bool_]:
         """Return which channels of a stream are not compared with the prediction."""
@@ -137,7 +148,11 @@ class HealthMonitor:
             return None
         self._told = done[-1].end
         alarms = [*(alarm for alarm in news if alarm.until is not None), *self._lasting()]
-        noise = {NOISE_OVER + SENSORS[stream].noise: self._checks[stream].noise for stream in MEASURED_NOISE}
+        noise = {
+            NOISE_OVER + SENSORS[stream].noise: self._checks[stream].noise
+            for stream in MEASURED_NOISE
+            if stream in self._checks
+        }
         return Health(self._told, tuple(alarms), tip_sigmas(), noise)
 
     def _lasting(self) -> Iterable[Alarm]:
@@ -157,27 +172,32 @@ class HealthMonitor:
         is_followed = bool(predictions.variances.max() < self._uncertain)
         span, readings = BLOCK * NANO if is_followed else 0.0, dict[Stream, StreamReadings]()
         for stream, survey in self._surveys.items():
+            if stream is self._drive:
+                continue
             readings[stream] = survey.take(block.readings(stream), self._sensors[stream].masked, span)
         for stream, each in readings.items():
             stamps, raw, left, _ = each.rows
             expected = raw - left if is_followed else np.full(raw.shape, np.nan)
             news += self._check(stream, block, stamps, raw, expected)
-        if is_followed and not self._sensors[Stream.STROKES].masked.any():
+        if is_followed and not self._sensors[self._drive].masked.any():
             news += self._compare(block, readings, predictions.measured.mean(axis=0))
         strokes = predictions.measured
         is_shaken = any(each.is_bent for each in readings.values())
         expected = np.full(strokes.shape, np.nan) if is_shaken else np.zeros(strokes.shape)
-        return news + self._check(Stream.STROKES, block, predictions.stamps, strokes, expected)
+        return news + self._check(self._drive, block, predictions.stamps, strokes, expected)
 
     def _compare(self, block: Block, readings: dict[Stream, StreamReadings], strokes: Array) -> list[Alarm]:
         """Compare readings with the prediction; `strokes` (n,) are means of the measured ones, m."""
-        news = self._angles.take(readings[Stream.ANGLES], strokes, BLOCK * NANO, block.start, block.end)
+        news = list[Alarm]()
+        if self._drive is not Stream.ANGLES:
+            news += self._angles.take(readings[Stream.ANGLES], strokes, BLOCK * NANO, block.start, block.end)
         if self._angles.has_wrong_strokes:
             return news
         if not self._sensors[Stream.IMU].masked.any():
             news += self._mount.take(readings[Stream.IMU], block.start, block.end)
         news += self._forces.take(readings[Stream.FORCES], block.start, block.end)
-        news += self._delay.take(readings[Stream.ANGLES], self._sensors[Stream.ANGLES].masked, block)
+        if self._drive is not Stream.ANGLES:
+            news += self._delay.take(readings[Stream.ANGLES], self._sensors[Stream.ANGLES].masked, block)
         for stream, deviations in self._deviations.items():
             news += deviations.take(readings[stream], self._masked(stream), block)
         return news
@@ -188,7 +208,7 @@ class HealthMonitor:
         findings = self._checks[stream].look(np.asarray(stamps * NANO), raw, expected, block.end * NANO)
         if findings.is_calm and not monitor.alarms:
             return []
-        newest = (raw if stream is Stream.STROKES else raw - expected)[-1] if len(raw) else None
+        newest = (raw if stream is self._drive else raw - expected)[-1] if len(raw) else None
         return monitor.take(findings, block.start, block.end, newest)
 
 

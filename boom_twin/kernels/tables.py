@@ -199,6 +199,7 @@ class Work(NamedTuple):
     local: Array  # (LOCAL_ROWS, P)
     drive: Array  # (cylinders,) drives of a sub-step, m
     drive_rate: Array  # (cylinders,), m/s
+    load: Array  # (2, 2) force at the tip, x and y (N): at the start of a step, and at its end
     dz: Array  # (unknowns,)
     guess: Array  # (unknowns,) uncorrected, see `kernels.transfer.kept_tangent`
     corrections: Array  # (CORRECTIONS, unknowns), newest first

@@ -31,7 +31,9 @@ _REMEDIES = {
     "zero": "Give what the sensor reads where the quantity is 0, in its unit.",
     "scale": "Give the factor that corrects the sensor, 1.0 for one that is right; turn it round by sign.",
     "unit": "Give the unit of the published values.",
-    "absolute": "Give root or head, where on its section the inclinometer sits; leave it out for an encoder.",
+    "absolute": "Give root or head, where on its section the inclinometer sits, with _compensated if a gyro corrects it; "
+    "leave it out for an encoder.",
+    "drive": "Give angles for a boom without stroke transducers; else leave it out.",
     "depth": "Give a number of messages.",
     "delay": "Give the seconds by which the stamps come after the readings.",
     "reads": "Give length for a transducer in or on the cylinder; drive only for sessions of a simulated boom.",
@@ -73,7 +75,7 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
     faults = _role_faults(values, usual_values)
     sensors = values.pop("sensors", None) or {}
     absent = frozenset(channel for channel, given in sensors.items() if given == "none") if isinstance(sensors, dict) else ()
-    sensors, names, found = _sensors(sensors)
+    sensors, names, found = _sensors(sensors, values.get("drive") == "angles")
     faults += found
     topics: Topics | None = None
     try:
@@ -86,7 +88,10 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
     if faults or topics is None:
         count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
         raise UsageError("\n".join([f"{source}: {count}", *(f"  {fault}" for fault in faults)]))
-    return topics.model_copy(update={"sensors": sensors, "absent": absent})
+    inputs = topics.inputs
+    if topics.drive == "angles":
+        inputs = {stream: topic for stream, topic in inputs.items() if stream is not Stream.STROKES}
+    return topics.model_copy(update={"inputs": inputs, "sensors": sensors, "absent": absent})
 
 
 def _merged(base: Any, own: Any) -> Any:
@@ -113,8 +118,11 @@ def _role_faults(values: dict[str, Any], usual_values: dict[str, Any]) -> list[F
     return faults
 
 
-def _sensors(values: Any) -> tuple[dict[str, Sensor], dict[str, str], list[Fault]]:
+def _sensors(values: Any, is_driven_by_angles: bool) -> tuple[dict[str, Sensor], dict[str, str], list[Fault]]:
     """Return the sensors that are valid by themselves, the names of all, and the faults."""
+    drive, bound = Stream.STROKES, "every cylinder's stroke drives the model"
+    if is_driven_by_angles:
+        drive, bound = Stream.ANGLES, "every joint's angle drives the model"
     if not isinstance(values, dict):
         return {}, {}, [Fault("sensors", values, "a block of channels is needed", _SEE)]
     sensors: dict[str, Sensor] = {}
@@ -126,10 +134,8 @@ def _sensors(values: Any) -> tuple[dict[str, Sensor], dict[str, str], list[Fault
             continue
         if given == "none":
             names[channel] = usual(channel)["name"]
-            if stream_of(channel) is Stream.STROKES:
-                faults.append(
-                    Fault(f"sensors.{channel}", given, "every cylinder's stroke drives the model", "Name its sensor.")
-                )
+            if stream_of(channel) is drive:
+                faults.append(Fault(f"sensors.{channel}", given, bound, "Name its sensor."))
             continue
         merged = _merged(usual(channel), given or {})
         if isinstance(merged, dict):
@@ -216,10 +222,11 @@ def _name_faults(topics: Topics) -> Iterator[Fault]:
 
 
 def _input_faults(topics: Topics) -> Iterator[Fault]:
-    """Yield faults for a delay of the strokes, whose stamps all outputs have, and for ``reads`` of another input."""
+    """Yield faults for a delay of what drives the model, whose stamps all outputs have, and for ``reads`` of another input."""
     for stream, topic in topics.inputs.items():
         if topic.reads is not None and stream is not Stream.STROKES:
-            yield Fault(f"inputs.{stream.value}.reads", topic.reads.value, "only cylinder_strokes has it", "Remove the key.")
-    if delay := topics.inputs[Stream.STROKES].delay:
-        bound = "every output has the stamp of a stroke sample, so the other streams' delays count against it"
-        yield Fault("inputs.cylinder_strokes.delay", delay, bound, f"Give the others {-delay:g} instead.")
+            yield Fault(f"inputs.{stream.value}.reads", topic.reads, "only cylinder_strokes has it", "Remove the key.")
+    drive, named = (Stream.ANGLES, "an angle") if topics.drive == "angles" else (Stream.STROKES, "a stroke")
+    if delay := topics.inputs[drive].delay:
+        bound = f"every output has the stamp of {named} sample, so the other streams' delays count against it"
+        yield Fault(f"inputs.{drive.value}.delay", delay, bound, f"Give the others {-delay:g} instead.")

@@ -48,6 +48,8 @@ class SampleAssembler:
         True for channels with a sensor.
     oddities : Counter
         Counter of ``names apart``, ``missing names`` and ``two sources``.
+    drive : Stream
+        The one that drives the model. The twin itself finds a second source of it.
 
     Attributes
     ----------
@@ -55,8 +57,8 @@ class SampleAssembler:
         Number of samples left out because of two sources.
     """
 
-    def __init__(self, wanted: Mapping[Stream, NDArray[np.bool_]], oddities: Counter[str]) -> None:
-        self._wanted, self._oddities, self.refused = wanted, oddities, 0
+    def __init__(self, wanted: Mapping[Stream, NDArray[np.bool_]], oddities: Counter[str], drive: Stream) -> None:
+        self._wanted, self._oddities, self._drive, self.refused = wanted, oddities, drive, 0
         self._lines = {stream: _Line() for stream in Stream}
 
     def take(self, reading: Reading) -> Iterator[Sample]:
@@ -64,7 +66,7 @@ class SampleAssembler:
         sample, line = reading.sample, self._lines[reading.sample.stream]
         found = [*self._ended(line), sample] if reading.is_whole else [*self._gathered(line, sample)]
         for each in found:
-            if each.stream is Stream.STROKES or not self._is_contested(line, each, reading.frame):
+            if each.stream is self._drive or not self._is_contested(line, each, reading.frame):
                 yield each
 
     def rest(self) -> Iterator[Sample]:

@@ -147,14 +147,15 @@ class SampleDecoder:
 
     def __init__(self, joints: int, topics: Topics | None = None) -> None:
         topics = topics or load_topics()
-        self._channels = {stream: _Channels(topics, stream, joints) for stream in Stream}
+        self._channels = {stream: _Channels(topics, stream, joints) for stream in topics.inputs}
         pair = {Stream.STROKES: Stream.ANGLES, Stream.ANGLES: Stream.STROKES}
         self._sharing = pair if topics.is_shared else {}
-        self.delays = {stream: topics.delay(stream) for stream in Stream}
+        self.delays = {stream: topics.delay(stream) for stream in topics.inputs}
         self.refused = 0
         self._by_axis = {stream for stream, kind in SENSORS.items() if kind.is_imu}
         self.oddities: Counter[str] = Counter()
-        self.assembler = SampleAssembler({s: each.wanted for s, each in self._channels.items()}, self.oddities)
+        wanted = {stream: each.wanted for stream, each in self._channels.items()}
+        self.assembler = SampleAssembler(wanted, self.oddities, topics.stroke_reading.stream)
         self.other_boom_names: dict[Stream, list[str]] = {}
         self.strange_names: dict[Stream, tuple[list[str], list[str]]] = {}
 

@@ -127,7 +127,7 @@ class InputTopic(Topic):
     """
 
     delay: Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)] = 0.0
-    reads: StrokeReading | None = None
+    reads: Literal["length", "drive"] | None = None
 
 
 class EventTopic(Topic):
@@ -143,6 +143,8 @@ class Topics(_Entry):
     """All topics by role, frame of the outputs, and sensors that differ from the defaults; see `boom_twin.messages.mapping`."""
 
     frame: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_/.-]*$", max_length=200)]
+    drive: Literal["strokes", "angles"] = "strokes"
+    """Readings that drive the model. Where angles do, `inputs` has no strokes."""
     inputs: dict[Stream, InputTopic]
     outputs: dict[Output, Topic]
     events: EventTopic
@@ -155,13 +157,14 @@ class Topics(_Entry):
     @property
     def is_shared(self) -> bool:
         """Return True if strokes and angles come by one topic."""
-        return self.inputs[Stream.STROKES].absolute == self.inputs[Stream.ANGLES].absolute
+        strokes = self.inputs.get(Stream.STROKES)
+        return strokes is not None and strokes.absolute == self.inputs[Stream.ANGLES].absolute
 
     @property
     def heard(self) -> dict[str, list[Stream]]:
         """Streams of every input topic by its name; strokes first."""
         found: dict[str, list[Stream]] = {}
-        for stream in Stream:
+        for stream in filter(self.inputs.__contains__, Stream):
             found.setdefault(self.inputs[stream].name, []).append(stream)
         return found
 
@@ -207,14 +210,18 @@ class Topics(_Entry):
         ]
 
     def reading(self, reads: StrokeReading) -> Topics:
-        """Return these topics with stroke transducers that read the quantity `reads`."""
+        """Return these topics with stroke transducers, if there are any, that read the quantity `reads`."""
+        if Stream.STROKES not in self.inputs:
+            return self
         strokes = self.inputs[Stream.STROKES].model_copy(update={"reads": reads})
         return self.model_copy(update={"inputs": {**self.inputs, Stream.STROKES: strokes}})
 
     @property
     def stroke_reading(self) -> StrokeReading:
-        """Quantity that stroke transducers read: that of the mapping, else lengths."""
-        return self.inputs[Stream.STROKES].reads or StrokeReading.LENGTH
+        """Quantity that drives the model: angles or what stroke transducers read, by the mapping; else lengths."""
+        if Stream.STROKES not in self.inputs:
+            return StrokeReading.ANGLE
+        return StrokeReading(self.inputs[Stream.STROKES].reads or StrokeReading.LENGTH)
 
     def mounts(self, joints: int) -> list[Mount | None]:
         """Return the mounts of a boom's inclinometers, one entry for each joint; None is an encoder."""

@@ -17,7 +17,7 @@ from ..messages.sample_decoder import stamp_of
 from ..messages.topic_table import Topics
 from ..system.received_files import holds_file, open_received
 from ..twin.blocks import EstimateBlock, PredictionBlock
-from ..types import NANO, Array, Stream
+from ..types import NANO, Array
 
 FILE_NAME = "truth.csv.gz"
 LARGEST_TRUTH = 64 * 2**20
@@ -141,5 +141,5 @@ def truth_in(window: TimeWindow, session: Session, topics: Topics, wanted: list[
 def _first_stroke_stamp(session: Session, topics: Topics, wanted: list[str], window: TimeWindow) -> int:
     """Return the stamp of the first message of strokes in a window, ns; 0 if there is none."""
     types = {name: topics.inputs[topics.heard[name][0]].type for name in wanted}
-    messages = read(session, types, window)
-    return next((stamp_of(message) for name, _, message in messages if Stream.STROKES in topics.heard[name]), 0)
+    messages, drive = read(session, types, window), topics.stroke_reading.stream
+    return next((stamp_of(message) for name, _, message in messages if drive in topics.heard[name]), 0)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..bag.joint_names import refuse_other_names
+from ..bag.joint_names import refuse_missing_drive, refuse_other_names
 from ..bag.reader import Session, scan
 from ..bag.session_model import (
     SessionScene,
@@ -24,7 +24,7 @@ from ..messages.topic_table import Topics
 from ..scene.load import SceneSource
 from ..scene.schema import Scene
 from ..twin.twin import Twin
-from ..types import NANO, Stream
+from ..types import NANO
 from .progress import Progress
 
 
@@ -63,7 +63,7 @@ class ReplayInputs:
         Source of the mapping.
     topics : Topics
     wanted : list of str
-        Input topics to read: that of the strokes, and those of other inputs with messages.
+        Input topics to read: that which drives the model, and those of other inputs with messages.
     strokes : SessionStrokes
     health : bool
         True if the rig's health is judged.
@@ -129,13 +129,15 @@ def replay_inputs(
     joints = kept.scene.joints
     mapped = mapping_of(session.path, Path(options.mapping) if options.mapping else None, len(joints), options.namespace)
     topics = mapped.topics.of_joints(joint.range_deg for joint in joints)
+    drive = topics.stroke_reading.stream
     topics_there = {name: session.find(name) for name in mapped.topics.heard}
     wanted = [
         name
         for name, topic in topics_there.items()
-        if Stream.STROKES in mapped.topics.heard[name] or (topic is not None and topic.count)
+        if drive in mapped.topics.heard[name] or (topic is not None and topic.count)
     ]
     strokes = strokes_of(session.path, mapped)
+    refuse_missing_drive(session, topics)
     refuse_other_names(session, topics, len(joints), kept.source)
     return ReplayInputs(session, kept, settings, mapped.source, topics, wanted, strokes, options.health, options.window)
 

@@ -166,7 +166,7 @@ class Recording:
         errors: TipErrors | None = None,
         reads: StrokeReading = StrokeReading.LENGTH,
     ) -> None:
-        self._joints, self._take, self._errors, self._reads = joints, take, errors, reads
+        self._joints, self._take, self._errors, self.reads = joints, take, errors, reads
         self._parts: list[ReportBlock] = []
         self._single: list[Report] = []
         self._health: list[Health] = []
@@ -273,7 +273,7 @@ class Recording:
     def _stretch(self) -> Stretch | None:
         self._close_single()
         parts = [part for part in self._parts if len(part.predictions.stamps) or len(part.residuals.stamps)]
-        own = self._health, self._first, self._samples, self._reads
+        own = self._health, self._first, self._samples, self.reads
         return Stretch(self._joints, joined(parts), *own) if parts else None
 
     @property

@@ -1,4 +1,4 @@
-"""Report the first stroke of a session that could not be used, and its likely unit."""
+"""Report the first stroke, or angle that drives the model, that could not be used in a session, and its likely unit."""
 
 from __future__ import annotations
 
@@ -7,36 +7,43 @@ import numpy as np
 from ..scene.load import DEFAULT_NAME
 from ..scene.schema import Scene
 from ..twin.blocks import CODES, SampleBlock
-from ..types import SENSORS, Array, Stream, channels_of
+from ..types import GIVE, SENSORS, Array, Stream, StrokeReading, channels_of
 
 OTHER_BOOM = 5.0  # times the travel: within that a stroke is rather one of another boom than in another unit
 
 
 class RefusedStrokes:
-    """Finder of the first stroke sample with a value outside the travel of its cylinder.
+    """Finder of the first sample of what drives the model with a value outside a cylinder's travel or a joint's range.
 
     Parameters
     ----------
     scene : Scene
     source : str
         Where that is from.
+    reads : StrokeReading
+        What drives the model.
     """
 
-    def __init__(self, scene: Scene, source: str = "") -> None:
+    def __init__(self, scene: Scene, source: str = "", reads: StrokeReading = StrokeReading.LENGTH) -> None:
+        self._reads = reads
         self._is_default = source == DEFAULT_NAME
-        self._names = channels_of(len(scene.joints))[Stream.STROKES]
+        self._names = channels_of(len(scene.joints))[reads.stream]
         self._closed = np.array([joint.cylinder.closed_length for joint in scene.joints])
         self._travel = np.array([joint.cylinder.max_stroke for joint in scene.joints])
+        self._lowest = np.zeros(len(scene.joints))
+        if reads is StrokeReading.ANGLE:
+            low, high = np.radians([joint.range_deg for joint in scene.joints]).T
+            self._lowest, self._travel = low - GIVE, high + GIVE
         self._first: Array | None = None
         self._is_read = np.zeros(len(scene.joints), bool)
 
     def take(self, block: SampleBlock) -> None:
         """Look at samples."""
-        strokes = block.values[block.streams == CODES[Stream.STROKES], : len(self._names)]
+        strokes = block.values[block.streams == CODES[self._reads.stream], : len(self._names)]
         self._is_read |= np.isfinite(strokes).any(axis=0)
         if self._first is not None:
             return
-        outside = np.flatnonzero(((strokes < 0.0) | (strokes > self._travel)).any(axis=1))
+        outside = np.flatnonzero(((strokes < self._lowest) | (strokes > self._travel)).any(axis=1))
         if len(outside):
             self._first = strokes[outside[0]]
 
@@ -51,7 +58,14 @@ class RefusedStrokes:
         """Sentence with the value, its bound and the likely unit; empty if there was none."""
         if self._first is None:
             return ""
-        i = int(np.flatnonzero((self._first < 0.0) | (self._first > self._travel))[0])
+        i = int(np.flatnonzero((self._first < self._lowest) | (self._first > self._travel))[0])
+        if self._reads is StrokeReading.ANGLE:
+            low, high = np.degrees([self._lowest[i], self._travel[i]])
+            value, bounds = f"{self._names[i]} = {self._first[i]:.6g} rad", f"{low:.4g} to {high:.4g} deg"
+            said = f" The first refused value: {value}, its sensor can read {bounds}."
+            if not low <= self._first[i] <= high:
+                return said
+            return f"{said} In degrees it would fit: give by --mapping `sensors: {{{self._names[i]}: {{unit: deg}}}}`, .."
         said = f" The first refused value: {self._names[i]} = {self._first[i]:.6g} m, its travel is 0 to {self._travel[i]:g} m."
         if self._fits(1.0, self._closed):
             return f"{said} {self._remedy(1.0, 'm', self._closed)}"

@@ -34,7 +34,7 @@ from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..twin.events import EVENTS
 from ..twin.twin import Twin
-from ..types import Array, Change, Report, Stream
+from ..types import Array, Change, Report, Stream, StrokeReading
 from .ground_truth import TipErrors, TipTruth, truth_in
 from .inputs import USUAL, ReplayOptions, replay_inputs
 from .progress import Progress
@@ -198,7 +198,7 @@ def replay_into(
     errors = None if truth is None else TipErrors(truth)
     taking = None if take is None else _Timed(take)
     recording = Recording(joints, taking, errors, given.strokes.reading)
-    other_boom, refused = OtherBoom(), RefusedStrokes(given.scene, given.kept.source)
+    other_boom, refused = OtherBoom(), RefusedStrokes(given.scene, given.kept.source, given.strokes.reading)
     samples = SessionSamples(session, given.topics, given.wanted, joints, options.window)
     with ExitStack() as stack:
         twin, put = given.twin(options.causes), None
@@ -231,16 +231,19 @@ def replay_into(
         bar.close()
     wall = time.perf_counter() - began - (taking.spent if taking else 0.0)
     twin.counts.update(samples.oddities)
+    one, names, bounds = "stroke", "cylinder", "the cylinders' travel"
+    if given.strokes.reading is StrokeReading.ANGLE:
+        one, names, bounds = "angle", "joint", "the joints' range_deg"
     if recording.is_empty:
         raise BagError(
-            f"{session.path}: no stroke sample could be used ({_told(twin)}){refused.never_read}. "
-            f"It needs names cylinder_1..{joints}, or those of a mapping, values within the cylinders' travel, "
+            f"{session.path}: no {one} sample could be used ({_told(twin)}){refused.never_read}. "
+            f"It needs names {names}_1..{joints}, or those of a mapping, values within {bounds}, "
             f"and stamps.{_explained(samples.oddities)}{refused.told}"
         )
     recording.close()
     if recording.totals.samples == 1 < recording.refused:
         raise BagError(
-            f"{session.path}: of {1 + recording.refused} stroke samples only the first could be used ({_told(twin)})."
+            f"{session.path}: of {1 + recording.refused} {one} samples only the first could be used ({_told(twin)})."
             f"{_explained(twin.counts)}"
         )
     if options.with_bag:

@@ -15,7 +15,7 @@ from ..messages.sample_decoder import SampleDecoder
 from ..messages.topic_table import TYPES, Output, Topics
 from ..messages.type_store import decode
 from ..twin.blocks import SampleBlock, block_of, samples_in
-from ..types import SENSORS, Change, Sample, Stream
+from ..types import SENSORS, Change, Sample
 
 CHANGE_SPAN = 2_000_000_000
 """Nanoseconds, of log time and of stamps, within which a change and its stroke sample are looked for.
@@ -122,7 +122,7 @@ class SessionSamples:
         changes = recorded_changes(session, self._topics)
         types = {name: self._topics.inputs[heard[name][0]].type for name in self._wanted}
         blocks, count = read_blocks(session, types, self._window), 0
-        streams = [heard[source.name] for source in blocks.sources]
+        streams, drive = [heard[source.name] for source in blocks.sources], self._topics.stroke_reading.stream
         wires = [CdrDecoder(TYPES[group[0]], decode, SENSORS[group[0]].field) for group in streams]
         for block in blocks:
             for row, source in enumerate(block.sources.tolist()):
@@ -131,7 +131,7 @@ class SessionSamples:
                 except PARSE_ERRORS:
                     blocks.decoded(block, row)  # raises it with its place
                     raise
-                if changes.are_left and Stream.STROKES in streams[source]:
+                if changes.are_left and drive in streams[source]:
                     for change in changes.due(int(block.log_times[row]), stamp):
                         yield from self._batch()
                         yield change

@@ -9,7 +9,7 @@ from typing import Any
 from ..deviation.load_spectrum import TipLoad
 from ..health.alarms import evidence_with_cause
 from ..system.received_files import sha256_of
-from ..types import NANO, Alarm, Stream
+from ..types import NANO, Alarm
 from .recording import Recording
 
 
@@ -48,12 +48,13 @@ def summary_of(recording: Recording, counts: Counter[str], wall: float, file: Pa
 
 def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
     """Return gaps, clock steps and health alarms in the order of their beginning; seconds since the stamp `first`."""
+    drive = recording.reads.stream.value
     gaps = [
-        Alarm(Stream.STROKES.value, "gap", start, end, None, f"for {(end - start) * NANO:.2f} s")
+        Alarm(drive, "gap", start, end, None, f"for {(end - start) * NANO:.2f} s")
         for start, end in recording.gaps
     ]
     gaps += [
-        Alarm(Stream.STROKES.value, "clock", start, start, None, f"stamps go on at {(end - first) * NANO:.3f} s")
+        Alarm(drive, "clock", start, start, None, f"stamps go on at {(end - first) * NANO:.3f} s")
         for start, end in recording.clock_sets
     ]
     return [

@@ -21,7 +21,7 @@ from ..plots import History
 from ..scene.schema import Scene
 from ..system.atomic_files import write_atomic
 from ..system.received_files import open_received
-from ..types import Array, Stream, sensor_kind, stream_of
+from ..types import SENSORS, Array, Stream, sensor_kind, stream_of
 from .vibration import RestPeriod
 
 FILE_NAME = "quantities.json"
@@ -99,7 +99,9 @@ class QuantityBuilder:
     def _stroke_travels(self, settings: Settings) -> Iterator[Quantity]:
         for i, travel in enumerate(self._travels):
             length, legs = travel.length
-            yield Quantity(f"stroke_travel_cylinder_{i + 1}", length, sqrt(2.0 * legs * settings.stroke_variance), "m")
+            yield Quantity(
+                f"stroke_travel_cylinder_{i + 1}", length, sqrt(2.0 * legs * settings.variance(SENSORS[Stream.STROKES])), "m"
+            )
 
 
 class BatchMeans:

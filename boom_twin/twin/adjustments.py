@@ -12,7 +12,7 @@ from ..errors import UsageError
 from ..types import SECOND, SENSORS, Array, Change, Stream
 from .blocks import CODES
 from .loaded_model import LoadedModel
-from .state import COUNT, FIRST, NONE, RECENT, STROKES, ZEROS, Ring, TwinState, zeros_at
+from .state import COUNT, FIRST, NONE, RECENT, ZEROS, Ring, TwinState, zeros_at
 
 
 class SensorZeros:
@@ -24,6 +24,8 @@ class SensorZeros:
         Where they are kept; samples of stamps before the newest ones have those that held then.
     channels : dict of Stream to tuple of str
         See `boom_twin.types.channels_of`.
+    drive : Stream
+        The one that drives the model.
 
     Attributes
     ----------
@@ -31,12 +33,12 @@ class SensorZeros:
         The newest ones, by channel: m, rad, m/s^2, N.
     """
 
-    def __init__(self, state: TwinState, channels: Mapping[Stream, tuple[str, ...]]) -> None:
-        self._state, self._channels = state, channels
+    def __init__(self, state: TwinState, channels: Mapping[Stream, tuple[str, ...]], drive: Stream) -> None:
+        self._state, self._channels, self._drive = state, channels, drive
         self.values: dict[str, float] = {}
 
     def put(self, stamp: int, values: Mapping[str, float]) -> bool:
-        """Set the zeros that hold from `stamp` (ns) on; return True if zeros of strokes change.
+        """Set the zeros that hold from `stamp` (ns) on; return True if zeros of what drives the model change.
 
         Samples with earlier stamps keep the zeros that held then.
         """
@@ -50,7 +52,7 @@ class SensorZeros:
         for row, names in zip(state.zeros[at], self._channels.values(), strict=True):
             row[: len(names)] = [self.values.get(name, 0.0) for name in names]
         state.zero_sets[0] += 1
-        return any(before.get(name) != values.get(name) for name in self._channels[Stream.STROKES])
+        return any(before.get(name) != values.get(name) for name in self._channels[self._drive])
 
     def forget_past(self) -> None:
         """Apply the newest zeros to every stamp."""
@@ -58,9 +60,9 @@ class SensorZeros:
         state.zeros[0], state.zeros_since[0] = state.zeros[state.zero_sets[0] - 1], NONE
         state.zero_sets[0] = 1
 
-    def of_strokes(self, stamp: int) -> Array:
-        """Return the zeros to subtract from the strokes at `stamp` (ns), m, shape (n,)."""
-        return self._state.zeros[zeros_at(self._state, stamp), STROKES, : len(self._channels[Stream.STROKES])]
+    def of_drive(self, stamp: int) -> Array:
+        """Return the zeros to subtract from what drives the model at `stamp` (ns), m or rad, shape (n,)."""
+        return self._state.zeros[zeros_at(self._state, stamp), CODES[self._drive], : len(self._channels[self._drive])]
 
 
 FEWEST_RESIDUALS = 5  # readings that make a mean
@@ -108,7 +110,7 @@ class ResidualBuffer:
         """
         if sensor in WHOLE:
             return {name: self._mean(name, now) for name in WHOLE[sensor]}
-        if self._places[sensor][0] != STROKES:
+        if self._places[sensor][0] != CODES[Stream.STROKES]:
             return {sensor: self._mean(sensor, now)}
         number = sensor.rpartition("_")[2]
         joint = f"joint_{number}"

@@ -20,8 +20,8 @@ from ..kernels.jit import hold
 from ..kernels.result_row import PIN
 from ..predictions import Outline
 from ..scene.schema import Scene
-from ..types import NANO, SECOND, Array, Health, Report, Residuals, Stream, channels_of
-from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
+from ..types import GIVE, NANO, SECOND, SENSORS, Array, Health, Report, Residuals, Stream, StrokeReading, channels_of
+from .blocks import CODES, STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
 from .load_shedding import LoadShedding
 from .regular import NOISE_REACH
 from .run import Run
@@ -31,22 +31,33 @@ from .update import DONE, LOOK, ODD, measure, update
 CAPACITY = 4096  # samples that one call of the compiled update takes at most
 
 
-def limits_of(scene: Scene, boom: BoomPredictor, settings: Settings, absent: Collection[str]) -> Limits:
+SWAY = 0.5  # rad, by which an inclinometer that drives the model may be off its estimate at once while its section shakes
+
+
+def limits_of(scene: Scene, boom: BoomPredictor, settings: Settings, absent: Collection[str], reads: StrokeReading) -> Limits:
     """Return the limits of the compiled update for `boom`, that of `scene` with its load, and for its sensors."""
     channels = list(channels_of(boom.plan.joints).values())
     counts = np.array([len(names) for names in channels])
-    far = NOISE_REACH * settings.stroke_variance**0.5
+    far = NOISE_REACH * settings.variance(SENSORS[reads.stream]) ** 0.5
+    low, high = np.zeros(boom.plan.joints), np.array([joint.cylinder.max_stroke for joint in scene.joints])
+    absolute = boom.posture.absolute
+    if reads is StrokeReading.ANGLE:
+        far += SWAY * boom.posture.sways.any()
+        low, high = np.radians([joint.range_deg for joint in scene.joints]).T
+        low, high = np.where(absolute, -np.inf, low - GIVE), np.where(absolute, np.inf, high + GIVE)
+        counts[CODES[Stream.STROKES]] = 0
     return Limits(
         gap=round(settings.gap * SECOND),
         leap=settings.leap / NANO,
+        drive=CODES[reads.stream],
         far=far,
-        rate=settings.stroke_rate,
-        shortest=np.full(boom.plan.joints, -far),
-        longest=np.array([joint.cylinder.max_stroke for joint in scene.joints]) + far,
+        rate=settings.rate(reads),
+        shortest=low - far,
+        longest=high + far,
+        turns=absolute & (reads is StrokeReading.ANGLE),
         valid=VALID_DEFLECTION * scene.reach,
         gravity=np.array(boom.plan.tables.gravity),
-        inclination=scene.base.inclination,
-        absolute=boom.posture.absolute,
+        absolute=absolute,
         absent=np.array([name in absent for names in channels[1:] for name in names]),
         first=np.concatenate([[0], np.cumsum(counts[1:]) - counts[1:]]),
         channels=counts,
@@ -105,7 +116,8 @@ class BlockUpdate:
         self._shedding, self._boom, self.limits, self._state, self._channels = shedding, boom, limits, state, channels
         self._judge, self._told_counts = judge, counts
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
-        self._measured = [(code, int(width)) for code, width in enumerate(limits.channels) if code]
+        drives = CODES[Stream.STROKES], limits.drive
+        self._measured = [(code, int(width)) for code, width in enumerate(limits.channels) if code not in drives]
         sizes = 2 * CAPACITY, self._joints, boom.width, boom.stations, limits.channels
         self._found: UpdateOutput = new_output(*sizes) if before is None else before._found
         self._found.counts[:] = 0

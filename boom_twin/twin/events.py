@@ -22,6 +22,7 @@ EVENTS = {
     "limits": "other settings changed while the twin ran",
     "zero": "the zero of a sensor was set anew",
     "deflected": "tip further than half the boom's reach from the undeformed boom's: outside the model's validity",
+    "not used": "a stroke, though angles drive the model; left out",
     "unmatched": "no prediction at the stamp of this sample; no residual",
 }
 

@@ -52,9 +52,9 @@ def loaded_model(
     """Return the model of `scene` under the load of `settings`; for the parameters see `boom_twin.Twin`."""
     scene = loaded(scene, *settings.load)
     boom = BoomPredictor(scene, settings, mounts, reads)
-    judge = HealthMonitor(scene, settings, tuple(mounts), absent) if health else None
+    judge = HealthMonitor(scene, settings, tuple(mounts), absent, reads) if health else None
     _ = boom.held  # made here, where no sample waits for it
-    return LoadedModel(scene, limits_of(scene, boom, settings, absent), boom, judge)
+    return LoadedModel(scene, limits_of(scene, boom, settings, absent, reads), boom, judge)
 
 
 class ModelPreparation:

@@ -6,9 +6,12 @@ Python to the samples of a twin that has irregular ones.
 
 from __future__ import annotations
 
+import numpy as np
+
+from ..deviation.sensor_model import TURN
 from ..kernels.jit import inner
 from ..types import LIMIT, NANO
-from .state import CHECKED, EPOCH, NEWEST, NONE, OTHERS, STROKES, TRUSTED, zeros_at
+from .state import CHECKED, EPOCH, NEWEST, NONE, OTHERS, TRUSTED, zeros_at
 
 SHORTEST_STEP = 20_000  # ns from one stroke sample of a rig to the next, at least
 USUAL_STEP = 1.75  # usual intervals; a longer one is looked at
@@ -55,25 +58,32 @@ def reach_of_strokes(far, rate, span):
 
 @inner
 def are_strokes_regular(estimates, limits, state, stamp, values):
-    """Return True if strokes are on time, complete and within reach of their cylinders; write them to `state` then."""
-    if state.held[STROKES] or stamp - state.clock[NEWEST] < SHORTEST_STEP or state.newest[STROKES] == NONE:
+    """Return True if strokes, or angles that drive the model, are on time, complete and within reach; write them to `state`."""
+    drive = limits.drive
+    if state.held[drive] or stamp - state.clock[NEWEST] < SHORTEST_STEP or state.newest[drive] == NONE:
         return False
-    if not is_next(state.newest[STROKES], state.usual[STROKES], limits.gap, stamp):
+    if not is_next(state.newest[drive], state.usual[drive], limits.gap, stamp):
         return False
     zeros = zeros_at(state, stamp)
     time = stamp - state.clock[EPOCH]
     limit = reach_of_strokes(limits.far, limits.rate, time - state.clock[CHECKED])
     for i in range(state.strokes.shape[0]):
-        value = values[i] - state.zeros[zeros, STROKES, i]
+        value = near(values[i] - state.zeros[zeros, drive, i], estimates[i, 0], limits.turns[i])
         if not abs(values[i]) <= LIMIT or not limits.shortest[i] <= value <= limits.longest[i]:
             return False
         if not abs(value - estimates[i, 0]) <= limit:
             return False
     for i in range(state.strokes.shape[0]):
-        state.strokes[i] = values[i] - state.zeros[zeros, STROKES, i]
+        state.strokes[i] = near(values[i] - state.zeros[zeros, drive, i], estimates[i, 0], limits.turns[i])
         state.taken[i] = state.strokes[i]
     state.clock[CHECKED], state.clock[TRUSTED], state.clock[OTHERS] = time, time, 0
     return True
+
+
+@inner
+def near(value, estimate, turns):
+    """Return a reading; if it may be whole `turns` off, the one next to its estimate."""
+    return value - TURN * np.rint((value - estimate) / TURN) if turns else value
 
 
 @inner
@@ -82,7 +92,11 @@ def is_regular(limits, state, stream, stamp, values):
     most = limits.leap
     if state.usual[stream] != 0.0:
         most = longest_step(state.usual[stream], limits.gap)
-    if state.held[stream] or (state.newest[stream] != NONE and not 0 < stamp - state.newest[stream] <= most):
+    if (
+        limits.channels[stream] == 0
+        or state.held[stream]
+        or (state.newest[stream] != NONE and not 0 < stamp - state.newest[stream] <= most)
+    ):
         return False
     complete = True
     for i in range(limits.channels[stream]):

@@ -26,9 +26,12 @@ class SampleCheck:
     ----------
     channels : dict of Stream to tuple of str
         See `boom_twin.types.channels_of`.
+    drive : Stream
+        The one that drives the model.
     """
 
-    def __init__(self, channels: Mapping[Stream, tuple[str, ...]]) -> None:
+    def __init__(self, channels: Mapping[Stream, tuple[str, ...]], drive: Stream) -> None:
+        self._drive = drive
         self._shapes = {stream: (len(names),) for stream, names in channels.items()}
         self._names = {stream: f"{names[0]}..{names[-1]}" for stream, names in channels.items()}
         self._count, self._low, self._high = 0, LARGEST_STAMP, -LARGEST_STAMP
@@ -58,7 +61,7 @@ class SampleCheck:
         else:
             stream = _stream(stream)
             found = Sample(stream, _stamp(stamp), self._values(stream, values))
-        if not self.is_sure and stream is Stream.STROKES:
+        if not self.is_sure and stream is self._drive:
             self._look(found.stamp)
         return found
 

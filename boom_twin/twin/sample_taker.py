@@ -22,7 +22,7 @@ from .block_update import BlockUpdate, limits_of
 from .blocks import CODES, SampleBlock
 from .load_shedding import LoadShedding
 from .loaded_model import LoadedModel, loaded_model
-from .regular import SHORTEST_STEP
+from .regular import SHORTEST_STEP, near
 from .run import Run
 from .sample_check import SampleCheck
 from .stamp_check import StampCheck
@@ -47,6 +47,7 @@ class SampleTaker:
         is_live: bool = False,
     ) -> None:
         self.reads, self.absent, scene = reads, frozenset(absent), as_scene(scene)
+        self._drive = reads.stream
         self.scene, self.settings, self._health = scene, settings or Settings(), health
         self.counts: Counter[str] = Counter()
         self.shedding = LoadShedding()
@@ -54,13 +55,13 @@ class SampleTaker:
         self._channels = channels_of(len(scene.joints))
         self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
         self._widths = [len(names) for names in self._channels.values()]
-        self._edge = SampleCheck(self._channels)
+        self._edge = SampleCheck(self._channels, self._drive)
         self.requests = Requests(self.settings)
         self._doubted = frozenset(doubted)
         self._judged = True  # health, with the present sample
         self._fault_twins: FaultTwins | None = None
         if causes and health:
-            self._fault_twins = FaultTwins(self.scene, self._maker(), self.settings.name_odds, is_live)
+            self._fault_twins = FaultTwins(self.scene, self._maker(), self.settings.name_odds, is_live, reads)
         self._begin()
 
     def _begin(self) -> None:
@@ -72,7 +73,7 @@ class SampleTaker:
         self._is_new = True
         self._failed: int | None = None
         self._lines = self._new_lines()
-        self._zeros = SensorZeros(self._state, self._channels)
+        self._zeros = SensorZeros(self._state, self._channels, self._drive)
         self._recent = ResidualBuffer(self._state.recent, self._channels)
 
     def _maker(self) -> Callable[[Hypothesis], Follower]:
@@ -119,7 +120,7 @@ class SampleTaker:
         parts = self._boom, model.limits, self._state, self._channels, self.judge
         self._former = before  # let go of when the next model is made, which may be in a thread of its own
         self._compiled = BlockUpdate(*parts, self.counts, self.shedding, before)
-        self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, self.plan.joints)))  # of strokes
+        self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, self.plan.joints)))  # of what drives
 
     def _take_over(self, stamp: int) -> list[str]:
         """Apply the requested changes; return the events. Another load, or other zeros of strokes, need a start from rest."""
@@ -132,7 +133,7 @@ class SampleTaker:
         events = ["load"] if before.load != self.settings.load else []
         if before.limits != self.settings.limits:
             events.append("limits")
-            self._compiled.limits = limits_of(self.scene, self._boom, self.settings, self.absent)
+            self._compiled.limits = limits_of(self.scene, self._boom, self.settings, self.absent, self.reads)
             for line in self._lines.values():
                 line.tune(self.settings)
         if asked.zeros != self._zeros.values:
@@ -160,10 +161,10 @@ class SampleTaker:
 
     def _advance_one(self, sample: Sample, trusted: bool = False) -> int:
         """Take a sample if it is regular, or `trusted`; see `BlockUpdate.advance`."""
-        if sample.stream is not Stream.STROKES:
+        if sample.stream is not self._drive:
             return self._compiled.measure(CODES[sample.stream], sample.stamp, sample.values, trusted)
         one = self._one
-        one.stamps[0], one.values[0] = sample.stamp, sample.values
+        one.streams[0], one.stamps[0], one.values[0] = CODES[self._drive], sample.stamp, sample.values
         reason, _ = self._compiled.advance(self._run, one, trusted)
         return reason
 
@@ -177,16 +178,20 @@ class SampleTaker:
             if not usable.any():
                 return self._refuse(sample, "empty")
             sample = replace(sample, values=np.where(usable, sample.values, np.nan))
-        if sample.stream is Stream.STROKES:
+        if sample.stream is self._drive:
             return self._take_strokes(sample, complete)
+        if sample.stream is Stream.STROKES:
+            return self._refuse(sample, "not used")
         return self._take_measured(sample, complete)
 
     def _take_strokes(self, sample: Sample, complete: bool) -> Report:
-        line, run, values = self._lines[Stream.STROKES], self._run, self._zeroed(sample)
+        line, run, values = self._lines[self._drive], self._run, self._zeroed(sample)
         if run is None:
             return self._follow(sample, values, complete, [])
         if line.is_next(sample.stamp) and sample.stamp - run.newest >= SHORTEST_STEP:
-            if run.plausible.is_of_others(sample.stamp - run.epoch, values, self._boom.estimate, self.settings):
+            if run.plausible.is_of_others(
+                sample.stamp - run.epoch, values, self._boom.extrapolated(0.0), self._compiled.limits
+            ):
                 return self._refuse(sample, "implausible")
             return self._follow(sample, values, complete, [])
         verdict = verdict_on(sample, line, run, self._boom, self._compiled.limits, self.settings, self._zeroed)
@@ -238,8 +243,12 @@ class SampleTaker:
         self._compiled.begin_health()
 
     def _zeroed(self, sample: Sample) -> Array:
-        """Return strokes less their zeros."""
-        return sample.values - self._zeros.of_strokes(sample.stamp)
+        """Return what drives the model less its zeros; of inclinometers, the turn next to what is expected."""
+        values = sample.values - self._zeros.of_drive(sample.stamp)
+        if self._run is None:
+            return values
+        expected = self._boom.extrapolated(0.0)
+        return np.where(self._compiled.limits.turns, near(values, expected, True), values)
 
     def _follow(self, sample: Sample, values: Array, complete: bool, events: list[str]) -> Report:
         """Step to a stroke sample, whose `values` are without the sensors' zeros; start the model if it has not started."""
@@ -269,7 +278,7 @@ class SampleTaker:
 
     def _start(self, sample: Sample, events: list[str]) -> Report:
         try:
-            self._boom.start(sample.values, not self._is_new)
+            sample = replace(sample, values=self._boom.start(sample.values, not self._is_new))
         except BoomTwinError as error:
             self._failed = sample.stamp if isinstance(error, SolverError) else self._failed
             return self._refuse(sample, "model", *events, status=str(error))
@@ -278,10 +287,10 @@ class SampleTaker:
 
     def _step(self, run: Run, sample: Sample, events: list[str]) -> Report:
         """Step the model to checked strokes, their values less the sensors' zeros."""
-        self._lines[Stream.STROKES].take(sample.stamp)
-        estimate = self._boom.estimate if run.is_predicted else None
+        self._lines[self._drive].take(sample.stamp)
+        estimate = self._boom.extrapolated(0.0) if run.is_predicted else None
         before, rates, check = self._state.strokes, self._boom.speeds, run.plausible
-        taken, oddities = check.of(sample.stamp - run.epoch, sample.values, before, estimate, rates, self.settings)
+        taken, oddities = check.of(sample.stamp - run.epoch, sample.values, before, estimate, rates, self._compiled.limits)
         if check.must_restart and np.isfinite(sample.values).all():
             self._begin_anew_at(sample.stamp)
             return self._follow(sample, sample.values, True, [*events, "stroke elsewhere"])

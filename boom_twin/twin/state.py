@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 
 from ..deviation.estimate_row import WIDTH
 from ..kernels.jit import by_reference, inner
-from ..types import Array, Stream
-from .blocks import CODES
+from ..types import Array
 
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-STROKES = CODES[Stream.STROKES]
 NONE = -(2**62)  # no stamp yet, ns
 KEPT = 16_384  # most expected readings, of the last `SPAN`: 8 kHz
 WAITING = 4096  # most samples that wait for a stroke
@@ -48,7 +46,8 @@ class TwinState(NamedTuple):
     newest : (s,) stamp of the newest sample of every stream, ns; NONE before the first.
     usual : (s,) time from one sample to the next, ns; 0 while unknown.
     held : (s,) samples that are held, see `boom_twin.twin.stamp_check`.
-    strokes, taken : (n,) newest strokes less their zeros, and as the model is to take them, m; NaN where missing.
+    strokes, taken : (n,) newest strokes, or angles that drive the model, less their zeros, and as the model is to take them, m
+    or rad; NaN where missing.
     past : expected readings (c,), their deviations and the strokes, of the last `SPAN`.
     waiting : measured samples that wait for a stroke, by stamp and stream.
     recent : measured less expected, without any zero.
@@ -74,24 +73,26 @@ class TwinState(NamedTuple):
 class Limits(NamedTuple):
     """Limits that `update` checks samples against.
 
-    gap, leap : ns. far : m, by which a stroke may be off its estimate at once. rate : m/s, of the fastest stroke.
-    shortest, longest : (n,) strokes that its cylinder can have, m.
+    gap, leap : ns. drive : code of the stream that drives the model, of strokes (m) or angles (rad). far : by which its
+    readings may be off their estimate at once. rate : of the fastest, per s. shortest, longest : (n,) readings that there can
+    be. turns : (n,) whether they may be whole turns off.
     valid : m, how far the tip may be from the undeformed boom's.
-    gravity : (2,) m/s^2. inclination : rad.
+    gravity : (2,) m/s^2.
     absolute : (n,) whether the angle sensor of a joint is an inclinometer.
     absent : (c,) measured channels without a sensor.
-    first, channels : (s,) first column of every stream among the measured channels, and how many it has.
+    first, channels : (s,) first column of every stream among the measured channels, and how many it has; 0 if it is not used.
     """
 
     gap: int
     leap: float
+    drive: int
     far: float
     rate: float
     shortest: Array
     longest: Array
+    turns: Flags
     valid: float
     gravity: Array
-    inclination: float
     absolute: Flags
     absent: Flags
     first: Integers

@@ -1,25 +1,24 @@
-"""Check strokes against what the cylinders can do: range and rate."""
+"""Check strokes, or angles that drive the model, against what the boom can do: range and rate."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..config.settings import Settings
 from ..types import NANO, Array
-from .regular import NOISE_REACH, reach_of_strokes
-from .state import CHECKED, OTHERS, TRUSTED
+from .regular import reach_of_strokes
+from .state import CHECKED, OTHERS, TRUSTED, Limits
 
 MOST_DOUBTED = 5  # readings in a row that are not believed though none jumps from the one before; the next one is
 SILENT_AFTER = 100_000_000  # ns after which a missing stroke is told
 BELIEVED_AFTER = 1_000_000_000  # ns after which readings that jumped elsewhere, and stay there, are believed
-USUAL_RATE = 0.05  # m/s, which a cylinder may have gone at meanwhile, beside twice what it was going at: then it is back
+USUAL_RATE = 0.1  # of the fastest, which it may have gone at meanwhile, beside twice what it was going at: then it is back
 NEVER = -1
 Flags = NDArray[np.bool_]
 
 
 class StrokeCheck:
-    """Check of the strokes of one run, sample by sample, against the estimates (m, shape (n,)) at the sample before.
+    """Check of what drives the model in one run, sample by sample, against the estimates (n,) at the sample before.
 
     Parameters
     ----------
@@ -32,25 +31,24 @@ class StrokeCheck:
         self._before = 0
         self._jumped = np.zeros(0, np.int64)  # stamp (ns) since when a stroke is where it jumped; NEVER
 
-    def is_of_others(self, stamp: int, values: Array, estimate: Array, settings: Settings) -> bool:
+    def is_of_others(self, stamp: int, values: Array, estimate: Array, limits: Limits) -> bool:
         """Return True if two or more strokes are out of reach of their cylinders, as of another boom.
 
         After `MOST_DOUBTED` such samples in a row the strokes are believed, and the result is False.
         """
-        limit = self._limit(stamp, settings)
+        limit = self._limit(stamp, limits)
         if np.count_nonzero(_are_far(values, estimate, limit)) < 2:
             self._clock[OTHERS] = 0
             return False
         self._clock[OTHERS] += 1
         return bool(self._clock[OTHERS] <= MOST_DOUBTED)
 
-    def _limit(self, stamp: int, settings: Settings) -> float:
-        """Return the allowed difference of strokes from their estimates, m."""
-        far, span = NOISE_REACH * settings.stroke_variance**0.5, stamp - int(self._clock[CHECKED])
-        return float(reach_of_strokes(far, settings.stroke_rate, span))
+    def _limit(self, stamp: int, limits: Limits) -> float:
+        """Return the allowed difference of readings from their estimates."""
+        return float(reach_of_strokes(limits.far, limits.rate, stamp - int(self._clock[CHECKED])))
 
     def of(
-        self, stamp: int, values: Array, before: Array, estimate: Array | None, rates: Array, settings: Settings
+        self, stamp: int, values: Array, before: Array, estimate: Array | None, rates: Array, limits: Limits
     ) -> tuple[Array, list[str]]:
         """Return the strokes for the model to take, and events; `must_restart` tells if the model can take them.
 
@@ -64,7 +62,7 @@ class StrokeCheck:
             m; None for the first sample of a run.
         rates : ndarray, shape (n,)
             Of the strokes, as estimated at the sample before, m/s.
-        settings : Settings
+        limits : Limits
 
         Returns
         -------
@@ -77,7 +75,7 @@ class StrokeCheck:
             self._jumped = np.full(len(values), NEVER)
             self._clock[CHECKED] = self._clock[TRUSTED] = stamp
             return values, []
-        limit = self._limit(stamp, settings)
+        limit = self._limit(stamp, limits)
         far = _are_far(values, estimate, limit)
         self._clock[CHECKED] = stamp
         if not far.any() and np.isfinite(values).all():
@@ -88,7 +86,9 @@ class StrokeCheck:
         self._before = stamp
         step = values - before
         jumps, is_onward = np.abs(step) > limit, step * (before - estimate) > 0.0
-        returned = jumps & (np.abs(values - estimate) <= limit + self._gone(stamp, rates))
+        returned = jumps & (
+            np.abs(values - estimate) <= limit + self._gone(stamp, USUAL_RATE * limits.rate + 2.0 * np.abs(rates))
+        )
         is_back = self._note_jumps(stamp, far, jumps, is_onward, returned)
         return self._doubted(stamp, values, far & ~is_back)
 
@@ -102,9 +102,9 @@ class StrokeCheck:
         return bool(jumped.any() and (self._before - self._jumped[jumped]).max() >= BELIEVED_AFTER)
 
     def _gone(self, stamp: int, rates: Array) -> Array:
-        """Return how far (m) each cylinder may have moved since its stroke jumped, shape (n,)."""
+        """Return how far each reading may have gone at these `rates` since it jumped, shape (n,)."""
         elapsed = np.where(self._jumped == NEVER, 0, stamp - self._jumped) * NANO
-        return np.asarray((USUAL_RATE + 2.0 * np.abs(rates)) * elapsed)
+        return np.asarray(rates * elapsed)
 
     def _note_jumps(self, stamp: int, far: Flags, jumps: Flags, is_onward: Flags, returned: Flags) -> Flags:
         """Update the record of strokes that jumped; return those that jumped back.

@@ -11,7 +11,7 @@ import numpy as np
 from ..config.settings import Settings
 from ..deviation.predictor import BoomPredictor
 from ..types import NANO, SECOND, Array, Sample
-from .regular import NOISE_REACH, SHORTEST_STEP
+from .regular import SHORTEST_STEP
 from .run import Run
 from .stamp_check import StampCheck
 from .state import Limits
@@ -36,22 +36,22 @@ def _largest_difference(strokes: Array, expected: Array) -> float:
     return float(np.fmax.reduce(np.abs(strokes - expected), initial=0.0))
 
 
-def _closeness(usual: float, settings: Settings) -> float:
-    """Return the allowed difference of strokes from their expected values, m.
+def _closeness(usual: float, limits: Limits) -> float:
+    """Return the allowed difference of strokes from their expected values.
 
     It is the noise plus a share of the largest motion in a usual interval (s).
     """
-    return float(NOISE_REACH * settings.stroke_variance**0.5 + SURPRISE * settings.stroke_rate * usual)
+    return float(limits.far + SURPRISE * limits.rate * usual)
 
 
-def _is_close(strokes: Array, expected: Array, usual: float, settings: Settings) -> bool:
+def _is_close(strokes: Array, expected: Array, usual: float, limits: Limits) -> bool:
     """Return True if strokes (m) are at their expected values."""
-    return _largest_difference(strokes, expected) <= _closeness(usual, settings)
+    return _largest_difference(strokes, expected) <= _closeness(usual, limits)
 
 
-def _is_continuous(boom: BoomPredictor, before: Array, strokes: Array, span: float, settings: Settings) -> bool:
+def _is_continuous(boom: BoomPredictor, before: Array, strokes: Array, span: float, limits: Limits) -> bool:
     """Return True if strokes (m) continue the newest sample `before`, extrapolated by `span` (s)."""
-    return _largest_difference(strokes, _nearest(boom, before, strokes, span)) <= _closeness(0.0, settings)
+    return _largest_difference(strokes, _nearest(boom, before, strokes, span)) <= _closeness(0.0, limits)
 
 
 def _nearest(boom: BoomPredictor, before: Array, strokes: Array, span: float) -> Array:
@@ -72,6 +72,7 @@ def _explain(
     apart: float,
     usual: float,
     settings: Settings,
+    limits: Limits,
 ) -> TimeStep:
     """Return the reason for a step of the stamps by `span` (s).
 
@@ -96,12 +97,12 @@ def _explain(
     first, later = strokes
     after = ((first, usual), (later, usual + apart))
     miss = max(_largest_difference(y, _nearest(boom, before, y, time)) for y, time in after)
-    fits = miss <= _closeness(usual, settings)
+    fits = miss <= _closeness(usual, limits)
     if not 0.0 < span <= settings.restart_gap:
         return TimeStep.CLOCK if fits else TimeStep.NEITHER
     if fits and CLEARER * miss < boom.least_way(min(max(span - usual, 0.0), LASTING_SPEED), MOVING):
         return TimeStep.CLOCK
-    reach = NOISE_REACH * settings.stroke_variance**0.5 + settings.stroke_rate * span
+    reach = limits.far + limits.rate * span
     if _largest_difference(first, boom.extrapolated(0.0)) <= reach:
         return TimeStep.EITHER if fits else TimeStep.PAUSE
     return TimeStep.NEITHER
@@ -150,20 +151,20 @@ def verdict_on(
     stamp, values = sample.stamp, zeroed(sample)
     span = stamp - run.newest
     if 0 <= span < SHORTEST_STEP:
-        return Verdict(Action.REFUSE, "duplicate" if _is_close(values, run.strokes, 0.0, settings) else "second source")
-    if line.is_soon(stamp) and _is_continuous(boom, run.strokes, values, span * NANO, settings):
+        return Verdict(Action.REFUSE, "duplicate" if _is_close(values, run.strokes, 0.0, limits) else "second source")
+    if line.is_soon(stamp) and _is_continuous(boom, run.strokes, values, span * NANO, limits):
         return Verdict(Action.FOLLOW)
     then = run.strokes_at(stamp)
     is_back = -settings.jump_back <= span * NANO < 0.0
     if then is not None and is_back and np.array_equal(then, values):
         return Verdict(Action.REFUSE, "late")
-    is_late = is_back and (then is None or _is_close(values, then, run.interval, settings))
+    is_late = is_back and (then is None or _is_close(values, then, run.interval, limits))
     event = line.hold(sample, "late" if is_late else "leap", _is_apart(sample, line, limits))
     if not line.is_confirmed(limits.gap if is_late or line.is_second else 0.0):
         return Verdict(Action.HOLD, event)
     (first, _), (later, _) = line.held[:2]
     step, apart = (first.stamp - run.newest) * NANO, (later.stamp - first.stamp) * NANO
-    why = _explain(boom, run.strokes, (zeroed(first), zeroed(later)), step, apart, line.usual * NANO or apart, settings)
+    why = _explain(boom, run.strokes, (zeroed(first), zeroed(later)), step, apart, line.usual * NANO or apart, settings, limits)
     is_recent = run.is_again and run.newest - run.epoch < SECOND
     is_in_time = 0 < first.stamp - run.newest <= limits.gap  # no clock and no pause: all strokes jumped at once
     needed = SECOND if is_recent or is_in_time or line.is_second else limits.gap

@@ -11,7 +11,7 @@ from ..config.settings import Settings
 from ..errors import UsageError
 from ..health.monitor import warm_up
 from ..scene.kinematics import strokes_of_angles
-from ..types import SECOND, Array, Health, Report, Sample, Stream
+from ..types import SECOND, Array, Health, Report, Sample, Stream, StrokeReading
 from .block_update import CAPACITY
 from .blocks import CODES, STREAMS, ReportBlock, SampleBlock, block_of
 from .loaded_model import LoadedModel
@@ -35,8 +35,8 @@ class Twin(SampleTaker):
     health : bool
         Judge the rig's health, see `Report.health`.
     reads : StrokeReading
-        What the stroke transducers read: the lengths of the cylinders, oil compressed, or, of sessions that were made before
-        version 0.2.0, their drives.
+        What drives the model: the lengths of the cylinders, oil compressed; of sessions that were made before version 0.2.0,
+        their drives; or, of a boom without stroke transducers, the angles of its joints.
     absent : collection of str
         Channels without a sensor, such as ``joint_3``: no reading of them is missed.
     doubted : collection of str
@@ -62,7 +62,7 @@ class Twin(SampleTaker):
 
     Notes
     -----
-    Everything predicted is a function of the accepted stroke samples alone; all other samples only give residuals, each
+    Everything predicted is a function of the accepted samples that drive the model alone; all others only give residuals, each
     against the prediction interpolated at its own stamp, in whatever order samples arrive.
     """
 
@@ -107,6 +107,9 @@ class Twin(SampleTaker):
             Too few residuals within the last second.
         """
         kind, _, number = sensor.rpartition("_")
+        if self.reads is StrokeReading.ANGLE and kind in ("cylinder", "joint"):
+            told = f"{sensor}: angles drive the model, and nothing else measures them"
+            raise UsageError(f"{told}. Set the zero of joint_{number} in the mapping.")
         if kind == "cylinder" and self.mounts[int(number) - 1] is not None:
             told = f"{sensor}: joint_{number} has an inclinometer, which feels every joint inboard"
             raise UsageError(f"{told}. Set the zero of {sensor} in the mapping.")
@@ -153,12 +156,13 @@ class Twin(SampleTaker):
     def warm_up(self) -> None:
         """Compile every kernel, with a temporary twin of the same boom."""
         other = Twin(self.scene, self.settings, reads=self.reads)
+        drive, beside = (self._drive, Stream.IMU) if self.reads is StrokeReading.ANGLE else (Stream.STROKES, Stream.ANGLES)
         middle = np.radians([sum(joint.range_deg) / 2 for joint in self.scene.joints])
-        strokes = strokes_of_angles(self.scene, middle)
+        driving = middle if self.reads is StrokeReading.ANGLE else strokes_of_angles(self.scene, middle)
         for k in range(20):
-            other.update(Sample(Stream.STROKES, k * 5_000_000, strokes))
-        other.update(Sample(Stream.ANGLES, 0, middle))
-        other.update(Sample(Stream.STROKES, 7_000_000, strokes))  # a late one is looked up among those before
+            other.update(Sample(drive, k * 5_000_000, driving))
+        other.update(Sample(beside, 0, middle[: len(self._channels[beside])]))
+        other.update(Sample(drive, 7_000_000, driving))  # a late one is looked up among those before
         if self.judge is not None:
             warm_up()
 
@@ -192,7 +196,7 @@ class Twin(SampleTaker):
         sample, self._judged = self._edge.checked(sample), judged
         if self._fault_twins is not None:
             self._fault_twins.reach(sample.stamp, self._failing)
-        if self._run is None or (self.requests.due and sample.stream is Stream.STROKES):
+        if self._run is None or (self.requests.due and sample.stream is self._drive):
             return self._told(sample, self._look_at(sample))
         reason = self._advance_one(sample)
         if reason == DONE:
@@ -262,7 +266,7 @@ class Twin(SampleTaker):
         found: list[ReportBlock | Report] = []
         block = SampleBlock(*map(np.ascontiguousarray, block, (np.int64, np.int64, float)))
         if not self._edge.is_sure:
-            self._edge.look_at(block.stamps[block.streams == CODES[Stream.STROKES]])
+            self._edge.look_at(block.stamps[block.streams == CODES[self._drive]])
         row, size, channels, self._judged = 0, len(block.stamps), self._widths, True
         while row < size:
             if self._run is not None and self._edge.is_sure and not self.requests.due:

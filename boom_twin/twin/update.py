@@ -29,7 +29,6 @@ from .state import (
     NEWEST,
     SLOT,
     STATUS,
-    STROKES,
     UNMATCHED,
     WAITING,
     new_row,
@@ -70,7 +69,7 @@ def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stam
     row = first
     while row < stamps.shape[0]:
         stamp, before = stamps[row], found.counts[1]
-        if streams[row] != STROKES:
+        if streams[row] != limits.drive:
             if not compare(limits, state, streams[row], stamp, values[row], row, trusted, found):
                 return ODD, row
             take_residuals(limits, state, p, f, before, found)
@@ -79,7 +78,7 @@ def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stam
         if not trusted:
             if not are_strokes_regular(f.strokes, limits, state, stamp, values[row]):
                 return ODD, row
-            note_stamp(state, STROKES, stamp)
+            note_stamp(state, limits.drive, stamp)
         state.clock[BEGINS_SLOT] = stamp // SLOT != state.clock[IN_SLOT]
         span = (stamp - state.clock[NEWEST]) * NANO
         status = step_lengths(t, boom, live, work, p, f, span, stamp, state.taken, limits.gravity, out)
@@ -89,10 +88,10 @@ def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stam
         end_step(state, stamp)
         give_prediction(t.clearances.shape[0], live, bending, out, limits, state, stamp, row, found)
         if span > 0.0:
-            give_innovations(f, state, stamp, row, found)
+            give_innovations(f, limits, state, stamp, row, found)
         results = results_in(out, state.strokes.shape[0], t.clearances.shape[0])
         past, at = state.past, keep_strokes(state, stamp)
-        write_expected_readings(p, f, live, results, limits.inclination, past.values[at], past.sigmas[at])
+        write_expected_readings(p, f, live, results, span, past.values[at], past.sigmas[at])
         flush_waiting(limits, state, row, found)
         take_residuals(limits, state, p, f, before, found)
         write_tip_estimate(p, f, results, found.estimates[found.counts[0] - 1])
@@ -120,7 +119,8 @@ def take_residuals(limits, state, p, f, first, found):
     """Correct the estimate by the residuals from row `first` on."""
     for k in range(first, found.counts[1]):
         stream = found.residual_streams[k]
-        take_sensor(p, f, stream, limits.first[stream], found.values[k], found.residual_stamps[k], state.clock[NEWEST])
+        if stream != limits.drive:
+            take_sensor(p, f, stream, limits.first[stream], found.values[k], found.residual_stamps[k], state.clock[NEWEST])
 
 
 # -- strokes --------------------------------------------------------------------------------------------------------------
@@ -158,9 +158,9 @@ def give_prediction(pins, live, bending, out, limits, state, stamp, row, found):
 
 
 @inner
-def give_innovations(f, state, stamp, row, found):
-    """Write the residuals of strokes against the prediction made before they were taken."""
-    k = new_residual(found, row, STROKES, stamp)
+def give_innovations(f, limits, state, stamp, row, found):
+    """Write the residuals of what drives the model against the prediction made before it was taken."""
+    k = new_residual(found, row, limits.drive, stamp)
     for i in range(state.taken.shape[0]):
         found.values[k, i], found.sigmas[k, i] = f.innovations[i, 0], math.sqrt(f.innovations[i, 1])
         found.raw[k, i] = state.taken[i]

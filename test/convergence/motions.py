@@ -41,7 +41,8 @@ def follow(scene, drive, angles, step, count, every=1, rho=RHO):
     lengths, rates, _ = drive(times)
     steps, counts = np.full(count // every, step), np.full(count // every, every, dtype=np.int64)
     status, _, _, _, _ = run(
-        plan.tables, state, work, steps, counts, lengths, rates, GENERALISED_ALPHA, rho, STEP_TOLERANCE, PASSES, None, rows[1:]
-    )
+        plan.tables, state, work, steps, counts, lengths, rates, np.zeros((0, 2)), GENERALISED_ALPHA, rho, STEP_TOLERANCE,
+        PASSES, None, rows[1:],
+    )  # fmt: skip
     assert status == 0
     return rows

@@ -63,8 +63,8 @@ class Closed:
     def _run(self, drives, rates):
         out, count = np.zeros((1, width_of(self.plan))), np.array([len(drives)])
         status, *_ = run(
-            self.plan.tables, self.state, self.work, np.array([self.step]), count, drives, rates, GENERALISED_ALPHA, RHO,
-            STEP_TOLERANCE, PASSES, None, out,
+            self.plan.tables, self.state, self.work, np.array([self.step]), count, drives, rates, np.zeros((0, 2)),
+            GENERALISED_ALPHA, RHO, STEP_TOLERANCE, PASSES, None, out,
         )  # fmt: skip
         assert status == 0, status
 

@@ -70,8 +70,9 @@ def stepped(start, step, count, every, drive=None, rho=RHO):
         lengths, rates = drive(step * np.arange(1, count + 1))
     steps, counts = np.full(count // every, step), np.full(count // every, every, dtype=np.int64)
     status, row, *_ = run(
-        plan.tables, state, work, steps, counts, lengths, rates, GENERALISED_ALPHA, rho, TOLERANCE, PASSES, None, rows[1:]
-    )
+        plan.tables, state, work, steps, counts, lengths, rates, np.zeros((0, 2)), GENERALISED_ALPHA, rho, TOLERANCE, PASSES,
+        None, rows[1:],
+    )  # fmt: skip
     assert status == 0, f"status {status} in row {row}"
     return taken_apart(plan, rows).tip
 

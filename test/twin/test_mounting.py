@@ -53,11 +53,20 @@ def test_an_inclined_base_is_in_the_reading(scene):
     assert is_turn(found[3] - prediction.tip_angle - 0.1)
 
 
-def test_an_inclinometer_at_the_tip_of_the_bundled_session(scene):
-    """The rig's own angle of the last head, from an independent code, with the noise of the session's encoders."""
+@pytest.mark.parametrize("mount", ["head", "head_compensated"])
+def test_an_inclinometer_at_the_tip_of_the_bundled_session(scene, mount):
+    """Angle of the last head and acceleration there, from an independent code, with the noise of the session's encoders.
+
+    One that is not compensated takes the direction of its specific force for the vertical: it is off by up to 8 deg.
+    """
     truth = np.genfromtxt(ARCH / "truth.csv.gz", delimiter=",", names=True)
+    read_angles = truth["tip_angle_rad"].copy()
+    if mount == "head":
+        sway = np.arctan2(truth["tip_ax_m_s2"], -scene.gravity[1] + truth["tip_ay_m_s2"])
+        assert np.degrees(np.abs(sway).max()) > 5.0
+        read_angles += sway
     noise = np.random.default_rng(5).normal(0.0, Settings().angle_sigma, len(truth))
-    twin, found = Twin(scene, Settings(), [None, None, None, "head"]), []
+    twin, found = Twin(scene, Settings(), [None, None, None, mount]), []
     rows = 4000
     for row, (_, _, msg) in zip(
         range(rows), read(scan(ARCH), {"cylinder_strokes": "sensor_msgs/msg/JointState"}), strict=False
@@ -65,7 +74,8 @@ def test_an_inclinometer_at_the_tip_of_the_bundled_session(scene):
         stamp = msg.header.stamp.sec * 10**9 + msg.header.stamp.nanosec
         twin.update(Sample(Stream.STROKES, stamp, msg.position))
         angles = np.full(4, np.nan)
-        angles[3] = truth["tip_angle_rad"][row] + noise[row]
+        angles[3] = read_angles[row] + noise[row]
         found += [residuals.normalised[3] for residuals in twin.update(Sample(Stream.ANGLES, stamp, angles)).residuals]
     assert len(found) == rows
-    assert abs(np.mean(found)) < 0.3 and 0.6 < np.std(found) < 1.15
+    least = 0.2 if mount == "head" else 0.6  # a share of the error by acceleration is stated as not known
+    assert abs(np.mean(found)) < 0.3 and least < np.std(found) < 1.15

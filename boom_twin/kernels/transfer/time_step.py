@@ -70,7 +70,10 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
     while done < TICKS:
         if part < TICKS:
             now = prepare(scheme.family, scheme.parameter, scheme.reach * part / TICKS, work.finer)
-        interpolate_drive(state, work, drive, drive_rate, scheme.reach, (done + part) / TICKS)
+        share = (done + part) / TICKS
+        interpolate_drive(state, work, drive, drive_rate, scheme.reach, share)
+        fx = work.load[0, 0] + share * (work.load[1, 0] - work.load[0, 0])
+        fy = work.load[0, 1] + share * (work.load[1, 1] - work.load[0, 1])
         start_step(now, history, work.hat, work.offset)
         predict(t, state, now.reach)
         if keep:
@@ -85,6 +88,8 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
             load_pins(t, state, work, motion)
             if product is None:
                 clear_cut(work, FREE)
+                work.p[0] -= fx
+                work.p[1] -= fy
                 solved, _, _ = sweep_in(t, state, work, motion, work.drive, work.drive_rate, ROOT, operations, FREE, condensed)
                 if solved == OK:
                     sweep_out(t, state, work, condensed, ROOT, operations, FREE)
@@ -243,7 +248,7 @@ def observe_pins(t, state, out):
 
 
 @kernel
-def run(t, state, work, steps, counts, drives, rates, family, parameter, tolerance, passes, product, out):
+def run(t, state, work, steps, counts, drives, rates, loads, family, parameter, tolerance, passes, product, out):
     """Follow drive lengths through many rows.
 
     Parameters
@@ -254,6 +259,8 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
         Number of such steps; `drives`, `rates` hold all of them one after the other.
     drives, rates : ndarray, shape (sum of counts, n)
         Drive lengths (m) and rates (m/s) at the end of every step, or where the scheme solves.
+    loads : ndarray, shape (sum of counts, 2)
+        Force at the tip (N) at the end of every step; without rows there is none. Before the first step it is ``work.load[1]``.
     family, parameter : int, float
         See `kernels.integrators.prepare`.
     product : Product or None
@@ -278,6 +285,9 @@ def run(t, state, work, steps, counts, drives, rates, family, parameter, toleran
             scheme = prepare(family, parameter, steps[row], work.weights)
         for _ in range(counts[row]):
             ax, ay = a[t.tip], a[t.tip + 1]
+            if loads.shape[0] > 0:
+                for i in range(2):
+                    work.load[0, i], work.load[1, i] = work.load[1, i], loads[at, i]
             status, count = advance_again(
                 t, state, work, scheme, drives[at], rates[at], tolerance, passes, LONGEST_INCREMENT, product, keep
             )

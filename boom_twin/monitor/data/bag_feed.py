@@ -27,7 +27,7 @@ from ...offline.session_samples import SessionSamples
 from ...scene.schema import Scene
 from ...twin.driver import Step, drive
 from ...twin.twin import Twin
-from ...types import NANO, Stream
+from ...types import NANO
 from .feed import Feed
 from .store import Store
 
@@ -100,8 +100,9 @@ def bag_feed(
     is_published = topics.outputs[PUBLISHED_OUTPUT].absolute in counts
     length = (session.end - session.start) * NANO
     store = Store(max(counts.values(), default=1), keeps_statuses=True)
-    if not is_published and topics.inputs[Stream.STROKES].absolute not in counts:
-        raise BagError(f"{path}: nothing to show. It needs strokes, or outputs of the twin.")
+    reads = given.strokes.reading
+    if not is_published and topics.inputs[reads.stream].absolute not in counts:
+        raise BagError(f"{path}: nothing to show. It needs {reads.named}, or outputs of the twin.")
     feed = BagFeed(_title(session, is_published), store, topics, given.scene, length * window.share(length))
     if is_published:
         feed.begin(_take_published(session, feed, topics, counts, window))

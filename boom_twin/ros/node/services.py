@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 from ...errors import UsageError
 from ...twin.adjustments import WHOLE
 from ...twin.twin import Twin
-from ...types import SENSORS, Change, Report
+from ...types import SENSORS, Change, Report, Stream, StrokeReading
 from ..runtime import Log
 
 PAUSE = 1.0
@@ -57,7 +57,8 @@ class Services:
     ) -> None:
         self._node, self._twin, self._is_active, self._catch_up = node, twin, is_active, catch_up
         numbers = range(1, twin.plan.joints + 1)
-        single = [kind.stem for kind in SENSORS.values() if not kind.ends]
+        driven = [SENSORS[Stream.STROKES], SENSORS[Stream.ANGLES]] if twin.reads is StrokeReading.ANGLE else []
+        single = [kind.stem for kind in SENSORS.values() if not kind.ends and kind not in driven]
         sensors = [f"{stem}_{number}" for stem in single for number in numbers] + list(WHOLE)
         acts: dict[str, Callable[[], str]] = {"reset": self._reset, "acknowledge": acknowledge}
         acts |= {f"rezero/{sensor}": partial(self._rezero, sensor) for sensor in sensors}

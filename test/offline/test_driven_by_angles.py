@@ -1,0 +1,128 @@
+"""Booms without stroke transducers: the bundled sessions, which are synthetic, with their strokes left out."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from boom_twin import Settings, Stream, Twin, load_scene, replay
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.session_files import write_samples
+from boom_twin.cli.main import main
+from boom_twin.errors import BagError
+from boom_twin.health.baseline import load_baseline
+from boom_twin.messages.mapping import load_mapping
+from boom_twin.messages.report_encoder import ReportEncoder
+from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
+from boom_twin.messages.topic_table import load_topics
+from boom_twin.messages.type_store import jazzy
+from boom_twin.offline.ground_truth import load_truth
+from boom_twin.types import Sample, StrokeReading
+
+BAGS = Path(__file__).parents[2] / "bags"
+MOST = {"arch_session": 2e-3, "pump_session": 3e-3}  # m
+
+
+def samples_of(session: Path, streams) -> list[Sample]:
+    inputs, decoder = load_topics().inputs, SampleDecoder(4)
+    names = {inputs[stream].absolute: stream for stream in streams}
+    there = {name: inputs[stream].type for name, stream in names.items() if scan(session).find(name)}
+    return [decoder.put(names[name], stamp_of(msg), msg) for name, _, msg in read(scan(session), there)]
+
+
+@pytest.fixture(scope="module")
+def mapping(tmp_path_factory):
+    path = tmp_path_factory.mktemp("mapping") / "angles.yaml"
+    path.write_text("drive: angles\n")
+    return path
+
+
+@pytest.fixture(scope="module", params=list(MOST))
+def without_strokes(request, tmp_path_factory):
+    folder, source = tmp_path_factory.mktemp("sessions") / request.param, BAGS / request.param
+    streams = [Stream.ANGLES, Stream.IMU]
+    write_samples(folder, samples_of(source, streams), streams, {"origin": "synthetic"})
+    shutil.copy(source / "truth.csv.gz", folder)
+    return folder
+
+
+def test_the_tip_follows_the_truth(without_strokes, mapping, tmp_path):
+    """Prediction from angles alone; the estimate with the IMU, and its stated deviation; joint residuals are innovations."""
+    found = replay(without_strokes, None, tmp_path / "out", mapping=mapping)
+    summary, truth, most = found.summary, load_truth(without_strokes), MOST[without_strokes.name]
+    assert summary["strokes"] == "angle" and summary["strokes_source"].endswith("angles.yaml, drive")
+    assert summary["samples"] == len(truth.times) and summary["dropped"] == 0 and summary["alarms"] == []
+    assert summary["tip_error_rms_m"] < 0.6 * most and summary["tip_estimate_error_rms_m"] < 0.6 * most
+    assert summary["tip_estimate_acceleration_error_rms_m_s2"] < 0.1
+    assert np.all(np.abs(np.array(summary["joint_residual_normalised_std"]) - 1.0) < 0.15)
+    assert np.all(np.abs(summary["joint_residual_normalised_mean"]) < 0.1)
+    estimates = found.recording.estimates
+    times = (estimates.stamps - estimates.stamps[0]) * 1e-9 + truth.times[0]
+    off = estimates.tip[:, :2] - truth.at(times, truth.position)
+    assert 0.6 < np.sqrt(np.mean(off**2 / estimates.tip_covariance[:, [0, 3]])) < 1.6
+    assert found.recording.of(Stream.STROKES).values.size == 0
+
+
+def test_a_replay_gives_what_the_node_does(without_strokes, mapping, tmp_path):
+    """A second of it, sample by sample as the node takes them, as the same bytes."""
+    replay(without_strokes, None, tmp_path / "out", mapping=mapping)
+    topics, store, scene = load_mapping(mapping, 4), jazzy(), load_scene()
+    live, decoder = Twin(scene, baseline=load_baseline(), reads=topics.stroke_reading), SampleDecoder(4, topics)
+    encoder, expected = ReportEncoder(scene, Settings()), []
+    wires = {
+        topic.absolute: (streams, topic) for name, streams in topics.heard.items() for topic in [topics.inputs[streams[0]]]
+    }
+    types = {name: topic.type for name, (_, topic) in wires.items() if scan(without_strokes).find(name)}
+    for name, log_time, msg in read(scan(without_strokes), types):
+        for sample in decoder.samples(wires[name][0], stamp_of(msg), msg):
+            for key, data in encoder.fill(live.update(sample)):
+                expected.append((topics.outputs[key].absolute, log_time, data))
+        if len(expected) > 2000:
+            break
+    kinds = {topic.absolute: topic.type for key, topic in topics.outputs.items() if key != "diagnostics"}
+    got = read(scan(tmp_path / "out" / "bag"), kinds)
+    for topic, _, data in expected:
+        name, _, msg = next(got)
+        assert (name, bytes(store.serialize_cdr(msg, kinds[name]))) == (topic, data)
+
+
+def test_without_the_mapping_the_remedy_is_told(without_strokes, mapping, tmp_path, capsys):
+    with pytest.raises(BagError, match=r"no strokes .*, but .* of /joint_angles.* write `drive: angles`"):
+        replay(without_strokes, None, tmp_path / "out")
+    assert main(["info", str(without_strokes)]) == 0 and "`drive: angles`" in capsys.readouterr().out
+    assert main(["info", str(without_strokes), "--mapping", str(mapping)]) == 0
+    told = capsys.readouterr().out
+    assert "replay     nothing is missing" in told and "are not read: angles drive the model" in told
+
+
+@pytest.mark.parametrize(("factor", "told"), [(180.0 / np.pi, "In degrees it would fit"), (-1.0, "its sensor can read")])
+def test_angles_that_do_not_fit_are_told(factor, told, mapping, tmp_path):
+    """A CSV file without strokes."""
+    angles = np.array([each.values for each in samples_of(BAGS / "arch_session", [Stream.ANGLES])[:400]])
+    rows = np.column_stack([0.005 * np.arange(len(angles)), factor * angles])
+    csv = tmp_path / "session.csv"
+    np.savetxt(csv, rows, delimiter=",", header="t_s," + ",".join(f"joint_{i}_rad" for i in range(1, 5)), comments="")
+    with pytest.raises(BagError, match=f"no angle sample could be used .* names joint_1..4.*{told}"):
+        replay(csv, None, tmp_path / "out", mapping=mapping)
+
+
+def test_a_boom_that_strokes_do_not_drive_leaves_them_out():
+    """Strokes that come all the same are counted; the zero of an angle that drives is none that a residual could give."""
+    twin = Twin(reads=StrokeReading.ANGLE)
+    angles, strokes = (samples_of(BAGS / "arch_session", [stream])[:50] for stream in (Stream.ANGLES, Stream.STROKES))
+    for one, other in zip(angles, strokes, strict=True):
+        assert twin.update(one).prediction is not None
+        assert not twin.update(other).accepted
+    assert twin.counts == {"not used": 50}
+    assert twin.update(Sample(Stream.ANGLES, angles[-1].stamp + 5_000_000, np.full(4, np.nan))).prediction is None
+
+
+def test_check_states_the_accuracy_beside_angles(capsys):
+    assert main(["check", "--drive", "angles", "--sensors", "imu", "--json"]) == 0
+    found = capsys.readouterr().out
+    assert '"accuracy_arch:angles only"' in found and '"accuracy_arch:imu"' in found
+    assert main(["check", "--drive", "angles", "--sensors", "angles"]) == 1
+    assert "they drive the model" in capsys.readouterr().err
