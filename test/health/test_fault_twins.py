@@ -46,8 +46,9 @@ def test_a_softer_part_is_named(tmp_path, capsys, cause):
     (alarm,) = alarms_of(tmp_path, stiffer(cause), "--causes")
     assert (alarm["cause"], alarm["kind"], alarm["channel"]) == (cause, "softer", cause.partition(".")[0])
     assert alarm["ranked"][0]["cause"] == cause and alarm["ranked"][0]["probability"] >= 0.95
-    told = capsys.readouterr().out
-    size = float(told.partition("k ")[2].partition(" % lower")[0])
+    assert sum(rank["probability"] for rank in alarm["ranked"]) == pytest.approx(1.0)
+    assert f"{alarm['told']} ({alarm['evidence']})" in capsys.readouterr().out
+    size = float(alarm["evidence"].split()[1])  # k 29 % lower (27 to 31)
     assert size == pytest.approx(100 * SOFTER, abs=10)
 
 

@@ -74,7 +74,7 @@ def test_faults_of_sensors_are_told_and_taken_back(rig: Rig) -> None:
     frozen = rig.values("sensor cylinder_2")
     assert float(frozen["unchanged_s"]) >= float(frozen["unchanged_s_error"]) == 1.0
     assert 0.0 < float(rig.values("sensor cylinder_3")["missing_share"]) < 0.5
-    assert rig.words("sensor cylinder_4") == alarm_text("cylinder_4", "range", None)
+    assert alarm_text("cylinder_4", "range", None) in rig.words("sensor cylinder_4")
     rig.until(lambda: levels() == [OK] * 4, lambda: send(False))
 
 
