@@ -1,13 +1,13 @@
 """Balances of energy and momentum along a motion.
 
-Energy: work of the drives and of a force at the tip = change of energy + what damping and contact take. Coriolis and centrifugal forces do no work, and
-neither do pins and links.
+Energy: work of the drives and of a force at the tip = change of energy + what damping and contact take. Coriolis and
+centrifugal forces do no work, and neither do pins and links.
 
-Momentum and its moment: change = impulse of weight, tip force and of what holds the boom. The base holds it in two pins, the pivot of
-section 1 and the barrel pin of cylinder 1. Their forces are what is left when all forces and inertia are swept from the tip to
-the base. All other pins, drives, beams, oil and contacts act between parts of the boom and cancel; a force that had no opposite
-would show here, though energy may balance. Linear momentum is of all mass points, moment of momentum of these about the pivot
-and of all that turns.
+Momentum and its moment: change = impulse of weight, of a force at the tip, and of what holds the boom. The base holds it in two
+pins, the pivot of section 1 and the barrel pin of cylinder 1. Their forces are what is left when all forces and inertia are
+swept from the tip to the base. All other pins, drives, beams, oil and contacts act between parts of the boom and cancel; one
+that had no opposite would show here, though energy may balance. Linear momentum is of all mass points, moment of momentum of
+these about the pivot and of all that turns.
 
 The gap of a balance is the error of the trapezoidal rule and of the time integration, which fall with the square of the step.
 Of energy it includes the numerical damping of generalised-alpha.

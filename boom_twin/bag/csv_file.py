@@ -105,7 +105,10 @@ def _columns_of(table: CsvTable) -> dict[Stream, list[str]]:
     }
     has_strokes = any(name in table.names for name in columns[Stream.STROKES])
     is_by_angles = not has_strokes and any(name in table.names for name in columns[Stream.ANGLES])
-    table.require([TIME, *columns[Stream.ANGLES if is_by_angles else Stream.STROKES]], " `boom_twin import` reads files with other headers.")
+    table.require(
+        [TIME, *columns[Stream.ANGLES if is_by_angles else Stream.STROKES]],
+        " `boom_twin import` reads files with other headers.",
+    )
     _refuse_unknown(table, [TIME, *(name for names in columns.values() for name in names)])
     return columns
 

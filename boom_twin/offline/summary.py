@@ -49,10 +49,7 @@ def summary_of(recording: Recording, counts: Counter[str], wall: float, file: Pa
 def _alarms(recording: Recording, first: int) -> list[dict[str, Any]]:
     """Return gaps, clock steps and health alarms in the order of their beginning; seconds since the stamp `first`."""
     drive = recording.reads.stream.value
-    gaps = [
-        Alarm(drive, "gap", start, end, None, f"for {(end - start) * NANO:.2f} s")
-        for start, end in recording.gaps
-    ]
+    gaps = [Alarm(drive, "gap", start, end, None, f"for {(end - start) * NANO:.2f} s") for start, end in recording.gaps]
     gaps += [
         Alarm(drive, "clock", start, start, None, f"stamps go on at {(end - first) * NANO:.3f} s")
         for start, end in recording.clock_sets

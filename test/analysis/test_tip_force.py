@@ -10,8 +10,8 @@ from oracle import booms
 from studies.clearance.scenes import treated, with_play
 
 from boom_twin import frequency_response, load_scene, simulate, statics
-from boom_twin.analysis.doubts import joint_doubts
 from boom_twin.analysis.balances import energy_balance, momentum_balance
+from boom_twin.analysis.doubts import joint_doubts
 from boom_twin.analysis.simulate import course_of
 from boom_twin.cli.main import main
 from boom_twin.errors import UsageError

@@ -13,7 +13,6 @@ from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_files import write_samples
 from boom_twin.cli.main import main
 from boom_twin.errors import BagError
-from boom_twin.health.baseline import load_baseline
 from boom_twin.messages.mapping import load_mapping
 from boom_twin.messages.report_encoder import ReportEncoder
 from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
@@ -70,7 +69,7 @@ def test_a_replay_gives_what_the_node_does(without_strokes, mapping, tmp_path):
     """A second of it, sample by sample as the node takes them, as the same bytes."""
     replay(without_strokes, None, tmp_path / "out", mapping=mapping)
     topics, store, scene = load_mapping(mapping, 4), jazzy(), load_scene()
-    live, decoder = Twin(scene, baseline=load_baseline(), reads=topics.stroke_reading), SampleDecoder(4, topics)
+    live, decoder = Twin(scene, health=True, reads=topics.stroke_reading), SampleDecoder(4, topics)
     encoder, expected = ReportEncoder(scene, Settings()), []
     wires = {
         topic.absolute: (streams, topic) for name, streams in topics.heard.items() for topic in [topics.inputs[streams[0]]]
