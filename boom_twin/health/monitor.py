@@ -110,7 +110,12 @@ class HealthMonitor:
         noise tells that its axes are wrong.
         """
         is_unknown = self._surveys[Stream.IMU].slow.weight.max() < KNOWN
-        return np.concatenate([self._masked(stream) | (stream is Stream.IMU and is_unknown) for stream in self._surveys])
+        return np.concatenate(
+            [
+                self._masked(stream) | self._wiring.doubted(stream) | (stream is Stream.IMU and is_unknown)
+                for stream in self._surveys
+            ]
+        )
 
     @property
     def failing_strokes(self) -> NDArray[np.bool_]:
@@ -119,7 +124,7 @@ class HealthMonitor:
 
     def _masked(self, stream: Stream) -> NDArray[np.bool_]:
         """Return which channels of a stream are not compared with the prediction."""
-        masked = self._sensors[stream].masked | self._wiring.masked(stream)
+        masked = self._sensors[stream].masked | self._wiring.wrong(stream)
         return masked | (stream is Stream.ANGLES and self._delay.alarm is not None)
 
     def judge(self, stamp: int, load: tuple[Array, Array], tip_sigmas: Callable[[], Array]) -> Health | None:

@@ -23,7 +23,6 @@ from .blocks import Block
 KIND = "wiring"  # kind of all its alarms
 CHECKS = 6, 20, 50, 100, 200, 400  # blocks after a start, at the end of which all of them are checked
 DELAY = 20  # blocks from a check until its answer is taken
-REMEDY = "It is not used. Record a session with moves, and run `boom_twin mapping --check` on it"
 
 
 class WiringMonitor:
@@ -57,6 +56,7 @@ class WiringMonitor:
         self._age, self._searched = 0, False
         self._search: tuple[int, Future[Checked | None]] | None = None
         self._wrong = {stream: np.zeros(len(names), bool) for stream, names in self._channels.items()}
+        self._doubted = {stream: np.zeros(len(names), bool) for stream, names in self._channels.items()}
         self._right = {stream: np.zeros(len(names), bool) for stream, names in self._channels.items()}
 
     @property
@@ -69,14 +69,21 @@ class WiringMonitor:
         """Return True if strokes are not read as declared, so that every prediction is wrong."""
         return bool(self._wrong[Stream.STROKES].any())
 
-    def masked(self, stream: Stream) -> NDArray[np.bool_]:
-        """Return the channels of a stream that must not be used, shape (channels,)."""
+    def wrong(self, stream: Stream) -> NDArray[np.bool_]:
+        """Return the channels of a stream that must not be compared with the prediction, shape (channels,)."""
         return self._wrong[stream] | self.has_wrong_strokes
+
+    def doubted(self, stream: Stream) -> NDArray[np.bool_]:
+        """Return the channels of a stream that are not read as declared, while it is looked for how, shape (channels,)."""
+        return self._doubted[stream]
 
     def explains(self, alarm: Alarm) -> bool:
         """Return True if an alarm of a single sensor is a consequence of its wiring."""
-        wrong = {name for stream, names in self._channels.items() for name in np.array(names)[self._wrong[stream]].tolist()}
-        return alarm.kind in {"range", "jump", "noise", "spikes"} and alarm.channel in wrong
+        channels = {name for stream, names in self._channels.items() for name in _chosen(names, self._all(stream))}
+        return alarm.kind in {"range", "jump", "noise", "spikes"} and alarm.channel in channels
+
+    def _all(self, stream: Stream) -> NDArray[np.bool_]:
+        return self._wrong[stream] | self._doubted[stream]
 
     def take(self, block: Block, strokes: Array, failing: Mapping[Stream, NDArray[np.bool_]]) -> list[Alarm]:
         """Take a block.
@@ -117,12 +124,13 @@ class WiringMonitor:
         found = check(self._scene, self._reads, self._declared, window, is_quick=True)
         if found is None:
             return
+        is_sound = not any(verdict.is_wrong for verdict in found.verdicts)
         for verdict in found.verdicts:
+            self._wrong[verdict.stream] &= not is_sound  # wrong strokes show in other sensors only
             place = self._channels[verdict.stream].index(verdict.channel)
-            self._wrong[verdict.stream][place] &= verdict.is_wrong
-            self._wrong[verdict.stream][place] |= verdict.is_wrong and not self._searched
+            self._doubted[verdict.stream][place] = verdict.is_wrong and not self._searched
             self._right[verdict.stream][place] |= not verdict.is_wrong
-        if any(verdict.is_wrong for verdict in found.verdicts):
+        if self._search is None and not is_sound:
             self._worker = self._worker or ThreadPoolExecutor(1, "wiring")
             search = self._worker.submit(check, self._scene, self._reads, self._declared, window)
             self._search = self._age + DELAY, search
@@ -140,6 +148,8 @@ class WiringMonitor:
     def _reported(self, found: Checked, end: int) -> list[Alarm]:
         """Begin and end alarms by the result of a search."""
         news, self._searched = list[Alarm](), True
+        for doubted in self._doubted.values():
+            doubted[:] = False
         for verdict in found.verdicts:
             is_wrong = (
                 verdict.is_wrong and verdict.is_explained and (verdict.has_no_gravity or verdict.best != verdict.declared)
@@ -149,18 +159,22 @@ class WiringMonitor:
             if is_wrong and (name not in self._last or (verdict.is_sure and name not in self._sure)):
                 cause = f"{name}.sensor"
                 since = self._last[name].since if name in self._last else self._blocks[0][0]
-                told = f"{cause} is wired otherwise than the mapping says: {likely(verdict)}. {REMEDY}"
-                self._last[name] = Alarm(name, KIND, since, None, cause, told, (Ranked(cause, 1.0, ()),))
+                evidence = f"not used; it reads as {likely(verdict)}"
+                self._last[name] = Alarm(name, KIND, since, None, cause, evidence, (Ranked(cause, 1.0, ()),))
                 self._sure |= {name} if verdict.is_sure else set()
                 news.append(self._last[name])
         return [*news, *self._ended(end)]
 
     def _ended(self, end: int) -> list[Alarm]:
         """End the alarms of channels that are read as declared by now."""
-        wrong = {name for stream, names in self._channels.items() for name in np.array(names)[self._wrong[stream]].tolist()}
+        wrong = {name for stream, names in self._channels.items() for name in _chosen(names, self._wrong[stream])}
         wrong |= {"tip_imu"} if self._wrong[Stream.IMU].any() else set()
         self._sure &= wrong
         return [replace(self._last.pop(name), until=end) for name in list(self._last) if name not in wrong]
+
+
+def _chosen(names: tuple[str, ...], chosen: NDArray[np.bool_]) -> list[str]:
+    return [name for name, is_chosen in zip(names, chosen.tolist(), strict=True) if is_chosen]
 
 
 def _means(raw: Array) -> Array:

@@ -40,6 +40,7 @@ from .readings import Channel, Table, Window, tables_of
 
 SURE = 7.0  # nats by which a reading of a channel has to be the best
 WRONG = 4.0  # nats a block, 2.8 standard deviations, above which a channel is not read as declared
+DOUBTFUL = 1.0  # nats a block from which on other ways to read it are compared: it may show in some postures only
 KEPT = 8  # explanations of strokes that are compared by all sensors
 MOVED = 0.03  # share of the largest stroke, from which on a change is a move
 STILL_WEIGHT, MOVED_WEIGHT = 1.0, 4.0  # independent postures among the blocks
@@ -157,12 +158,11 @@ class _Checker:
         self._scene, self._declared, self._tables, self._weight = scene, declared, tables, weight
         self._limit = weight * (MOST - WRONG) + ANY_ZERO  # nats that readings cost at most if a hypothesis explains them
         self._model = RestModel(scene, reads)
-        self._is_quick = True
+        self._is_quick = is_quick
         usual, cost = tuple(declared[Stream.STROKES]), self._declared_cost()
         self.found = [] if cost is None else [self._explained(usual, cost)]
         wrong = [any(part.wrong) for each in self.found for part in each.parts.values()]
         if not is_quick and (cost is None or cost > WRONG or any(wrong)):
-            self._is_quick = False
             found = [self._explained(strokes, prior) for strokes, prior in self._stroke_explanations().items()]
             self.found = sorted(found, key=lambda each: each.cost)
 
@@ -239,7 +239,7 @@ class _Checker:
         costs = declared_costs(stream, self._tables[stream], declared, expected, self._weight)
         is_known = {each.name for each in declared}.issuperset(names)
         wrong = [not is_known if cost is None else cost > WRONG * self._weight for cost in costs]
-        if self._is_quick or not any(wrong):
+        if self._is_quick or not any(cost is None or cost > DOUBTFUL * self._weight for cost in costs):
             total = sum(cost or 0.0 for cost in costs)
             return _Part(total, tuple(declared), tuple(wrong), tuple(not each for each in wrong), lambda j: np.inf)
         cube = cube_of()
@@ -259,6 +259,8 @@ class _Checker:
             alike = read_alike(cube, j, read)
             return min(extra + assigned(without(each, alike))[0] for extra, each in cases) - cost
 
+        for j, (read, own) in enumerate(zip(best, declared, strict=True)):
+            wrong[j] |= read not in (None, own) and explained[j] and margin(j) >= SURE
         return _Part(cost, tuple(best), tuple(wrong), tuple(explained), margin)
 
     def _gravity_part(self, ways: list[GravityHypothesis]) -> _Part:
@@ -276,13 +278,17 @@ class _Checker:
         for j, (own, read) in enumerate(zip(self._declared[Stream.STROKES], best.strokes, strict=True)):
             others = [each.cost - best.cost for each in self.found[1:] if each.strokes[j] != read]
             found.append(Verdict(Stream.STROKES, names[Stream.STROKES][j], own, read, min(others, default=np.inf), read != own))
+        unsettled = list[float]()  # margins of angles that are not known: they vouch for the strokes
         for stream, part in best.parts.items():
             for j, own in enumerate(self._declared[stream]):
                 rivals = [
                     each.cost - best.cost for each in self.found[1:]
                     if each.parts[stream].best[j] != part.best[j] and part.best[j] is not None
                 ]  # fmt: skip
-                margin = min([part.margin(j), *rivals])
+                margin = min([part.margin(j), *rivals, *(unsettled if stream is not Stream.ANGLES else ())])
                 flags = part.wrong[j], part.explained[j], part.has_no_gravity
                 found.append(Verdict(stream, names[stream][j], own, part.best[j], margin, *flags))
+            unsettled += [
+                each.margin for each in found if each.stream is stream is Stream.ANGLES and each.is_wrong and not each.is_sure
+            ]
         return tuple(found)

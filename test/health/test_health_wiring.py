@@ -40,7 +40,7 @@ def test_it_is_reported_and_not_used(case: str) -> None:
     found, right = run(rewired(stream, change, 8.0)), run(session(8.0))
     alarms = {(alarm.channel, alarm.kind, alarm.cause) for time, alarm in found.states() if time > 4.0}
     assert alarms == {(channel, "wiring", f"{channel}.sensor") for channel in channels}
-    assert any(told in alarm.told and "mapping --check" in alarm.told for _, alarm in found.states())
+    assert any(told in alarm.evidence and "mapping --check" in alarm.told for _, alarm in found.states())
     if stream is not Stream.STROKES:
         np.testing.assert_allclose(tips(found)[800:], tips(right)[800:], atol=6e-3)
 
