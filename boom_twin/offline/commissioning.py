@@ -196,11 +196,14 @@ def readings_of(session: Session, topics: Topics, joints: int, window: TimeWindo
                 stamps.append(stamp - delay)
                 values.append(value)
     found: dict[Stream, dict[str, Series]] = {stream: {} for stream in Stream}
-    known = {stream: [each.name for each in topics.sensors_of(stream, joints).values()] for stream in Stream}
+    known = {
+        stream: [each.name for channel, each in topics.sensors_of(stream, joints).items() if channel not in topics.absent]
+        for stream in Stream
+    }
     for (stream, key), (stamps, values) in columns.items():
         is_lacking = any((stream, name) not in columns for name in known[stream])
         others = {name for other in Stream if other is not stream for name in known[other]}
-        if key in known[stream] or SENSORS[stream].is_imu or (is_lacking and key not in others):
+        if key in known[stream] or (SENSORS[stream].is_imu and known[stream]) or (is_lacking and key not in others):
             order = np.argsort(stamps, kind="stable")
             found[stream][key] = Series(np.array(stamps, np.int64)[order], np.array(values, float)[order])
     return found
@@ -226,7 +229,7 @@ def _lags(twin: Twin, session: Session, topics: Topics, window: TimeWindow, foun
                 if isinstance(each, ReportBlock):
                     _collect(left, each.residuals)
     known = {v.stream for v in found.verdicts} - {v.stream for v in found.verdicts if v.is_wrong and not v.is_sure}
-    return {stream: _lag(raw[stream], left[stream]) for stream in known if stream is not Stream.STROKES and left[stream]}
+    return {each: _lag(raw[each], left[each]) for each in Stream if each in known and each is not Stream.STROKES and left[each]}
 
 
 def _collect(columns: dict[Stream, list[tuple[Array, Array]]], block: SampleBlock | Any) -> None:
