@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from ..scene.kinematics import stroke_curve
 from ..scene.schema import Scene
@@ -78,6 +77,8 @@ def misfit(off: Array, weight: float) -> Array:
 
 def assigned(costs: Array) -> tuple[float, dict[int, tuple[int, int, int]]]:
     """Return the least total of costs (n, names, hypotheses), and by channel the place of its name and hypothesis."""
+    from scipy.optimize import linear_sum_assignment  # its import takes longer than the check of a sound rig
+
     least = costs.min(axis=2)
     rows, columns = linear_sum_assignment(least)
     places = {int(j): (int(j), int(a), int(costs[j, a].argmin())) for j, a in zip(rows, columns, strict=True)}
@@ -259,6 +260,7 @@ def gravity_hypotheses(table: Table, declared: Sequence[Channel], expected: Expe
                     f = si(one, units, table.values[is_read, places[x]]) + 1j * si(two, units, table.values[is_read, places[z]])
                     spread = np.hypot(table.spreads[is_read, places[x]], table.spreads[is_read, places[z]]) * units[unit]
                     sigma = np.hypot(GRAVITY_ERROR, spread)
+                    f = f * np.exp(1j * one.turned)
                     cost = (UNIT if unit != declared[0].unit else 0.0) + (SIGN if min(flip_x, flip_z) < 0 else 0.0)
                     cost += NAME if (x, z) != (declared[0].name, declared[1].name) else 0.0
                     found.append(GravityHypothesis(cost + float(misfit(np.abs(f - right) / sigma, weight)), (one, two)))
