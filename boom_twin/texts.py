@@ -46,7 +46,9 @@ SENTENCES = {
     "jump": Sentence("{thing} jumped at once, as no boom can", "Check its mount; if it stays, set its zero"),
     "dropout": Sentence("{thing} gives no readings", "Check its cable, supply and driver"),
     "range": Sentence("{thing} reads what it cannot", "Check its unit, sign and zero in the mapping"),
-    "swapped": Sentence("{thing} and another one are exchanged", "Exchange their names in the mapping, or their cables"),
+    "wiring": Sentence(
+        "{thing} is wired otherwise than the mapping says", "Record slow moves, then run `boom_twin mapping --check`"
+    ),
     "late": Sentence("stamps of {thing} are late", "Correct their delay in the mapping"),
     "deviation": Sentence("{thing} does not fit the cylinder lengths", "Compare both at rest, then set the zero"),
     "deviation cylinder_force": Sentence(

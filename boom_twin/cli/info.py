@@ -29,11 +29,13 @@ def run(args: Namespace) -> int:
     """Read the session once and print its content."""
     from ..bag.inspect import inspect
     from ..bag.session_model import mapping_of, strokes_of
+    from ..offline.commissioning import wiring_of
 
     info = inspect(Path(args.bag), window_of(args))
     scene = open_session_scene(args.bag, args.scene)
     mapped = mapping_of(info.session.path, args.mapping)
     values = as_json(info, scene, mapped, strokes_of(info.session.path, mapped))
+    values["wiring"] = wiring_of(info.session.path, args.scene, args.mapping, window_of(args))
     print_result(args.json, values, as_text(info, scene, values))
     return 0
 
@@ -82,6 +84,7 @@ def as_json(info: BagInfo, scene: SessionScene, mapped: Mapped, strokes: Session
         "strokes": strokes.reading,
         "strokes_source": strokes.source,
         "scene_sha256": scene.sha256,
+        "wiring": None,
         "missing_for_replay": missing(info, topics, joints, scene.source),
         "remarks": remarks(info, topics),
     }
@@ -117,6 +120,7 @@ def as_text(info: BagInfo, scene: SessionScene, values: dict[str, Any]) -> list[
     lines += [f"note       {note}" for note in values["notes"] if not note.startswith("origin: ")]
     lines += [f"name       {sentence}" for sentence in values["names_extra"]]
     lines += [f"remark     {remark}" for remark in values["remarks"]]
+    lines += [f"wiring     {values['wiring']}"]
     lines += [f"missing    {sentence}" for sentence in values["missing_for_replay"]]
     lines += [] if values["missing_for_replay"] else ["replay     nothing is missing"]
     return [printable(line, keep="") for line in lines]

@@ -1,18 +1,94 @@
-"""`boom_twin mapping`: the default mapping of topics and sensors, with its comments."""
+"""`boom_twin mapping`: the default mapping of topics and sensors, or the one that a session's readings ask for."""
 
 from __future__ import annotations
 
 import sys
 from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .arguments import SESSION, add_json, add_mapping, add_session_scene, add_window, refuse_given, window_of
+
+if TYPE_CHECKING:
+    from ..offline.commissioning import Commissioning
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare no arguments."""
+    """Declare the arguments."""
+    parser.add_argument("--check", metavar="BAG", help=f"check how the sensors of a session are wired: {SESSION}")
+    add_session_scene(parser)
+    add_mapping(parser)
+    parser.add_argument("--out", type=Path, metavar="FILE", help="with --check: write the proposed mapping")
+    add_window(parser)
+    add_json(parser)
 
 
 def run(args: Namespace) -> int:
-    """Print the default mapping."""
+    """Print the default mapping, or check a session."""
+    if args.check is not None:
+        return _check(args)
+    remedy = "only with --check BAG; without it, the default mapping is printed. Add --check BAG."
+    refuse_given(args, remedy, "scene", "mapping", "out", "duration", "json")
     from ..messages.topic_table import DEFAULT_FILE
 
     sys.stdout.write(DEFAULT_FILE.read_text(encoding="utf-8"))
     return 0
+
+
+def _check(args: Namespace) -> int:
+    from ..config.yaml_text import whole_text
+    from ..offline.commissioning import commission
+    from ..system.atomic_files import check_target, write_atomic
+    from .output import print_result
+
+    if args.out is not None:
+        check_target(args.out, [Path(args.check)])
+    found = commission(args.check, args.scene, args.mapping, window_of(args))
+    text = whole_text(found.document) if found.has_proposal else ""
+    if args.out is not None and text:
+        write_atomic(args.out, text)
+    print_result(args.json, as_json(found, text), as_text(found, text, args.out))
+    return 0
+
+
+def as_json(found: Commissioning, text: str) -> dict[str, Any]:
+    """Return the result as a flat object; lists have an entry for each channel or stream."""
+    from ..wiring.words import finding, reading
+
+    verdicts, moved = found.checked.verdicts, found.checked.moved
+    return {
+        "channels": [each.channel for each in verdicts],
+        "declared": [reading(each.declared) for each in verdicts],
+        "found": [finding(each, moved) for each in verdicts],
+        "wrong": [each.is_wrong for each in verdicts],
+        "sure": [each.is_sure or not each.is_wrong for each in verdicts],
+        "lag_streams": [stream.value for stream in found.lags],
+        "lags_s": [lag.lag for lag in found.lags.values()],
+        "lag_sigmas_s": [lag.sigma for lag in found.lags.values()],
+        "strokes": found.reads and found.reads.value,
+        "mapping": text or None,
+    }
+
+
+def as_text(found: Commissioning, text: str, out: Path | None) -> list[str]:
+    """Return a table of all channels, of lags, and the proposed mapping."""
+    from ..wiring.words import finding, reading
+    from .output import columns
+
+    rows = [["channel", "declared as", "found"]]
+    rows += [[each.channel, reading(each.declared), finding(each, found.checked.moved)] for each in found.checked.verdicts]
+    rows += [[f"{stream.value}.delay", "", lag_words(lag.lag, lag.sigma)] for stream, lag in found.lags.items()]
+    told = "not determined by the encoders" if found.reads is None else f"are {found.reads.value}s"
+    lines = [*columns(rows, left=(0, 1, 2)), "", f"strokes {told}; declared as {found.declared_reads.value}s", ""]
+    if not text:
+        unknown = "; see the channels that are not as declared" if found.wrong else ""
+        return [*lines, f"nothing to propose{unknown}" if unknown else "wiring as expected: nothing to mend"]
+    where = f"written to {out}" if out is not None else "save it as a file, and give it by --mapping or `-p mapping:=FILE`"
+    return [*lines, f"# proposed mapping; {where}", *text.rstrip().splitlines()]
+
+
+def lag_words(lag: float, sigma: float) -> str:
+    """Return a lag in words."""
+    if sigma == float("inf"):
+        return "not determined: too little moved"
+    return f"{1e3 * lag:+.0f} +- {1e3 * sigma:.0f} ms against the strokes"

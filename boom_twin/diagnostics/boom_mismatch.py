@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from math import degrees, radians
-from operator import neg
 
 import numpy as np
 
-from ..types import Array, Report, Sample, Stream
+from ..health.wiring_monitor import KIND as WIRING
+from ..types import Array, Health, Report, Sample, Stream
 
 JUDGED_TIME = 5_000_000_000
 """Time (ns) over which angles are judged together."""
@@ -25,7 +25,7 @@ class OtherBoom:
 
     An encoder that stands still to the last bit may be dead, and tells nothing about the boom. One that is far off may be
     wrong. If more than half of them are, it is the scene. The test is made once, because a later difference is a
-    fault of the rig.
+    fault of the rig. If health says that sensors are wired otherwise than declared, it is not made.
 
     Attributes
     ----------
@@ -41,9 +41,15 @@ class OtherBoom:
 
     def took(self, sample: Sample, report: Report) -> str:
         """Take the `report` of `sample`; return why the session is of another boom, empty as long as nothing shows that."""
+        for part in report.all:
+            self.hear(part.health)
         values = [sample.values] if sample.stream is Stream.ANGLES else []
         found = [each.values for part in report.all for each in part.residuals if each.stream is Stream.ANGLES]
         return self.take(sample.stamp, values, found)
+
+    def hear(self, health: Health | None) -> None:
+        """Take the health of the rig: sensors that are wired otherwise explain what is off."""
+        self.is_judged |= health is not None and any(alarm.kind == WIRING for alarm in health.alarms)
 
     def take(self, stamp: int, values: Iterable[Array], residuals: Iterable[Array]) -> str:
         """Take rows of angles and of their residuals (n,) in rad up to a `stamp` (ns); return as `took`."""
@@ -72,17 +78,4 @@ class OtherBoom:
         if 2 * len(far) <= len(live):
             return ""
         told = ", ".join(f"joint_{i + 1} by {degrees(value):+.1f} deg" for i, value in far.items())
-        bound = f"{told} off what the strokes say, and at most {degrees(LARGEST_RESIDUAL):g} deg can be a fault of the rig"
-        return bound + _likely({i: (float(np.nanmedian(table[:, i])), value) for i, value in far.items()})
-
-
-def _likely(readings: Mapping[int, tuple[float, float]]) -> str:
-    """Return a remedy if the readings fit as degrees or with the other sign, else an empty text.
-
-    `readings` holds reading and residual (rad) by joint, 0-based.
-    """
-    for key, read in (("unit: deg", radians), ("sign: -1", neg)):
-        if all(abs(read(value) - (value - off)) < LARGEST_RESIDUAL for value, off in readings.values()):
-            mapping = f"sensors: {{joint_{min(readings) + 1}: {{{key}}}}}"
-            return f". With `{key}` they would fit: give by --mapping `{mapping}`, others likewise"
-    return ""
+        return f"{told} off what the strokes say, and at most {degrees(LARGEST_RESIDUAL):g} deg can be a fault of the rig"

@@ -10,21 +10,20 @@ from numpy.typing import NDArray
 from ..config.settings import Settings
 from ..scene.schema import Scene
 from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, StrokeReading, channels_of
-from .angle_reading import AngleReading
 from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows, PredictionRows
 from .causes import explains
 from .delay_monitor import DelayMonitor
 from .deviations import SIGMAS, DeviationMonitor
 from .fault_twins import FaultTwins
-from .force_reading import ForceReading
-from .imu_mount import KNOWN, ImuMount
 from .sensor_check import NOISE_OVER, SensorCheck, sensor_ranges
 from .sensor_monitor import SensorMonitor
 from .stream_readings import StreamReadings, StreamSurvey
 from .tip_load import TipLoadMonitor
+from .wiring_monitor import WiringMonitor
 
 PERIOD = 1_000_000_000  # ns between two `Health` without news
 UNCERTAIN = 2.0  # variances of a stroke reading; while a stroke is known worse, sensors are not compared with the prediction
+KNOWN = 0.25  # weight of the slow means of an IMU from which on it is used: after 0.6 s, once its wiring is checked
 MEASURED_NOISE = (Stream.STROKES, Stream.ANGLES)  # streams whose noise is reported: an IMU's is not told from vibration
 
 
@@ -70,8 +69,7 @@ class HealthMonitor:
         self._delay = DelayMonitor()
         compared = [stream for stream in SIGMAS if stream is not self._drive]
         self._deviations = {stream: DeviationMonitor(stream, scene, settings) for stream in compared}
-        self._mount, self._forces = ImuMount(), ForceReading(self._channels[Stream.FORCES])
-        self._angles, self._load = AngleReading(scene, mounts), TipLoadMonitor(settings.tip_load_limit)
+        self._wiring, self._load = WiringMonitor(scene, reads, mounts), TipLoadMonitor(settings.tip_load_limit)
         self._told = 0
         self.begin()
 
@@ -93,8 +91,7 @@ class HealthMonitor:
         for sensors in self._sensors.values():
             sensors.begin()
         self._delay.begin()
-        self._forces.begin()
-        self._angles.begin()
+        self._wiring.begin()
         self._load.begin()
 
     def predicted(self, followed: PredictionRows) -> None:
@@ -113,7 +110,12 @@ class HealthMonitor:
         noise tells that its axes are wrong.
         """
         is_unknown = self._surveys[Stream.IMU].slow.weight.max() < KNOWN
-        return np.concatenate([self._masked(stream) | (stream is Stream.IMU and is_unknown) for stream in self._surveys])
+        return np.concatenate(
+            [
+                self._masked(stream) | self._wiring.doubted(stream) | (stream is Stream.IMU and is_unknown)
+                for stream in self._surveys
+            ]
+        )
 
     @property
     def failing_strokes(self) -> NDArray[np.bool_]:
@@ -122,12 +124,8 @@ class HealthMonitor:
 
     def _masked(self, stream: Stream) -> NDArray[np.bool_]:
         """Return which channels of a stream are not compared with the prediction."""
-        masked = self._sensors[stream].masked
-        if stream is Stream.ANGLES:
-            return masked | self._angles.masked | (self._delay.alarm is not None)
-        if stream is Stream.FORCES and self._forces.alarms:
-            return masked | self._forces.masked
-        return masked | (stream is Stream.IMU and self._mount.alarm is not None)
+        masked = self._sensors[stream].masked | self._wiring.wrong(stream)
+        return masked | (stream is Stream.ANGLES and self._delay.alarm is not None)
 
     def judge(self, stamp: int, load: tuple[Array, Array], tip_sigmas: Callable[[], Array]) -> Health | None:
         """Judge the blocks that strokes with `stamp` (ns) complete; return None if there is nothing to report.
@@ -158,9 +156,9 @@ class HealthMonitor:
     def _lasting(self) -> Iterable[Alarm]:
         """Yield all alarms that last."""
         for sensors in self._sensors.values():
-            yield from (alarm for alarm in sensors.alarms if not self._angles.explains(alarm))
-        yield from (*self._angles.alarms, *self._forces.alarms)
-        yield from (alarm for alarm in (self._mount.alarm, self._delay.alarm, self._load.alarm) if alarm is not None)
+            yield from (alarm for alarm in sensors.alarms if not self._wiring.explains(alarm))
+        yield from self._wiring.alarms
+        yield from (alarm for alarm in (self._delay.alarm, self._load.alarm) if alarm is not None)
         named = [] if self.fault_twins is None else self.fault_twins.alarms
         for stream, deviations in self._deviations.items():
             yield from (alarm for alarm in deviations.alarms if not any(explains(each, stream, alarm) for each in named))
@@ -190,12 +188,9 @@ class HealthMonitor:
         """Compare readings with the prediction; `strokes` (n,) are means of the measured ones, m."""
         news = list[Alarm]()
         if self._drive is not Stream.ANGLES:
-            news += self._angles.take(readings[Stream.ANGLES], strokes, BLOCK * NANO, block.start, block.end)
-        if self._angles.has_wrong_strokes:
+            news += self._wiring.take(block, strokes, {stream: sensors.masked for stream, sensors in self._sensors.items()})
+        if self._wiring.has_wrong_strokes:
             return news
-        if not self._sensors[Stream.IMU].masked.any():
-            news += self._mount.take(readings[Stream.IMU], block.start, block.end)
-        news += self._forces.take(readings[Stream.FORCES], block.start, block.end)
         if self._drive is not Stream.ANGLES:
             news += self._delay.take(readings[Stream.ANGLES], self._sensors[Stream.ANGLES].masked, block)
         for stream, deviations in self._deviations.items():

@@ -115,8 +115,9 @@ class ReplayInputs:
         """Raise BagError if there is a `reason` for which the session is of another boom than the scene."""
         if reason:
             raise BagError(
-                f"{self.session.path}: {reason}. The scene ({self.kept.source}) is of another boom, or the sensors' zeros and "
-                "units are others: give the scene by --scene, or those by --mapping."
+                f"{self.session.path}: {reason}. The scene ({self.kept.source}) is of another boom, or the sensors are wired "
+                f"otherwise: give the scene by --scene, or the mapping that `boom_twin mapping --check {self.session.path}` "
+                "proposes by --mapping."
             )
 
 

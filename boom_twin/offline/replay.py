@@ -220,6 +220,8 @@ def replay_into(
             recording.add_samples(block)
             for each in found:
                 recording.add(each)
+                for health in [r.health for r in each.all] if isinstance(each, Report) else each.health.values():
+                    other_boom.hear(health)
             if put is not None:
                 put(found)
             if recording.is_empty:

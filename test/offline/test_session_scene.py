@@ -21,6 +21,7 @@ from boom_twin.cli.output import warn_incomplete
 from boom_twin.diagnostics.boom_mismatch import OtherBoom
 from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.scene.load import DEFAULT_NAME
+from boom_twin.types import Alarm, Health
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 FAULTY = "sections: []\n"
@@ -186,11 +187,11 @@ def test_the_bundled_session_keeps_the_default_scene():
     assert "synthetic" in str(as_document(BUNDLED)["origin"])
 
 
-@pytest.mark.parametrize(("factor", "key"), [(180.0 / np.pi, "unit: deg"), (-1.0, "sign: -1"), (3.0, None)])
-def test_angles_in_another_unit_are_told_with_it(factor, key):
+def test_angles_of_another_boom_are_told_unless_their_wiring_explains_them():
     right = np.array([1.04, -0.72, -0.88, -0.87]) + 1e-4 * np.random.default_rng(2).normal(size=(20, 4))
-    judge = OtherBoom()
-    judge.take(1, factor * right, factor * right - right)
-    told = judge.judge()
-    assert told.startswith("joint_1 by ") and ("would fit" in told) == (key is not None)
-    assert key is None or f"`sensors: {{joint_1: {{{key}}}}}`" in told
+    wired = Health(1, (Alarm("joint_1", "wiring", 0, None, "joint_1.sensor", "in degrees"),), np.zeros(2))
+    for health, is_told in ((None, True), (wired, False)):
+        judge = OtherBoom()
+        judge.hear(health)
+        judge.take(1, 3.0 * right, 2.0 * right)
+        assert judge.judge().startswith("joint_1 by ") == is_told

@@ -1,0 +1,184 @@
+"""Monitor of how sensors are wired: the commissioning check on the first seconds after a start, reported once.
+
+What is not read as declared is left out at once. Which name, unit, sign or zero it has is looked for in a thread; the answer is
+taken `DELAY` later, so a live node and a replay give it with the same sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scene.schema import Scene
+from ..types import SENSORS, Alarm, Array, Mount, Ranked, Stream, StrokeReading, channels_of
+from ..wiring.check import Checked, check
+from ..wiring.readings import Channel, Series, Window
+from ..wiring.words import channel_name, likely
+from .blocks import Block
+
+KIND = "wiring"  # kind of all its alarms
+CHECKS = 6, 20, 50, 100, 200, 400  # blocks after a start, at the end of which all of them are checked
+DELAY = 20  # blocks from a check until its answer is taken
+
+
+class WiringMonitor:
+    """Monitor of the wiring of all sensors.
+
+    Parameters
+    ----------
+    scene : Scene
+        With its load.
+    reads : StrokeReading
+        What stroke transducers read.
+    mounts : sequence of Mount or None
+        Of the angle sensors.
+    """
+
+    def __init__(self, scene: Scene, reads: StrokeReading, mounts: Sequence[Mount | None]) -> None:
+        self._scene, self._reads, self._channels = scene, reads, channels_of(len(scene.joints))
+        self._declared = {
+            stream: [Channel(name, SENSORS[stream].unit) for name in names] for stream, names in self._channels.items()
+        }
+        angles = self._declared[Stream.ANGLES]
+        self._declared[Stream.ANGLES] = [each._replace(absolute=at) for each, at in zip(angles, mounts, strict=True)]
+        self._last: dict[str, Alarm] = {}
+        self._sure: set[str] = set()
+        self._worker: ThreadPoolExecutor | None = None
+        self.begin()
+
+    def begin(self) -> None:
+        """Restart with the boom at rest; alarms last until the next check."""
+        self._blocks: list[tuple[int, Mapping[Stream, Array]]] = []
+        self._age, self._searched = 0, False
+        self._search: tuple[int, Future[Checked | None]] | None = None
+        self._wrong = {stream: np.zeros(len(names), bool) for stream, names in self._channels.items()}
+        self._doubted = {stream: np.zeros(len(names), bool) for stream, names in self._channels.items()}
+        self._right = {stream: np.zeros(len(names), bool) for stream, names in self._channels.items()}
+
+    @property
+    def alarms(self) -> tuple[Alarm, ...]:
+        """Alarms that last."""
+        return tuple(self._last.values())
+
+    @property
+    def has_wrong_strokes(self) -> bool:
+        """Return True if strokes are not read as declared, so that every prediction is wrong."""
+        return bool(self._wrong[Stream.STROKES].any())
+
+    def wrong(self, stream: Stream) -> NDArray[np.bool_]:
+        """Return the channels of a stream that must not be compared with the prediction, shape (channels,)."""
+        return self._wrong[stream] | self.has_wrong_strokes
+
+    def doubted(self, stream: Stream) -> NDArray[np.bool_]:
+        """Return the channels of a stream that are not read as declared, while it is looked for how, shape (channels,)."""
+        return self._doubted[stream]
+
+    def explains(self, alarm: Alarm) -> bool:
+        """Return True if an alarm of a single sensor is a consequence of its wiring."""
+        channels = {name for stream, names in self._channels.items() for name in _chosen(names, self._all(stream))}
+        return alarm.kind in {"range", "jump", "noise", "spikes"} and alarm.channel in channels
+
+    def _all(self, stream: Stream) -> NDArray[np.bool_]:
+        return self._wrong[stream] | self._doubted[stream]
+
+    def take(self, block: Block, strokes: Array, failing: Mapping[Stream, NDArray[np.bool_]]) -> list[Alarm]:
+        """Take a block.
+
+        Parameters
+        ----------
+        block : Block
+        strokes : ndarray, shape (n,)
+            Mean of the measured strokes, m.
+        failing : mapping of Stream to ndarray of bool
+            Channels that fail by themselves; they are left out once their wiring is known to be right.
+
+        Returns
+        -------
+        list of Alarm
+            Those that began or ended.
+        """
+        if self._age < CHECKS[-1]:
+            means = {Stream.STROKES: strokes}
+            for stream in self._wrong:
+                if stream is not Stream.STROKES and (rows := block.readings(stream)) is not None:
+                    means[stream] = np.where(failing[stream] & self._right[stream], np.nan, _means(rows.raw))
+            self._blocks.append((block.start, means))
+        self._age += 1
+        if self._age in CHECKS:
+            self._check()
+        if self._search is not None and self._age >= self._search[0]:
+            found, self._search = self._search[1].result(), None
+            return [] if found is None else self._reported(found, block.end)
+        return [] if self._search is not None or self._age not in CHECKS else self._ended(block.end)
+
+    def _check(self) -> None:
+        """Look for channels that are not read as declared; if there are any, begin the search for how they are read.
+
+        After the first search, only its successors say that further channels are wrong.
+        """
+        window = self._window()
+        found = check(self._scene, self._reads, self._declared, window, is_quick=True)
+        if found is None:
+            return
+        is_sound = not any(verdict.is_wrong for verdict in found.verdicts)
+        for verdict in found.verdicts:
+            self._wrong[verdict.stream] &= not is_sound  # wrong strokes show in other sensors only
+            place = self._channels[verdict.stream].index(verdict.channel)
+            self._doubted[verdict.stream][place] = verdict.is_wrong and not self._searched
+            self._right[verdict.stream][place] |= not verdict.is_wrong
+        if self._search is None and not is_sound:
+            self._worker = self._worker or ThreadPoolExecutor(1, "wiring")
+            search = self._worker.submit(check, self._scene, self._reads, self._declared, window)
+            self._search = self._age + DELAY, search
+
+    def _window(self) -> Window:
+        """Return the means of all blocks since the start by stream and channel."""
+        found: dict[Stream, dict[str, Series]] = {}
+        for stream, names in self._channels.items():
+            rows = [(start, means[stream]) for start, means in self._blocks if stream in means]
+            stamps = np.array([start for start, _ in rows], np.int64)
+            columns = np.array([values for _, values in rows]).reshape(len(rows), len(names)).T
+            found[stream] = {name: Series(stamps, column) for name, column in zip(names, columns, strict=True)}
+        return found
+
+    def _reported(self, found: Checked, end: int) -> list[Alarm]:
+        """Begin and end alarms by the result of a search."""
+        news, self._searched = list[Alarm](), True
+        for doubted in self._doubted.values():
+            doubted[:] = False
+        for verdict in found.verdicts:
+            is_wrong = (
+                verdict.is_wrong and verdict.is_explained and (verdict.has_no_gravity or verdict.best != verdict.declared)
+            )
+            self._wrong[verdict.stream][self._channels[verdict.stream].index(verdict.channel)] = is_wrong
+            name = channel_name(verdict)
+            if is_wrong and (name not in self._last or (verdict.is_sure and name not in self._sure)):
+                cause = f"{name}.sensor"
+                since = self._last[name].since if name in self._last else self._blocks[0][0]
+                evidence = f"not used; it reads as {likely(verdict)}"
+                self._last[name] = Alarm(name, KIND, since, None, cause, evidence, (Ranked(cause, 1.0, ()),))
+                self._sure |= {name} if verdict.is_sure else set()
+                news.append(self._last[name])
+        return [*news, *self._ended(end)]
+
+    def _ended(self, end: int) -> list[Alarm]:
+        """End the alarms of channels that are read as declared by now."""
+        wrong = {name for stream, names in self._channels.items() for name in _chosen(names, self._wrong[stream])}
+        wrong |= {"tip_imu"} if self._wrong[Stream.IMU].any() else set()
+        self._sure &= wrong
+        return [replace(self._last.pop(name), until=end) for name in list(self._last) if name not in wrong]
+
+
+def _chosen(names: tuple[str, ...], chosen: NDArray[np.bool_]) -> list[str]:
+    return [name for name, is_chosen in zip(names, chosen.tolist(), strict=True) if is_chosen]
+
+
+def _means(raw: Array) -> Array:
+    """Return the means of readings (k, channels); NaN of none."""
+    is_read = np.isfinite(raw)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(is_read, raw, 0.0).sum(axis=0) / is_read.sum(axis=0))

@@ -1,0 +1,292 @@
+"""Commissioning check of a recorded session: reads it by the names of its messages, and proposes the mapping that mends it."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..bag.reader import Session, read, scan
+from ..bag.session_model import mapping_of, scene_of, settings_of, strokes_of
+from ..bag.session_sheet import kept
+from ..bag.time_window import WHOLE, TimeWindow
+from ..config.yaml_text import plain, read_plain
+from ..errors import BagError, UsageError
+from ..messages.mapping import mapping_from
+from ..messages.topic_table import Sensor, Topics, usual
+from ..scene.edit import loaded
+from ..twin.blocks import CODES, ReportBlock, SampleBlock
+from ..twin.driver import drive_blocks
+from ..twin.twin import Twin
+from ..types import SENSORS, Array, Change, Stream, StrokeReading
+from ..wiring.check import Checked, Verdict, check
+from ..wiring.lag import Lag, lag_of
+from ..wiring.readings import Channel, Series, Window
+from ..wiring.words import finding
+from .session_samples import SessionSamples
+
+LOOK = 60.0  # s of a session that `wiring_of` reads
+LATE = 0.01  # s, smallest lag that is proposed as `delay`
+SIGMAS = 4.0  # standard deviations by which a lag, or a reading as drive or length, has to be told
+ZERO = math.radians(0.15)  # zeros of encoders
+AXES = "x", "y", "z"
+
+
+@dataclass(frozen=True)
+class Commissioning:
+    """Result of the check of a session.
+
+    Attributes
+    ----------
+    checked : Checked
+    document : dict
+        Keys of the mapping that mends what the check is sure of.
+    lags : dict of Stream to Lag
+        Lag of each stream against the strokes; empty if it was not asked for, or the strokes are not known.
+    declared_reads, reads : StrokeReading
+        What stroke transducers read as declared, and as told by the encoders; None if it cannot be told.
+    """
+
+    checked: Checked
+    document: dict[str, Any]
+    lags: Mapping[Stream, Lag]
+    declared_reads: StrokeReading
+    reads: StrokeReading | None
+
+    @property
+    def wrong(self) -> list[Verdict]:
+        """Channels that are not read as the mapping says."""
+        return [verdict for verdict in self.checked.verdicts if verdict.is_wrong]
+
+    @property
+    def late(self) -> dict[Stream, Lag]:
+        """Streams whose lag is proposed as a delay."""
+        return {stream: lag for stream, lag in self.lags.items() if is_late(lag)}
+
+    @property
+    def has_proposal(self) -> bool:
+        """Return True if a mapping is proposed."""
+        is_other = self.reads is not None and self.reads is not self.declared_reads
+        return bool(self.late) or is_other or any(verdict.is_sure for verdict in self.wrong)
+
+
+def wiring_of(bag: Path, scene: str | Path | None, mapping: Path | None, window: TimeWindow) -> str:
+    """Return one line on how the sensors of a session are wired, by its first `LOOK` seconds."""
+    duration = LOOK if window.duration is None else min(LOOK, window.duration)
+    try:
+        found = commission(bag, scene, mapping, TimeWindow(window.start, duration), with_lags=False)
+    except (BagError, UsageError) as error:
+        return f"not checked: {str(error).splitlines()[0]}"
+    if not found.wrong:
+        still = "" if found.checked.moved else f", as far as a boom tells that stands still for {duration:g} s"
+        return f"as expected{still}"
+    told = "; ".join(f"{each.channel} {finding(each, found.checked.moved)}" for each in found.wrong)
+    return f"{told}. `boom_twin mapping --check {bag}` proposes a mapping"
+
+
+def is_late(lag: Lag) -> bool:
+    """Return True if a lag is sure and large enough to be proposed."""
+    return abs(lag.lag) > max(LATE, SIGMAS * lag.sigma)
+
+
+def commission(
+    bag: str | Path,
+    scene: str | Path | None = None,
+    mapping: Path | None = None,
+    window: TimeWindow = WHOLE,
+    with_lags: bool = True,
+) -> Commissioning:
+    """Check how the sensors of a session are wired.
+
+    Parameters
+    ----------
+    bag : path
+    scene, mapping : path, optional
+        By default those of the session, else those of the package.
+    window : TimeWindow
+        Part of the session that is read.
+    with_lags : bool
+        Run the twin over the session, for the lags of the streams.
+
+    Raises
+    ------
+    BagError
+        The session cannot be read, or its messages do not name all cylinders.
+    UsageError
+        Scene or mapping have faults.
+    """
+    session = scan(Path(bag))
+    own = scene_of(session.path, scene)
+    joints = len(own.scene.joints)
+    mapped, document = mapping_of(session.path, mapping, joints), _document(session.path, mapping)
+    reads = strokes_of(session.path, mapped).reading
+    settings = settings_of(session.path).settings
+    series = readings_of(session, mapped.topics, joints, window)
+    found = check(loaded(own.scene, *settings.load), reads, declared(mapped.topics, joints), series)
+    if found is None:
+        lacking = f"{session.path}: no time in which all {joints} cylinders of the scene ({own.source}) have strokes"
+        raise BagError(f"{lacking}. Give the boom's scene by --scene.")
+    told = told_reading(found, reads)
+    _mend(document, found, None if told is reads else told)
+    lags: dict[Stream, Lag] = {}
+    if with_lags and all(v.is_sure or not v.is_wrong for v in found.verdicts if v.stream is Stream.STROKES):
+        topics = mapping_from(document, mapped.source, joints).of_joints(joint.range_deg for joint in own.scene.joints)
+        twin = Twin(own.scene, settings, topics.mounts(joints), reads=told or reads, absent=topics.absent)
+        lags = _lags(twin, session, topics, window, found)
+        for stream, lag in lags.items():
+            if is_late(lag):
+                delay = round(topics.inputs[stream].delay + lag.lag, 3)
+                document.setdefault("inputs", {}).setdefault(stream.value, {})["delay"] = delay
+    return Commissioning(found, document, lags, reads, told)
+
+
+def _document(session: Path, mapping: Path | None) -> dict[str, Any]:
+    """Return the content of the mapping that a session is read with; nothing for the package's own."""
+    if mapping is not None:
+        return dict(read_plain(mapping, UsageError, "Give a file like msg_config/topics.yaml.") or {})
+    own = kept(session, "mapping", "--mapping")
+    return {} if own is None else dict(plain(own.text) or {})
+
+
+def _mend(document: dict[str, Any], found: Checked, reads: StrokeReading | None) -> None:
+    """Write everything that a check is sure of into the content of a mapping."""
+    for verdict in found.verdicts:
+        if verdict.is_sure and verdict.best is not None:
+            mended = "none" if verdict.has_no_gravity else _sensor(verdict.channel, verdict.best)
+            document.setdefault("sensors", {})[verdict.channel] = mended
+    if reads is not None:
+        document.setdefault("inputs", {}).setdefault(Stream.STROKES.value, {})["reads"] = reads.value
+
+
+def _sensor(channel: str, way: Channel) -> dict[str, Any]:
+    """Return the keys of a sensor that differ from the usual ones."""
+    least = Sensor(**usual(channel)).model_dump()
+    values = way._replace(zero=float(f"{way.zero:.6g}"))._asdict()
+    return {key: values[key] for key, value in least.items() if values[key] != value}
+
+
+def declared(topics: Topics, joints: int) -> dict[Stream, list[Channel]]:
+    """Return how a mapping reads every channel."""
+
+    def channel(sensor: Sensor) -> Channel:
+        return Channel(sensor.name, sensor.unit, sensor.sign, sensor.zero, sensor.scale, sensor.absolute)
+
+    return {stream: [channel(each) for each in topics.sensors_of(stream, joints).values()] for stream in Stream}
+
+
+def readings_of(session: Session, topics: Topics, joints: int, window: TimeWindow = WHOLE) -> Window:
+    """Return the readings of a session by the names of its messages.
+
+    Names that the mapping does not have are taken if it names a sensor that is in no message.
+    """
+    heard = {name: streams for name, streams in topics.heard.items() if (topic := session.find(name)) and topic.count}
+    types = {name: topics.inputs[streams[0]].type for name, streams in heard.items()}
+    columns: dict[tuple[Stream, str], tuple[list[int], list[float]]] = defaultdict(lambda: ([], []))
+    for name, _, message in read(session, types, window):
+        stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
+        for stream in heard[name]:
+            delay = topics.delay(stream)
+            for key, value in _values(message, stream):
+                stamps, values = columns[stream, key]
+                stamps.append(stamp - delay)
+                values.append(value)
+    found: dict[Stream, dict[str, Series]] = {stream: {} for stream in Stream}
+    known = {
+        stream: [each.name for channel, each in topics.sensors_of(stream, joints).items() if channel not in topics.absent]
+        for stream in Stream
+    }
+    for (stream, key), (stamps, values) in columns.items():
+        is_lacking = any((stream, name) not in columns for name in known[stream])
+        others = {name for other in Stream if other is not stream for name in known[other]}
+        if key in known[stream] or (SENSORS[stream].is_imu and known[stream]) or (is_lacking and key not in others):
+            order = np.argsort(stamps, kind="stable")
+            found[stream][key] = Series(np.array(stamps, np.int64)[order], np.array(values, float)[order])
+    return found
+
+
+def _values(message: Any, stream: Stream) -> list[tuple[str, float]]:
+    """Return names and readings of a message."""
+    if SENSORS[stream].is_imu:
+        return [(axis, float(getattr(message.linear_acceleration, axis))) for axis in AXES]
+    return list(zip(message.name, map(float, getattr(message, SENSORS[stream].field)), strict=False))
+
+
+def _lags(twin: Twin, session: Session, topics: Topics, window: TimeWindow, found: Checked) -> dict[Stream, Lag]:
+    """Return the lags of the streams against what the strokes make a twin expect."""
+    wanted = [name for name in topics.heard if (topic := session.find(name)) is not None and topic.count]
+    raw: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
+    left: dict[Stream, list[tuple[Array, Array]]] = defaultdict(list)
+    items = SessionSamples(session, topics, wanted, len(twin.mounts), window)
+    for step in drive_blocks(twin, (item for item in items if not isinstance(item, Change))):
+        if step is not None:
+            _collect(raw, step[0])
+            for each in step[1]:
+                if isinstance(each, ReportBlock):
+                    _collect(left, each.residuals)
+    known = {v.stream for v in found.verdicts} - {v.stream for v in found.verdicts if v.is_wrong and not v.is_sure}
+    return {each: _lag(raw[each], left[each]) for each in Stream if each in known and each is not Stream.STROKES and left[each]}
+
+
+def _collect(columns: dict[Stream, list[tuple[Array, Array]]], block: SampleBlock | Any) -> None:
+    """Append the rows of every stream: stamps and values."""
+    for stream, code in CODES.items():
+        own = block.streams == code
+        if own.any():
+            columns[stream].append((block.stamps[own], block.values[own]))
+
+
+def _lag(raw: Sequence[tuple[Array, Array]], left: Sequence[tuple[Array, Array]]) -> Lag:
+    """Return the lag of a stream by its readings and their residuals."""
+    (stamps, values), (own, residuals) = (
+        (np.concatenate([each[0] for each in rows]), np.concatenate([each[1] for each in rows])) for rows in (raw, left)
+    )
+    common, here, there = np.intersect1d(stamps, own, return_indices=True)
+    read, off = values[here], residuals[there]
+    is_read = np.isfinite(read).any(axis=0) & np.isfinite(off).any(axis=0)
+    width = min(read.shape[1], off.shape[1])
+    whole = np.isfinite(off[:, :width][:, is_read[:width]]).all(axis=1)
+    if whole.sum() < 2 or not is_read.any():
+        return Lag(0.0, math.inf)
+    columns = np.flatnonzero(is_read[:width])
+    read, off = read[whole][:, columns], off[whole][:, columns]
+    return lag_of(common[whole], read, read - off)
+
+
+def told_reading(found: Checked, reads: StrokeReading) -> StrokeReading | None:
+    """Return what stroke transducers read by the encoders; None if it cannot be told."""
+    table, own = found.tables.get(Stream.ANGLES), [v for v in found.verdicts if v.stream is Stream.ANGLES]
+    if table is None or any(v.is_wrong and not v.is_sure for v in found.verdicts if v.stream is not Stream.IMU):
+        return None
+    units, turns, off = SENSORS[Stream.ANGLES].units, list[Array](), list[Array]()
+    for j, verdict in enumerate(own):
+        way = verdict.best
+        if way is None or way.absolute is not None or way.name not in table.names:
+            continue
+        angle = way.sign * way.scale * units[way.unit] * (table.values[:, table.names.index(way.name)] - way.zero)
+        rest = angle - found.expected.angles[None][:, j]
+        off.append(np.remainder(rest + math.pi, math.tau) - math.pi)
+        turns.append(found.expected.compression[:, j])
+    return _reading_by(np.array(turns), np.array(off), reads)
+
+
+def _reading_by(turns: Array, off: Array, reads: StrokeReading) -> StrokeReading | None:
+    """Return what transducers read by residuals of encoders (joints, blocks), rad; None if that is not sure.
+
+    They are `turns` if drives are read as lengths, and minus that if lengths are read as drives.
+    """
+    if not len(off):
+        return None
+    right, by = np.nanmean(off, axis=1), np.nanmean(turns, axis=1)
+    weight = float((by**2).sum())
+    share, sigma = float((right * by).sum()) / max(weight, 1e-300), ZERO / max(weight, 1e-300) ** 0.5
+    rest = float(np.abs(right - share * by).max())
+    other = StrokeReading.DRIVE if reads is StrokeReading.LENGTH else StrokeReading.LENGTH
+    shares = {reads: 0.0, other: 1.0 if reads is StrokeReading.LENGTH else -1.0}
+    near = min(shares, key=lambda each: abs(share - shares[each]))
+    is_sure = SIGMAS * sigma < 0.5 * abs(shares[other]) and abs(share - shares[near]) < SIGMAS * sigma and rest < 3.0 * ZERO
+    return near if is_sure else None

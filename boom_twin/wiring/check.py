@@ -1,0 +1,294 @@
+"""Commissioning check of a window of readings: what is wired as declared, what is not, and the declaration that mends it.
+
+An explanation says how every stroke is read. It gives the strokes, hence the boom at rest, hence what all other sensors should
+read. The explanation with the least cost wins. A channel is determined if every explanation and hypothesis that reads it in
+another way costs `SURE` nats more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from ..scene.schema import Scene
+from ..types import SENSORS, Stream, StrokeReading, channels_of
+from .expected import Expected, RestModel
+from .hypotheses import (
+    ANY_ZERO,
+    MOST,
+    SIGN,
+    UNIT,
+    Cube,
+    Encoders,
+    GravityHypothesis,
+    angle_cube,
+    assigned,
+    common_costs,
+    declared_costs,
+    force_cube,
+    gravity_hypotheses,
+    read_alike,
+    si,
+    stroke_cube,
+    without,
+)
+from .readings import Channel, Table, Window, tables_of
+
+SURE = 7.0  # nats by which a reading of a channel has to be the best
+WRONG = 4.0  # nats a block, 2.8 standard deviations, above which a channel is not read as declared
+DOUBTFUL = 1.0  # nats a block from which on other ways to read it are compared: it may show in some postures only
+KEPT = 8  # explanations of strokes that are compared by all sensors
+MOVED = 0.03  # share of the largest stroke, from which on a change is a move
+STILL_WEIGHT, MOVED_WEIGHT = 1.0, 4.0  # independent postures among the blocks
+Declared = Mapping[Stream, Sequence[Channel]]
+
+
+class Verdict(NamedTuple):
+    """Result about one channel.
+
+    Attributes
+    ----------
+    stream : Stream
+    channel : str
+    declared : Channel
+    best : Channel or None
+        How it is read; None if no hypothesis explains its readings.
+    margin : float
+        Nats by which other ways of reading are less likely.
+    is_wrong : bool
+        True if it is not read as declared.
+    is_explained : bool
+        True if `best` explains the readings.
+    has_no_gravity : bool
+        True if the driver of an IMU has taken gravity out.
+    """
+
+    stream: Stream
+    channel: str
+    declared: Channel
+    best: Channel | None
+    margin: float
+    is_wrong: bool
+    is_explained: bool = True
+    has_no_gravity: bool = False
+
+    @property
+    def is_sure(self) -> bool:
+        """Return True if `best` mends the channel."""
+        return self.is_wrong and self.is_explained and self.best is not None and self.margin >= SURE
+
+
+class Checked(NamedTuple):
+    """Result of a check: `moved` is False if the boom stood still; `expected` is that of the strokes as they are read best."""
+
+    verdicts: tuple[Verdict, ...]
+    moved: bool
+    expected: Expected
+    tables: Mapping[Stream, Table]
+
+
+class _Part(NamedTuple):
+    """Best readings of one stream under an explanation.
+
+    `cost` in nats; by channel how it is read, and flags of `Verdict`. `margin` gives that of a channel (0-based).
+    """
+
+    cost: float
+    best: tuple[Channel | None, ...]
+    wrong: tuple[bool, ...]
+    explained: tuple[bool, ...]
+    margin: Callable[[int], float]
+    has_no_gravity: bool = False
+
+
+@dataclass(frozen=True)
+class _Explanation:
+    strokes: tuple[Channel, ...]
+    expected: Expected
+    parts: Mapping[Stream, _Part]
+    cost: float
+
+
+def check(scene: Scene, reads: StrokeReading, declared: Declared, window: Window, is_quick: bool = False) -> Checked | None:
+    """Check how the sensors of a rig are read.
+
+    Parameters
+    ----------
+    scene : Scene
+        With its load.
+    reads : StrokeReading
+        What stroke transducers read.
+    declared : mapping of Stream to sequence of Channel
+        How every channel is read now, in the order of the channels.
+    window : mapping of Stream to mapping of str to Series
+        Readings by name; of an IMU by axis. Strokes are needed.
+    is_quick : bool
+        Tell only what is not read as declared, and not how it is read.
+
+    Returns
+    -------
+    Checked or None
+        None if there is no block in which every stroke was read, or no explanation at all.
+    """
+    tables = {stream: table for stream, table in tables_of(window).items() if len(table.names)}
+    strokes = tables.get(Stream.STROKES)
+    if strokes is None or not len(strokes.values) or len(strokes.names) < len(scene.joints):
+        return None
+    moved = bool((np.ptp(strokes.values, axis=0) > MOVED * np.abs(strokes.values).max()).any())
+    checker = _Checker(scene, reads, declared, tables, MOVED_WEIGHT if moved else STILL_WEIGHT, is_quick)
+    return Checked(checker.verdicts(), moved, checker.found[0].expected, tables) if checker.found else None
+
+
+class _Checker:
+    """Comparison of explanations."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        reads: StrokeReading,
+        declared: Declared,
+        tables: Mapping[Stream, Table],
+        weight: float,
+        is_quick: bool,
+    ) -> None:
+        self._scene, self._declared, self._tables, self._weight = scene, declared, tables, weight
+        self._limit = weight * (MOST - WRONG) + ANY_ZERO  # nats that readings cost at most if a hypothesis explains them
+        self._model = RestModel(scene, reads)
+        self._is_quick = is_quick
+        usual, cost = tuple(declared[Stream.STROKES]), self._declared_cost()
+        self.found = [] if cost is None else [self._explained(usual, cost)]
+        wrong = [any(part.wrong) for each in self.found for part in each.parts.values()]
+        if not is_quick and (cost is None or cost > WRONG or any(wrong)):
+            found = [self._explained(strokes, prior) for strokes, prior in self._stroke_explanations().items()]
+            self.found = sorted(found, key=lambda each: each.cost)
+
+    def _declared_cost(self) -> float | None:
+        """Return the prior cost of the strokes as declared; None if a name is in no message."""
+        table, declared = self._tables[Stream.STROKES], self._declared[Stream.STROKES]
+        if any(each.name not in table.names for each in declared):
+            return None
+        plain = stroke_cube(table, declared, self._scene, None, self._weight)
+        costs = common_costs(plain, None, False)
+        own = {j: (j, table.names.index(each.name)) for j, each in enumerate(declared)}
+        return sum(float(costs[at]) for at, each in plain.channels.items() if own[at[0]] == at[:2] and each == declared[at[0]])
+
+    def _common(self, stream: Stream) -> list[tuple[float, int | None, bool]]:
+        """Return prior cost, unit and reversal that the sensors of a stream may have in common."""
+        units, own = list(SENSORS[stream].units), self._declared[stream][0].unit
+        ways = product((None, *range(len(units))), (False,) if stream is Stream.STROKES else (False, True))
+        return [
+            ((0.0 if unit is None or units[unit] == own else UNIT) + (SIGN if is_reversed else 0.0), unit, is_reversed)
+            for unit, is_reversed in ways
+        ]
+
+    def _stroke_explanations(self) -> dict[tuple[Channel, ...], float]:
+        """Return the ways to read the strokes that go best with travels and encoders, with their prior costs."""
+        table, declared = self._tables[Stream.STROKES], self._declared[Stream.STROKES]
+        angles, encoders = self._tables.get(Stream.ANGLES), self._declared[Stream.ANGLES]
+        if any(each.absolute for each in encoders):
+            angles = None
+        found = dict[tuple[Channel, ...], tuple[float, float]]()
+        if (prior := self._declared_cost()) is not None:
+            found[tuple(declared)] = -np.inf, prior
+        plain = stroke_cube(table, declared, self._scene, None, self._weight)
+        cubes = [plain]
+        if angles is not None:
+            order = (Encoders(angles, encoders, is_in_order) for is_in_order in (True, False))
+            cubes += [stroke_cube(table, declared, self._scene, each, self._weight) for each in order]
+        for extra, unit, _ in self._common(Stream.STROKES):
+            priors = common_costs(plain, unit, False)
+            for cube in cubes:
+                costs = common_costs(cube, unit, False)
+                best = assigned(costs)
+                others = (assigned(without(costs, read_alike(cube, j, cube.channels[at]))) for j, at in best[1].items())
+                for total, chosen in (best, *others):
+                    if len(chosen) < len(declared) or not all(at in cube.channels for at in chosen.values()):
+                        continue
+                    strokes = tuple(cube.channels[chosen[j]] for j in range(len(declared)))
+                    if total + extra < found.get(strokes, (np.inf, 0.0))[0]:
+                        found[strokes] = total + extra, extra + sum(float(priors[at]) for at in chosen.values())
+        kept = sorted(found.items(), key=lambda item: item[1][0])[: KEPT + 1]
+        return {strokes: prior for strokes, (_, prior) in kept}
+
+    def _explained(self, strokes: tuple[Channel, ...], prior: float) -> _Explanation:
+        """Return an explanation with the best readings of all other sensors."""
+        table, units = self._tables[Stream.STROKES], SENSORS[Stream.STROKES].units
+        columns = [si(each, units, table.values[:, table.names.index(each.name)]) for each in strokes]
+        expected = self._model.expected(np.column_stack(columns))
+        parts: dict[Stream, _Part] = {}
+        if (angles := self._tables.get(Stream.ANGLES)) is not None:
+            own = self._declared[Stream.ANGLES]
+            parts[Stream.ANGLES] = self._part(Stream.ANGLES, expected, lambda: angle_cube(angles, own, expected, self._weight))
+        if (forces := self._tables.get(Stream.FORCES)) is not None:
+            of_forces = self._declared[Stream.FORCES]
+            parts[Stream.FORCES] = self._part(
+                Stream.FORCES, expected, lambda: force_cube(forces, of_forces, expected, self._weight)
+            )
+        imu, axes = self._tables.get(Stream.IMU), self._declared[Stream.IMU]
+        if imu is not None and axes and all(each.name in imu.names for each in axes):
+            parts[Stream.IMU] = self._gravity_part(gravity_hypotheses(imu, axes, expected, self._weight))
+        return _Explanation(strokes, expected, parts, prior + sum(part.cost for part in parts.values()))
+
+    def _part(self, stream: Stream, expected: Expected, cube_of: Callable[[], Cube]) -> _Part:
+        """Return the best readings of a stream, over what all its sensors may have in common."""
+        declared, names = self._declared[stream], self._tables[stream].names
+        costs = declared_costs(stream, self._tables[stream], declared, expected, self._weight)
+        is_known = {each.name for each in declared}.issuperset(names)
+        wrong = [not is_known if cost is None else cost > WRONG * self._weight for cost in costs]
+        if self._is_quick or not any(cost is None or cost > DOUBTFUL * self._weight for cost in costs):
+            total = sum(cost or 0.0 for cost in costs)
+            return _Part(total, tuple(declared), tuple(wrong), tuple(not each for each in wrong), lambda j: np.inf)
+        cube = cube_of()
+        cases = [(extra, common_costs(cube, unit, is_reversed)) for extra, unit, is_reversed in self._common(stream)]
+        solved = [(extra + (found := assigned(each))[0], number, found[1]) for number, (extra, each) in enumerate(cases)]
+        cost, number, places = min(solved, key=lambda each: each[:2])
+        is_common = cases[number][0] > 0.0
+        best = [cube.channels[places[j]] if j in places else None for j in range(len(declared))]
+        explained = [not wrong[j] if j not in places else float(cube.costs[places[j]]) < self._limit for j in range(len(best))]
+        for j, (read, own) in enumerate(zip(best, declared, strict=True)):
+            wrong[j] |= read is not None and is_common and (read.unit, read.sign) != (own.unit, own.sign)
+            wrong[j] &= not (read == own and explained[j])  # its zero is off, or a fault came meanwhile
+
+        def margin(j: int) -> float:
+            if (read := best[j]) is None:
+                return 0.0
+            alike = read_alike(cube, j, read)
+            return min(extra + assigned(without(each, alike))[0] for extra, each in cases) - cost
+
+        for j, (read, own) in enumerate(zip(best, declared, strict=True)):
+            wrong[j] |= read not in (None, own) and explained[j] and margin(j) >= SURE
+        return _Part(cost, tuple(best), tuple(wrong), tuple(explained), margin)
+
+    def _gravity_part(self, ways: list[GravityHypothesis]) -> _Part:
+        best = min(ways, key=lambda way: way.cost)
+        others = [way.cost for way in ways if way.channels != best.channels or way.has_no_gravity != best.has_no_gravity]
+        margin, is_wrong, is_explained = min(others) - best.cost, ways[0].cost > WRONG * self._weight, best.cost < self._limit
+        is_sure = margin >= SURE and is_explained and not best.has_no_gravity
+        pairs = zip(best.channels, ways[0].channels, strict=True)
+        wrong = tuple(is_wrong and not (is_sure and read == own) for read, own in pairs)
+        return _Part(best.cost, best.channels, wrong, (is_explained,) * 2, lambda _: margin, best.has_no_gravity)
+
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Return the results for all channels that have readings."""
+        best, names, found = self.found[0], channels_of(len(self._scene.joints)), list[Verdict]()
+        for j, (own, read) in enumerate(zip(self._declared[Stream.STROKES], best.strokes, strict=True)):
+            others = [each.cost - best.cost for each in self.found[1:] if each.strokes[j] != read]
+            found.append(Verdict(Stream.STROKES, names[Stream.STROKES][j], own, read, min(others, default=np.inf), read != own))
+        unsettled = list[float]()  # margins of angles that are not known: they vouch for the strokes
+        for stream, part in best.parts.items():
+            for j, own in enumerate(self._declared[stream]):
+                rivals = [
+                    each.cost - best.cost for each in self.found[1:]
+                    if each.parts[stream].best[j] != part.best[j] and part.best[j] is not None
+                ]  # fmt: skip
+                margin = min([part.margin(j), *rivals, *(unsettled if stream is not Stream.ANGLES else ())])
+                flags = part.wrong[j], part.explained[j], part.has_no_gravity
+                found.append(Verdict(stream, names[stream][j], own, part.best[j], margin, *flags))
+            unsettled += [
+                each.margin for each in found if each.stream is stream is Stream.ANGLES and each.is_wrong and not each.is_sure
+            ]
+        return tuple(found)

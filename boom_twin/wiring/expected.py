@@ -1,0 +1,88 @@
+"""Expected readings at rest: what angles, forces and gravity at the tip are for measured strokes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..analysis.cylinder_drives import drives_as_read
+from ..analysis.equilibrium import settle
+from ..compiler.compile import compile_scene
+from ..compiler.plan import first_row, taken_apart
+from ..deviation.sensor_model import mounting_of
+from ..errors import BoomTwinError
+from ..scene.edit import with_rigid_cylinders
+from ..scene.kinematics import gravity_in_base, joint_angles_of_strokes, stroke_curve
+from ..scene.schema import Scene
+from ..types import Array, Mount, StrokeReading
+
+
+class Expected(NamedTuple):
+    """Expected readings in every block; NaN where the boom cannot have such strokes.
+
+    Attributes
+    ----------
+    angles : dict of Mount or None to ndarray, shape (blocks, n)
+        rad: of encoders (None), and of inclinometers at the root and at the head of each section.
+    forces : ndarray, shape (blocks, n)
+        N.
+    gravity : ndarray of complex, shape (blocks,)
+        Specific force at the tip at rest, along the last head (real) and across it (imaginary), m/s^2.
+    compression : ndarray, shape (blocks, n)
+        rad, by which each joint would turn if the strokes were drives instead of lengths.
+    """
+
+    angles: dict[Mount | None, Array]
+    forces: Array
+    gravity: Array
+    compression: Array
+
+
+class RestModel:
+    """Model of a scene at rest.
+
+    Parameters
+    ----------
+    scene : Scene
+        With its load.
+    reads : StrokeReading
+        What stroke transducers read.
+    """
+
+    def __init__(self, scene: Scene, reads: StrokeReading) -> None:
+        self.scene = scene
+        self._boom, self._struts = compile_scene(scene), compile_scene(with_rigid_cylinders(scene))
+        self._plan = self._struts if reads is StrokeReading.LENGTH else self._boom
+        self._state, self._work = self._plan.state(), self._plan.work()
+        joints = self._plan.joints
+        kinds: tuple[Mount, ...] = "root", "head"
+        self._frames = {kind: mounting_of(self._plan, [kind] * joints).frames for kind in kinds}
+
+    def expected(self, strokes: Array) -> Expected:
+        """Return the expected readings for strokes (blocks, n), m."""
+        blocks, n = strokes.shape
+        angles: dict[Mount | None, Array] = {kind: np.full((blocks, n), np.nan) for kind in (None, "root", "head")}
+        forces, gravity, compression = np.full((blocks, n), np.nan), np.full(blocks, np.nan, complex), np.zeros((blocks, n))
+        inclination = self.scene.base.inclination
+        up = -complex(*gravity_in_base(self.scene))
+        for row, values in enumerate(strokes):
+            try:
+                near = joint_angles_of_strokes(self.scene, values)
+                settle(self._plan, self._state, self._work, values, near)
+            except BoomTwinError:
+                continue
+            found, frames = taken_apart(self._plan, first_row(self._plan, self._state)), self._state.frames
+            angles[None][row], forces[row] = found.joints, found.cylinder_forces
+            for kind, places in self._frames.items():
+                angles[kind][row] = frames[places, 2] + inclination
+            gravity[row] = up * np.exp(-1j * frames[-1, 2])
+            compression[row] = self._compression(values, near, found.cylinder_forces)
+        return Expected(angles, forces, gravity, compression)
+
+    def _compression(self, strokes: Array, angles: Array, forces: Array) -> Array:
+        """Return the turn (rad) of each joint by the compression of its oil."""
+        drives = drives_as_read(self._boom, strokes, forces, StrokeReading.LENGTH)
+        step = 1e-4
+        slopes = [np.diff(stroke_curve(self.scene, i, each + np.array([-step, step])))[0] for i, each in enumerate(angles)]
+        return np.asarray((strokes - drives).reshape(-1) * 2.0 * step / np.array(slopes))

@@ -1,0 +1,349 @@
+"""Hypotheses of how each sensor is read, and their costs: minus the logarithm of prior and likelihood, nats.
+
+A stream of n channels has a cube of costs (n, names, hypotheses): that the readings by a name are those of a channel, under one
+conversion. Names go to channels by the assignment of the least total cost.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scene.kinematics import stroke_curve
+from ..scene.schema import Scene
+from ..types import GIVE, SENSORS, Array, Stream
+from .expected import Expected
+from .readings import Channel, Table
+
+ANGLE_ERROR = math.radians(0.7)  # zero of an encoder, and what the scene may be wrong by
+GRAVITY_ERROR = 0.6  # m/s^2, bias of an IMU and mean acceleration of the tip
+REST_ERROR = 0.3  # m/s^2, likewise where gravity is taken out
+FORCE_SHARE, FORCE_LEAST = 0.12, 0.04  # error of a force by loads: share of itself, and of the largest
+MOST = 12.0  # nats that a block may count for: a reading may be wrong for a reason that no hypothesis has
+NEAR_ZERO = math.radians(
+    5.0
+)  # a zero below it is for a calibration, and is not told; a turn or half a turn within it is taken as that
+UNIT, OTHER_UNIT, SIGN, NAME, EXTRA_NAME = 4.0, 9.0, 4.0, 3.0, 6.0  # nats, prior costs of changes
+REVERSED, PIN_TO_PIN, HALF_TURN, SMALL_ZERO, ANY_ZERO = 6.0, 5.0, 5.0, 6.0, 9.0
+ABSOLUTE, TURNED, NO_GRAVITY = 4.0, 8.0, 4.0
+IMPOSSIBLE = 1e6  # nats
+OUTSIDE = 60.0  # nats for strokes beyond the travel
+SLACK = 0.02  # share of a travel that a stroke may be outside
+LEAST_SLOPE = 0.02  # m/rad, of a cylinder at a dead centre
+LOOSE = 3.0  # times the error of angles, where encoders choose the explanations of strokes
+TAU = 2.0 * math.pi
+
+
+class Cube(NamedTuple):
+    """Costs of the readings of one stream.
+
+    Attributes
+    ----------
+    costs : ndarray, shape (n, names, hypotheses)
+        Without those of units and signs; see `common_costs`.
+    channels : dict of (int, int, int) to Channel
+        How a channel is read under a hypothesis.
+    units, declared_units : ndarray of int, shape (n, names, hypotheses)
+        Places of the unit, and of that declared, among the units of the stream.
+    reversals : ndarray of bool, shape (n, names, hypotheses)
+        True if the sign is not that declared.
+    """
+
+    costs: Array
+    channels: Mapping[tuple[int, int, int], Channel]
+    units: NDArray[np.int64]
+    declared_units: NDArray[np.int64]
+    reversals: NDArray[np.bool_]
+
+
+def common_costs(cube: Cube, unit: int | None, is_reversed: bool) -> Array:
+    """Return all costs if the sensors of a stream have a unit in common (None: as declared), and are reversed or not."""
+    free = cube.declared_units if unit is None else unit
+    return np.asarray(
+        cube.costs + np.where(cube.units == free, 0.0, OTHER_UNIT) + np.where(cube.reversals == is_reversed, 0.0, SIGN)
+    )
+
+
+def misfit(off: Array, weight: float) -> Array:
+    """Return the cost of readings that are `off` (.., blocks) standard deviations; NaN is what no boom can have."""
+    if not off.shape[-1]:
+        return np.zeros(off.shape[:-1])
+    return np.asarray(weight * np.minimum(np.where(np.isfinite(off), 0.5 * off**2, MOST), MOST).mean(axis=-1))
+
+
+def assigned(costs: Array) -> tuple[float, dict[int, tuple[int, int, int]]]:
+    """Return the least total of costs (n, names, hypotheses), and by channel the place of its name and hypothesis."""
+    from scipy.optimize import linear_sum_assignment  # its import takes longer than the check of a sound rig
+
+    least = costs.min(axis=2)
+    rows, columns = linear_sum_assignment(least)
+    places = {int(j): (int(j), int(a), int(costs[j, a].argmin())) for j, a in zip(rows, columns, strict=True)}
+    return float(least[rows, columns].sum()), places
+
+
+def read_alike(cube: Cube, j: int, channel: Channel) -> tuple[NDArray[np.int64], ...]:
+    """Return the places of the hypotheses that read channel j in this way.
+
+    The place of an inclinometer on its section makes no difference, nor that the first joint has one: bending is small.
+    """
+    places = [
+        place
+        for place, each in cube.channels.items()
+        if place[0] == j
+        and each._replace(absolute=None) == channel._replace(absolute=None)
+        and (j == 0 or (each.absolute is None) == (channel.absolute is None))
+    ]
+    return tuple(np.array(places, np.int64).reshape(-1, 3).T)
+
+
+def without(costs: Array, places: tuple[NDArray[np.int64], ...]) -> Array:
+    """Return costs without some hypotheses."""
+    found = costs.copy()
+    found[places] = IMPOSSIBLE
+    return found
+
+
+def name_cost(declared: Sequence[Channel], j: int, name: str, names: Sequence[str]) -> float:
+    """Return the prior cost of reading channel j by a name."""
+    if name == declared[j].name:
+        return 0.0
+    is_extra = all(name != each.name for each in declared)
+    return EXTRA_NAME if is_extra and declared[j].name in names else NAME
+
+
+def settings_of(declared: Sequence[Channel], j: int, name: str) -> Channel:
+    """Return how the sensor of a name is read as declared; one that is not declared is read as that of channel j."""
+    return next((each for each in declared if each.name == name), declared[j])._replace(name=name)
+
+
+def si(channel: Channel, units: Mapping[str, float], readings: Array) -> Array:
+    """Return readings as quantities, SI."""
+    return channel.sign * channel.scale * units[channel.unit] * (readings - channel.zero)
+
+
+def ways(base: Channel, units: Mapping[str, float]) -> list[Channel]:
+    """Return a sensor with every unit and sign."""
+    return [base._replace(unit=unit, sign=sign) for unit in units for sign in (1, -1)]
+
+
+class _Builder:
+    """Collector of the costs of one stream."""
+
+    def __init__(self, n: int, names: int, units: Mapping[str, float]) -> None:
+        self._shape, self._units = (n, names), list(units)
+        self._cells: dict[tuple[int, int], list[tuple[float, Channel, Channel]]] = {}
+
+    def add(self, j: int, a: int, cost: float, channel: Channel, base: Channel) -> None:
+        self._cells.setdefault((j, a), []).append((cost, channel, base))
+
+    def cube(self) -> Cube:
+        shape = (*self._shape, max(map(len, self._cells.values())))
+        costs, channels = np.full(shape, IMPOSSIBLE), {}
+        units, declared, reversals = np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros(shape, bool)
+        for (j, a), cell in self._cells.items():
+            for h, (cost, channel, base) in enumerate(cell):
+                at = j, a, h
+                costs[at], channels[at], reversals[at] = min(cost, IMPOSSIBLE), channel, channel.sign != base.sign
+                units[at], declared[at] = self._units.index(channel.unit), self._units.index(base.unit)
+        return Cube(costs, channels, units, declared, reversals)
+
+
+def declared_costs(
+    stream: Stream, table: Table, declared: Sequence[Channel], expected: Expected, weight: float
+) -> list[float | None]:
+    """Return the costs of angle or force readings as declared; None of a name without readings."""
+    costs: list[float | None] = []
+    for j, own in enumerate(declared):
+        if own.name not in table.names:
+            costs.append(None)
+            continue
+        readings = si(own, SENSORS[stream].units, table.values[:, table.names.index(own.name)])
+        right, sigma = expected.forces[:, j], _force_error(expected, j)
+        if stream is Stream.ANGLES:
+            right, sigma = expected.angles[own.absolute][:, j], np.array(ANGLE_ERROR)
+            readings = right + np.remainder(readings - right + math.pi, TAU) - math.pi
+        costs.append(float(misfit(((readings - right) / sigma)[np.isfinite(readings)], weight)))
+    return costs
+
+
+def _force_error(expected: Expected, j: int) -> Array:
+    """Return the standard deviation of a cylinder's force in each block, N."""
+    return np.asarray(
+        FORCE_SHARE * np.abs(expected.forces[:, j]) + FORCE_LEAST * np.nanmax(np.abs(expected.forces), initial=1.0)
+    )
+
+
+def angle_cube(table: Table, declared: Sequence[Channel], expected: Expected, weight: float) -> Cube:
+    """Return the costs of angle readings."""
+    units = SENSORS[Stream.ANGLES].units
+    found = _Builder(len(declared), len(table.names), units)
+    for a, name in enumerate(table.names):
+        readings = table.values[:, a][np.isfinite(table.values[:, a])]
+        is_read = np.isfinite(table.values[:, a])
+        for j in range(len(declared)):
+            base = settings_of(declared, j, name)
+            own = ways(base, units)
+            tracks = np.array([si(channel, units, readings) for channel in own])
+            before = name_cost(declared, j, name, table.names)
+            for kind, angles in expected.angles.items():
+                cost = before + (ABSOLUTE if kind != base.absolute else 0.0)
+                for more, zeros, costs in _zeros(tracks - angles[is_read, j], kind is None, weight):
+                    for channel, zero, misfits in zip(own, zeros.tolist(), costs.tolist(), strict=True):
+                        size = channel.sign * channel.scale * units[channel.unit]
+                        moved = channel._replace(absolute=kind, zero=channel.zero + zero / size)
+                        found.add(j, a, cost + more + misfits, moved, base)
+    return found.cube()
+
+
+def _zeros(off: Array, is_encoder: bool, weight: float) -> Iterator[tuple[float, Array, Array]]:
+    """Yield prior cost, zeros (ways,) in rad, and misfits (ways,) of angles that are `off` (ways, blocks), rad.
+
+    The decoder finds one turn by itself.
+    """
+    turns = np.round(off / TAU)
+    wrapped = off - TAU * turns
+    known = np.isfinite(wrapped)
+    first = np.where(known.any(axis=1), turns[np.arange(len(off)), known.argmax(axis=1)], 0.0)
+    is_steady = np.where(known, np.abs(turns - first[:, None]) < 0.5, True).all(axis=1) & is_encoder & (np.abs(first) > 1.5)
+    yield 0.0, np.where(is_steady, TAU * first, 0.0), misfit(wrapped / ANGLE_ERROR, weight)
+    half = np.remainder(wrapped, TAU) - math.pi
+    yield HALF_TURN, np.copysign(math.pi, np.nansum(wrapped, axis=1)), misfit(half / ANGLE_ERROR, weight)
+    middle = np.angle(np.where(known, np.exp(1j * np.where(known, wrapped, 0.0)), 0.0).sum(axis=1))
+    rest = np.remainder(wrapped - middle[:, None] + math.pi, TAU) - math.pi
+    misfits, size = misfit(rest / ANGLE_ERROR, weight), np.abs(middle)
+    yield SMALL_ZERO, np.zeros(len(off)), np.where(size <= NEAR_ZERO, misfits, IMPOSSIBLE)
+    yield ANY_ZERO, middle, np.where((size > NEAR_ZERO) & (size < math.pi - NEAR_ZERO), misfits, IMPOSSIBLE)
+
+
+def force_cube(table: Table, declared: Sequence[Channel], expected: Expected, weight: float) -> Cube:
+    """Return the costs of force readings."""
+    units = SENSORS[Stream.FORCES].units
+    found = _Builder(len(declared), len(table.names), units)
+    for a, name in enumerate(table.names):
+        readings = table.values[:, a]
+        is_read = np.isfinite(readings)
+        for j in range(len(declared)):
+            base, right = settings_of(declared, j, name), expected.forces[is_read, j]
+            sigma = _force_error(expected, j)[is_read]
+            for channel in ways(base, units):
+                off = (si(channel, units, readings[is_read]) - right) / sigma
+                found.add(j, a, name_cost(declared, j, name, table.names) + float(misfit(off, weight)), channel, base)
+    return found.cube()
+
+
+class GravityHypothesis(NamedTuple):
+    """Way in which an IMU is read: its cost, the channels of x and z, and True if it has no gravity in it."""
+
+    cost: float
+    channels: tuple[Channel, Channel]
+    has_no_gravity: bool = False
+
+
+def gravity_hypotheses(table: Table, declared: Sequence[Channel], expected: Expected, weight: float) -> list[GravityHypothesis]:
+    """Return all ways in which an IMU may be read, as declared first."""
+    units = SENSORS[Stream.IMU].units
+    places = {name: a for a, name in enumerate(table.names)}
+    is_read = np.isfinite(table.values[:, [places[each.name] for each in declared]]).all(axis=1)
+    right, found = expected.gravity[is_read], list[GravityHypothesis]()
+    for x in table.names:
+        for z in table.names:
+            if x == z:
+                continue
+            for unit in units:
+                for flip_x, flip_z in ((1, 1), (-1, 1), (1, -1), (-1, -1)):
+                    one = declared[0]._replace(name=x, unit=unit, sign=flip_x * declared[0].sign)
+                    two = declared[1]._replace(name=z, unit=unit, sign=flip_z * declared[1].sign)
+                    f = si(one, units, table.values[is_read, places[x]]) + 1j * si(two, units, table.values[is_read, places[z]])
+                    spread = np.hypot(table.spreads[is_read, places[x]], table.spreads[is_read, places[z]]) * units[unit]
+                    sigma = np.hypot(GRAVITY_ERROR, spread)
+                    f = f * np.exp(1j * one.turned)
+                    cost = (UNIT if unit != declared[0].unit else 0.0) + (SIGN if min(flip_x, flip_z) < 0 else 0.0)
+                    cost += NAME if (x, z) != (declared[0].name, declared[1].name) else 0.0
+                    found.append(GravityHypothesis(cost + float(misfit(np.abs(f - right) / sigma, weight)), (one, two)))
+                    if flip_z < 0 or places[x] > places[z]:  # the same as a turn of another pair
+                        continue
+                    turn = float(np.angle(np.nansum(right * f.conj())))
+                    if abs(math.remainder(turn, math.pi / 2.0)) > NEAR_ZERO:
+                        off = np.abs(f * np.exp(1j * turn) - right) / sigma
+                        pair = one._replace(turned=one.turned + turn), two._replace(turned=two.turned + turn)
+                        found.append(GravityHypothesis(cost + TURNED + float(misfit(off, weight)), pair))
+    rest = np.hypot.reduce([table.values[is_read, a] for a in range(len(table.names))], axis=0)
+    found.append(GravityHypothesis(NO_GRAVITY + float(misfit(rest / REST_ERROR, weight)), (declared[0], declared[1]), True))
+    first = next(i for i, each in enumerate(found) if each.channels == tuple(declared))
+    return [found[first], *found[:first], *found[first + 1 :]]
+
+
+def stroke_cube(strokes: Table, declared: Sequence[Channel], scene: Scene, encoders: Encoders | None, weight: float) -> Cube:
+    """Return the costs of stroke readings by the cylinders' travels and by encoders."""
+    units = SENSORS[Stream.STROKES].units
+    found = _Builder(len(declared), len(strokes.names), units)
+    for j, joint in enumerate(scene.joints):
+        closed, longest = joint.cylinder.closed_length, joint.cylinder.max_stroke
+        curves = None if encoders is None else _curves(scene, j, encoders)
+        for c, name in enumerate(strokes.names):
+            base = settings_of(declared, j, name)
+            before = name_cost(declared, j, name, strokes.names)
+            for unit in units:
+                same = base._replace(unit=unit)
+                size = base.sign * base.scale * units[unit]
+                for way_cost, channel in (
+                    (0.0, same),
+                    (0.0, same._replace(sign=-base.sign)),
+                    (REVERSED, same._replace(sign=-base.sign, zero=base.zero + longest / size)),
+                    (PIN_TO_PIN, same._replace(zero=base.zero + closed / size)),
+                ):
+                    track = si(channel, units, strokes.values[:, c])
+                    slack = SLACK * longest
+                    outside = float(((track < -slack) | (track > longest + slack)).mean())
+                    # a larger unit that fits the travel is more likely
+                    cost = before + way_cost + OUTSIDE * outside - math.log(units[unit])
+                    if curves is not None and len(curves.strokes) and outside < 0.5:
+                        off = (curves.strokes - track) / curves.sigmas
+                        cost += float((misfit(off, weight) + curves.costs).min())
+                    elif curves is not None and len(curves.strokes):
+                        cost += MOST * weight
+                    found.add(j, c, cost, channel, base)
+    return found.cube()
+
+
+class Encoders(NamedTuple):
+    """Readings of encoders with their declaration; `is_in_order` if each is of its own joint. Unit and sign may be any."""
+
+    table: Table
+    declared: Sequence[Channel]
+    is_in_order: bool
+
+
+class _Curves(NamedTuple):
+    """Strokes (hypotheses, blocks) in m that encoders tell, their standard deviations, and prior costs (hypotheses,)."""
+
+    strokes: Array
+    sigmas: Array
+    costs: Array
+
+
+def _curves(scene: Scene, j: int, encoders: Encoders) -> _Curves:
+    """Return the strokes of joint j by what encoders read, for all their hypotheses."""
+    tracks, costs = list[Array](), list[float]()
+    units, (table, declared, is_in_order) = SENSORS[Stream.ANGLES].units, encoders
+    low, high = np.radians(scene.joints[j].range_deg)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low) + GIVE
+    for a, name in enumerate(table.names):
+        if is_in_order and name != declared[j].name:
+            continue
+        base = settings_of(declared, j, name)
+        for channel in ways(base, units):
+            is_other = channel.unit != base.unit
+            for turn_cost, turn in ((0.0, 0.0), (HALF_TURN, math.pi)):
+                track = np.remainder(si(channel, units, table.values[:, a]) + turn - middle + math.pi, TAU) - math.pi
+                tracks.append(np.where(np.abs(track) < half, track + middle, np.nan))
+                cost = turn_cost + (UNIT if is_other else 0.0) + (SIGN if channel.sign != base.sign else 0.0)
+                costs.append(name_cost(declared, j, name, table.names) + cost)
+    angles, step = np.array(tracks).reshape(len(costs), len(table.values)), 1e-3
+    before, after = (stroke_curve(scene, j, (angles + each).ravel()).reshape(angles.shape) for each in (-step, step))
+    sigmas = np.maximum(np.abs(after - before) / (2.0 * step), LEAST_SLOPE) * LOOSE * ANGLE_ERROR
+    return _Curves(0.5 * (before + after), sigmas, np.array(costs))

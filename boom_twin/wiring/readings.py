@@ -1,0 +1,102 @@
+"""Readings of a session by the names of its messages, and the blocks of them that a commissioning check compares."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types import Array, Mount, Stream
+
+BLOCK = 100_000_000  # ns; readings are averaged over it
+MEAN = 10  # blocks before and after one, over which forces and accelerations are averaged: vibration has mean 0
+CORRELATED = 5.0  # blocks whose vibration is alike
+EVENLY = 12  # blocks that are compared, evenly in time; beside them the extremes of every stroke
+
+
+class Channel(NamedTuple):
+    """How a channel is read: quantity (SI) = sign * scale * (reading - zero), in `unit`; `turned` (rad) is an IMU's."""
+
+    name: str
+    unit: str
+    sign: int = 1
+    zero: float = 0.0
+    scale: float = 1.0
+    absolute: Mount | None = None
+    turned: float = 0.0
+
+
+class Series(NamedTuple):
+    """Readings of one name: stamps (k,) in ns, values (k,) in the unit of its messages."""
+
+    stamps: NDArray[np.int64]
+    values: Array
+
+
+Window = Mapping[Stream, Mapping[str, Series]]
+"""Readings of every stream by name."""
+
+
+class Table(NamedTuple):
+    """Readings of one stream in the blocks that are compared.
+
+    Attributes
+    ----------
+    names : tuple of str
+    values, spreads : ndarray, shape (blocks, names)
+        Means and their standard errors by vibration; NaN where there is none.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    spreads: Array
+
+
+def tables_of(window: Window) -> dict[Stream, Table]:
+    """Return the readings in some blocks in which all strokes were read; no blocks if there is none.
+
+    Names without readings there are left out.
+    """
+    strokes = [_means(series) for series in window[Stream.STROKES].values()]
+    common = strokes[0][0] if strokes else np.zeros(0, np.int64)
+    for numbers, _ in strokes[1:]:
+        common = np.intersect1d(common, numbers)
+    chosen = _chosen(common, [means[np.searchsorted(numbers, common)] for numbers, means in strokes])
+    reach = {Stream.IMU: MEAN, Stream.FORCES: MEAN}
+    found = {}
+    for stream, by_name in window.items():
+        columns = [_at(chosen, *_means(series), reach.get(stream, 0)) for series in by_name.values()]
+        values, spreads = np.moveaxis(np.array(columns).reshape(len(columns), 2, len(chosen)), 0, 2)
+        there = np.flatnonzero(np.isfinite(values).any(axis=0))
+        names = list(by_name)
+        found[stream] = Table(tuple(names[i] for i in there.tolist()), values[:, there], spreads[:, there])
+    return found
+
+
+def _means(series: Series) -> tuple[NDArray[np.int64], Array]:
+    """Return the numbers of the blocks that have readings, and the means of these."""
+    is_read = np.isfinite(series.values)
+    numbers, places, counts = np.unique(series.stamps[is_read] // BLOCK, return_inverse=True, return_counts=True)
+    return numbers, np.bincount(places, series.values[is_read], len(numbers)) / np.maximum(counts, 1)
+
+
+def _chosen(common: NDArray[np.int64], strokes: list[Array]) -> NDArray[np.int64]:
+    """Return the numbers of the blocks to compare."""
+    if not len(common):
+        return common
+    rows = set(np.linspace(0, len(common) - 1, EVENLY).round().astype(int).tolist())
+    rows |= {int(pick(values)) for values in strokes for pick in (np.argmin, np.argmax)}
+    return common[sorted(rows)]
+
+
+def _at(chosen: NDArray[np.int64], numbers: NDArray[np.int64], means: Array, reach: int) -> Array:
+    """Return mean and its standard error (2, blocks) over `reach` blocks before and after each of those chosen."""
+    first, end = np.searchsorted(numbers, chosen - reach), np.searchsorted(numbers, chosen + reach, "right")
+    middle = means.mean() if len(means) else 0.0
+    sums = [np.concatenate([[0.0], np.cumsum(each)]) for each in (means - middle, (means - middle) ** 2)]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean, square = ((each[end] - each[first]) / (end - first) for each in sums)
+    share = np.minimum(CORRELATED / np.maximum(end - first, 1), 1.0)
+    return np.array([mean + middle, np.sqrt(np.maximum(square - mean**2, 0.0) * share)])

@@ -1,0 +1,45 @@
+"""Words for the results of a commissioning check."""
+
+from __future__ import annotations
+
+import math
+
+from ..types import SENSORS
+from .check import Verdict
+from .readings import Channel
+
+UNEXPLAINED = "no name, unit, sign or zero explains its readings"
+
+
+def reading(way: Channel) -> str:
+    """Return how a channel is read."""
+    parts = [way.name, way.unit]
+    parts += ["sign -1"] if way.sign < 0 else []
+    parts += [f"zero {way.zero:.6g}"] if way.zero else []
+    parts += [f"scale {way.scale:g}"] if way.scale != 1.0 else []
+    parts += [f"absolute at the {way.absolute}"] if way.absolute else []
+    parts += [f"turned by {math.degrees(way.turned):+.1f} deg"] if way.turned else []
+    return ", ".join(parts)
+
+
+def finding(verdict: Verdict, moved: bool) -> str:
+    """Return what was found about a channel."""
+    if not verdict.is_wrong:
+        return "as declared"
+    if not verdict.is_explained or verdict.best is None:
+        return f"not as declared: {UNEXPLAINED}"
+    if verdict.is_sure:
+        return likely(verdict)
+    why = "several ways explain it" if moved else "the boom stood still"
+    return f"not as declared; not determined: {why}; {likely(verdict)}"
+
+
+def likely(verdict: Verdict) -> str:
+    """Return the most likely way in which a wrong channel is read."""
+    way = "gravity taken out" if verdict.has_no_gravity or verdict.best is None else reading(verdict.best)
+    return way if verdict.is_sure else f"perhaps {way}"
+
+
+def channel_name(verdict: Verdict) -> str:
+    """Return the sensor of a verdict as alarms name it."""
+    return "tip_imu" if SENSORS[verdict.stream].is_imu else verdict.channel

@@ -1,0 +1,60 @@
+"""Sensors wired otherwise than declared: reported once, left out of the estimate, reported ended by a right start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from boom_twin import Sample, Stream
+
+from .recorded import Outcome, run, session
+
+G = 9.80665
+SWAP_23 = [0, 2, 1, 3]
+CASES: dict[str, tuple[Stream, Callable[[np.ndarray], np.ndarray], set[str], str]] = {
+    "encoders swapped": (Stream.ANGLES, lambda v: v[SWAP_23], {"joint_2", "joint_3"}, "joint_3, rad"),
+    "encoders in degrees": (Stream.ANGLES, np.degrees, {"joint_1", "joint_2", "joint_3", "joint_4"}, "deg"),
+    "an encoder of the other sign": (Stream.ANGLES, lambda v: v * [1, 1, -1, 1], {"joint_3"}, "sign -1"),
+    "strokes swapped": (Stream.STROKES, lambda v: v[SWAP_23], {"cylinder_2", "cylinder_3"}, "cylinder_3, m"),
+    "IMU in g": (Stream.IMU, lambda v: v / G, {"tip_imu"}, "g"),
+    "IMU with swapped axes": (Stream.IMU, lambda v: v[::-1], {"tip_imu"}, "tip_imu_z, m/s^2"),
+    "IMU without gravity": (Stream.IMU, lambda v: 0.01 * v, {"tip_imu"}, "gravity taken out"),
+}
+
+
+def rewired(stream: Stream, change: Callable[[np.ndarray], np.ndarray], seconds: float) -> list[Sample]:
+    """The bundled session with the readings of one stream changed."""
+    return [replace(each, values=change(each.values)) if each.stream is stream else each for each in session(seconds)]
+
+
+def tips(found: Outcome) -> np.ndarray:
+    return np.array([each.estimate.tip for each in found.reports if each.estimate is not None])
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_it_is_reported_and_not_used(case: str) -> None:
+    stream, change, channels, told = CASES[case]
+    found, right = run(rewired(stream, change, 8.0)), run(session(8.0))
+    alarms = {(alarm.channel, alarm.kind, alarm.cause) for time, alarm in found.states() if time > 4.0}
+    assert alarms == {(channel, "wiring", f"{channel}.sensor") for channel in channels}
+    assert any(told in alarm.evidence and "mapping --check" in alarm.told for _, alarm in found.states())
+    if stream is not Stream.STROKES:
+        np.testing.assert_allclose(tips(found)[800:], tips(right)[800:], atol=6e-3)
+
+
+def test_a_start_with_right_readings_ends_it() -> None:
+    wrong, right = rewired(Stream.ANGLES, lambda v: v[SWAP_23], 6.0), session(8.0)
+    later = wrong[-1].stamp - right[0].stamp + 60_000_000_000  # after a pause the boom starts from rest
+    found = run([*wrong, *(replace(each, stamp=each.stamp + later) for each in right)])
+    ends = {alarm.channel for _, alarm in found.states() if alarm.kind == "wiring" and alarm.until is not None}
+    assert ends == {"joint_2", "joint_3"}
+    assert not [alarm for time, alarm in found.states() if time > 70.0 and alarm.until is None]
+
+
+def test_a_sound_session_and_an_offset_are_no_wiring() -> None:
+    offset = rewired(Stream.ANGLES, lambda v: v + np.array([0.0, 0.04, 0.0, 0.0]), 12.0)
+    assert not run(session(12.0)).told()
+    assert {alarm.kind for _, alarm in run(offset).states()} == {"deviation"}

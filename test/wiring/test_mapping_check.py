@@ -1,0 +1,150 @@
+"""`mapping --check`: what is wired otherwise in a session, and the mapping that mends it; then nothing is left to mend."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import yaml
+
+from boom_twin import Stream
+from boom_twin.bag.reader import read, scan
+from boom_twin.bag.session_files import write_session
+from boom_twin.cli.main import main
+
+BAGS = Path(__file__).parents[2] / "bags"
+G = 9.80665
+SECONDS = "24"
+
+
+class Rows(NamedTuple):
+    """A bundled session at 50 Hz."""
+
+    stamps: np.ndarray
+    strokes: np.ndarray
+    joints: np.ndarray
+    imu: np.ndarray
+
+
+@pytest.fixture(scope="module")
+def rows() -> Rows:
+    found: dict[str, list[Any]] = {stream.value: [] for stream in (Stream.STROKES, Stream.ANGLES, Stream.IMU)}
+    kinds = {"tip_imu": "sensor_msgs/msg/Imu"}
+    types = {name: kinds.get(name, "sensor_msgs/msg/JointState") for name in found}
+    for name, _, msg in read(scan(BAGS / "arch_session"), types):
+        force = getattr(msg, "linear_acceleration", None)
+        found[name].append(msg.position if force is None else (force.x, force.z))
+    strokes, joints, imu = (np.array(each)[::4] for each in found.values())
+    return Rows(10**18 + 20_000_000 * np.arange(len(strokes)), strokes, joints, imu)
+
+
+def swapped(values: np.ndarray, i: int, j: int) -> np.ndarray:
+    order = list(range(values.shape[1]))
+    order[i], order[j] = j, i
+    return values[:, order]
+
+
+def scaled(values: np.ndarray, *factors: float) -> np.ndarray:
+    return values * np.array(factors)
+
+
+LONGEST = 0.49  # m, travel of cylinder 4
+WIRINGS: dict[str, tuple[Callable[[Rows], Rows], dict[str, Any]]] = {
+    "sound": (lambda r: r, {}),
+    "encoders swapped": (
+        lambda r: r._replace(joints=swapped(r.joints, 1, 3)),
+        {"joint_2": {"name": "joint_4"}, "joint_4": {"name": "joint_2"}},
+    ),
+    "strokes swapped, in mm": (
+        lambda r: r._replace(strokes=1e3 * swapped(r.strokes, 0, 2)),
+        {
+            "cylinder_1": {"name": "cylinder_3", "unit": "mm"},
+            "cylinder_2": {"unit": "mm"},
+            "cylinder_3": {"name": "cylinder_1", "unit": "mm"},
+            "cylinder_4": {"unit": "mm"},
+        },
+    ),
+    "angles in gon, one of the other sign": (
+        lambda r: r._replace(joints=scaled(r.joints * 200.0 / np.pi, 1, 1, -1, 1)),
+        {f"joint_{i}": {"unit": "gon"} | ({"sign": -1} if i == 3 else {}) for i in range(1, 5)},
+    ),
+    "a stroke from its far end": (
+        lambda r: r._replace(strokes=np.column_stack([r.strokes[:, :3], LONGEST - r.strokes[:, 3]])),
+        {"cylinder_4": {"sign": -1, "zero": LONGEST}},
+    ),
+    "inclinometers at the roots": (
+        lambda r: r._replace(joints=np.cumsum(r.joints, axis=1)),
+        {f"joint_{i}": {"absolute": "root"} for i in range(2, 5)},
+    ),
+    "IMU without gravity": (lambda r: r._replace(imu=0.02 * r.imu), {"tip_imu_x": "none", "tip_imu_z": "none"}),
+    "IMU in g, its axes swapped": (
+        lambda r: r._replace(imu=r.imu[:, ::-1] / G),
+        {"tip_imu_x": {"name": "z", "unit": "g"}, "tip_imu_z": {"name": "x", "unit": "g"}},
+    ),
+}
+
+
+def written(rows: Rows, path: Path, **more: Any) -> Path:
+    write_session(path, rows.stamps, rows.strokes, rows.joints, rows.imu, {"origin": "synthetic, rewired by a test"}, **more)
+    return path
+
+
+def checked(capsys: pytest.CaptureFixture[str], bag: Path, *more: str) -> dict[str, Any]:
+    assert main(["mapping", "--check", str(bag), "--duration", SECONDS, *more, "--json"]) == 0
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return found
+
+
+@pytest.mark.parametrize("wiring", WIRINGS)
+def test_the_mapping_that_is_proposed_mends_the_session(
+    wiring: str, rows: Rows, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change, sensors = WIRINGS[wiring]
+    bag, out = written(change(rows), tmp_path / "bag"), tmp_path / "mapping.yaml"
+    found = checked(capsys, bag, "--out", str(out))
+    assert all(found["sure"]) and out.exists() == bool(sensors)
+    if not sensors:
+        assert found["mapping"] is None and not any(found["wrong"])
+        return
+    proposed = yaml.safe_load(out.read_text())["sensors"]
+    for channel in proposed.keys() | sensors.keys():  # where on its section an inclinometer is, bending hardly tells
+        given, right = proposed.get(channel, {}), sensors.get(channel, {})
+        if "none" in (given, right):
+            assert given == right
+            continue
+        assert given.keys() == right.keys()
+        assert all(given[key] == pytest.approx(right[key]) for key in right if key != "absolute"), channel
+    again = checked(capsys, bag, "--mapping", str(out))
+    assert again["mapping"] is None and not any(again["wrong"])
+
+
+def test_a_late_stream_and_its_delay(rows: Rows, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    late = rows.stamps + 60_000_000
+    bag, out = written(rows, tmp_path / "bag", angle_stamps_ns=late), tmp_path / "mapping.yaml"
+    found = checked(capsys, bag, "--out", str(out))
+    lags = dict(zip(found["lag_streams"], found["lags_s"], strict=True))
+    assert lags["joint_angles"] == pytest.approx(0.06, abs=0.003) and abs(lags["tip_imu"]) < 0.005
+    assert yaml.safe_load(out.read_text()) == {"inputs": {"joint_angles": {"delay": pytest.approx(0.06, abs=0.003)}}}
+
+
+def test_a_boom_at_rest_leaves_open_what_it_cannot_tell(rows: Rows, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    still = Rows(*(each[:100] for each in rows))
+    bag = written(still._replace(joints=scaled(still.joints, 1, 1, -1, 1)), tmp_path / "bag")
+    assert main(["mapping", "--check", str(bag)]) == 0
+    told = capsys.readouterr().out
+    assert "joint_3" in told and "not determined: the boom stood still" in told and "nothing to propose" in told
+    assert main(["info", str(bag)]) == 0
+    (line,) = (each for each in capsys.readouterr().out.splitlines() if each.startswith("wiring "))
+    assert "joint_3 not as declared" in line and f"boom_twin mapping --check {bag}" in line
+
+
+def test_a_session_of_another_boom_is_refused(rows: Rows, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    fewer = rows._replace(strokes=rows.strokes[:, :2], joints=rows.joints[:, :2])
+    assert main(["mapping", "--check", str(written(fewer, tmp_path / "bag"))]) == 1
+    assert "no time in which all 4 cylinders" in capsys.readouterr().err
+    assert main(["mapping", "--out", "x.yaml"]) == 1
+    assert "Add --check BAG" in capsys.readouterr().err
