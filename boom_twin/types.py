@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from enum import Enum, StrEnum
 from math import pi
 from typing import TYPE_CHECKING, Any, Literal
@@ -43,6 +43,13 @@ class Stream(Enum):
     ANGLES = "joint_angles"
     IMU = "tip_imu"
     FORCES = "cylinder_forces"
+    RATE = "tip_imu_rate"
+    IMU_2 = "imu_2"
+    RATE_2 = "imu_2_rate"
+    IMU_3 = "imu_3"
+    RATE_3 = "imu_3_rate"
+    IMU_4 = "imu_4"
+    RATE_4 = "imu_4_rate"
 
     __hash__ = object.__hash__  # members are single; Enum's own is a Python function, called for every look-up
 
@@ -53,6 +60,28 @@ class StrokeReading(StrEnum):
     LENGTH = "length"
     DRIVE = "drive"
 
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Place of a sensor in the plane of the boom.
+
+    Attributes
+    ----------
+    section : int or None
+        From 1 at the base; None is the last section.
+    at : float or None
+        Distance from the section's inboard pivot along it, m; None is its outboard pivot.
+    turned : float
+        Angle of the sensor's x axis to the section, positive anticlockwise (as a section is raised), rad.
+    """
+
+    section: int | None = None
+    at: float | None = None
+    turned: float = 0.0
+
+
+NO_PLACES: Mapping[str, Place] = {}
+"""Places of a boom whose only placed sensor is the tip IMU, at the tip."""
 
 G = 9.80665
 """Standard gravity, m/s^2."""
@@ -65,7 +94,7 @@ class SensorKind:
     title: str
     """Name for people."""
     message: str
-    """Type of its messages: a JointState, read by names, or an Imu, read by axes."""
+    """Type of its messages: a JointState, read by names, or another one, read by `axes`."""
     stem: str
     """Start of its channel names: ``joint`` gives ``joint_1`` .. ``joint_n``."""
     ends: tuple[str, ...]
@@ -78,7 +107,13 @@ class SensorKind:
     lack: str
     """What is missing without these sensors; empty if few rigs have them."""
     field: str = "position"
-    """Field of a JointState that is read: ``position`` or ``effort``."""
+    """Field that is read: of a JointState ``position`` or ``effort``, of another message the vector with the `axes`."""
+    axes: tuple[str, ...] = ()
+    """Axes of that vector, one for each channel; empty if messages are read by names."""
+    beside: str = ""
+    """Input whose messages hold these readings, too, if they have no topic of their own."""
+    is_placed: bool = False
+    """True if a boom has these sensors only where a mapping places them."""
     part: str = ""
     """Stem of the names in messages, if it differs: a force is that of ``cylinder_1``."""
     shown: str = ""
@@ -87,9 +122,9 @@ class SensorKind:
     """Alarms of a single sensor. Jumps, spikes and noise count only if its quantity changes little per reading."""
 
     @property
-    def is_imu(self) -> bool:
-        """Return True if its messages are read by axes."""
-        return self.message == "sensor_msgs/msg/Imu"
+    def is_named(self) -> bool:
+        """Return True if its messages are read by names."""
+        return not self.axes
 
     @property
     def named(self) -> str:
@@ -117,6 +152,40 @@ class SensorKind:
         return tuple(f"{self.stem}_{end}" for end in self.ends or range(1, joints + 1))
 
 
+def _imu(stem: str, lack: str = "") -> SensorKind:
+    """Return the accelerometers of an IMU."""
+    return SensorKind(
+        title=stem.replace("tip_imu", "tip IMU").replace("imu_", "IMU "),
+        message="sensor_msgs/msg/Imu",
+        stem=stem,
+        ends=("x", "z"),
+        units={"m/s^2": 1.0, "g": G, "mg": 1e-3 * G},
+        noise="imu_sigma",
+        resolution="",
+        lack=lack,
+        field="linear_acceleration",
+        axes=("x", "z"),
+        is_placed=not lack,
+        alarms=("stuck",),
+    )
+
+
+def _gyro(imu: SensorKind) -> SensorKind:
+    """Return the gyro of an IMU, which reads how fast its place is raised."""
+    return replace(
+        imu,
+        title=f"{imu.title} gyro",
+        ends=("rate",),
+        units={"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": pi / 180.0},
+        noise="rate_sigma",
+        lack="",
+        field="angular_velocity",
+        axes=("y",),
+        beside=imu.stem,
+        shown="mrad/s",
+    )
+
+
 SENSORS: dict[Stream, SensorKind] = {
     Stream.STROKES: SensorKind(
         title="cylinder strokes",
@@ -140,17 +209,7 @@ SENSORS: dict[Stream, SensorKind] = {
         lack="there are no joint residuals",
         shown="mrad",
     ),
-    Stream.IMU: SensorKind(
-        title="tip IMU",
-        message="sensor_msgs/msg/Imu",
-        stem="tip_imu",
-        ends=("x", "z"),
-        units={"m/s^2": 1.0, "g": G, "mg": 1e-3 * G},
-        noise="imu_sigma",
-        resolution="",
-        lack="there are no residuals of the tip's acceleration (optional)",
-        alarms=("stuck",),
-    ),
+    Stream.IMU: _imu("tip_imu", "there are no residuals of the tip's acceleration (optional)"),
     Stream.FORCES: SensorKind(
         title="cylinder forces",
         message="sensor_msgs/msg/JointState",
@@ -165,12 +224,28 @@ SENSORS: dict[Stream, SensorKind] = {
         alarms=("stuck", "dropout"),
     ),
 }
-"""Expected readings are in `boom_twin.deviation.step.write_expected_readings`, topics in ``topics.yaml``."""
+SENSORS[Stream.RATE] = _gyro(SENSORS[Stream.IMU])
+for _accelerometer, _rate in ((Stream.IMU_2, Stream.RATE_2), (Stream.IMU_3, Stream.RATE_3), (Stream.IMU_4, Stream.RATE_4)):
+    SENSORS[_accelerometer] = _imu(_accelerometer.value)
+    SENSORS[_rate] = _gyro(SENSORS[_accelerometer])
+"""In the order of `Stream`. Expected readings are in `boom_twin.deviation.channels`, topics in ``topics.yaml``."""
 
 
-def channels_of(joints: int) -> dict[Stream, tuple[str, ...]]:
-    """Return the names of the channels of every stream, in the order of its samples, of a boom with so many joints."""
-    return {stream: kind.channels(joints) for stream, kind in SENSORS.items()}
+USUAL_STREAMS = tuple(stream for stream, kind in SENSORS.items() if not (kind.is_placed or kind.beside))
+"""Streams that a boom has without a mapping, but for the gyro of its IMU."""
+
+
+def streams_of(places: Collection[str]) -> tuple[Stream, ...]:
+    """Return the streams of a boom whose mapping places these sensors, such as ``imu_2``."""
+    return tuple(stream for stream, kind in SENSORS.items() if not kind.is_placed or kind.stem in places)
+
+
+def channels_of(joints: int, streams: Collection[Stream] = tuple(Stream)) -> dict[Stream, tuple[str, ...]]:
+    """Return the names of the channels of every stream, in the order of its samples, of a boom with so many joints.
+
+    Streams that are not among `streams` have no channels.
+    """
+    return {stream: kind.channels(joints) if stream in streams else () for stream, kind in SENSORS.items()}
 
 
 NUMBER = re.compile(r"[1-9]\d{0,3}")
@@ -209,9 +284,9 @@ class Sample:
     stamp: int
     """Nanoseconds, `header.stamp` of the message."""
     values: Array
-    """``STROKES``: (n,) m. ``ANGLES``: (n,) rad, of an inclinometer to the horizontal. ``IMU``: (2,) m/s^2, specific force
-    along x and z of the tip. ``FORCES``: (n,) N, of the cylinders, positive in tension. NaN where the message had no value;
-    a value beyond `LIMIT` counts as none.
+    """``STROKES``: (n,) m. ``ANGLES``: (n,) rad, of an inclinometer to the horizontal. ``IMU``, ``IMU_2`` ..: (2,) m/s^2,
+    specific force along x and z of the sensor. ``RATE``, ``RATE_2`` ..: (1,) rad/s, positive when raised. ``FORCES``: (n,) N,
+    of the cylinders, positive in tension. NaN where the message had no value; a value beyond `LIMIT` counts as none.
     """
 
 

@@ -20,7 +20,7 @@ from .session_model import mapping_of
 SKEW = 0.05
 """Threshold (s) for a reported clock difference. A boom moves by centimetres in that time."""
 
-JOINT_STATES = tuple(stream for stream, kind in SENSORS.items() if not kind.is_imu)
+JOINT_STATES = tuple(stream for stream, kind in SENSORS.items() if kind.is_named)
 
 
 def names_missing(info: BagInfo, topics: Topics, joints: int) -> list[str]:

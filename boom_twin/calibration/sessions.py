@@ -88,8 +88,7 @@ def read_sessions(paths: Sequence[Path], topics: Topics, joints: int, window: Ti
 def _wanted(session: Session, topics: Topics) -> list[str]:
     """Return the topics of the streams of `NEEDED`, which must be there, and of the others if they are."""
     names = []
-    for stream in Stream:
-        topic = topics.inputs[stream]
+    for stream, topic in topics.inputs.items():
         found = session.find(topic.name)
         if stream in NEEDED:
             check_topic(session, topic.name, topic.type)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from argparse import REMAINDER, SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable
-from math import inf
+from collections.abc import Callable, Iterable
+from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
-from ..types import Stream
+from ..types import Place, Stream
 
 if TYPE_CHECKING:
     from ..bag.time_window import TimeWindow
+    from ..scene.schema import Scene
 
 
 SESSION = "a rosbag2 directory, a directory of its files, or one file: .mcap, .db3, .bag of ROS 1, .csv"
@@ -110,7 +111,7 @@ def refuse_given(args: Namespace, remedy: str, *names: str) -> None:
             raise UsageError(f"--{name.replace('_', '-')}{shown}: {remedy}")
 
 
-SENSORS = {"angles": Stream.ANGLES, "imu": Stream.IMU, "forces": Stream.FORCES}
+SENSORS = {"angles": Stream.ANGLES, "imu": Stream.IMU, "gyro": Stream.RATE, "forces": Stream.FORCES}
 """Sensors beside strokes by their names in ``--sensors``."""
 
 
@@ -120,6 +121,55 @@ def sensors_of(text: str) -> list[str]:
     if unknown := [name for name in names if name not in SENSORS]:
         raise UsageError(f"--sensors {text}: {', '.join(map(repr, unknown))} is no sensor. Give some of {', '.join(SENSORS)}.")
     return names
+
+
+PLACE = "SECTION:AT[:TURNED]"
+FURTHER = ("imu_2", "imu_3", "imu_4")
+"""IMUs that a boom may have beside that at the tip."""
+
+
+def place_of(text: str, scene: Scene) -> Place:
+    """Return the place that is written as `PLACE` says; UsageError if there is none on the boom."""
+    section, _, rest = text.partition(":")
+    at, _, turned = rest.partition(":")
+    try:
+        place = Place(int(section), float(at), float(turned or 0.0))
+    except ValueError:
+        raise UsageError(f"{text}: section, place (m) and turn (rad) must be numbers. Write {PLACE}.") from None
+    count = len(scene.sections)
+    if not 1 <= int(section) <= count:
+        raise UsageError(f"{text}: section = {section}, the boom has sections 1 to {count}. Give one of them.")
+    length = scene.sections[int(section) - 1].length
+    if not (0.0 <= float(at) <= length and isfinite(place.turned)):
+        raise UsageError(f"{text}: section {section} reaches from 0 to {length:g} m. Give the distance from its inboard pivot.")
+    return place
+
+
+def imu_places(texts: Iterable[str], scene: Scene) -> dict[str, Place]:
+    """Return the places of IMUs beside that at the tip, by their names; UsageError for one off the boom or too many."""
+    places = [place_of(text, scene) for text in texts]
+    if len(places) > len(FURTHER):
+        raise UsageError(f"{len(places)} IMUs beside that at the tip, at most {len(FURTHER)} are possible. Leave some out.")
+    return dict(zip(FURTHER, places, strict=False))
+
+
+def placed_sensors_of(text: str, scene: Scene) -> tuple[list[tuple[str, Stream]], dict[str, Place]]:
+    """Return names and streams of the sensors between commas, and the places of IMUs, which are written as imu@`PLACE`.
+
+    UsageError: see `sensors_of` and `imu_places`.
+    """
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    sensors_of(",".join(name.partition("@")[0] for name in names))
+    texts = dict.fromkeys(at for name in names if (at := name.partition("@")[2]))
+    places = imu_places(texts, scene)
+    stems, found = dict(zip(texts, places, strict=True)), list[tuple[str, Stream]]()
+    for name in names:
+        kind, _, at = name.partition("@")
+        if at and kind not in ("imu", "gyro"):
+            raise UsageError(f"--sensors {name}: only imu and gyro have a place. Leave @ out.")
+        stream = Stream(stems[at] if kind == "imu" else f"{stems[at]}_rate") if at else SENSORS[kind]
+        found.append((name, stream))
+    return found, places
 
 
 def positive(text: str) -> float:

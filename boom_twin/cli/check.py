@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,8 +17,9 @@ from ..scene.schema import Base, Clearance
 from ..scene.segmentation import LEAST_PARTS
 from ..scene.summary import UNKNOWNS_BASE, UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from ..system.atomic_files import check_target
+from ..types import Place, Stream
 from . import reduce as need
-from .arguments import SENSORS, add_file, add_json, add_scene, files_of, sensors_of
+from .arguments import PLACE, SENSORS, add_file, add_json, add_scene, files_of, placed_sensors_of
 from .output import columns, open_scene, print_result, tell
 
 if TYPE_CHECKING:
@@ -41,7 +42,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--sensors",
         metavar="NAME,..",
         help=f"also tell how accurate the estimate of the tip is with these and with fewer, at every posture of the scene: "
-        f"{', '.join(SENSORS)}; a name given twice is two such sensors (example: angles,imu,imu)",
+        f"{', '.join(SENSORS)}; a name given twice is two such sensors; imu@{PLACE} and gyro@..: of an IMU anywhere "
+        f"(example: angles,imu,imu@2:3.1)",
     )
 
 
@@ -50,8 +52,8 @@ def run(args: Namespace) -> int:
     need.refuse_misuse(args)
     if args.picture is not None:
         check_target(args.picture, files_of(args, "scene"), PNG)
-    sensors = None if args.sensors is None else sensors_of(args.sensors)
     scene, oddities = examine(args.scene)
+    sensors = None if args.sensors is None else placed_sensors_of(args.sensors, scene)
     name = args.scene or DEFAULT_NAME
     drawn = [] if args.picture is None else [f"Written: {_draw(args.picture, scene, name)}"]
     if args.strict and any(not oddity.is_note for oddity in oddities):
@@ -68,7 +70,7 @@ def run(args: Namespace) -> int:
             need.write(args.scene, scene, result, args.need, args.out)
             lines.append(f"Written: {args.out}")
     if sensors is not None:
-        accuracy, rows = _accuracy(scene, sensors)
+        accuracy, rows = _accuracy(scene, *sensors)
         values |= accuracy
         lines += rows
     print_result(args.json, values, lines + drawn)
@@ -269,7 +271,9 @@ def _table(rows: list[list[str]], left: int = 1) -> list[str]:
     return [f"  {line}" for line in columns(rows, range(left))] if rows else []
 
 
-def _accuracy(scene: Scene, sensors: list[str]) -> tuple[dict[str, Any], list[str]]:
+def _accuracy(
+    scene: Scene, sensors: Sequence[tuple[str, Stream]], places: Mapping[str, Place]
+) -> tuple[dict[str, Any], list[str]]:
     """Return the accuracy at every posture with every selection of `sensors`, as values for ``--json`` and as lines."""
     from ..deviation.accuracy import accuracy_at
 
@@ -281,9 +285,10 @@ def _accuracy(scene: Scene, sensors: list[str]) -> tuple[dict[str, Any], list[st
     lines.append(f"  {'posture':12} {'sensors beside strokes':24} {titles}")
     for posture in scene.postures:
         for chosen in sets:
-            name = ",".join(chosen) or "strokes only"
+            name = ",".join(each for each, _ in chosen) or "strokes only"
             try:
-                result = accuracy_at(scene, strokes_of_posture(scene, posture), tuple(SENSORS[sensor] for sensor in chosen))
+                streams = [stream for _, stream in chosen]
+                result = accuracy_at(scene, strokes_of_posture(scene, posture), streams, places=places)
             except BoomTwinError as error:
                 lines.append(f"  {posture:12} {name:24} {error}")
                 continue

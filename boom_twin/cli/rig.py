@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from argparse import Action, ArgumentParser, Namespace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NoReturn
 
 from .. import __version__
 from ..errors import UsageError
-from ..types import StrokeReading
-from .arguments import add_scene, files_of, positive, sensors_of
+from ..types import Place, Stream, StrokeReading
+from .arguments import PLACE, add_scene, files_of, imu_places, positive, sensors_of
 from .output import tell, tell_oddities
 
 
@@ -40,8 +41,13 @@ def add_arguments(parser: ArgumentParser) -> None:
         "wind:DEVIATION[:TIME_SCALE] (N, s; gusts, horizontal), with @ONSET (s), for instance pump:0.43:130; may be repeated"
     )
     parser.add_argument("--load", action="append", default=[], metavar="KIND:NUMBERS[@ONSET]", help=load)
-    sensors = "what is recorded beside strokes, of angles, imu and forces, with commas between them (default angles,imu)"
+    sensors = "what is recorded beside strokes, of angles, imu, gyro (that of the tip IMU) and forces; default angles,imu"
     parser.add_argument("--sensors", default="angles,imu", metavar="LIST", help=sensors)
+    imu = (
+        "another IMU with a gyro, AT m along a SECTION from its inboard pivot, its x axis turned by TURNED rad against the "
+        "section; up to three times"
+    )
+    parser.add_argument("--imu", action="append", default=[], metavar=PLACE, help=imu)
     parser.add_argument("--rate", type=float, metavar="HZ", help="of all sensors, 50 to 1000 (default 200)")
 
 
@@ -63,6 +69,12 @@ def _refuse_unrecorded(causes: list[str], recorded: set[str]) -> None:
             if cause.startswith(stem) and sensors not in recorded:
                 enough = ",".join(sorted([*recorded, sensors]))
                 raise UsageError(f"fault {cause}: {sensors} are not recorded. Give --sensors {enough}.")
+
+
+def _mapping_text(places: Mapping[str, Place]) -> str | None:
+    """Return the mapping that places these IMUs; None without any."""
+    lines = [f"  {name}: {{place: {{section: {p.section}, at: {p.at}, turned: {p.turned}}}}}" for name, p in places.items()]
+    return "\n".join(["inputs:", *lines, ""]) if places else None
 
 
 def run(args: Namespace) -> int:
@@ -93,6 +105,7 @@ def run(args: Namespace) -> int:
     recorded = set(sensors_of(args.sensors))
     rate = RATE if args.rate is None else args.rate
     sensors = noise_free(rate) if args.clean else Sensors(rate)
+    places = imu_places(args.imu, scene)
     wrong = [faults.parse(text) for text in args.fault]
     faults.check(wrong, scene, duration)
     _refuse_unrecorded([fault.cause for fault in wrong], recorded)
@@ -118,13 +131,16 @@ def run(args: Namespace) -> int:
         notes["forces"] = f"noise {sensors.force_sigma:g} N, resolution {sensors.force_resolution:g} N"
     with result_folder(out, RIG, files_of(args, "scene")) as building:
         tell(f"simulating {duration:g} s, about as long as that ..")
-        session = record_session(boom, drive, duration, sensors, args.seed, load=load, changes=changes)
+        session = record_session(boom, drive, duration, sensors, args.seed, load=load, changes=changes, places=places)
         session = faults.spoil(session, wrong, args.seed)
         readings = {"angles": session.joints, "imu": session.imu, "forces": session.forces}
         joints, imu, forces = (values if name in recorded else None for name, values in readings.items())
-        write_session(building.folder, session.stamps, session.strokes, joints, imu, notes, session.angle_stamps, forces)
+        placed = {stream: rows for stream, rows in session.placed.items() if stream is not Stream.RATE or "gyro" in recorded}
+        given = session.stamps, session.strokes, joints, imu, notes, session.angle_stamps, forces, placed
+        write_session(building.folder, *given)
         # not the boom that was simulated: what a twin is to assume
-        sheet = SessionSheet(__version__, assumed.text, origin=RIG_ORIGIN, strokes=StrokeReading.LENGTH)
+        own = _mapping_text(places)
+        sheet = SessionSheet(__version__, assumed.text, mapping=own, origin=RIG_ORIGIN, strokes=StrokeReading.LENGTH)
         sheet.write(building.folder)
         session.save_truth(building.folder / FILE_NAME)
     print(out)

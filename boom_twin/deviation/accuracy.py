@@ -6,7 +6,7 @@ held. A covariance does not depend on what is measured.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..config.settings import Settings
 from ..kernels.jit import kernel
 from ..kernels.result_row import results_in
 from ..scene.schema import Scene
-from ..types import SECOND, Array, Mount, Stream, channels_of
+from ..types import NO_PLACES, SECOND, Array, Mount, Place, Stream
 from .estimate_row import ACCELERATION_COVARIANCE, FORCE_VARIANCE, TIP_COVARIANCE, VARIANCES, WIDTH
 from .predictor import BoomPredictor
 from .sensors import take_sensor
@@ -40,6 +40,7 @@ def accuracy_at(
     settings: Settings | None = None,
     mounts: Sequence[Mount | None] = (),
     rate: float = 200.0,
+    places: Mapping[str, Place] = NO_PLACES,
 ) -> TipAccuracy:
     """Return the accuracy of the estimate at rest, `SETTLED` s after nothing was known.
 
@@ -53,15 +54,17 @@ def accuracy_at(
         Beside lengths of the cylinders; one that is named twice is there twice.
     rate : float
         Of all of them, Hz.
+    places : mapping of str to Place
+        See `boom_twin.deviation.predictor.BoomPredictor`.
 
     Raises
     ------
     UsageError, SolverError
         Strokes out of reach; no equilibrium there.
     """
-    boom, lengths = BoomPredictor(scene, settings or Settings(), mounts), statics(scene, drives).lengths
+    boom, lengths = BoomPredictor(scene, settings or Settings(), mounts, places=places), statics(scene, drives).lengths
     boom.start(lengths)
-    widths = [len(names) for stream, names in channels_of(boom.plan.joints).items() if stream is not Stream.STROKES]
+    widths = [len(names) for stream, names in boom.channels.items() if stream is not Stream.STROKES]
     counts = np.array([sum(each is stream for each in sensors) for stream in Stream])
     first, zeros, out = np.cumsum([0, 0, *widths]), np.zeros(max(widths)), np.zeros(WIDTH)
     tables, anchor, live, work, posture, filters, _, row = boom.compiled

@@ -11,7 +11,7 @@ Recordings of drives themselves are the case c_i = 0 of that reading; the boom k
 
 States: modal coordinates and rates of the vibration about static equilibrium; a fast and a slow part of the force at the tip
 that the model does not know (Gauss-Markov, `FAST` and `SLOW` seconds); length, rate and acceleration of the drives. The
-estimate adds zeros of IMU, angle sensors and force sensors.
+estimate adds zeros of IMU, angle sensors and force sensors, and errors of further sensors.
 
 A closed valve locks the oil, so its drive stands still: that is a reading of rate zero. Three models interact (H. Blom and
 Y. Bar-Shalom, IEEE Trans. Automat. Control 33 (1988), 780-783): valves as they are believed to be; all valves open; valves as
@@ -27,7 +27,8 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .kalman import ANGLE_ZERO, FAST, IMU_ZERO, correct, free_sensors, make_transition, transit
+from .channels import IMU_ZERO
+from .kalman import ANGLE_ZERO, FAST, correct, free_sensors, make_transition, transit
 from .learning import learn_jerk, learn_length_noise, learn_load, watch_valves
 from .mixture import copy_model, interact, mix, weigh_models
 from .rows import clear, column_row, length_of, length_row, read, variance_of
@@ -87,7 +88,7 @@ def start_models(p, f, speed, swing):
     copy_model(f, VALVES, OPEN, size)
     copy_model(f, VALVES, BURST, size)
     f.chances[VALVES], f.chances[OPEN], f.chances[BURST] = 0.8, 0.1, 0.1
-    f.excess[:], f.ratio[:], f.shaking[0] = 1.0, 1.0, 0.0
+    f.excess[:], f.ratio[:], f.shaking[:] = 1.0, 1.0, 0.0
     mix(f, PREDICTION, zero_place(p))
     follow_prediction(p, f)
     f.status[FED] = 0

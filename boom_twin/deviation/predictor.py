@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -27,7 +27,8 @@ from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
-from ..types import SENSORS, Array, Mount, Stream, StrokeReading, channels_of
+from ..types import NO_PLACES, Array, Mount, Place, Stream, StrokeReading, channels_of, streams_of
+from .channels import measurement_of
 from .estimate_row import MODES
 from .models import start_models
 from .posture import Posture, linearise, new_posture
@@ -84,6 +85,8 @@ class BoomPredictor:
         Of the angle sensors.
     reads : StrokeReading
         What the stroke transducers read.
+    places : mapping of str to Place
+        Of sensors that have one, such as ``imu_2``. The tip IMU is at the tip if it is not among them.
 
     Attributes
     ----------
@@ -92,6 +95,8 @@ class BoomPredictor:
         The boom as predicted by the newest sample.
     posture : Posture
     filters : Filters
+    channels : dict of Stream to tuple of str
+        Channels of every stream; none of those that the boom does not have.
     compiled : CompiledBoom
     places : Places
         Where everything stands in a row of a prediction.
@@ -105,6 +110,7 @@ class BoomPredictor:
         settings: Settings,
         mounts: Sequence[Mount | None] = (),
         reads: StrokeReading = StrokeReading.LENGTH,
+        places: Mapping[str, Place] = NO_PLACES,
     ) -> None:
         self._scene, self.plan = scene, compile_scene(scene)
         self.live: State = self.plan.state()
@@ -114,12 +120,12 @@ class BoomPredictor:
         self._row, self.places = np.zeros(prediction_width(n, self.pins)), places_in(n, self.pins)
         self._bending = moments_by_unknowns(self.plan)
         lengths, self._reads_length = np.array([each.length for each in scene.sections]), reads is StrokeReading.LENGTH
-        self.posture = new_posture(self.plan, MODES, lengths, mounting_of(self.plan, mounts), self._reads_length)
+        self.channels = channels_of(n, streams_of(places))
+        measured, mounting = measurement_of(self.plan, settings, places), mounting_of(self.plan, mounts)
+        self.posture = new_posture(self.plan, MODES, lengths, mounting, measured, self._reads_length)
         sizes = (USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)
-        used = Stream.STROKES, Stream.ANGLES, Stream.IMU, Stream.FORCES
-        variances = (settings.variance(SENSORS[stream]) for stream in used)
-        channels = sum(len(names) for stream, names in channels_of(n).items() if stream is not Stream.STROKES)
-        self.filters = new_filters(n, MODES, channels, SensorNoise(*variances, *(size * weight for size in sizes)))
+        noise = SensorNoise(settings.stroke_variance, *(size * weight for size in sizes))
+        self.filters = new_filters(n, MODES, measured, noise)
         self._struts = compile_scene(with_rigid_cylinders(scene))
         own = self.plan.tables, self._anchor, self.live, self._work, self.posture, self.filters, self._bending, self._row
         self.compiled = CompiledBoom(*own)
@@ -243,9 +249,8 @@ class BoomPredictor:
 
     def _zeros_of(self, channels: Collection[str]) -> list[int]:
         """Return the places of the zeros of these sensors among those of all."""
-        names = channels_of(self.plan.joints)  # mount and scale of the IMU stand between
-        places = [*names[Stream.IMU], "", "", *names[Stream.ANGLES], *names[Stream.FORCES]]
-        return [place for place, name in enumerate(places) if name in channels]
+        names = [name for stream, names in self.channels.items() if stream is not Stream.STROKES for name in names]
+        return sorted(int(row.zero) for name, row in zip(names, self.posture.channels, strict=True) if name in channels)
 
     def rebase(self, shift: int) -> None:
         """Shift stamps by `shift` (ns) from now on."""

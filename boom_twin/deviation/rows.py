@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..kernels.jit import inner
-from .states import all_states, drive_place, force_place, zero_place
+from .states import all_states, drive_place, force_place
 
 
 @inner
@@ -89,52 +89,38 @@ def length_of(p, i, row, x, size):
 
 
 @inner
-def rate_row(p, a, row):
-    """Write the row of the velocity of the tip (x, y, angle: `a`)."""
+def site_column(p, site):
+    """Return the place of x of a site in a row of `Posture.readings`; y and angle follow."""
+    return p.drives.shape[0] + 3 * site
+
+
+@inner
+def rate_row(p, at, row):
+    """Write the row of the rate of column `at` of `Posture.readings`."""
     n, m = p.drives.shape[0], p.modes[0]
     clear(row, all_states(p))
     drive = drive_place(p)
     for j in range(m):
-        row[m + j] = p.readings[2 + n + j, n + a]
+        row[m + j] = p.readings[2 + n + j, at]
     for i in range(n):
-        row[drive + n + i] = p.readings[2 + i, n + a]
+        row[drive + n + i] = p.readings[2 + i, at]
 
 
 @inner
-def acceleration_row(p, a, row):
-    """Write the row of the acceleration of the tip (x, y, angle: `a`), less what its curved way needs at its speed."""
+def acceleration_row(p, at, row):
+    """Write the row of the acceleration of column `at` of `Posture.readings`, less what its curved way needs at its speed."""
     n, m = p.drives.shape[0], p.modes[0]
     clear(row, all_states(p))
     load, drive = force_place(p), drive_place(p)
     for i in range(n):
-        row[drive + 2 * n + i] = p.readings[2 + i, n + a]
+        row[drive + 2 * n + i] = p.readings[2 + i, at]
     for j in range(m):
-        at, omega2 = 2 + n + j, p.omega[j] * p.omega[j]
-        motion = p.readings[at, n + a]
+        mode, omega2 = 2 + n + j, p.omega[j] * p.omega[j]
+        motion = p.readings[mode, at]
         row[j], row[m + j] = -omega2 * motion, -p.decay[j] * motion
         for b in range(2):
-            share = motion * p.readings[at, n + b]
+            share = motion * p.readings[mode, n + b]
             row[load + b] += share
             row[load + 2 + b] += share
         for i in range(n):
-            row[drive + 2 * n + i] -= motion * p.forces[at, i] / omega2
-
-
-@inner
-def angle_row(p, i, row):
-    """Write the row of angle sensor `i`."""
-    column_row(p, p.readings, i, 1.0, row)
-
-
-@inner
-def specific_force_row(p, f, axis, c, s, row):
-    """Write the row of the IMU's x or z (`axis` 0 or 1) at a tip whose angle has cosine `c` and sine `s`."""
-    n = p.drives.shape[0]
-    acceleration_row(p, 0, f.rows[0])
-    acceleration_row(p, 1, f.rows[1])
-    column_row(p, p.readings, n + 2, f.felt[1] if axis == 0 else -f.felt[0], row)
-    along, across = (c, s) if axis == 0 else (-s, c)
-    zero = zero_place(p)
-    for k in range(zero):
-        row[k] += along * f.rows[0, k] + across * f.rows[1, k]
-    row[zero + 2], row[zero + 3] = f.felt[1] if axis == 0 else -f.felt[0], f.felt[axis]
+            row[drive + 2 * n + i] -= motion * p.forces[mode, i] / omega2

@@ -10,6 +10,7 @@ from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, NOT_FINITE, OK
 from ..kernels.transfer.forward_kinematics import place
+from .channels import READS_ACCELERATION
 from .estimate_row import (
     ACCELERATION,
     ACCELERATION_COVARIANCE,
@@ -24,18 +25,17 @@ from .estimate_row import (
 )
 from .estimate_row import TIP as TIP_AT
 from .models import step_models
-from .posture import WIDEST, linearise
+from .posture import WIDEST, linearise, locate
 from .rows import (
     about_rest,
     acceleration_row,
-    angle_row,
     column_row,
     force_row,
     length_of,
     length_row,
     rate_row,
     read,
-    specific_force_row,
+    site_column,
     spread_of,
     variance_of,
 )
@@ -131,7 +131,6 @@ def write_prediction(t, live, p, f, h, gravity, out):
     """Write results and estimates; see `kernels.result_row`."""
     n, size, pins = p.drives.shape[0], zero_place(p), t.clearances.shape[0]
     found, estimates = results_in(out, n, pins), estimates_in(out, n, pins)
-    last = live.frames.shape[0] - 1
     for i in range(n):
         root = p.roots[i]
         found.joints[i] = live.frames[root, FRAME_ANGLE] - live.frames[root - 1, FRAME_ANGLE]
@@ -148,21 +147,36 @@ def write_prediction(t, live, p, f, h, gravity, out):
         row = t.clearances[k]
         found.pins[k, 0], found.pins[k, 1] = live.z[row.z], live.z[row.z + 1]
         found.pins[k, 2], found.pins[k, 3] = 0.0, 1.0
-    found.tip[0, 0], found.tip[0, 1] = live.frames[last, FRAME_X], live.frames[last, FRAME_Y]
-    found.tip[0, 2] = live.frames[last, FRAME_ANGLE]
-    write_bend(live, p, f, found.tip[2])
-    for a in range(3):
-        rate_row(p, a, f.row)
-        found.tip[1, a] = read(f.row, f.mean[PREDICTION], size)
-        acceleration_row(p, a, f.row)
-        found.tip[2, a] += read(f.row, f.mean[PREDICTION], size)
-    angle = f.angle[0] = found.tip[0, 2]
-    f.felt[0], f.felt[1] = specific_force(
-        found.tip[2, 0] - gravity[0], found.tip[2, 1] - gravity[1], math.cos(angle), math.sin(angle)
-    )
-    size2 = found.tip[2, 0] * found.tip[2, 0] + found.tip[2, 1] * found.tip[2, 1]
-    f.shaking[0] += min(h / SHAKEN_TIME, 1.0) * (size2 - f.shaking[0])
+    move_sites(t, live, p, f, h, gravity)
+    for k in range(3):
+        for a in range(3):
+            found.tip[k, a] = f.motion[0, 3 * k + a]
     estimates.rigid_tip[0], estimates.rigid_tip[1] = rigid_tip(t, p, estimates.strokes)
+
+
+@inner
+def move_sites(t, live, p, f, h, gravity):
+    """Write the predicted motion of all sites, how much they shake, and what accelerometers read there."""
+    size = zero_place(p)
+    for k in range(p.sites.shape[0]):
+        motion, at = f.motion[k], site_column(p, k)
+        motion[0], motion[1], motion[2] = locate(t, live, p, k)
+        write_bend(live, p, f, p.sites[k].section, motion)
+        for a in range(3):
+            rate_row(p, at + a, f.row)
+            motion[3 + a] = read(f.row, f.mean[PREDICTION], size)
+            acceleration_row(p, at + a, f.row)
+            motion[6 + a] += read(f.row, f.mean[PREDICTION], size)
+        share = min(h / SHAKEN_TIME, 1.0)
+        f.shaking[k, 0] += share * (motion[6] * motion[6] + motion[7] * motion[7] - f.shaking[k, 0])
+        f.shaking[k, 1] += share * (motion[5] * motion[5] - f.shaking[k, 1])
+    for c in range(p.channels.shape[0]):
+        channel = p.channels[c]
+        if channel.kind == READS_ACCELERATION:
+            motion = f.motion[channel.site]
+            angle = motion[2] + channel.turned
+            x, z = specific_force(motion[6] - gravity[0], motion[7] - gravity[1], math.cos(angle), math.sin(angle))
+            f.felt[c] = x if channel.index == 0 else z
 
 
 @inner
@@ -178,26 +192,29 @@ def stroke_rate(p, f, i):
 
 
 @inner
-def write_bend(live, p, f, found):
-    """Write the acceleration (x, y, angle) that the tip's curved way needs at constant rates of drives and modes.
+def write_bend(live, p, f, section, motion):
+    """Write the acceleration (x, y, angle) that a site's curved way needs at constant rates of drives and modes.
 
     With the turning rate w_i of the chord r_i of section i, and what w_i changes by the geometry of the linkages, a_i,
-    the tip has sum_i (a_i e_z x r_i - w_i^2 r_i).
+    the site has sum_i (a_i e_z x r_i - w_i^2 r_i). The chord of its own section ends at the site.
     """
     n, m, drive, change = p.drives.shape[0], p.modes[0], drive_place(p), 0.0
-    found[0], found[1], found[2] = 0.0, 0.0, 0.0
-    for i in range(n):
+    chords = site_column(p, p.sites.shape[0])
+    motion[6], motion[7] = 0.0, 0.0
+    for i in range(section + 1):
         rate, v = 0.0, f.mean[PREDICTION, drive + n + i]
         for k in range(n):
-            rate += p.readings[2 + k, n + 3 + i] * f.mean[PREDICTION, drive + n + k]
+            rate += p.readings[2 + k, chords + i] * f.mean[PREDICTION, drive + n + k]
         for j in range(m):
-            rate += p.readings[2 + n + j, n + 3 + i] * f.mean[PREDICTION, m + j]
+            rate += p.readings[2 + n + j, chords + i] * f.mean[PREDICTION, m + j]
         change += p.curvature[i] * v * v
         one, other = live.frames[p.roots[i]], live.frames[p.roots[i + 1]]
         x, y = other[FRAME_X] - one[FRAME_X], other[FRAME_Y] - one[FRAME_Y]
-        found[0] -= rate * rate * x + change * y
-        found[1] += change * x - rate * rate * y
-    found[2] = change
+        if i == section:
+            x, y = motion[0] - one[FRAME_X], motion[1] - one[FRAME_Y]
+        motion[6] -= rate * rate * x + change * y
+        motion[7] += change * x - rate * rate * y
+    motion[8] = change
 
 
 @inner
@@ -213,42 +230,13 @@ def rigid_tip(t, p, lengths):
 
 
 @inner
-def write_expected_readings(p, f, live, results, inclination, values, sigmas):
-    """Write the expected readings of all sensors for the newest prediction, and the residuals' standard deviations.
-
-    Parameters
-    ----------
-    results : Results
-        Of the prediction.
-    inclination : float
-        Of the base, rad.
-    values, sigmas : ndarray, shape (measured channels,)
-        Angles (rad), then the tip IMU's x and z (m/s^2), then the cylinders' forces (N).
-    """
-    n, size = p.drives.shape[0], zero_place(p)
-    for i in range(n):
-        values[i] = live.frames[p.frames[i], FRAME_ANGLE] + inclination if p.absolute[i] else results.joints[i]
-        angle_row(p, i, f.row)
-        sigmas[i] = math.sqrt(f.noise.angle2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
-    at, angle = n, results.tip[0, 2]
-    for axis in range(2):
-        values[at + axis] = f.felt[axis]
-        specific_force_row(p, f, axis, math.cos(angle), math.sin(angle), f.row)
-        sigmas[at + axis] = math.sqrt(f.noise.acceleration2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
-    for i in range(n):
-        values[at + 2 + i] = results.cylinder_forces[i]
-        force_row(p, i, f.row)
-        sigmas[at + 2 + i] = math.sqrt(f.noise.force2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
-
-
-@inner
 def write_tip_estimate(p, f, results, out):
     """Write the estimate beside the newest prediction; see `boom_twin.deviation.estimate_row.WIDTH`."""
     n, m, size, load = p.drives.shape[0], p.modes[0], zero_place(p), force_place(p)
     for a in range(3):
         column_row(p, p.readings, n + a, 1.0, f.rows[a])
-        rate_row(p, a, f.rows[3 + a])
-        acceleration_row(p, a, f.rows[6 + a])
+        rate_row(p, n + a, f.rows[3 + a])
+        acceleration_row(p, n + a, f.rows[6 + a])
         out[TIP_AT + a] = results.tip[0, a] + difference(f, f.rows[a], size)
         out[VELOCITY + a] = results.tip[1, a] + difference(f, f.rows[3 + a], size)
         out[ACCELERATION + a] = results.tip[2, a] + difference(f, f.rows[6 + a], size)

@@ -40,17 +40,22 @@ def sensors_of(
 ) -> dict[Stream, list[SensorSpec]]:
     """Return the sensors of every stream, in the order of a sample's values.
 
-    Ranges are those of `boom_twin.health.sensor_check.sensor_ranges`. `required` says which streams the twin needs, `absent`
-    which channels have no sensor.
+    Ranges are those of `boom_twin.health.sensor_check.sensor_ranges`. `required` says of every input if the twin needs it,
+    `absent` which channels have no sensor.
     """
     found = {}
     ranges = sensor_ranges(scene, mounts)
     for stream, kind in SENSORS.items():
+        is_required = required.get(Stream(kind.beside or stream))
+        if is_required is None:
+            continue
         sigma, resolution = settings.noise(kind)
         unit, over = kind.unit_suffix, RANGE_MARGIN * sigma
         bounds = zip(kind.channels(len(scene.joints)), *(bound.tolist() for bound in ranges[stream]), strict=True)
         found[stream] = [
-            SensorSpec(name, unit, low - over, high + over, sigma, resolution, required[stream] and name not in absent)
+            SensorSpec(
+                name, unit, low - over, high + over, sigma, resolution, is_required and not kind.beside and name not in absent
+            )
             for name, low, high in bounds
         ]
     return found

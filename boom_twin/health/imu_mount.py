@@ -1,4 +1,4 @@
-"""Monitor how the tip's IMU is mounted and read: its mean must be the specific force that gravity makes in its axes.
+"""Monitor how an IMU is mounted and read: its mean must be the specific force that gravity makes in its axes.
 
 An IMU in g, one whose axes are swapped or point the other way, one that takes gravity out: each differs from the model by
 much of g for good, and more than any bias of a working sensor. It is told in these words, and neither the estimate nor the
@@ -17,7 +17,6 @@ G = SENSORS[Stream.IMU].units["g"]
 FAR, GONE = 0.2 * G, 0.1 * G  # m/s^2, by which the means differ from which on it is told, and below which it has ended
 CLOSE, CLEAR = 0.1 * G, 0.05 * G  # m/s^2, how well a reason must explain the mean, and how much better than others
 KNOWN = 0.25  # weight of the slow means from which on readings are judged, and used: after 0.6 s
-CAUSE = "tip_imu.sensor"
 REASONS = {
     "in g": lambda x, z: (G * x, G * z),
     "in mg": lambda x, z: (1e-3 * G * x, 1e-3 * G * z),
@@ -34,7 +33,7 @@ TAKEN_OUT = "with gravity taken out"
 
 
 class ImuMount:
-    """Monitor of the IMU at the tip.
+    """Monitor of the IMU of that name.
 
     Attributes
     ----------
@@ -42,7 +41,8 @@ class ImuMount:
         While it lasts.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, name: str = "tip_imu") -> None:
+        self._name, self._cause = name, f"{name}.sensor"
         self.alarm: Alarm | None = None
         self._reasons: tuple[str, ...] = ()
 
@@ -66,11 +66,11 @@ class ImuMount:
         self._reasons = _likely(read, expected)
         likely = f", as if {' or '.join(self._reasons)}" if self._reasons else ""
         told = (
-            f"{CAUSE} reads ({read[0]:+.3g}, {read[1]:+.3g}) m/s^2 in x and z, where gravity makes "
-            f"({expected[0]:+.3g}, {expected[1]:+.3g}){likely}: not used; give tip_imu_x and tip_imu_z their unit, axis and "
-            "sign in the mapping"
+            f"{self._cause} reads ({read[0]:+.3g}, {read[1]:+.3g}) m/s^2 in x and z, where gravity makes "
+            f"({expected[0]:+.3g}, {expected[1]:+.3g}){likely}: not used; give {self._name}_x and {self._name}_z their unit, "
+            "axis and sign in the mapping"
         )
-        self.alarm = Alarm("tip_imu", "range", start, None, CAUSE, told, (Ranked(CAUSE, 1.0, ()),))
+        self.alarm = Alarm(self._name, "range", start, None, self._cause, told, (Ranked(self._cause, 1.0, ()),))
         return self.alarm
 
     def _is_reason_open(self, slow: SlowMeans) -> bool:

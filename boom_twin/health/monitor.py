@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, channels_of
+from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream
 from .angle_reading import AngleReading
 from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows, PredictionRows
 from .causes import explains
@@ -40,6 +40,8 @@ class HealthMonitor:
         Mounts of the angle sensors.
     absent : collection of str
         Channels without a sensor, see `boom_twin.Twin`.
+    channels : mapping of Stream to tuple of str
+        Channels of every stream.
 
     Attributes
     ----------
@@ -48,10 +50,16 @@ class HealthMonitor:
     """
 
     def __init__(
-        self, scene: Scene, settings: Settings, mounts: tuple[Mount | None, ...], absent: Collection[str] = ()
+        self,
+        scene: Scene,
+        settings: Settings,
+        mounts: tuple[Mount | None, ...],
+        absent: Collection[str],
+        channels: Mapping[Stream, tuple[str, ...]],
     ) -> None:
         self.fault_twins: FaultTwins | None = None
-        self._settings, self._channels = settings, channels_of(len(scene.joints))
+        self._settings = settings
+        self._channels = {stream: names for stream, names in channels.items() if names}
         self._ranges = sensor_ranges(scene, mounts)
         self._uncertain = UNCERTAIN * settings.stroke_variance
         self._sensors = {
@@ -60,7 +68,9 @@ class HealthMonitor:
         }
         self._delay = DelayMonitor()
         self._deviations = {stream: DeviationMonitor(stream, scene, settings) for stream in SIGMAS}
-        self._mount, self._forces = ImuMount(), ForceReading(self._channels[Stream.FORCES])
+        self._forces = ForceReading(self._channels[Stream.FORCES])
+        accelerometers = (s for s in self._channels if SENSORS[s].field == "linear_acceleration")
+        self._mounts = {stream: ImuMount(SENSORS[stream].stem) for stream in accelerometers}
         self._angles, self._load = AngleReading(scene, mounts), TipLoadMonitor(settings.tip_load_limit)
         self._told = 0
         self.begin()
@@ -73,6 +83,7 @@ class HealthMonitor:
         self._checks = {
             stream: SensorCheck(*settings.noise(kind), *self._ranges[stream], fastest.get(stream, 0.0))
             for stream, kind in SENSORS.items()
+            if stream in self._channels
         }
         self._surveys: dict[Stream, StreamSurvey] = {
             stream: StreamSurvey(settings.variance(SENSORS[stream]), len(names))
@@ -101,8 +112,8 @@ class HealthMonitor:
         Those are the channels of sensors and streams that are known to fail. An IMU is used once its mean is known, for no
         noise tells that its axes are wrong.
         """
-        is_unknown = self._surveys[Stream.IMU].slow.weight.max() < KNOWN
-        return np.concatenate([self._masked(stream) | (stream is Stream.IMU and is_unknown) for stream in self._surveys])
+        unknown = {stream for stream in self._mounts if self._surveys[stream].slow.weight.max() < KNOWN}
+        return np.concatenate([self._masked(stream) | (stream in unknown) for stream in self._surveys])
 
     @property
     def failing_strokes(self) -> NDArray[np.bool_]:
@@ -116,7 +127,7 @@ class HealthMonitor:
             return masked | self._angles.masked | (self._delay.alarm is not None)
         if stream is Stream.FORCES and self._forces.alarms:
             return masked | self._forces.masked
-        return masked | (stream is Stream.IMU and self._mount.alarm is not None)
+        return masked | (stream in self._mounts and self._mounts[stream].alarm is not None)
 
     def judge(self, stamp: int, load: tuple[Array, Array], tip_sigmas: Callable[[], Array]) -> Health | None:
         """Judge the blocks that strokes with `stamp` (ns) complete; return None if there is nothing to report.
@@ -145,7 +156,8 @@ class HealthMonitor:
         for sensors in self._sensors.values():
             yield from (alarm for alarm in sensors.alarms if not self._angles.explains(alarm))
         yield from (*self._angles.alarms, *self._forces.alarms)
-        yield from (alarm for alarm in (self._mount.alarm, self._delay.alarm, self._load.alarm) if alarm is not None)
+        mounts = (mount.alarm for mount in self._mounts.values())
+        yield from (alarm for alarm in (*mounts, self._delay.alarm, self._load.alarm) if alarm is not None)
         named = [] if self.fault_twins is None else self.fault_twins.alarms
         for stream, deviations in self._deviations.items():
             yield from (alarm for alarm in deviations.alarms if not any(explains(each, stream, alarm) for each in named))
@@ -174,8 +186,9 @@ class HealthMonitor:
         news = self._angles.take(readings[Stream.ANGLES], strokes, BLOCK * NANO, block.start, block.end)
         if self._angles.has_wrong_strokes:
             return news
-        if not self._sensors[Stream.IMU].masked.any():
-            news += self._mount.take(readings[Stream.IMU], block.start, block.end)
+        for stream, mount in self._mounts.items():
+            if not self._sensors[stream].masked.any():
+                news += mount.take(readings[stream], block.start, block.end)
         news += self._forces.take(readings[Stream.FORCES], block.start, block.end)
         news += self._delay.take(readings[Stream.ANGLES], self._sensors[Stream.ANGLES].masked, block)
         for stream, deviations in self._deviations.items():

@@ -18,10 +18,12 @@ from .topic_table import (
     InputTopic,
     Qos,
     Sensor,
+    SensorPlace,
     Topic,
     Topics,
     default_document,
     load_topics,
+    used_inputs,
     usual,
 )
 
@@ -34,6 +36,10 @@ _REMEDIES = {
     "absolute": "Give root or head, where on its section the inclinometer sits; leave it out for an encoder.",
     "depth": "Give a number of messages.",
     "delay": "Give the seconds by which the stamps come after the readings.",
+    "section": "Give the number of a section, 1 at the base.",
+    "at": "Give the distance from the section's inboard pivot along it, m.",
+    "turned": "Give the angle of the sensor's x axis to the section, rad, positive anticlockwise.",
+    "place": "Give section, at and turned.",
     "reads": "Give length for a transducer in or on the cylinder; drive only for sessions of a simulated boom.",
     "frame": "Give the name of a frame without a leading slash: base_link.",
 }
@@ -71,6 +77,8 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
     usual_values = default_document()
     values = _merged(usual_values, document or {})
     faults = _role_faults(values, usual_values)
+    if isinstance(values["inputs"], dict):
+        values["inputs"] = used_inputs(values["inputs"])
     sensors = values.pop("sensors", None) or {}
     absent = frozenset(channel for channel, given in sensors.items() if given == "none") if isinstance(sensors, dict) else ()
     sensors, names, found = _sensors(sensors)
@@ -149,8 +157,8 @@ def _kind_faults(channel: str, given: Mapping[str, Any]) -> Iterator[Fault]:
         yield Fault(f"{place}.unit", unit, f"it must be one of {', '.join(kind.units)}", "Use scale for any other.")
     if kind is not SENSORS[Stream.ANGLES] and (mount := given.get("absolute")) is not None:
         yield Fault(f"{place}.absolute", mount, "only an angle (joint_i) can be absolute", "Remove the key.")
-    if kind.is_imu and (name := given.get("name", "x")) not in ("x", "y", "z"):
-        yield Fault(f"{place}.name", name, "it must be x, y or z", "Give the axis of linear_acceleration.")
+    if not kind.is_named and (name := given.get("name", "x")) not in ("x", "y", "z"):
+        yield Fault(f"{place}.name", name, "it must be x, y or z", f"Give the axis of {kind.field}.")
 
 
 def _set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Iterator[Fault]:
@@ -197,6 +205,8 @@ def _model_at(place: list[str]) -> type[BaseModel]:
         return Sensor
     if "qos" in place[:-1]:
         return Qos
+    if "place" in place[:-1]:
+        return SensorPlace
     return {"inputs": InputTopic}.get(place[0], Topic) if len(place) > 1 else Topics
 
 
@@ -216,8 +226,13 @@ def _name_faults(topics: Topics) -> Iterator[Fault]:
 
 
 def _input_faults(topics: Topics) -> Iterator[Fault]:
-    """Yield faults for a delay of the strokes, whose stamps all outputs have, and for ``reads`` of another input."""
+    """Yield faults for a delay of the strokes, whose stamps all outputs have, and for keys of another kind of input."""
     for stream, topic in topics.inputs.items():
+        if topic.place is not None and SENSORS[stream].is_named:
+            yield Fault(f"inputs.{stream.value}.place", "given", "only an IMU has a place", "Remove the key.")
+        if topic.place is None and SENSORS[stream].is_placed:
+            told = "it must be there: section, at (m), turned (rad)"
+            yield Fault(f"inputs.{stream.value}.place", None, told, "Give {} for the tip.")
         if topic.reads is not None and stream is not Stream.STROKES:
             yield Fault(f"inputs.{stream.value}.reads", topic.reads.value, "only cylinder_strokes has it", "Remove the key.")
     if delay := topics.inputs[Stream.STROKES].delay:

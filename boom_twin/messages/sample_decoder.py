@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..types import LIMIT, SECOND, SENSORS, Array, Sample, Stream
-from .cdr_decoder import Force
+from .cdr_decoder import Axes
 from .sample_assembler import Reading, SampleAssembler
 from .topic_table import Topics, factor, load_topics
 
@@ -152,7 +152,7 @@ class SampleDecoder:
         self._sharing = pair if topics.is_shared else {}
         self.delays = {stream: topics.delay(stream) for stream in Stream}
         self.refused = 0
-        self._by_axis = {stream for stream, kind in SENSORS.items() if kind.is_imu}
+        self._by_axis = {stream for stream, kind in SENSORS.items() if not kind.is_named}
         self.oddities: Counter[str] = Counter()
         self.assembler = SampleAssembler({s: each.wanted for s, each in self._channels.items()}, self.oddities)
         self.other_boom_names: dict[Stream, list[str]] = {}
@@ -179,7 +179,7 @@ class SampleDecoder:
         if not (stamp_ns and 0 < taken < LATEST):
             self.oddities["impossible stamp" if stamp_ns else "no stamp"] += 1
             return None
-        raw, is_whole = self._by_name(msg, stream) if is_by_name else (self._force(msg, stream), True)
+        raw, is_whole = self._by_name(msg, stream) if is_by_name else (self._by_axes(msg, stream), True)
         if raw is None:
             return None
         channels = self._channels[stream]
@@ -188,7 +188,7 @@ class SampleDecoder:
         if isnan(values[0]) and all(map(isnan, values)):
             self.oddities["no usable value"] += 1
             return None
-        frame = "" if is_by_name else msg.frame if isinstance(msg, Force) else msg.header.frame_id
+        frame = "" if is_by_name else msg.frame if isinstance(msg, Axes) else msg.header.frame_id
         array = in_range(np.array(values), *channels.range) if stream is Stream.ANGLES else np.array(values)
         return Reading(Sample(stream, taken, array), is_whole, frame)
 
@@ -231,13 +231,15 @@ class SampleDecoder:
             self.oddities[name] += 1
         return None if places is None else [float(found[place]) if place >= 0 else _ABSENT for place in places], is_whole
 
-    def _force(self, msg: Any, stream: Stream) -> list[float] | None:
-        """Return the specific force (m/s^2) along the axes that the mapping takes for the tip's x and z."""
-        if msg.linear_acceleration_covariance[0] == NO_MEASUREMENT:
-            self.oddities["no measurement"] += 1
+    def _by_axes(self, msg: Any, stream: Stream) -> list[float] | None:
+        """Return readings along the axes that the mapping names; None if the message has none."""
+        kind = SENSORS[stream]
+        if getattr(msg, f"{kind.field}_covariance")[0] == NO_MEASUREMENT:
+            if not kind.beside:
+                self.oddities["no measurement"] += 1
             return None
-        force = msg.linear_acceleration
-        return [float(getattr(force, axis)) if axis else _ABSENT for axis in self._channels[stream].names]
+        vector = getattr(msg, kind.field)
+        return [float(getattr(vector, axis)) if axis else _ABSENT for axis in self._channels[stream].names]
 
     def _reject(self, value: float) -> float:
         """Return NaN and count the reason. An absent channel is counted elsewhere."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from functools import cache
-from math import radians
+from math import pi, radians
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ..config.yaml_text import read_plain
 from ..errors import UsageError
-from ..types import GIVE, NUMBER, SECOND, SENSORS, Mount, Stream, StrokeReading, sensor_kind
+from ..types import GIVE, NUMBER, SECOND, SENSORS, Mount, Place, Stream, StrokeReading, sensor_kind, streams_of
 
 
 class Sensor(BaseModel):
@@ -33,12 +33,18 @@ class Sensor(BaseModel):
 def usual(channel: str) -> dict[str, Any]:
     """Return the default name and unit of a channel."""
     kind, end = sensor_kind(channel), channel.rpartition("_")[2]
-    return {"name": end if kind.is_imu else f"{kind.named}_{end}", "unit": kind.unit}
+    name = f"{kind.named}_{end}" if kind.is_named else kind.axes[kind.ends.index(end)]
+    return {"name": name, "unit": kind.unit}
 
 
 def factor(channel: str, sensor: Sensor) -> float:
-    """Return the factor of (reading - zero): sign, scale and conversion of the unit to SI."""
-    return sensor.sign * sensor.scale * sensor_kind(channel).units[sensor.unit]
+    """Return the factor of (reading - zero): sign, scale and conversion of the unit to SI.
+
+    A gyro reads a turn about an axis that points to the right of a boom that is raised about the one to its left.
+    """
+    kind = sensor_kind(channel)
+    turn = -1.0 if kind.field == "angular_velocity" else 1.0
+    return turn * sensor.sign * sensor.scale * kind.units[sensor.unit]
 
 
 NODE = "boom_twin"
@@ -120,14 +126,29 @@ class Topic(_Entry):
         return self.name if self.name.startswith("/") else f"/{self.name}"
 
 
+class SensorPlace(_Entry):
+    """Place of a sensor on the boom; see `boom_twin.types.Place`."""
+
+    section: Annotated[int, Field(ge=1)] | None = None
+    at: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
+    turned: Annotated[float, Field(ge=-2 * pi, le=2 * pi, allow_inf_nan=False)] = 0.0
+
+    @property
+    def value(self) -> Place:
+        """The place."""
+        return Place(self.section, self.at, self.turned)
+
+
 class InputTopic(Topic):
     """One topic of readings.
 
     ``delay`` is the time from reading to stamp, s. ``reads`` is the quantity that stroke transducers read, if known.
+    ``place`` is where an IMU sits.
     """
 
     delay: Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)] = 0.0
     reads: StrokeReading | None = None
+    place: SensorPlace | None = None
 
 
 class EventTopic(Topic):
@@ -161,9 +182,15 @@ class Topics(_Entry):
     def heard(self) -> dict[str, list[Stream]]:
         """Streams of every input topic by its name; strokes first."""
         found: dict[str, list[Stream]] = {}
-        for stream in Stream:
-            found.setdefault(self.inputs[stream].name, []).append(stream)
+        for stream in streams_of(self.places):
+            topic = self.inputs[Stream(SENSORS[stream].beside or stream)]
+            found.setdefault(topic.name, []).append(stream)
         return found
+
+    @property
+    def places(self) -> dict[str, Place]:
+        """Places of the sensors that have one, by their names."""
+        return {SENSORS[stream].stem: topic.place.value for stream, topic in self.inputs.items() if topic.place is not None}
 
     def renamed(self, name: Callable[[Topic], str]) -> Topics:
         """Return these topics, each with the name that `name` returns for it."""
@@ -185,7 +212,8 @@ class Topics(_Entry):
 
     def delay(self, stream: Stream) -> int:
         """Return the time from the readings of a stream to their stamps, ns."""
-        return round(self.inputs[stream].delay * SECOND)
+        topic = self.inputs.get(Stream(SENSORS[stream].beside or stream))
+        return 0 if topic is None else round(topic.delay * SECOND)
 
     def sensors_of(self, stream: Stream, joints: int) -> dict[str, Sensor]:
         """Return the sensors of a stream by channel, in the order of its samples."""
@@ -224,7 +252,19 @@ class Topics(_Entry):
 @cache
 def load_topics() -> Topics:
     """Return the topics of the package with default sensors; the file is read once."""
-    return Topics.model_validate(default_document())
+    return Topics.model_validate({**default_document(), "inputs": used_inputs(default_document()["inputs"])})
+
+
+@cache
+def every_input() -> dict[Stream, InputTopic]:
+    """Return all inputs of the package, with those that a boom has only if its mapping names them."""
+    return {Stream(role): InputTopic.model_validate(topic) for role, topic in default_document()["inputs"].items()}
+
+
+def used_inputs(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the inputs without those that need a place and are as in the package, which gives them none."""
+    placed, usual = {stream.value for stream, kind in SENSORS.items() if kind.is_placed}, default_document()["inputs"]
+    return {role: topic for role, topic in inputs.items() if role not in placed or topic != usual[role]}
 
 
 @cache

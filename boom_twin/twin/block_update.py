@@ -20,7 +20,7 @@ from ..kernels.jit import hold
 from ..kernels.result_row import PIN
 from ..predictions import Outline
 from ..scene.schema import Scene
-from ..types import NANO, SECOND, Array, Health, Report, Residuals, Stream, channels_of
+from ..types import NANO, SECOND, Array, Health, Report, Residuals, Stream
 from .blocks import STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
 from .load_shedding import LoadShedding
 from .regular import NOISE_REACH
@@ -33,7 +33,7 @@ CAPACITY = 4096  # samples that one call of the compiled update takes at most
 
 def limits_of(scene: Scene, boom: BoomPredictor, settings: Settings, absent: Collection[str]) -> Limits:
     """Return the limits of the compiled update for `boom`, that of `scene` with its load, and for its sensors."""
-    channels = list(channels_of(boom.plan.joints).values())
+    channels = list(boom.channels.values())
     counts = np.array([len(names) for names in channels])
     far = NOISE_REACH * settings.stroke_variance**0.5
     return Limits(

@@ -181,7 +181,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
 
         def make() -> Twin:
             reads, absent = topics.stroke_reading, topics.absent
-            twin = Twin(scene, settings, mounts, health, reads, absent, causes=causes, is_live=True)
+            twin = Twin(scene, settings, mounts, health, reads, absent, causes=causes, is_live=True, places=topics.places)
             twin.warm_up()
             import_module("scipy.special")  # the first alarm and the first pause need it; their samples would wait 0.3 s
             return twin

@@ -26,7 +26,7 @@ from .lumped_masses import lump_masses
 from .masses import Lump, Lumps
 from .pin_clearance import Bush, contact_of, pin_with_play, refuse_other_pins
 from .six_bar import Link, six_bar
-from .system import Base, Boom, BuiltSection, Frame, Station, oil_stiffness, section_frames
+from .system import Base, Boom, BuiltSection, Frame, Site, Station, oil_stiffness, section_frames
 
 SAME_PLACE = 1e-9  # m
 SHEAR_OVER_AXIAL = 10.0  # GA = 10 EA: Euler-Bernoulli in effect; of the default boom's tip, shear is then 0.02 mm
@@ -39,7 +39,7 @@ def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSec
         return BuiltSection(None, [_station(boom, frame, 0.0, masses.rigid_section(boom.scene, index), [*borne.values()])])
     section = boom.scene.sections[index]
     assert section.beam is not None
-    inside = _bracket_places(boom.scene, index)
+    inside = _places_on_beam(boom, index)
     places = [section.beam[0], *inside, section.beam[1]]
     own = [masses.flexible_root(boom.scene, section), *([] for _ in inside), masses.flexible_head(boom.scene, index)]
     near = {x: int(np.argmin([abs(x - place) for place in places])) for x in borne}
@@ -61,11 +61,11 @@ def _station(boom: Boom, frame: Frame, x: float, own: list[Lump], borne: list[Lu
     return Station(x, node, boom.body(node, mass.mass, mass.com, mass.inertia, weight), frame.angle)
 
 
-def _bracket_places(scene: Scene, index: int) -> list[float]:
-    """Return the places (m) on the flexible part of a section where a cylinder is pinned to it."""
-    section = scene.sections[index]
+def _places_on_beam(boom: Boom, index: int) -> list[float]:
+    """Return the places (m) on the flexible part of a section where a cylinder is pinned to it, or a sensor sits."""
+    scene, section = boom.scene, boom.scene.sections[index]
     assert section.beam is not None
-    places = []
+    places = [site.at for site in boom.sites if site.section == index]
     if index == 0 and section.rod_pin is not None:
         places.append(section.rod_pin[0])
     if index + 1 < len(scene.joints):
@@ -247,6 +247,7 @@ def build(
     nodally_exact: bool = False,
     lumped: bool = False,
     shear_over_axial: float = SHEAR_OVER_AXIAL,
+    sites: tuple[Site, ...] = (),
 ) -> Boom:
     """Build the undeformed boom with its drives at absolute `strokes` (m), shape (n,). Sensors may still be added.
 
@@ -260,6 +261,8 @@ def build(
         True if cylinders and two-force links are no bodies, their masses lumped; see `lumped_masses`.
     shear_over_axial : float
         GA over EA.
+    sites : tuple of Site
+        Where sensors are.
 
     Raises
     ------
@@ -279,7 +282,7 @@ def build(
     lumps = lump_masses(scene, frames, strokes) if lumped else None
     gravity = [*gravity_in_base(scene).tolist(), 0.0]
     base = add_base(system, ground, scene)
-    boom = Boom(scene, container, system, gravity, base, nodally_exact, shear_over_axial, elements, lumps)
+    boom = Boom(scene, container, system, gravity, base, nodally_exact, shear_over_axial, elements, lumps, sites=sites)
     for index, frame in enumerate(frames):
         boom.sections.append(add_section(boom, frame, index, elements))
         add_pivot(boom, index)

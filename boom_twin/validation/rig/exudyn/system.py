@@ -61,6 +61,14 @@ class BuiltSection:
         return min(self.stations, key=lambda station: abs(station.x - x))
 
 
+@dataclass(frozen=True, slots=True)
+class Site:
+    """Place of sensors: section, 0-based, and the distance from its inboard pivot, m."""
+
+    section: int
+    at: float
+
+
 @dataclass(slots=True)
 class Boom:
     """An assembled system and the numbers by which its parts are found.
@@ -86,6 +94,8 @@ class Boom:
         Pins with play.
     tip_load : int
         The external force at the tip.
+    sites : tuple of Site
+        Where sensors are; the beams there have nodes.
     """
 
     scene: Scene
@@ -101,6 +111,7 @@ class Boom:
     drives: list[tuple[int, str]] = field(default_factory=list)
     bushes: list[Bush] = field(default_factory=list)
     tip_load: int = -1
+    sites: tuple[Site, ...] = ()
 
     def marker(self, body: int, local: Point) -> int:
         """Add a marker on a rigid body, in the body's axes."""

@@ -1,0 +1,227 @@
+"""Table of measured channels: what each reads, where on the boom, with which noise, and which states are its errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler.plan import Plan
+from ..config.settings import Settings
+from ..errors import UsageError
+from ..kernels.elements.beam_shapes import integrals_to, rotations_at
+from ..kernels.jit import inner
+from ..kernels.tables import BEAM, FRAME_ANGLE, JOINT_A, JOINT_B, OFFSET
+from ..types import SENSORS, Array, Place, Stream, channels_of, streams_of
+from .rows import acceleration_row, column_row, force_row, rate_row, site_column, variance_of
+from .states import PREDICTION, zero_place
+
+READS_ANGLE, READS_FORCE, READS_ACCELERATION, READS_RATE = range(4)
+TIP_IMU_STATES, IMU_STATES = 4, 4  # zeros of two axes, mount, scale
+IMU_ZERO, IMU_DRIFT = 0.3, 3e-3  # m/s^2; m/s^2 in a root second
+IMU_TURN, IMU_SCALE = 0.1, 0.1  # rad, by which it may be mounted askew; share by which it may read too much
+RATE_ZERO, RATE_DRIFT = 0.02, 1e-4  # rad/s; rad/s in a root second
+SAME_PLACE = 1e-9  # m
+
+CHANNEL = np.dtype(
+    [
+        ("stream", np.int64),  # its place in `Stream`
+        ("kind", np.int64),
+        ("index", np.int64),  # joint, cylinder, or axis
+        ("site", np.int64),  # row of `SITE`
+        ("turned", float),  # of the sensor's x axis to the section, rad
+        ("zero", np.int64),  # place of its zero among the states behind those of the prediction
+        ("last", np.int64),  # place there of the last state that its reading depends on: an IMU's scale, behind its mount
+        ("noise2", float),  # variance of its noise
+    ]
+)
+
+SITE = np.dtype(
+    [
+        ("section", np.int64),
+        ("frame", np.int64),  # row of `State.frames`
+        ("beam", np.int64),  # row of the beam that begins in this frame; -1 on a rigid part
+        ("x", float),  # distance from the frame on a rigid part, m
+    ]
+)
+
+ERROR = np.dtype([("first", float), ("walk", float)])  # standard deviations: at first, and of the walk in a root second
+
+
+class Measurement(NamedTuple):
+    """Measured channels of a boom, and their places.
+
+    Attributes
+    ----------
+    channels, sites : recarray
+        Rows of `CHANNEL` and of `SITE`; the tip is the first site.
+    errors : recarray
+        Rows of `ERROR`: states behind the zeros, mount and scale of the tip IMU, and the zeros of angles and forces.
+    psi : ndarray, shape (sites, shapes)
+        Rotation of a beam at the site by its bending coordinates.
+    weights : ndarray, shape (sites, points)
+        See `boom_twin.kernels.elements.beam_shapes.integrals_to`, m.
+    """
+
+    channels: np.recarray
+    sites: np.recarray
+    errors: np.recarray
+    psi: Array
+    weights: Array
+
+
+@inner
+def measurement_row(p, f, c, row):
+    """Write the row of the measured channel `c`, without its zero, at the state of `Filters.motion`."""
+    channel = p.channels[c]
+    if channel.kind == READS_ANGLE:
+        column_row(p, p.readings, channel.index, 1.0, row)
+    elif channel.kind == READS_FORCE:
+        force_row(p, channel.index, row)
+    elif channel.kind == READS_RATE:
+        rate_row(p, site_column(p, channel.site) + 2, row)
+    else:
+        specific_force_row(p, f, c, row)
+
+
+@inner
+def specific_force_row(p, f, c, row):
+    """Write the row of channel `c`, an axis of an accelerometer, with the mount and the scale of its IMU."""
+    channel = p.channels[c]
+    at, axis = site_column(p, channel.site), channel.index
+    angle = f.motion[channel.site, 2] + channel.turned
+    cosine, sine = math.cos(angle), math.sin(angle)
+    acceleration_row(p, at, f.rows[0])
+    acceleration_row(p, at + 1, f.rows[1])
+    turn = f.felt[c + 1] if axis == 0 else -f.felt[c - 1]
+    column_row(p, p.readings, at + 2, turn, row)
+    along, across = (cosine, sine) if axis == 0 else (-sine, cosine)
+    zero = zero_place(p)
+    for k in range(zero):
+        row[k] += along * f.rows[0, k] + across * f.rows[1, k]
+    row[zero + channel.last - 1], row[zero + channel.last] = turn, f.felt[c]
+
+
+@inner
+def write_expected_readings(p, f, live, results, inclination, values, sigmas):
+    """Write the expected readings of all sensors for the newest prediction, and the residuals' standard deviations.
+
+    Parameters
+    ----------
+    results : Results
+        Of the prediction.
+    inclination : float
+        Of the base, rad.
+    values, sigmas : ndarray, shape (measured channels,)
+        In the order of the channels: rad, m/s^2, N, rad/s.
+    """
+    size = zero_place(p)
+    for c in range(p.channels.shape[0]):
+        channel = p.channels[c]
+        if channel.kind == READS_ANGLE:
+            i = channel.index
+            values[c] = live.frames[p.frames[i], FRAME_ANGLE] + inclination if p.absolute[i] else results.joints[i]
+        elif channel.kind == READS_FORCE:
+            values[c] = results.cylinder_forces[channel.index]
+        elif channel.kind == READS_RATE:
+            values[c] = f.motion[channel.site, 5]
+        else:
+            values[c] = f.felt[c]
+        measurement_row(p, f, c, f.row)
+        sigmas[c] = math.sqrt(channel.noise2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
+
+
+def measurement_of(plan: Plan, settings: Settings, places: Mapping[str, Place]) -> Measurement:
+    """Return the measured channels of a boom whose IMUs have these places, by their names.
+
+    Raises
+    ------
+    UsageError
+        A place is not on the boom.
+    """
+    sites, rows, errors = _Sites(plan), list[tuple[float, ...]](), list[tuple[float, float]]()
+    n, codes = plan.joints, {stream: code for code, stream in enumerate(Stream)}
+    for stream, names in channels_of(n, streams_of(places)).items():
+        kind, behind = SENSORS[stream], TIP_IMU_STATES + 2 * n + len(errors)
+        noise2 = settings.variance(kind)
+        if stream is Stream.ANGLES:
+            rows += [(codes[stream], READS_ANGLE, i, 0, 0.0, at := TIP_IMU_STATES + i, at, noise2) for i in range(n)]
+        elif stream is Stream.FORCES:
+            rows += [(codes[stream], READS_FORCE, i, 0, 0.0, at := TIP_IMU_STATES + n + i, at, noise2) for i in range(n)]
+        elif names and kind.field == "linear_acceleration":
+            place, first = places.get(kind.stem, Place()), 0 if stream is Stream.IMU else behind
+            site = sites.of(place, kind.stem)
+            last = first + IMU_STATES - 1
+            rows += [
+                (codes[stream], READS_ACCELERATION, i, site, place.turned, first + i, last, noise2) for i in range(len(names))
+            ]
+            if stream is not Stream.IMU:
+                errors += [(IMU_ZERO, IMU_DRIFT), (IMU_ZERO, IMU_DRIFT), (IMU_TURN, 0.0), (IMU_SCALE, 0.0)]
+        elif names and kind.field == "angular_velocity":
+            place = places.get(kind.stem, Place())
+            rows.append((codes[stream], READS_RATE, 0, sites.of(place, kind.stem), place.turned, behind, behind, noise2))
+            errors.append((RATE_ZERO, RATE_DRIFT))
+    return Measurement(_table(rows, CHANNEL), _table(sites.rows, SITE), _table(errors, ERROR), *sites.shapes())
+
+
+def _table(rows: Sequence[tuple[float, ...]], kind: np.dtype) -> np.recarray:
+    return np.array(rows, kind).view(np.recarray)
+
+
+class _Sites:
+    """Collector of the sites of sensors, each once; the tip is the first."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+        kinds = plan.tables.operations.kind
+        self._roots = np.append(np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1, len(kinds) + 1).tolist()
+        self.rows: list[tuple[float, ...]] = [(plan.joints - 1, len(kinds), -1, 0.0)]
+        self._along = [0.0]  # of a beam: share of its length
+
+    def of(self, place: Place, name: str) -> int:
+        """Return the row of a place on the boom; UsageError if it is not on it."""
+        sections = self._plan.joints
+        section = sections if place.section is None else place.section
+        if not 1 <= section <= sections:
+            raise UsageError(f"{name}: section = {section}, the boom has sections 1 to {sections}. Give one of them.")
+        row, along = self._found(section - 1, place.at, name)
+        if row not in self.rows or (row[2] >= 0 and along not in self._along):
+            self.rows.append(row)
+            self._along.append(along)
+            return len(self.rows) - 1
+        return next(i for i, each in enumerate(self.rows) if each == row and (row[2] < 0 or self._along[i] == along))
+
+    def _found(self, section: int, at: float | None, name: str) -> tuple[tuple[int, int, int, float], float]:
+        """Return the row of a place, and the share of the beam's length that it is at."""
+        t, start, end = self._plan.tables, 0.0, self._roots[section + 1] - 1
+        for frame in range(self._roots[section], end):
+            operation = t.operations[frame]
+            if operation.kind not in (OFFSET, BEAM):
+                continue
+            is_beam, row = operation.kind == BEAM, int(operation.row)
+            length = float(t.weights[row, int(t.beams[row].points)].sum()) if is_beam else float(t.offsets[row].x)
+            if at is not None and -SAME_PLACE <= at - start <= length - SAME_PLACE:
+                inside = max(at - start, 0.0)
+                return ((section, frame, row, 0.0), inside / length) if is_beam else ((section, frame, -1, inside), 0.0)
+            start += length
+        if at is not None and abs(at - start) > SAME_PLACE:
+            raise UsageError(
+                f"{name}: at = {at:g} m, section {section + 1} reaches from 0 to {start:g} m. "
+                "Give the distance from its inboard pivot."
+            )
+        return (section, end, -1, 0.0), 0.0
+
+    def shapes(self) -> tuple[Array, Array]:
+        """Return the rotations and integrals of beams at the sites, see `Measurement`."""
+        t = self._plan.tables
+        psi = np.zeros((len(self.rows), t.psi.shape[2]))
+        weights = np.zeros((len(self.rows), t.weights.shape[2]))
+        for site, ((_, _, beam, _), along) in enumerate(zip(self.rows, self._along, strict=True)):
+            if beam >= 0:
+                row = t.beams[int(beam)]
+                n, points, length = int(row.bending), int(row.points), t.weights[int(beam), int(row.points)].sum()
+                psi[site, :n] = rotations_at(n, np.array([along]))[0]
+                weights[site, :points] = length * integrals_to(points, np.array([along]))[0]
+        return psi, weights
