@@ -50,6 +50,9 @@ class Stream(Enum):
     RATE_3 = "imu_3_rate"
     IMU_4 = "imu_4"
     RATE_4 = "imu_4_rate"
+    MOMENTS = "section_moments"
+    POINT = "points"
+    POINT_2 = "points_2"
 
     __hash__ = object.__hash__  # members are single; Enum's own is a Python function, called for every look-up
 
@@ -114,6 +117,11 @@ class SensorKind:
     """Input whose messages hold these readings, too, if they have no topic of their own."""
     is_placed: bool = False
     """True if a boom has these sensors only where a mapping places them."""
+
+    def is_at(self, places: Collection[str]) -> bool:
+        """Return True if any of these sensors has a place; places are those of a stem, or of single channels of one."""
+        return self.stem in places or any(not self.ends and place.rpartition("_")[0] == self.stem for place in places)
+
     part: str = ""
     """Stem of the names in messages, if it differs: a force is that of ``cylinder_1``."""
     shown: str = ""
@@ -139,7 +147,7 @@ class SensorKind:
     @property
     def unit_suffix(self) -> str:
         """SI unit as the end of a key or of a column's name: ``rad``, ``m_s2``."""
-        return self.unit.replace("/", "_").replace("^", "")
+        return self.unit.replace("/", "_").replace("^", "").replace(" ", "")
 
     @property
     def shown_unit(self) -> tuple[float, str]:
@@ -228,6 +236,36 @@ SENSORS[Stream.RATE] = _gyro(SENSORS[Stream.IMU])
 for _accelerometer, _rate in ((Stream.IMU_2, Stream.RATE_2), (Stream.IMU_3, Stream.RATE_3), (Stream.IMU_4, Stream.RATE_4)):
     SENSORS[_accelerometer] = _imu(_accelerometer.value)
     SENSORS[_rate] = _gyro(SENSORS[_accelerometer])
+SENSORS[Stream.MOMENTS] = SensorKind(
+    title="bending moments",
+    message="sensor_msgs/msg/JointState",
+    stem="moment",
+    ends=(),
+    units={"N m": 1.0, "kN m": 1e3},
+    noise="moment_sigma",
+    resolution="",
+    lack="",
+    field="effort",
+    is_placed=True,
+    shown="kN m",
+    alarms=("stuck",),
+)
+for _point in (Stream.POINT, Stream.POINT_2):
+    SENSORS[_point] = SensorKind(
+        title=_point.value.replace("_", " "),
+        message="geometry_msgs/msg/PointStamped",
+        stem=_point.value,
+        ends=("x", "z"),
+        units={"m": 1.0, "mm": 1e-3},
+        noise="point_sigma",
+        resolution="",
+        lack="",
+        field="point",
+        axes=("x", "z"),
+        is_placed=True,
+        shown="mm",
+        alarms=(),
+    )
 """In the order of `Stream`. Expected readings are in `boom_twin.deviation.channels`, topics in ``topics.yaml``."""
 
 
@@ -237,7 +275,7 @@ USUAL_STREAMS = tuple(stream for stream, kind in SENSORS.items() if not (kind.is
 
 def streams_of(places: Collection[str]) -> tuple[Stream, ...]:
     """Return the streams of a boom whose mapping places these sensors, such as ``imu_2``."""
-    return tuple(stream for stream, kind in SENSORS.items() if not kind.is_placed or kind.stem in places)
+    return tuple(stream for stream, kind in SENSORS.items() if not kind.is_placed or kind.is_at(places))
 
 
 def channels_of(joints: int, streams: Collection[Stream] = tuple(Stream)) -> dict[Stream, tuple[str, ...]]:
@@ -286,7 +324,8 @@ class Sample:
     values: Array
     """``STROKES``: (n,) m. ``ANGLES``: (n,) rad, of an inclinometer to the horizontal. ``IMU``, ``IMU_2`` ..: (2,) m/s^2,
     specific force along x and z of the sensor. ``RATE``, ``RATE_2`` ..: (1,) rad/s, positive when raised. ``FORCES``: (n,) N,
-    of the cylinders, positive in tension. NaN where the message had no value; a value beyond `LIMIT` counts as none.
+    of the cylinders, positive in tension. ``MOMENTS``: (n,) N m, positive where the outboard end is bent up. ``POINT``,
+    ``POINT_2``: (2,) m, forward and up. NaN where the message had no value; a value beyond `LIMIT` counts as none.
     """
 
 

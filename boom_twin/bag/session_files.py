@@ -124,6 +124,9 @@ def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
     msg = new_message(kind.message)
     if not kind.is_named:
         fill_header(msg.header, sample.stamp, kind.stem.removesuffix("_imu"))
+        if kind.field == "point":
+            msg.point.x, msg.point.z = map(float, sample.values)
+            return msg
         msg.linear_acceleration.x, msg.linear_acceleration.z = map(float, sample.values)
         msg.orientation.w = 1.0
         msg.orientation_covariance[0] = msg.angular_velocity_covariance[0] = _UNKNOWN

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import REMAINDER, SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -124,8 +124,8 @@ def sensors_of(text: str) -> list[str]:
 
 
 PLACE = "SECTION:AT[:TURNED]"
-FURTHER = ("imu_2", "imu_3", "imu_4")
-"""IMUs that a boom may have beside that at the tip."""
+FURTHER = {"imu": ("imu_2", "imu_3", "imu_4"), "point": ("points", "points_2")}
+"""Sensors that a boom may have at a place beside the IMU at the tip, by kind; a moment is that of its section."""
 
 
 def place_of(text: str, scene: Scene) -> Place:
@@ -145,31 +145,54 @@ def place_of(text: str, scene: Scene) -> Place:
     return place
 
 
-def imu_places(texts: Iterable[str], scene: Scene) -> dict[str, Place]:
-    """Return the places of IMUs beside that at the tip, by their names; UsageError for one off the boom or too many."""
+def named_places(kind: str, texts: Sequence[str], scene: Scene) -> dict[str, Place]:
+    """Return the places of sensors of one kind by their names; UsageError for one off the boom or too many."""
     places = [place_of(text, scene) for text in texts]
-    if len(places) > len(FURTHER):
-        raise UsageError(f"{len(places)} IMUs beside that at the tip, at most {len(FURTHER)} are possible. Leave some out.")
-    return dict(zip(FURTHER, places, strict=False))
+    names = FURTHER.get(kind) or tuple(f"moment_{place.section}" for place in places)
+    if len(places) > len(names):
+        raise UsageError(f"{len(places)} places of {kind}, at most {len(names)} are possible. Leave some out.")
+    for text, place in zip(texts, places, strict=True):
+        beam = scene.sections[(place.section or 1) - 1].beam if scene.is_flexible((place.section or 1) - 1) else None
+        if kind == "moment" and not (beam and beam[0] < (place.at or 0.0) < beam[1]):
+            bends = f"bends from {beam[0]:g} to {beam[1]:g} m" if beam else "is rigid"
+            raise UsageError(f"--moment {text}: section {place.section} {bends}; strain is read on a beam only.")
+    if len(set(names)) < len(names):
+        raise UsageError("two strain gauges are on one section: one is possible. Leave the other out.")
+    return dict(zip(names, places, strict=False))
 
 
-def placed_sensors_of(text: str, scene: Scene) -> tuple[list[tuple[str, Stream]], dict[str, Place]]:
-    """Return names and streams of the sensors between commas, and the places of IMUs, which are written as imu@`PLACE`.
+PLACED = ("imu", "gyro", "moment", "point")
 
-    UsageError: see `sensors_of` and `imu_places`.
+
+def placed_sensors_of(text: str, scene: Scene) -> list[tuple[str, Stream, dict[str, Place]]]:
+    """Return name, stream and place of the sensors between commas; those with a place are written as imu@`PLACE`.
+
+    UsageError: see `sensors_of` and `named_places`.
     """
     names = [name.strip() for name in text.split(",") if name.strip()]
-    sensors_of(",".join(name.partition("@")[0] for name in names))
-    texts = dict.fromkeys(at for name in names if (at := name.partition("@")[2]))
-    places = imu_places(texts, scene)
-    stems, found = dict(zip(texts, places, strict=True)), list[tuple[str, Stream]]()
+    sensors_of(",".join(name for name in names if name.partition("@")[0] not in PLACED or "@" not in name))
+    places, stems = dict[str, Place](), dict[tuple[str, str], str]()
+    for kind in ("imu", "moment", "point"):
+        texts = list(dict.fromkeys(at for name in names if _placed(name)[0] == kind and (at := _placed(name)[1])))
+        found = named_places(kind, texts, scene)
+        stems |= {(kind, at): stem for at, stem in zip(texts, found, strict=True)}
+        places |= found
+    chosen = []
     for name in names:
-        kind, _, at = name.partition("@")
-        if at and kind not in ("imu", "gyro"):
-            raise UsageError(f"--sensors {name}: only imu and gyro have a place. Leave @ out.")
-        stream = Stream(stems[at] if kind == "imu" else f"{stems[at]}_rate") if at else SENSORS[kind]
-        found.append((name, stream))
-    return found, places
+        kind, at = _placed(name)
+        stem = stems.get((kind, at), "")
+        if name.startswith("gyro@"):
+            stem += "_rate"
+        stream = Stream.MOMENTS if kind == "moment" else Stream(stem) if stem else SENSORS[name]
+        own = stems.get((kind, at))
+        chosen.append((name, stream, {own: places[own]} if own else {}))
+    return chosen
+
+
+def _placed(name: str) -> tuple[str, str]:
+    """Return kind and place of a sensor; a gyro is part of an IMU."""
+    kind, _, at = name.partition("@")
+    return "imu" if kind == "gyro" else kind, at
 
 
 def positive(text: str) -> float:

@@ -42,7 +42,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--sensors",
         metavar="NAME,..",
         help=f"also tell how accurate the estimate of the tip is with these and with fewer, at every posture of the scene: "
-        f"{', '.join(SENSORS)}; a name given twice is two such sensors; imu@{PLACE} and gyro@..: of an IMU anywhere "
+        f"{', '.join(SENSORS)}; a name given twice is two such sensors; imu@{PLACE}, gyro@.., moment@.., point@..: elsewhere "
         f"(example: angles,imu,imu@2:3.1)",
     )
 
@@ -70,7 +70,7 @@ def run(args: Namespace) -> int:
             need.write(args.scene, scene, result, args.need, args.out)
             lines.append(f"Written: {args.out}")
     if sensors is not None:
-        accuracy, rows = _accuracy(scene, *sensors)
+        accuracy, rows = _accuracy(scene, sensors)
         values |= accuracy
         lines += rows
     print_result(args.json, values, lines + drawn)
@@ -271,23 +271,24 @@ def _table(rows: list[list[str]], left: int = 1) -> list[str]:
     return [f"  {line}" for line in columns(rows, range(left))] if rows else []
 
 
-def _accuracy(
-    scene: Scene, sensors: Sequence[tuple[str, Stream]], places: Mapping[str, Place]
-) -> tuple[dict[str, Any], list[str]]:
+def _accuracy(scene: Scene, sensors: Sequence[tuple[str, Stream, Mapping[str, Place]]]) -> tuple[dict[str, Any], list[str]]:
     """Return the accuracy at every posture with every selection of `sensors`, as values for ``--json`` and as lines."""
     from ..deviation.accuracy import accuracy_at
 
     values: dict[str, Any] = {}
-    sets = dict.fromkeys(chosen for count in range(len(sensors) + 1) for chosen in combinations(sensors, count))
+    sets = {
+        ",".join(name for name, *_ in chosen) or "strokes only": chosen
+        for count in range(len(sensors) + 1)
+        for chosen in combinations(sensors, count)
+    }
     acting = "an unknown load of 0.25 % of the boom's weight comes and goes at the tip"
     lines = ["", f"Accuracy of the estimate at rest, while {acting} (standard deviations)"]
     titles = f"{'tip x, y mm':>16} {'pitch mrad':>11} {'acceleration':>13} {'load N':>14}"
     lines.append(f"  {'posture':12} {'sensors beside strokes':24} {titles}")
     for posture in scene.postures:
-        for chosen in sets:
-            name = ",".join(each for each, _ in chosen) or "strokes only"
+        for name, chosen in sets.items():
             try:
-                streams = [stream for _, stream in chosen]
+                streams, places = [stream for _, stream, _ in chosen], {k: v for *_, own in chosen for k, v in own.items()}
                 result = accuracy_at(scene, strokes_of_posture(scene, posture), streams, places=places)
             except BoomTwinError as error:
                 lines.append(f"  {posture:12} {name:24} {error}")

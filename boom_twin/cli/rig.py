@@ -10,7 +10,7 @@ from typing import NoReturn
 from .. import __version__
 from ..errors import UsageError
 from ..types import Place, Stream, StrokeReading
-from .arguments import PLACE, add_scene, files_of, imu_places, positive, sensors_of
+from .arguments import PLACE, add_scene, files_of, named_places, positive, sensors_of
 from .output import tell, tell_oddities
 
 
@@ -48,6 +48,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         "section; up to three times"
     )
     parser.add_argument("--imu", action="append", default=[], metavar=PLACE, help=imu)
+    gauge = "a strain gauge that reads the bending moment AT m along a SECTION; one on each section"
+    parser.add_argument("--moment", action="append", default=[], metavar="SECTION:AT", help=gauge)
+    point = "a point whose position is measured once a second, as by a total station; up to twice"
+    parser.add_argument("--point", action="append", default=[], metavar="SECTION:AT", help=point)
     parser.add_argument("--rate", type=float, metavar="HZ", help="of all sensors, 50 to 1000 (default 200)")
 
 
@@ -72,9 +76,14 @@ def _refuse_unrecorded(causes: list[str], recorded: set[str]) -> None:
 
 
 def _mapping_text(places: Mapping[str, Place]) -> str | None:
-    """Return the mapping that places these IMUs; None without any."""
-    lines = [f"  {name}: {{place: {{section: {p.section}, at: {p.at}, turned: {p.turned}}}}}" for name, p in places.items()]
-    return "\n".join(["inputs:", *lines, ""]) if places else None
+    """Return the mapping that places these sensors; None without any."""
+    if not places:
+        return None
+    lines: dict[str, list[str]] = {"inputs": [], "sensors": []}
+    for name, p in places.items():
+        block = "sensors" if name.startswith("moment_") else "inputs"
+        lines[block].append(f"  {name}: {{place: {{section: {p.section}, at: {p.at}, turned: {p.turned}}}}}")
+    return "\n".join(line for block, found in lines.items() if found for line in (f"{block}:", *found)) + "\n"
 
 
 def run(args: Namespace) -> int:
@@ -105,7 +114,8 @@ def run(args: Namespace) -> int:
     recorded = set(sensors_of(args.sensors))
     rate = RATE if args.rate is None else args.rate
     sensors = noise_free(rate) if args.clean else Sensors(rate)
-    places = imu_places(args.imu, scene)
+    asked = (("imu", args.imu), ("moment", args.moment), ("point", args.point))
+    places = {name: place for kind, texts in asked for name, place in named_places(kind, texts, scene).items()}
     wrong = [faults.parse(text) for text in args.fault]
     faults.check(wrong, scene, duration)
     _refuse_unrecorded([fault.cause for fault in wrong], recorded)

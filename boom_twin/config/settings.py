@@ -173,6 +173,8 @@ class Settings(BaseModel):
     rate_sigma: float = setting(2e-3, "rad/s", POSITIVE, "standard deviation of the noise of a gyro")
     force_sigma: float = setting(100.0, "N", POSITIVE, "standard deviation of the noise of a cylinder's force")
     force_resolution: float = setting(20.0, "N", NOT_NEGATIVE, "resolution of a cylinder's force")
+    moment_sigma: float = setting(50.0, "N m", POSITIVE, "standard deviation of the noise of a bending moment")
+    point_sigma: float = setting(2e-3, "m", POSITIVE, "standard deviation of the noise of the position of a point")
     payload: float = setting(-1.0, "kg", LOAD, "mass at the tip; below 0: that of the scene", True)
     line_fill: float = setting(-1.0, "kg/m", LOAD, "concrete in the pipe line; below 0: that of the scene", True)
     stroke_rate: float = setting(STROKE_RATE, "m/s", LIMIT, "maximum speed of a cylinder; faster strokes are left out", True)

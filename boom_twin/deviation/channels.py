@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import legendre
 
 from ..compiler.plan import Plan
 from ..config.settings import Settings
@@ -15,21 +17,22 @@ from ..kernels.elements.beam_shapes import integrals_to, rotations_at
 from ..kernels.jit import inner
 from ..kernels.tables import BEAM, FRAME_ANGLE, JOINT_A, JOINT_B, OFFSET
 from ..types import SENSORS, Array, Place, Stream, channels_of, streams_of
-from .rows import acceleration_row, column_row, force_row, rate_row, site_column, variance_of
-from .states import PREDICTION, zero_place
+from .rows import acceleration_row, clear, column_row, force_row, rate_row, site_column, variance_of
+from .states import PREDICTION, all_states, zero_place
 
-READS_ANGLE, READS_FORCE, READS_ACCELERATION, READS_RATE = range(4)
+READS_ANGLE, READS_FORCE, READS_ACCELERATION, READS_RATE, READS_MOMENT, READS_COORDINATE, READS_NOTHING = range(7)
 TIP_IMU_STATES, IMU_STATES = 4, 4  # zeros of two axes, mount, scale
 IMU_ZERO, IMU_DRIFT = 0.3, 3e-3  # m/s^2; m/s^2 in a root second
 IMU_TURN, IMU_SCALE = 0.1, 0.1  # rad, by which it may be mounted askew; share by which it may read too much
 RATE_ZERO, RATE_DRIFT = 0.02, 1e-4  # rad/s; rad/s in a root second
+POINT_ZERO, POINT_DRIFT = 1e-3, 1e-5  # m; m in a root second: of a prism, and of the model's statics
 SAME_PLACE = 1e-9  # m
 
 CHANNEL = np.dtype(
     [
         ("stream", np.int64),  # its place in `Stream`
         ("kind", np.int64),
-        ("index", np.int64),  # joint, cylinder, or axis
+        ("index", np.int64),  # joint, cylinder, axis, or station of `Measurement.bending`
         ("site", np.int64),  # row of `SITE`
         ("turned", float),  # of the sensor's x axis to the section, rad
         ("zero", np.int64),  # place of its zero among the states behind those of the prediction
@@ -63,6 +66,8 @@ class Measurement(NamedTuple):
         Rotation of a beam at the site by its bending coordinates.
     weights : ndarray, shape (sites, points)
         See `boom_twin.kernels.elements.beam_shapes.integrals_to`, m.
+    bending : ndarray, shape (stations, unknowns)
+        Bending moments that strain gauges read by the unknowns, N m.
     """
 
     channels: np.recarray
@@ -70,6 +75,7 @@ class Measurement(NamedTuple):
     errors: np.recarray
     psi: Array
     weights: Array
+    bending: Array
 
 
 @inner
@@ -80,6 +86,12 @@ def measurement_row(p, f, c, row):
         column_row(p, p.readings, channel.index, 1.0, row)
     elif channel.kind == READS_FORCE:
         force_row(p, channel.index, row)
+    elif channel.kind == READS_MOMENT:
+        column_row(p, p.moments, channel.index, 1.0, row)
+    elif channel.kind == READS_COORDINATE:
+        column_row(p, p.readings, site_column(p, channel.site) + channel.index, 1.0, row)
+    elif channel.kind == READS_NOTHING:
+        clear(row, all_states(p))
     elif channel.kind == READS_RATE:
         rate_row(p, site_column(p, channel.site) + 2, row)
     else:
@@ -115,7 +127,7 @@ def write_expected_readings(p, f, live, results, inclination, values, sigmas):
     inclination : float
         Of the base, rad.
     values, sigmas : ndarray, shape (measured channels,)
-        In the order of the channels: rad, m/s^2, N, rad/s.
+        In the order of the channels: rad, m/s^2, N, rad/s, N m, m.
     """
     size = zero_place(p)
     for c in range(p.channels.shape[0]):
@@ -125,6 +137,14 @@ def write_expected_readings(p, f, live, results, inclination, values, sigmas):
             values[c] = live.frames[p.frames[i], FRAME_ANGLE] + inclination if p.absolute[i] else results.joints[i]
         elif channel.kind == READS_FORCE:
             values[c] = results.cylinder_forces[channel.index]
+        elif channel.kind == READS_MOMENT:
+            values[c] = 0.0
+            for k in range(live.z.shape[0]):
+                values[c] += p.bending[channel.index, k] * live.z[k]
+        elif channel.kind == READS_COORDINATE:
+            values[c] = f.motion[channel.site, channel.index]
+        elif channel.kind == READS_NOTHING:
+            values[c] = math.nan
         elif channel.kind == READS_RATE:
             values[c] = f.motion[channel.site, 5]
         else:
@@ -134,7 +154,7 @@ def write_expected_readings(p, f, live, results, inclination, values, sigmas):
 
 
 def measurement_of(plan: Plan, settings: Settings, places: Mapping[str, Place]) -> Measurement:
-    """Return the measured channels of a boom whose IMUs have these places, by their names.
+    """Return the measured channels of a boom whose sensors have these places, by their names.
 
     Raises
     ------
@@ -142,6 +162,7 @@ def measurement_of(plan: Plan, settings: Settings, places: Mapping[str, Place]) 
         A place is not on the boom.
     """
     sites, rows, errors = _Sites(plan), list[tuple[float, ...]](), list[tuple[float, float]]()
+    bending = list[Array]()
     n, codes = plan.joints, {stream: code for code, stream in enumerate(Stream)}
     for stream, names in channels_of(n, streams_of(places)).items():
         kind, behind = SENSORS[stream], TIP_IMU_STATES + 2 * n + len(errors)
@@ -163,11 +184,30 @@ def measurement_of(plan: Plan, settings: Settings, places: Mapping[str, Place]) 
             place = places.get(kind.stem, Place())
             rows.append((codes[stream], READS_RATE, 0, sites.of(place, kind.stem), place.turned, behind, behind, noise2))
             errors.append((RATE_ZERO, RATE_DRIFT))
-    return Measurement(_table(rows, CHANNEL), _table(sites.rows, SITE), _table(errors, ERROR), *sites.shapes())
+        elif names and kind.field == "point":
+            site = sites.of(places[kind.stem], kind.stem)
+            rows += [(codes[stream], READS_COORDINATE, i, site, 0.0, behind + i, behind + i, noise2) for i in range(len(names))]
+            errors += [(POINT_ZERO, POINT_DRIFT)] * len(names)
+        elif stream is Stream.MOMENTS:
+            for section, name in enumerate(names, start=1):
+                if name not in places:
+                    rows.append((codes[stream], READS_NOTHING, 0, 0, 0.0, 0, 0, noise2))
+                    continue
+                place, at = places[name], TIP_IMU_STATES + 2 * n + len(errors)
+                bending.append(sites.bending(replace(place, section=place.section or section), name))
+                rows.append((codes[stream], READS_MOMENT, len(bending) - 1, 0, 0.0, at, at, noise2))
+                errors.append((np.inf, 0.0))  # by the moment that is there, see `BoomPredictor.start`
+    stations = np.array(bending).reshape(-1, len(plan.names))
+    tables = _table(rows, CHANNEL), _table([row for row, _ in sites.found], SITE), _table(errors, ERROR)
+    return Measurement(*tables, *sites.shapes(), stations)
 
 
 def _table(rows: Sequence[tuple[float, ...]], kind: np.dtype) -> np.recarray:
     return np.array(rows, kind).view(np.recarray)
+
+
+_Found = tuple[tuple[int, int, int, float], float]
+"""Row of `SITE`, and the share of a beam's length at which it is."""
 
 
 class _Sites:
@@ -177,24 +217,23 @@ class _Sites:
         self._plan = plan
         kinds = plan.tables.operations.kind
         self._roots = np.append(np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1, len(kinds) + 1).tolist()
-        self.rows: list[tuple[float, ...]] = [(plan.joints - 1, len(kinds), -1, 0.0)]
-        self._along = [0.0]  # of a beam: share of its length
+        self.found: list[_Found] = [((plan.joints - 1, len(kinds), -1, 0.0), 0.0)]
 
     def of(self, place: Place, name: str) -> int:
-        """Return the row of a place on the boom; UsageError if it is not on it."""
+        """Return the number of a place on the boom among those found; UsageError if it is not on it."""
+        found = self._checked(place, name)
+        if found not in self.found:
+            self.found.append(found)
+        return self.found.index(found)
+
+    def _checked(self, place: Place, name: str) -> _Found:
         sections = self._plan.joints
         section = sections if place.section is None else place.section
         if not 1 <= section <= sections:
             raise UsageError(f"{name}: section = {section}, the boom has sections 1 to {sections}. Give one of them.")
-        row, along = self._found(section - 1, place.at, name)
-        if row not in self.rows or (row[2] >= 0 and along not in self._along):
-            self.rows.append(row)
-            self._along.append(along)
-            return len(self.rows) - 1
-        return next(i for i, each in enumerate(self.rows) if each == row and (row[2] < 0 or self._along[i] == along))
+        return self._looked_up(section - 1, place.at, name)
 
-    def _found(self, section: int, at: float | None, name: str) -> tuple[tuple[int, int, int, float], float]:
-        """Return the row of a place, and the share of the beam's length that it is at."""
+    def _looked_up(self, section: int, at: float | None, name: str) -> _Found:
         t, start, end = self._plan.tables, 0.0, self._roots[section + 1] - 1
         for frame in range(self._roots[section], end):
             operation = t.operations[frame]
@@ -213,15 +252,27 @@ class _Sites:
             )
         return (section, end, -1, 0.0), 0.0
 
+    def bending(self, place: Place, name: str) -> Array:
+        """Return the bending moment (N m) at a place by the unknowns; UsageError where nothing bends."""
+        (section, _, beam, _), along = self._checked(place, name)
+        if beam < 0:
+            raise UsageError(
+                f"{name}: section {section + 1} is rigid at {place.at} m, and has no strain there. Give a place on its beam."
+            )
+        t, found = self._plan.tables, np.zeros(len(self._plan.names))
+        row = t.beams[beam]
+        n, first = int(row.bending), int(row.z)
+        found[first : first + n] = t.stiffness[beam, 0, 0] * legendre.legvander(np.array([2.0 * along - 1.0]), n - 1)[0]
+        return found
+
     def shapes(self) -> tuple[Array, Array]:
         """Return the rotations and integrals of beams at the sites, see `Measurement`."""
         t = self._plan.tables
-        psi = np.zeros((len(self.rows), t.psi.shape[2]))
-        weights = np.zeros((len(self.rows), t.weights.shape[2]))
-        for site, ((_, _, beam, _), along) in enumerate(zip(self.rows, self._along, strict=True)):
+        psi = np.zeros((len(self.found), t.psi.shape[2]))
+        weights = np.zeros((len(self.found), t.weights.shape[2]))
+        for site, ((_, _, beam, _), along) in enumerate(self.found):
             if beam >= 0:
-                row = t.beams[int(beam)]
-                n, points, length = int(row.bending), int(row.points), t.weights[int(beam), int(row.points)].sum()
+                n, points = int(t.beams[beam].bending), int(t.beams[beam].points)
                 psi[site, :n] = rotations_at(n, np.array([along]))[0]
-                weights[site, :points] = length * integrals_to(points, np.array([along]))[0]
+                weights[site, :points] = t.weights[beam, points].sum() * integrals_to(points, np.array([along]))[0]
         return psi, weights

@@ -55,14 +55,16 @@ class Posture(NamedTuple):
     rest : (u,) unknowns at rest. columns : (c, u) their changes. motions : (m, h) of every mass point.
     readings : (c, 2 n + 3 sites) changes of what angle sensors read (rad), of x, y, angle of every site of
     `boom_twin.deviation.channels`, the tip first, and of the angles of the sections' chords, from pivot to pivot.
-    forces : (c, n) of the cylinders, N. read, pulled : (2 n + 3 sites,), (n,) the same at rest.
+    forces : (c, n) of the cylinders, N. moments : (c, stations) of bending, N m.
+    read, pulled : (2 n + 3 sites,), (n,) angles to forces at rest.
     omega, decay : (m,) rad/s and 2 zeta omega, 1/s. compliance, lag : (n,) 1/k (m/N; 0 if rigid) and d/k (s).
     oil_read : (n,) the compliance where stroke transducers read lengths (`reads_length`), 0 where they read drives.
     slope, curvature : (n,) change of a joint's angle by its stroke, rad/m, and of that, rad/m^2.
     frames : (n,) of the chain that inclinometers are fixed to. absolute : (n,) which angle sensors are such. roots : (n + 1,)
     frames of the pivots and of the tip. masses : (h,) kg, kg m^2. lengths : (n,) of the sections, m. closed : (n,) m.
-    channels, sites, errors, psi, weights : see `boom_twin.deviation.channels.Measurement`. behind : (1,) states that the
-    estimate has beside those of the prediction. The other fields are scratch; `rate` (n,) stays zero.
+    channels, sites, errors, psi, weights, bending : see `boom_twin.deviation.channels.Measurement`.
+    behind : (1,) states that the estimate has beside those of the prediction.
+    The other fields are scratch; `rate` (n,) stays zero.
     """
 
     modes: NDArray[np.int64]
@@ -73,6 +75,7 @@ class Posture(NamedTuple):
     motions: Array
     readings: Array
     forces: Array
+    moments: Array
     read: Array
     pulled: Array
     omega: Array
@@ -94,6 +97,7 @@ class Posture(NamedTuple):
     errors: np.recarray
     psi: Array
     weights: Array
+    bending: Array
     behind: NDArray[np.int64]
     still: Array
     position: Array
@@ -120,7 +124,8 @@ def new_posture(
     return Posture(
         modes=np.zeros(1, np.int64), drives=np.full(n, np.inf), angles=np.zeros(n), rest=np.zeros(unknowns),
         columns=np.zeros((columns, unknowns)), motions=np.zeros((most, histories)), readings=np.zeros((columns, width)),
-        forces=np.zeros((columns, n)), read=np.zeros(width), pulled=np.zeros(n), omega=np.zeros(most),
+        forces=np.zeros((columns, n)), moments=np.zeros((columns, len(measured.bending))),
+        read=np.zeros(width), pulled=np.zeros(n), omega=np.zeros(most),
         decay=np.zeros(most), compliance=np.zeros(n), lag=np.zeros(n),
         oil_read=np.zeros(n), reads_length=reads_length, slope=np.zeros(n), curvature=np.zeros(n),
         frames=mounting.frames.astype(np.int64), absolute=mounting.absolute, roots=roots.astype(np.int64), masses=plan.masses,
@@ -180,6 +185,10 @@ def linearise(t, boom, work, p, drives, follow):
         change_readings(t, boom, work, p, k)
         for i in range(n):
             p.forces[k, i] = p.columns[k, t.cylinders[i].z]
+        for i in range(p.bending.shape[0]):
+            p.moments[k, i] = 0.0
+            for j in range(boom.z.shape[0]):
+                p.moments[k, i] += p.bending[i, j] * p.columns[k, j]
     leave_modes_out(p)
     return OK
 
@@ -301,6 +310,8 @@ def leave_modes_out(p):
                 p.readings[a, i] -= share * p.readings[at, i]
             for i in range(n):
                 p.forces[a, i] -= share * p.forces[at, i]
+            for i in range(p.bending.shape[0]):
+                p.moments[a, i] -= share * p.moments[at, i]
 
 
 # -- modes ------------------------------------------------------------------------------------------------------------------

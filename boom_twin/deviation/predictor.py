@@ -28,8 +28,9 @@ from ..scene.kinematics import joint_angles_of_strokes
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
 from ..types import NO_PLACES, Array, Mount, Place, Stream, StrokeReading, channels_of, streams_of
-from .channels import measurement_of
+from .channels import READS_MOMENT, TIP_IMU_STATES, measurement_of
 from .estimate_row import MODES
+from .kalman import FORCE_DRIFT, FORCE_ZERO
 from .models import start_models
 from .posture import Posture, linearise, new_posture
 from .sensor_model import mounting_of
@@ -186,8 +187,17 @@ class BoomPredictor:
         status = linearise(self.plan.tables, boom, self._work, p, drives, False)
         if status != OK:
             raise SolverError(SENTENCES[int(status)])
+        self._free_gauges()
         sag = float(np.hypot(*(boom.frames[-1, :2] - self._undeflected.at(rigid)[-1])))
         start_models(p, f, SPEED if may_move else 0.0, SWING * sag if may_move else 0.0)
+
+    def _free_gauges(self) -> None:
+        """Write how far the zeros of strain gauges may be off, as of forces: by the moment that they bear."""
+        p = self.posture
+        bent = np.abs(p.bending @ p.rest)
+        for row in p.channels[p.channels.kind == READS_MOMENT]:
+            error = p.errors[int(row.zero) - TIP_IMU_STATES - 2 * self.plan.joints]
+            error.first, error.walk = FORCE_ZERO * (bent[row.index] + 0.1 * bent.max()), FORCE_DRIFT * bent[row.index]
 
     @property
     def angles(self) -> Array:

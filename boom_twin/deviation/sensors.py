@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .channels import READS_ACCELERATION, READS_ANGLE, READS_RATE, TIP_IMU_STATES, measurement_row
+from .channels import READS_ACCELERATION, READS_ANGLE, READS_COORDINATE, READS_RATE, TIP_IMU_STATES, measurement_row
 from .kalman import ANGLE_ZERO, correct
 from .learning import SURPRISE
 from .mixture import mix, weigh_models
@@ -16,6 +16,7 @@ INEXACT = 0.03  # share of the tip's acceleration that modes left out and those 
 LEARN_NOISE = 0.02  # of a reading, by which the noise of its channel is learnt
 LEARN_RATIO = 0.005  # of a reading, by which the size of its channel's normalised innovations is learnt
 DOF = 4.0  # degrees of freedom of Student's t, by which innovations of the estimate are weighed
+SLOW = 5_000_000_000  # ns for which the position of a point keeps the estimate, beyond other readings
 OLDEST = 0.1  # s, most that a reading may be late
 
 
@@ -41,7 +42,8 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
         last += 1
     if not usable or age > OLDEST:
         return
-    f.status[FED], f.status[FED_STAMP] = 1, newest
+    patience = SLOW if p.channels[first].kind == READS_COORDINATE else 0
+    f.status[FED], f.status[FED_STAMP] = 1, max(f.status[FED_STAMP], newest + patience)
     f.likely[ALL_VALVES] = f.likely[ALL_OPEN] = 0.0
     for c in range(first, last):
         residual = residuals[c - first]

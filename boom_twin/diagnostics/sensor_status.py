@@ -14,6 +14,8 @@ from ..types import SENSORS, Mount, Stream
 from .levels import Bounds, ComponentJudge, Status
 from .stream_stats import ChannelStats
 
+SLOW = 2.0
+"""Usual times from one reading to the next that are no gap, whatever the rate."""
 RANGE_MARGIN = 5.0
 """Standard deviations of its noise by which a sensor may read beyond its range."""
 
@@ -71,14 +73,15 @@ def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats
         return judge.finish("not there; optional")
     judge.note({f"value_{unit}": stats.value, "rate_Hz": stats.rate})
     judge.check_age(age, "no readings" if stats.stamp else "no reading yet")
-    judge.check("gap_s", stats.gap, Bounds(thresholds.gap_warn), "a gap in the readings", at_once=True)
+    period = 0.0 if isnan(stats.rate) or stats.rate == 0.0 else 1.0 / stats.rate
+    gap = Bounds(max(thresholds.gap_warn, SLOW * period))
+    judge.check("gap_s", stats.gap, gap, "a gap in the readings", at_once=True)
     judge.note({"gaps": stats.gaps})
     share = Bounds(thresholds.unusable_warn, thresholds.unusable_error)
     judge.check("missing_share", stats.missing, share, "messages without a value")
     if sensor.high < inf:
         judge.note({f"low_{unit}": sensor.low, f"high_{unit}": sensor.high})
         judge.check("outside_share", stats.outside, share, alarm_text(sensor.name, "range", None))
-    period = 0.0 if isnan(stats.rate) else 1.0 / stats.rate
     needed = readings_of_frozen(sensor.sigma, sensor.resolution, thresholds.frozen_false_alarm)
     stuck, unchanged = Bounds(error=max(thresholds.frozen_after, needed * period)), stats.unchanged * period
     judge.check("unchanged_s", unchanged, stuck, alarm_text(sensor.name, "stuck", None))

@@ -111,7 +111,7 @@ class CdrDecoder:
     Parameters
     ----------
     type_name : str
-        ``sensor_msgs/msg/JointState`` or ``sensor_msgs/msg/Imu``.
+        Those of ``sensor_msgs/msg/JointState`` and ``sensor_msgs/msg/Imu`` are read in place, others are decoded.
     decode : callable, optional
         Decodes a message with a new head, or one that is not whole.
     field : str
@@ -130,7 +130,8 @@ class CdrDecoder:
         ValueError, or what `decode` raises
             The message is not whole.
         """
-        is_little, is_imu = data[:2] == _LITTLE, self._type == TYPES[Stream.IMU]
+        is_imu = self._type == TYPES[Stream.IMU]
+        is_little = data[:2] == _LITTLE and (is_imu or self._type == TYPES[Stream.STROKES])
         found = None
         if is_little:
             for head, end, text in self._heads:

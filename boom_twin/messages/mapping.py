@@ -77,12 +77,12 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
     usual_values = default_document()
     values = _merged(usual_values, document or {})
     faults = _role_faults(values, usual_values)
-    if isinstance(values["inputs"], dict):
-        values["inputs"] = used_inputs(values["inputs"])
     sensors = values.pop("sensors", None) or {}
     absent = frozenset(channel for channel, given in sensors.items() if given == "none") if isinstance(sensors, dict) else ()
     sensors, names, found = _sensors(sensors)
     faults += found
+    if isinstance(values["inputs"], dict):
+        values["inputs"] = used_inputs(values["inputs"], sensors)
     topics: Topics | None = None
     try:
         topics = Topics.model_validate(values)
@@ -157,6 +157,8 @@ def _kind_faults(channel: str, given: Mapping[str, Any]) -> Iterator[Fault]:
         yield Fault(f"{place}.unit", unit, f"it must be one of {', '.join(kind.units)}", "Use scale for any other.")
     if kind is not SENSORS[Stream.ANGLES] and (mount := given.get("absolute")) is not None:
         yield Fault(f"{place}.absolute", mount, "only an angle (joint_i) can be absolute", "Remove the key.")
+    if kind is not SENSORS[Stream.MOMENTS] and given.get("place") is not None:
+        yield Fault(f"{place}.place", "given", "only a moment_i has a place", "Give the place of an IMU under inputs.")
     if not kind.is_named and (name := given.get("name", "x")) not in ("x", "y", "z"):
         yield Fault(f"{place}.name", name, "it must be x, y or z", f"Give the axis of {kind.field}.")
 
@@ -201,12 +203,12 @@ def _fault(detail: ErrorDetails, *before: str) -> Fault:
 
 def _model_at(place: list[str]) -> type[BaseModel]:
     """Return the model that has the key at `place`."""
+    if "place" in place[:-1]:
+        return SensorPlace
     if place[0] == "sensors" and len(place) > 1:
         return Sensor
     if "qos" in place[:-1]:
         return Qos
-    if "place" in place[:-1]:
-        return SensorPlace
     return {"inputs": InputTopic}.get(place[0], Topic) if len(place) > 1 else Topics
 
 
@@ -229,8 +231,8 @@ def _input_faults(topics: Topics) -> Iterator[Fault]:
     """Yield faults for a delay of the strokes, whose stamps all outputs have, and for keys of another kind of input."""
     for stream, topic in topics.inputs.items():
         if topic.place is not None and SENSORS[stream].is_named:
-            yield Fault(f"inputs.{stream.value}.place", "given", "only an IMU has a place", "Remove the key.")
-        if topic.place is None and SENSORS[stream].is_placed:
+            yield Fault(f"inputs.{stream.value}.place", "given", "only IMUs and points have a place", "Remove the key.")
+        if topic.place is None and SENSORS[stream].is_placed and not SENSORS[stream].is_named:
             told = "it must be there: section, at (m), turned (rad)"
             yield Fault(f"inputs.{stream.value}.place", None, told, "Give {} for the tip.")
         if topic.reads is not None and stream is not Stream.STROKES:

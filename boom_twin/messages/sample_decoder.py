@@ -69,7 +69,9 @@ class _Channels:
 
     def __init__(self, topics: Topics, stream: Stream, joints: int) -> None:
         sensors = topics.sensors_of(stream, joints)
-        self.wanted = np.array([channel not in topics.absent for channel in sensors])
+        places, kind = topics.places, SENSORS[stream]
+        has_places = kind.is_placed and kind.is_named
+        self.wanted = np.array([channel not in topics.absent and (not has_places or channel in places) for channel in sensors])
         self.names = [sensor.name if wanted else "" for sensor, wanted in zip(sensors.values(), self.wanted, strict=True)]
         self.scales = [(sensor.zero, factor(channel, sensor)) for channel, sensor in sensors.items()]
         self.is_plain = all(scale == (0.0, 1.0) for scale in self.scales)  # readings are quantities
@@ -234,7 +236,7 @@ class SampleDecoder:
     def _by_axes(self, msg: Any, stream: Stream) -> list[float] | None:
         """Return readings along the axes that the mapping names; None if the message has none."""
         kind = SENSORS[stream]
-        if getattr(msg, f"{kind.field}_covariance")[0] == NO_MEASUREMENT:
+        if hasattr(msg, f"{kind.field}_covariance") and getattr(msg, f"{kind.field}_covariance")[0] == NO_MEASUREMENT:
             if not kind.beside:
                 self.oddities["no measurement"] += 1
             return None

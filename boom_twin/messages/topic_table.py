@@ -17,6 +17,21 @@ from ..errors import UsageError
 from ..types import GIVE, NUMBER, SECOND, SENSORS, Mount, Place, Stream, StrokeReading, sensor_kind, streams_of
 
 
+class SensorPlace(BaseModel):
+    """Place of a sensor on the boom; see `boom_twin.types.Place`."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    section: Annotated[int, Field(ge=1)] | None = None
+    at: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
+    turned: Annotated[float, Field(ge=-2 * pi, le=2 * pi, allow_inf_nan=False)] = 0.0
+
+    @property
+    def value(self) -> Place:
+        """The place."""
+        return Place(self.section, self.at, self.turned)
+
+
 class Sensor(BaseModel):
     """Sensor of one channel: quantity = sign * scale * (reading - zero), in `unit`. ``topics.yaml`` explains the keys."""
 
@@ -28,6 +43,7 @@ class Sensor(BaseModel):
     zero: Annotated[float, Field(allow_inf_nan=False)] = 0.0
     scale: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
     absolute: Mount | None = None
+    place: SensorPlace | None = None
 
 
 def usual(channel: str) -> dict[str, Any]:
@@ -126,19 +142,6 @@ class Topic(_Entry):
         return self.name if self.name.startswith("/") else f"/{self.name}"
 
 
-class SensorPlace(_Entry):
-    """Place of a sensor on the boom; see `boom_twin.types.Place`."""
-
-    section: Annotated[int, Field(ge=1)] | None = None
-    at: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
-    turned: Annotated[float, Field(ge=-2 * pi, le=2 * pi, allow_inf_nan=False)] = 0.0
-
-    @property
-    def value(self) -> Place:
-        """The place."""
-        return Place(self.section, self.at, self.turned)
-
-
 class InputTopic(Topic):
     """One topic of readings.
 
@@ -190,7 +193,8 @@ class Topics(_Entry):
     @property
     def places(self) -> dict[str, Place]:
         """Places of the sensors that have one, by their names."""
-        return {SENSORS[stream].stem: topic.place.value for stream, topic in self.inputs.items() if topic.place is not None}
+        found = {SENSORS[stream].stem: topic.place.value for stream, topic in self.inputs.items() if topic.place is not None}
+        return found | {channel: each.place.value for channel, each in self.sensors.items() if each.place is not None}
 
     def renamed(self, name: Callable[[Topic], str]) -> Topics:
         """Return these topics, each with the name that `name` returns for it."""
@@ -252,7 +256,7 @@ class Topics(_Entry):
 @cache
 def load_topics() -> Topics:
     """Return the topics of the package with default sensors; the file is read once."""
-    return Topics.model_validate({**default_document(), "inputs": used_inputs(default_document()["inputs"])})
+    return Topics.model_validate({**default_document(), "inputs": used_inputs(default_document()["inputs"], {})})
 
 
 @cache
@@ -261,9 +265,12 @@ def every_input() -> dict[Stream, InputTopic]:
     return {Stream(role): InputTopic.model_validate(topic) for role, topic in default_document()["inputs"].items()}
 
 
-def used_inputs(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the inputs without those that need a place and are as in the package, which gives them none."""
-    placed, usual = {stream.value for stream, kind in SENSORS.items() if kind.is_placed}, default_document()["inputs"]
+def used_inputs(inputs: Mapping[str, Any], sensors: Mapping[str, Sensor]) -> dict[str, Any]:
+    """Return the inputs without those of sensors that no place is given for: as in the package, or under `sensors`."""
+    usual = default_document()["inputs"]
+    placed = {stream.value for stream, kind in SENSORS.items() if kind.is_placed}
+    if any(sensor.place is not None for sensor in sensors.values()):
+        placed.discard(Stream.MOMENTS.value)
     return {role: topic for role, topic in inputs.items() if role not in placed or topic != usual[role]}
 
 

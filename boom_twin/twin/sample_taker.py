@@ -69,6 +69,7 @@ class SampleTaker:
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
         self.places = dict(places)
         self._channels = channels_of(len(scene.joints), streams_of(self.places))
+        self.absent |= {name for name in self._channels[Stream.MOMENTS] if name not in self.places}
         self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
         self._widths = [len(names) for names in self._channels.values()]
         self._edge = SampleCheck(self._channels)

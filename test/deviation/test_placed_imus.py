@@ -126,7 +126,7 @@ def test_a_mapping_places_them_and_their_messages_are_read(tmp_path: Path) -> No
     [
         ("inputs: {imu_2: {place: {section: 0}}}", "inputs.imu_2.place.section"),
         ("inputs: {imu_2: {place: {sektion: 1}}}", "nearest known key here is `section`"),
-        ("inputs: {joint_angles: {place: {section: 1}}}", "only an IMU has a place"),
+        ("inputs: {joint_angles: {place: {section: 1}}}", "only IMUs and points have a place"),
         ("inputs: {imu_5: {name: other}}", "nearest is `imu_"),
         ("inputs: {imu_2: {name: other}}", "inputs.imu_2.place"),
     ],

@@ -25,6 +25,7 @@ from .sensors import Sensors, read, sampling_stamps, specific_force
 
 EPOCH = 1_700_000_000 * SECOND
 """Stamp (ns) of the start of every session."""
+POINT_PERIOD = 1.0  # s, of a total station
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,7 @@ def observe(
     Parameters
     ----------
     places : mapping of str to Place
-        Of IMUs beside that at the tip.
+        Of IMUs beside that at the tip, strain gauges (``moment_1`` ..) and points; a point is seen once in `POINT_PERIOD`.
     rows : dict of ndarray
         What `simulate` gave for this drive and this load.
 
@@ -123,7 +124,7 @@ def observe(
     RigSession
         Samples of all sensors, and the truth beside them.
     """
-    clock, stroke_noise, angle_noise, imu_noise, force_noise, *others = np.random.default_rng(seed).spawn(6 + 2 * len(places))
+    clock, stroke_noise, angle_noise, imu_noise, force_noise, *others = np.random.default_rng(seed).spawn(6 + len(places))
     stamps = sampling_stamps(sensors, float(rows["t_s"][-1]), EPOCH, clock)
     times = (stamps - EPOCH) / SECOND
 
@@ -134,13 +135,21 @@ def observe(
     truth |= {"t": times, "drives": drive(times)[0]} | ({} if load is None else {"load": load(times)})
     force = specific_force(truth["tip_acc"], truth["tip_angle"], gravity_in_base(scene))
     placed = {Stream.RATE: read(at(rows["tip_angular_velocity_rad_s"])[:, None], sensors.rate_sigma, 0.0, others[0])}
-    noises = zip(others[1::2], others[2::2], strict=True)
-    for k, ((name, place), (force_noise_here, rate_noise)) in enumerate(zip(places.items(), noises, strict=True), start=1):
-        columns = {end: at(rows[f"site_{k}_{end}"]) for end in SITE}
-        accelerations = np.column_stack([columns["ax_m_s2"], columns["ay_m_s2"]])
-        felt = specific_force(accelerations, columns["angle_rad"] + place.turned, gravity_in_base(scene))
-        placed[Stream(name)] = read(felt, sensors.imu_sigma, 0.0, force_noise_here)
-        placed[Stream(f"{name}_rate")] = read(columns["rate_rad_s"][:, None], sensors.rate_sigma, 0.0, rate_noise)
+    for k, ((name, place), noise) in enumerate(zip(places.items(), others[1:], strict=True), start=1):
+        columns = {end: at(rows[f"site_{k}_{end}"]) for end in SITE if np.isfinite(rows[f"site_{k}_{end}"]).all()}
+        if name.startswith("moment_"):
+            of_all = placed.setdefault(Stream.MOMENTS, np.full(truth["joints"].shape, np.nan))
+            of_all[:, int(name.removeprefix("moment_")) - 1] = read(columns["moment_Nm"], sensors.moment_sigma, 0.0, noise)
+        elif name.startswith("points"):
+            position = np.column_stack([columns["x_m"], columns["y_m"]])
+            placed[Stream(name)] = np.full(position.shape, np.nan)
+            seen = np.unique(np.floor(times / POINT_PERIOD), return_index=True)[1]
+            placed[Stream(name)][seen] = read(position[seen], sensors.point_sigma, 0.0, noise)
+        else:
+            accelerations = np.column_stack([columns["ax_m_s2"], columns["ay_m_s2"]])
+            felt = specific_force(accelerations, columns["angle_rad"] + place.turned, gravity_in_base(scene))
+            placed[Stream(name)] = read(felt, sensors.imu_sigma, 0.0, noise)
+            placed[Stream(f"{name}_rate")] = read(columns["rate_rad_s"][:, None], sensors.rate_sigma, 0.0, noise)
     return RigSession(
         stamps,
         read(truth["strokes"], sensors.stroke_sigma, sensors.stroke_resolution, stroke_noise),
@@ -165,7 +174,7 @@ def record(
     changes: Sequence[Change] = (),
     places: Mapping[str, Place] = NO_PLACES,
 ) -> RigSession:
-    """Simulate the boom for `duration` (s) under a load, while it changes, and sample it; IMUs are at `places`, too."""
+    """Simulate the boom for `duration` (s) under a load, while it changes, and sample it; sensors are at `places`, too."""
     sites = tuple(site_of(scene, place) for place in places.values())
     rows = simulate(scene, drive, duration, step, 2 * step, elements, load, changes, sites)
     return observe(scene, drive, rows, sensors or Sensors(), seed, load, places)

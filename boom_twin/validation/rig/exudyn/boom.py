@@ -47,10 +47,11 @@ def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSec
         _station(boom, frame, x, lumps, [borne[pin] for pin in borne if near[pin] == number])
         for number, (x, lumps) in enumerate(zip(places, own, strict=True))
     ]
+    beams: list[tuple[float, float, int]] = []
     for start, end in pairwise(stations):
         share = (end.x - start.x) / (section.beam[1] - section.beam[0])
-        _beam_part(boom, frame, index, (start, end), max(1, round(elements * share)))
-    return BuiltSection(section.beam, stations)
+        beams += _beam_part(boom, frame, index, (start, end), max(1, round(elements * share)))
+    return BuiltSection(section.beam, stations, beams)
 
 
 def _station(boom: Boom, frame: Frame, x: float, own: list[Lump], borne: list[Lumps]) -> Station:
@@ -76,7 +77,10 @@ def _places_on_beam(boom: Boom, index: int) -> list[float]:
     return sorted({round(x, 9) for x in places if low < x < high})
 
 
-def _beam_part(boom: Boom, frame: Frame, index: int, ends: tuple[Station, Station], elements: int) -> None:
+def _beam_part(
+    boom: Boom, frame: Frame, index: int, ends: tuple[Station, Station], elements: int
+) -> list[tuple[float, float, int]]:
+    """Add the elements between two stations; return start and end of each, and its object."""
     section, scene = boom.scene.sections[index], boom.scene
     assert section.A is not None and section.I is not None
     axial, bending, beta = scene.material.E * section.A, scene.material.E * section.I, section.beta or 0.0
@@ -85,7 +89,8 @@ def _beam_part(boom: Boom, frame: Frame, index: int, ends: tuple[Station, Statio
     nodes = [ends[0].node, *inner, ends[1].node]
     length = float(places[1] - places[0])
     shear = shear_stiffness(boom.shear_over_axial * axial, bending, length if boom.nodally_exact else 0.0)
-    for pair in pairwise(nodes):
+    found = []
+    for pair, (start, end) in zip(pairwise(nodes), pairwise(places.tolist()), strict=True):
         beam = boom.system.AddObject(
             items.ObjectBeamGeometricallyExact2D(
                 nodeNumbers=[*pair],
@@ -101,6 +106,8 @@ def _beam_part(boom: Boom, frame: Frame, index: int, ends: tuple[Station, Statio
             )
         )
         boom.weigh(int(beam))
+        found.append((start, end, int(beam)))
+    return found
 
 
 def shear_stiffness(shear: float, bending: float, length: float) -> float:

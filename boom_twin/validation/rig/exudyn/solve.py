@@ -25,7 +25,7 @@ from .stepping import Course, Effort, Scheme, step_through
 from .system import Boom, Site, section_frames
 
 PASSES = 40
-SITE = ("x_m", "y_m", "ax_m_s2", "ay_m_s2", "angle_rad", "rate_rad_s")  # ends of the columns of a site
+SITE = ("x_m", "y_m", "ax_m_s2", "ay_m_s2", "angle_rad", "rate_rad_s", "moment_Nm")  # ends of the columns of a site
 LAST_INCREMENT = 1e-6  # m and rad, last increment; what is left is near its square
 LONGEST_INCREMENT = 0.2  # m and rad, in one pass
 NUDGE = 1e-5  # m and rad, of the difference quotient
@@ -153,7 +153,8 @@ def simulate(
         ``tip_ax_m_s2``, ``tip_ay_m_s2``, ``cylinder_force_1_N``, ..), then ``tip_angle_rad``,
         ``tip_angular_velocity_rad_s``, ``tip_angular_acceleration_rad_s2``, ``length_1_m``, .., and of pins with play the
         journals' offsets, ``cylinder_1_rod_dx_m``, ``cylinder_1_rod_dy_m``, ..; each of shape (rows,). Of the first site
-        ``site_1_x_m``, ``site_1_y_m``, ``site_1_ax_m_s2``, ``site_1_ay_m_s2``, ``site_1_angle_rad``, ``site_1_rate_rad_s``.
+        ``site_1_x_m``, ``site_1_y_m``, ``site_1_ax_m_s2``, ``site_1_ay_m_s2``, ``site_1_angle_rad``, ``site_1_rate_rad_s``,
+        ``site_1_moment_Nm``.
     """
     first = drive(np.zeros(1))[0][0]
     return move(at_rest(scene, first, elements, sites=sites), drive, t_end, step, output_step, None, load, changes)[0]

@@ -41,6 +41,8 @@ class BuiltSection:
 
     beam: Point | None
     stations: list[Station]
+    beams: list[tuple[float, float, int]] = field(default_factory=list)
+    """Start and end (m) of every beam element, and its object."""
 
     @property
     def root(self) -> Station:
