@@ -147,7 +147,9 @@ def replay_inputs(
         for stream in streams_of(topics.places)
         if not SENSORS[stream].beside or _has_rates(session, topics.inputs[Stream(SENSORS[stream].beside)], wanted)
     )
-    return ReplayInputs(session, kept, settings, mapped.source, topics, wanted, strokes, streams, options.health, options.window)
+    return ReplayInputs(
+        session, kept, settings, mapped.source, topics, wanted, strokes, streams, options.health, options.window
+    )
 
 
 def _has_rates(session: Session, topic: InputTopic, wanted: list[str]) -> bool:
