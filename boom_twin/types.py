@@ -53,6 +53,7 @@ class Stream(Enum):
     MOMENTS = "section_moments"
     POINT = "points"
     POINT_2 = "points_2"
+    PRESSURES = "cylinder_pressures"
 
     __hash__ = object.__hash__  # members are single; Enum's own is a Python function, called for every look-up
 
@@ -115,6 +116,8 @@ class SensorKind:
     """Axes of that vector, one for each channel; empty if messages are read by names."""
     beside: str = ""
     """Input whose messages hold these readings, too, if they have no topic of their own."""
+    gives: str = ""
+    """Stream that these readings are converted to when they are decoded; they have channels in messages only."""
     is_placed: bool = False
     """True if a boom has these sensors only where a mapping places them."""
 
@@ -157,6 +160,8 @@ class SensorKind:
 
     def channels(self, joints: int) -> tuple[str, ...]:
         """Return the names of the channels in the order of a sample, of a boom with so many joints."""
+        if self.gives:
+            return tuple(f"{self.stem}_{i}_{end}" for i in range(1, joints + 1) for end in self.ends)
         return tuple(f"{self.stem}_{end}" for end in self.ends or range(1, joints + 1))
 
 
@@ -266,16 +271,28 @@ for _point in (Stream.POINT, Stream.POINT_2):
         shown="mm",
         alarms=(),
     )
+SENSORS[Stream.PRESSURES] = SensorKind(
+    title="cylinder pressures",
+    message="sensor_msgs/msg/JointState",
+    stem="cylinder",
+    ends=("cap", "rod"),
+    units={"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "psi": 6894.757293168},
+    noise="pressure_sigma",
+    resolution="",
+    lack="",
+    field="effort",
+    gives=Stream.FORCES.value,
+)
 """In the order of `Stream`. Expected readings are in `boom_twin.deviation.channels`, topics in ``topics.yaml``."""
 
 
-USUAL_STREAMS = tuple(stream for stream, kind in SENSORS.items() if not (kind.is_placed or kind.beside))
+USUAL_STREAMS = tuple(stream for stream, kind in SENSORS.items() if not (kind.is_placed or kind.beside or kind.gives))
 """Streams that a boom has without a mapping, but for the gyro of its IMU."""
 
 
 def streams_of(places: Collection[str]) -> tuple[Stream, ...]:
     """Return the streams of a boom whose mapping places these sensors, such as ``imu_2``."""
-    return tuple(stream for stream, kind in SENSORS.items() if not kind.is_placed or kind.is_at(places))
+    return tuple(stream for stream, kind in SENSORS.items() if not (kind.gives or (kind.is_placed and not kind.is_at(places))))
 
 
 def channels_of(joints: int, streams: Collection[Stream] = tuple(Stream)) -> dict[Stream, tuple[str, ...]]:
@@ -283,17 +300,20 @@ def channels_of(joints: int, streams: Collection[Stream] = tuple(Stream)) -> dic
 
     Streams that are not among `streams` have no channels.
     """
-    return {stream: kind.channels(joints) if stream in streams else () for stream, kind in SENSORS.items()}
+    return {s: kind.channels(joints) if s in streams and not kind.gives else () for s, kind in SENSORS.items()}
 
 
 NUMBER = re.compile(r"[1-9]\d{0,3}")
+NUMBERED_SIDE = re.compile(rf"cylinder_{NUMBER.pattern}_(cap|rod)")
 
 
 def stream_of(channel: str) -> Stream | None:
     """Return the stream of a channel; None if there can be no such channel."""
     stem, _, end = channel.rpartition("_")
+    if NUMBERED_SIDE.fullmatch(channel):
+        return Stream.PRESSURES
     for stream, kind in SENSORS.items():
-        if stem == kind.stem and (end in kind.ends if kind.ends else NUMBER.fullmatch(end)):
+        if stem == kind.stem and not kind.gives and (end in kind.ends if kind.ends else NUMBER.fullmatch(end)):
             return stream
     return None
 

@@ -27,7 +27,7 @@ def names_missing(info: BagInfo, topics: Topics, joints: int) -> list[str]:
     """Return a sentence for each channel (of `joints` joints) that is missing from some or all messages."""
     found: list[str] = []
     for stream, tally in _joint_states(info, topics):
-        own = [name for name in _names(topics, stream, joints) if name not in topics.absent]
+        own = [sensor.name for channel, sensor in topics.sensors_of(stream, joints).items() if not topics.lacks(channel)]
         its = {names: count for names, count in tally.names.items() if not topics.is_shared or set(own) & set(names)}
         has = {name: sum(count for names, count in its.items() if name in names) for name in own}
         most = max(has.values(), default=0) or sum(its.values())  # messages, or cycles of separate messages
@@ -136,7 +136,7 @@ def _stamps(tally: Tally) -> Iterator[str]:
 
 def _joint_states(info: BagInfo, topics: Topics) -> Iterator[tuple[Stream, Tally]]:
     for stream in JOINT_STATES:
-        if (tally := info.tally(topics.inputs[stream].name)) is not None and tally.named:
+        if stream in topics.inputs and (tally := info.tally(topics.inputs[stream].name)) is not None and tally.named:
             yield stream, tally
 
 

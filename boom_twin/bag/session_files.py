@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import UsageError
 from ..messages.topic_table import FRAME, every_input
 from ..messages.type_store import fill_header, new_message
-from ..types import SENSORS, Array, Sample, Stream, channels_of
+from ..types import SENSORS, Array, Sample, Stream
 from .writer import SessionWriter
 
 _UNKNOWN = -1.0
@@ -134,14 +134,15 @@ def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
             msg.angular_velocity.y, msg.angular_velocity_covariance[0] = -float(rate[0]), 0.0
         return msg
     fill_header(msg.header, sample.stamp, FRAME)
-    msg.name = [f"{kind.named}_{end}" for end in kind.ends or range(1, 1 + len(sample.values))]
+    joints = len(sample.values) // (len(kind.ends) or 1)
+    msg.name = [*kind.channels(joints)] if kind.gives else [f"{kind.named}_{end}" for end in kind.ends or range(1, 1 + joints)]
     setattr(msg, kind.field, np.array(sample.values, dtype=float))
     return msg
 
 
 def _check_shapes(rows: int, joints: int, values: Mapping[Stream, Array]) -> None:
-    for stream, names in channels_of(joints).items():
-        shape = rows, len(names)
+    for stream, kind in SENSORS.items():
+        shape = rows, len(kind.channels(joints))
         if stream in values and values[stream].shape != shape:
-            found = f"{SENSORS[stream].title}: shape {values[stream].shape}, not {shape}"
+            found = f"{kind.title}: shape {values[stream].shape}, not {shape}"
             raise UsageError(f"{found}. Give one row for each of {rows} stamps.")

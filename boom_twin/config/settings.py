@@ -173,6 +173,7 @@ class Settings(BaseModel):
     rate_sigma: float = setting(2e-3, "rad/s", POSITIVE, "standard deviation of the noise of a gyro")
     force_sigma: float = setting(100.0, "N", POSITIVE, "standard deviation of the noise of a cylinder's force")
     force_resolution: float = setting(20.0, "N", NOT_NEGATIVE, "resolution of a cylinder's force")
+    pressure_sigma: float = setting(1e4, "Pa", POSITIVE, "standard deviation of the noise of a cylinder's pressure")
     moment_sigma: float = setting(50.0, "N m", POSITIVE, "standard deviation of the noise of a bending moment")
     point_sigma: float = setting(2e-3, "m", POSITIVE, "standard deviation of the noise of the position of a point")
     payload: float = setting(-1.0, "kg", LOAD, "mass at the tip; below 0: that of the scene", True)

@@ -49,7 +49,7 @@ def sensors_of(
     ranges = sensor_ranges(scene, mounts)
     for stream, kind in SENSORS.items():
         is_required = required.get(Stream(kind.beside or stream))
-        if is_required is None:
+        if is_required is None or kind.gives:
             continue
         sigma, resolution = settings.noise(kind)
         unit, over = kind.unit_suffix, RANGE_MARGIN * sigma

@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
-from ..types import SENSORS, Stream, channels_of, sensor_kind, stream_of
+from ..types import SENSORS, Stream, sensor_kind, stream_of
 from .topic_table import (
     TYPES,
     InputTopic,
@@ -39,6 +39,8 @@ _REMEDIES = {
     "section": "Give the number of a section, 1 at the base.",
     "at": "Give the distance from the section's inboard pivot along it, m.",
     "turned": "Give the angle of the sensor's x axis to the section, rad, positive anticlockwise.",
+    "bore": "Give a list of diameters, m, one for each cylinder.",
+    "rod": "Give a list of diameters, m, one for each cylinder.",
     "place": "Give section, at and turned.",
     "reads": "Give length for a transducer in or on the cylinder; drive only for sessions of a simulated boom.",
     "frame": "Give the name of a frame without a leading slash: base_link.",
@@ -168,7 +170,7 @@ def _set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Itera
 
     `names` are those that a mapping lists by channel; `is_shared` is True if strokes and angles come by one topic.
     """
-    known = channels_of(joints)
+    known = {stream: kind.channels(joints) for stream, kind in SENSORS.items()}
     for channel in names:
         if not any(channel in group for group in known.values()):
             bound = f"the scene has {joints} joints, so channels end at {sensor_kind(channel).stem}_{joints}"
@@ -187,7 +189,7 @@ def _set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Itera
 def _known_channels() -> str:
     """Return all possible names of channels, for a message."""
     kinds = SENSORS.values()
-    *most, last = [name for kind in kinds for name in (kind.channels(0) or (f"{kind.stem}_1", f"{kind.stem}_2 .."))]
+    *most, last = [name for kind in kinds for name in (kind.channels(0) or (kind.channels(1)[0], f"{kind.channels(2)[-1]} .."))]
     return f"{', '.join(most)} and {last}"
 
 
@@ -230,6 +232,8 @@ def _name_faults(topics: Topics) -> Iterator[Fault]:
 def _input_faults(topics: Topics) -> Iterator[Fault]:
     """Yield faults for a delay of the strokes, whose stamps all outputs have, and for keys of another kind of input."""
     for stream, topic in topics.inputs.items():
+        if (topic.bore or topic.rod) and stream is not Stream.PRESSURES:
+            yield Fault(f"inputs.{stream.value}.bore", topic.bore, "only cylinder_pressures has it", "Remove the key.")
         if topic.place is not None and SENSORS[stream].is_named:
             yield Fault(f"inputs.{stream.value}.place", "given", "only IMUs and points have a place", "Remove the key.")
         if topic.place is None and SENSORS[stream].is_placed and not SENSORS[stream].is_named:

@@ -69,9 +69,7 @@ class _Channels:
 
     def __init__(self, topics: Topics, stream: Stream, joints: int) -> None:
         sensors = topics.sensors_of(stream, joints)
-        places, kind = topics.places, SENSORS[stream]
-        has_places = kind.is_placed and kind.is_named
-        self.wanted = np.array([channel not in topics.absent and (not has_places or channel in places) for channel in sensors])
+        self.wanted = np.array([not topics.lacks(channel) for channel in sensors])
         self.names = [sensor.name if wanted else "" for sensor, wanted in zip(sensors.values(), self.wanted, strict=True)]
         self.scales = [(sensor.zero, factor(channel, sensor)) for channel, sensor in sensors.items()]
         self.is_plain = all(scale == (0.0, 1.0) for scale in self.scales)  # readings are quantities
@@ -153,6 +151,7 @@ class SampleDecoder:
         pair = {Stream.STROKES: Stream.ANGLES, Stream.ANGLES: Stream.STROKES}
         self._sharing = pair if topics.is_shared else {}
         self.delays = {stream: topics.delay(stream) for stream in Stream}
+        self._areas = topics.areas
         self.refused = 0
         self._by_axis = {stream for stream, kind in SENSORS.items() if not kind.is_named}
         self.oddities: Counter[str] = Counter()
@@ -186,6 +185,8 @@ class SampleDecoder:
             return None
         channels = self._channels[stream]
         quantities = raw if channels.is_plain else channels.quantities(raw)
+        if SENSORS[stream].gives:
+            stream, quantities = Stream(SENSORS[stream].gives), self._forces(quantities)
         values = [value if -LIMIT <= value <= LIMIT else self._reject(value) for value in quantities]
         if isnan(values[0]) and all(map(isnan, values)):
             self.oddities["no usable value"] += 1
@@ -242,6 +243,13 @@ class SampleDecoder:
             return None
         vector = getattr(msg, kind.field)
         return [float(getattr(vector, axis)) if axis else _ABSENT for axis in self._channels[stream].names]
+
+    def _forces(self, pressures: list[float]) -> list[float]:
+        """Return the forces (N, positive in tension) of cylinders by the pressures (Pa) of their cap and rod sides."""
+        pairs = zip(pressures[::2], pressures[1::2], self._areas, strict=True)
+        return [
+            _ABSENT if cap is _ABSENT or rod is _ABSENT else rod * ring - cap * piston for cap, rod, (piston, ring) in pairs
+        ]
 
     def _reject(self, value: float) -> float:
         """Return NaN and count the reason. An absent channel is counted elsewhere."""

@@ -6,15 +6,19 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from functools import cache
-from math import pi, radians
+from math import hypot, pi, radians
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from ..config.settings import Settings
 from ..config.yaml_text import read_plain
 from ..errors import UsageError
 from ..types import GIVE, NUMBER, SECOND, SENSORS, Mount, Place, Stream, StrokeReading, sensor_kind, streams_of
+
+if TYPE_CHECKING:
+    from ..scene.schema import Joint
 
 
 class SensorPlace(BaseModel):
@@ -49,6 +53,8 @@ class Sensor(BaseModel):
 def usual(channel: str) -> dict[str, Any]:
     """Return the default name and unit of a channel."""
     kind, end = sensor_kind(channel), channel.rpartition("_")[2]
+    if kind.gives:
+        return {"name": channel, "unit": kind.unit}
     name = f"{kind.named}_{end}" if kind.is_named else kind.axes[kind.ends.index(end)]
     return {"name": name, "unit": kind.unit}
 
@@ -63,6 +69,10 @@ def factor(channel: str, sensor: Sensor) -> float:
     return turn * sensor.sign * sensor.scale * kind.units[sensor.unit]
 
 
+NO_AREAS = (
+    "inputs.cylinder_pressures: bore and rod of the cylinders are not known. Give `oil: {bore, rod, ..}` to each "
+    "cylinder of the scene, or bore and rod (lists, m) to inputs.cylinder_pressures in the mapping."
+)
 NODE = "boom_twin"
 FRAME = "base_link"
 """Frame of the base, in which outputs are given unless a mapping or a parameter names another."""
@@ -146,12 +156,14 @@ class InputTopic(Topic):
     """One topic of readings.
 
     ``delay`` is the time from reading to stamp, s. ``reads`` is the quantity that stroke transducers read, if known.
-    ``place`` is where an IMU sits.
+    ``place`` is where an IMU sits or a point is. ``bore`` and ``rod`` are diameters of cylinders with pressures, m.
     """
 
     delay: Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)] = 0.0
     reads: StrokeReading | None = None
     place: SensorPlace | None = None
+    bore: tuple[Annotated[float, Field(gt=0, le=1)], ...] = ()
+    rod: tuple[Annotated[float, Field(gt=0, le=1)], ...] = ()
 
 
 class EventTopic(Topic):
@@ -175,6 +187,8 @@ class Topics(_Entry):
     """Channels without a sensor, marked by ``none`` in the mapping."""
     ranges: tuple[tuple[float, float], ...] = ()
     """Lowest and highest angle of every joint, rad; empty where the scene is not known."""
+    areas: tuple[tuple[float, float], ...] = ()
+    """Areas of piston and ring of every cylinder, m^2; empty where they are not known."""
 
     @property
     def is_shared(self) -> bool:
@@ -185,7 +199,8 @@ class Topics(_Entry):
     def heard(self) -> dict[str, list[Stream]]:
         """Streams of every input topic by its name; strokes first."""
         found: dict[str, list[Stream]] = {}
-        for stream in streams_of(self.places):
+        pressures = [Stream.PRESSURES] if self.areas else []
+        for stream in [*streams_of(self.places), *pressures]:
             topic = self.inputs[Stream(SENSORS[stream].beside or stream)]
             found.setdefault(topic.name, []).append(stream)
         return found
@@ -213,6 +228,50 @@ class Topics(_Entry):
     def of_joints(self, ranges: Iterable[Sequence[float]]) -> Topics:
         """Return these topics with the `ranges` (deg) of a scene's joints, which resolve the whole turns of an encoder."""
         return self.model_copy(update={"ranges": tuple((radians(low) - GIVE, radians(high) + GIVE) for low, high in ranges)})
+
+    def of_scene(self, joints: Sequence[Joint]) -> Topics:
+        """Return these topics of a scene: ranges of its joints, and areas of its cylinders, which turn pressures to forces.
+
+        Raises
+        ------
+        UsageError
+            The mapping says that there are pressures, but areas are not known.
+        """
+        topics = self.of_joints(joint.range_deg for joint in joints)
+        topic, oils = self.inputs[Stream.PRESSURES], [joint.cylinder.oil for joint in joints]
+        given: list[tuple[float, float] | None] = [None if oil is None else (oil.bore, oil.rod) for oil in oils]
+        if topic.bore or topic.rod:
+            if not len(topic.bore) == len(topic.rod) == len(oils):
+                told = f"bore and rod have {len(topic.bore)} and {len(topic.rod)} entries, the scene has {len(oils)} cylinders"
+                raise UsageError(f"inputs.cylinder_pressures: {told}. Give one for each, m.")
+            given = list(zip(topic.bore, topic.rod, strict=True))
+        areas = [(pi / 4 * bore**2, pi / 4 * (bore**2 - rod**2)) for bore, rod in filter(None, given) if rod < bore]
+        if len(areas) == len(oils):
+            return topics.model_copy(update={"areas": tuple(areas)})
+        if self.has_pressures:
+            raise UsageError(NO_AREAS)
+        return topics
+
+    @property
+    def has_pressures(self) -> bool:
+        """Return True if the mapping says that there are pressures."""
+        topic = self.inputs[Stream.PRESSURES]
+        return topic.required or bool(topic.bore)
+
+    def noise_of(self, settings: Settings) -> Settings:
+        """Return the settings with the noise of forces that come from pressures: that of the smallest cylinder.
+
+        The filter learns what is above it.
+        """
+        if not (self.areas and self.has_pressures):
+            return settings
+        sigma = settings.pressure_sigma * min(hypot(*areas) for areas in self.areas)
+        return settings.model_copy(update={"force_sigma": sigma, "force_resolution": 0.0})
+
+    def lacks(self, channel: str) -> bool:
+        """Return True if the mapping says that a channel has no sensor, or does not place one that needs a place."""
+        kind = sensor_kind(channel)
+        return channel in self.absent or (kind.is_placed and kind.is_named and channel not in self.places)
 
     def delay(self, stream: Stream) -> int:
         """Return the time from the readings of a stream to their stamps, ns."""

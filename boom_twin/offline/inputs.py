@@ -21,7 +21,7 @@ from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
 from ..messages.sample_decoder import NO_MEASUREMENT
-from ..messages.topic_table import InputTopic, Topics
+from ..messages.topic_table import NO_AREAS, InputTopic, Topics
 from ..scene.load import SceneSource
 from ..scene.schema import Scene
 from ..twin.twin import Twin
@@ -113,8 +113,8 @@ class ReplayInputs:
     def twin(self, causes: bool = False) -> Twin:
         """Return a twin for the session, which names causes of faults if that is asked for."""
         topics, reads = self.topics, self.strokes.reading
-        given = self.scene, self.settings, topics.mounts(len(self.scene.joints)), self.health, reads, topics.absent
-        return Twin(*given, causes=causes, places=topics.places)
+        mounts, settings = topics.mounts(len(self.scene.joints)), topics.noise_of(self.settings)
+        return Twin(self.scene, settings, mounts, self.health, reads, topics.absent, causes=causes, places=topics.places)
 
     def refuse(self, reason: str) -> None:
         """Raise BagError if there is a `reason` for which the session is of another boom than the scene."""
@@ -133,12 +133,14 @@ def replay_inputs(
     kept = scene_for(session.path, scene)
     joints = kept.scene.joints
     mapped = mapping_of(session.path, Path(options.mapping) if options.mapping else None, len(joints), options.namespace)
-    topics = mapped.topics.of_joints(joint.range_deg for joint in joints)
-    topics_there = {name: session.find(name) for name in mapped.topics.heard}
+    topics = mapped.topics.of_scene(joints)
+    if not topics.areas and (found := session.find(topics.inputs[Stream.PRESSURES].name)) is not None and found.count:
+        raise UsageError(f"{session.path}: {NO_AREAS}")
+    topics_there = {name: session.find(name) for name in topics.heard}
     wanted = [
         name
         for name, topic in topics_there.items()
-        if Stream.STROKES in mapped.topics.heard[name] or (topic is not None and topic.count)
+        if Stream.STROKES in topics.heard[name] or (topic is not None and topic.count)
     ]
     strokes = strokes_of(session.path, mapped)
     refuse_other_names(session, topics, len(joints), kept.source)

@@ -14,6 +14,7 @@ def test_defaults_are_those_of_the_interface() -> None:
         Stream.ANGLES: "joint_angles",
         Stream.IMU: "tip_imu",
         Stream.FORCES: "cylinder_forces",
+        Stream.PRESSURES: "cylinder_pressures",
     }
     assert {role: topic.absolute for role, topic in topics.outputs.items()} == {
         Output.TIP_DISPLACEMENT: "/boom_twin/tip/displacement",

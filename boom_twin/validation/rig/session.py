@@ -26,6 +26,7 @@ from .sensors import Sensors, read, sampling_stamps, specific_force
 EPOCH = 1_700_000_000 * SECOND
 """Stamp (ns) of the start of every session."""
 POINT_PERIOD = 1.0  # s, of a total station
+BACK_PRESSURE = 1e6  # Pa
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,7 @@ def observe(
     seed: int,
     load: TipLoad | None = None,
     places: Mapping[str, Place] = NO_PLACES,
+    cylinders: Sequence[tuple[float, float]] = (),
 ) -> RigSession:
     """Sample a simulated motion; stamps depend on the seed alone, not on the noise.
 
@@ -116,6 +118,8 @@ def observe(
     ----------
     places : mapping of str to Place
         Of IMUs beside that at the tip, strain gauges (``moment_1`` ..) and points; a point is seen once in `POINT_PERIOD`.
+    cylinders : sequence of (float, float)
+        Bore and rod (m) of every cylinder whose pressures are measured; empty without.
     rows : dict of ndarray
         What `simulate` gave for this drive and this load.
 
@@ -124,7 +128,7 @@ def observe(
     RigSession
         Samples of all sensors, and the truth beside them.
     """
-    clock, stroke_noise, angle_noise, imu_noise, force_noise, *others = np.random.default_rng(seed).spawn(6 + len(places))
+    clock, stroke_noise, angle_noise, imu_noise, force_noise, *others = np.random.default_rng(seed).spawn(7 + len(places))
     stamps = sampling_stamps(sensors, float(rows["t_s"][-1]), EPOCH, clock)
     times = (stamps - EPOCH) / SECOND
 
@@ -135,7 +139,7 @@ def observe(
     truth |= {"t": times, "drives": drive(times)[0]} | ({} if load is None else {"load": load(times)})
     force = specific_force(truth["tip_acc"], truth["tip_angle"], gravity_in_base(scene))
     placed = {Stream.RATE: read(at(rows["tip_angular_velocity_rad_s"])[:, None], sensors.rate_sigma, 0.0, others[0])}
-    for k, ((name, place), noise) in enumerate(zip(places.items(), others[1:], strict=True), start=1):
+    for k, ((name, place), noise) in enumerate(zip(places.items(), others[1:-1], strict=True), start=1):
         columns = {end: at(rows[f"site_{k}_{end}"]) for end in SITE if np.isfinite(rows[f"site_{k}_{end}"]).all()}
         if name.startswith("moment_"):
             of_all = placed.setdefault(Stream.MOMENTS, np.full(truth["joints"].shape, np.nan))
@@ -150,6 +154,9 @@ def observe(
             felt = specific_force(accelerations, columns["angle_rad"] + place.turned, gravity_in_base(scene))
             placed[Stream(name)] = read(felt, sensors.imu_sigma, 0.0, noise)
             placed[Stream(f"{name}_rate")] = read(columns["rate_rad_s"][:, None], sensors.rate_sigma, 0.0, noise)
+    if cylinders:
+        pressures = _pressures(truth["forces"], cylinders)
+        placed[Stream.PRESSURES] = read(pressures, sensors.pressure_sigma, 0.0, others[-1])
     return RigSession(
         stamps,
         read(truth["strokes"], sensors.stroke_sigma, sensors.stroke_resolution, stroke_noise),
@@ -173,11 +180,20 @@ def record(
     load: TipLoad | None = None,
     changes: Sequence[Change] = (),
     places: Mapping[str, Place] = NO_PLACES,
+    cylinders: Sequence[tuple[float, float]] = (),
 ) -> RigSession:
     """Simulate the boom for `duration` (s) under a load, while it changes, and sample it; sensors are at `places`, too."""
     sites = tuple(site_of(scene, place) for place in places.values())
     rows = simulate(scene, drive, duration, step, 2 * step, elements, load, changes, sites)
-    return observe(scene, drive, rows, sensors or Sensors(), seed, load, places)
+    return observe(scene, drive, rows, sensors or Sensors(), seed, load, places, cylinders)
+
+
+def _pressures(forces: Array, cylinders: Sequence[tuple[float, float]]) -> Array:
+    """Return pressures (m, 2 n; Pa) of cap and rod side by forces (m, n; N): the side that pulls less has `BACK_PRESSURE`."""
+    bore, rod = np.array(cylinders).T
+    piston, ring = np.pi / 4 * bore**2, np.pi / 4 * (bore**2 - rod**2)
+    cap = np.maximum((BACK_PRESSURE * ring - forces) / piston, BACK_PRESSURE)
+    return np.asarray(np.stack([cap, (forces + cap * piston) / ring], axis=2).reshape(len(forces), -1))
 
 
 def site_of(scene: Scene, place: Place) -> Site:
