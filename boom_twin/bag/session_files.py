@@ -127,9 +127,12 @@ def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
         if kind.field == "point":
             msg.point.x, msg.point.z = map(float, sample.values)
             return msg
-        msg.linear_acceleration.x, msg.linear_acceleration.z = map(float, sample.values)
         msg.orientation.w = 1.0
         msg.orientation_covariance[0] = msg.angular_velocity_covariance[0] = _UNKNOWN
+        if kind.beside:
+            rate, msg.linear_acceleration_covariance[0] = sample.values, _UNKNOWN
+        else:
+            msg.linear_acceleration.x, msg.linear_acceleration.z = map(float, sample.values)
         if rate is not None:
             msg.angular_velocity.y, msg.angular_velocity_covariance[0] = -float(rate[0]), 0.0
         return msg
