@@ -238,7 +238,7 @@ class SampleDecoder:
         """Return readings along the axes that the mapping names; None if the message has none."""
         kind = SENSORS[stream]
         if hasattr(msg, f"{kind.field}_covariance") and getattr(msg, f"{kind.field}_covariance")[0] == NO_MEASUREMENT:
-            if not kind.beside and msg.angular_velocity_covariance[0] == NO_MEASUREMENT:
+            if not kind.beside:
                 self.oddities["no measurement"] += 1
             return None
         vector = getattr(msg, kind.field)

@@ -34,6 +34,6 @@ def test_defaults_are_those_of_the_interface() -> None:
         Output.DIAGNOSTICS: "/diagnostics",
     }
     assert topics.inputs[Stream.IMU].absolute == "/tip_imu"
-    assert [topic.required for topic in topics.inputs.values()] == [True, True, False, False]
+    assert [topic.required for topic in topics.inputs.values()] == [True, True, False, False, False]
     assert {topic.qos.reliability for topic in topics.inputs.values()} == {"best_effort"}
     assert not topics.sensors and topics.mounts(3) == [None] * 3 and not topics.is_shared
