@@ -159,9 +159,11 @@ def _mend(document: dict[str, Any], found: Checked, reads: StrokeReading | None)
     """Write everything that a check is sure of into the content of a mapping."""
     for verdict in found.verdicts:
         if verdict.is_sure and verdict.best is not None:
-            mended = "none" if verdict.has_no_gravity else _sensor(verdict.channel, verdict.best)
-            document.setdefault("sensors", {})[verdict.channel] = mended
-            if verdict.best.turned != verdict.declared.turned:
+            is_turned = verdict.best.turned != verdict.declared.turned
+            if not is_turned or verdict.best._replace(turned=verdict.declared.turned) != verdict.declared:
+                mended = "none" if verdict.has_no_gravity else _sensor(verdict.channel, verdict.best)
+                document.setdefault("sensors", {})[verdict.channel] = mended
+            if is_turned:
                 entry = document.setdefault("inputs", {}).setdefault(verdict.stream.value, {})
                 turned = round(math.remainder(verdict.best.turned, math.tau), 4)
                 entry["place"] = {**(entry.get("place") or {}), "turned": turned}
