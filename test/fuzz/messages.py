@@ -28,7 +28,7 @@ from boom_twin.messages.type_store import PADDING
 from boom_twin.monitor.data.feed import Feed
 from boom_twin.monitor.data.store import Store
 from boom_twin.monitor.protocol import alarms, dump, layout, state
-from boom_twin.types import SENSORS
+from boom_twin.types import SENSORS, USUAL_STREAMS
 
 from .mutate import damaged, pick
 from .verdict import Kind, Verdict
@@ -78,7 +78,7 @@ def _outputs() -> dict[str, list[bytes]]:
     twin, encoder = drive_twin(scene, health=True), ReportEncoder(scene, Settings())
     found: dict[str, list[bytes]] = {}
     for number in range(400):
-        for stream in Stream:
+        for stream in USUAL_STREAMS:
             for key, data in encoder.fill(twin.update(_true(random, number, stream))):
                 found.setdefault(key.name, []).append(bytes(data))
     return found
@@ -97,7 +97,7 @@ def make(random: Generator, path: Path) -> Path:
     """Write true and hostile messages in turn."""
     lines, number = [], 0
     for _ in range(LINES):
-        stream = list(Stream)[int(random.choice(4, p=(0.55, 0.2, 0.1, 0.15)))]
+        stream = USUAL_STREAMS[int(random.choice(4, p=(0.55, 0.2, 0.1, 0.15)))]
         if stream is Stream.STROKES:
             number += 1
         if random.random() > HOSTILE:

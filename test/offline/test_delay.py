@@ -18,7 +18,7 @@ MAPPING = "inputs:\n" + "".join(f"  {stream.value}: {{delay: {delay}}}\n" for st
 
 def written(path: Path, delays: dict[Stream, float]) -> Path:
     """The first messages of every topic of the bundled session, their stamps later by `delays`; log times as they were."""
-    inputs = load_topics().inputs
+    inputs = {stream: topic for stream, topic in load_topics().inputs.items() if scan(SESSION).find(topic.name) is not None}
     streams = {topic.absolute: stream for stream, topic in inputs.items()}
     with SessionWriter(path, {stream.value: topic for stream, topic in inputs.items()}, {"origin": "synthetic, a test"}) as bag:
         count = dict.fromkeys(Stream, 0)

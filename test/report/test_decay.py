@@ -62,11 +62,12 @@ def swung():
 
 @pytest.mark.parametrize("reads", list(StrokeReading))
 def test_a_boom_on_locked_drives_rests_with_the_frequencies_of_its_drives(swung, reads: StrokeReading) -> None:
-    """Whatever the transducers read; lengths that are taken for drives never rest, and give other frequencies."""
+    """Whatever drives the model; lengths that are taken for drives never rest, and give other frequencies."""
     scene, found = load_scene(), []
     twin, recording, finder = Twin(scene, reads=reads), Recording(4, found.append, reads=reads), RestFinder(scene)
-    for time, row in zip(swung.times, swung.strokes if reads is StrokeReading.DRIVE else swung.lengths, strict=True):
-        recording.add(twin.update(Sample(Stream.STROKES, SECOND + round(SECOND * float(time)), row)))
+    rows = {StrokeReading.LENGTH: swung.lengths, StrokeReading.DRIVE: swung.strokes, StrokeReading.ANGLE: swung.joints}[reads]
+    for time, row in zip(swung.times, rows, strict=True):
+        recording.add(twin.update(Sample(reads.stream, SECOND + round(SECOND * float(time)), row)))
     recording.close()
     (stretch,) = found
     finder.add(own := HistoryBuilder(scene).add(stretch), stretch.estimates.load)

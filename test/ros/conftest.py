@@ -18,6 +18,7 @@ from default_boom import joint_angles_of_strokes, strokes_of_posture
 from demo.isolation import Isolation
 from made_once import MadeOnce
 from recordings import SessionWriter, load_mapping, read_both, scan, write_session
+from ros_messages import load_topics
 
 from boom_twin import Stream, load_scene, statics
 
@@ -27,7 +28,7 @@ SECONDS, RATE = 4.0, 200.0
 
 def mapping_with(qos: str) -> str:
     """The text of a mapping whose inputs have this quality of service."""
-    return "inputs:\n" + "".join(f"  {stream.value}: {{qos: {{{qos}}}}}\n" for stream in Stream)
+    return "inputs:\n" + "".join(f"  {stream.value}: {{qos: {{{qos}}}}}\n" for stream in load_topics().inputs)
 
 
 class Process:
