@@ -192,7 +192,7 @@ class TwinWatch:
         if (load := self._load.status(judge("tip load"))) is not None:
             found.append(load)
         if self._newest is not None:
-            found.append(self._swing.status(judge("tip")))
+            found.append(self._swing.status(judge("swing")))
         yield
         if self._stress is not None and self._newest is not None and self._newest.prediction is not None:
             bending = judge("bending")

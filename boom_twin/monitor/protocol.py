@@ -77,7 +77,7 @@ def state(store: Store, now: float, time: float, dropped: DroppedMessages | None
 ACTIONS = {
     Severity.OFF: "unknown", Severity.OK: "go", Severity.WARN: "look", Severity.STALE: "unknown", Severity.ERROR: "look",
 }  # fmt: skip
-SWING = "tip"
+SWING = "swing"
 """Status whose error stops the boom."""
 
 

@@ -23,7 +23,7 @@ HEALTH = "health"
 """The status that stands for all alarms of the rig's health."""
 SENSOR_GROUPS = ("sensor", "residual")
 """Kinds of statuses that speak of one channel, as an alarm of the rig's health does."""
-WITH_FIGURES = ("tip", "tip load")
+WITH_FIGURES = ("swing", "tip load")
 """Statuses whose values the page shows."""
 _LIMITS = ("_error", "_warn", "_stale")
 
@@ -124,7 +124,7 @@ def _lamp(name: str, status: Any, clock: float) -> StatusLamp:
 
 
 def _group(name: str) -> str:
-    if name in ("model", "tip", "tip load", "bending"):
+    if name in ("model", "swing", "tip load", "bending"):
         return "model"
     kind = name.split(" ")[0]
     return {"sensor": "sensors", "residual": "residuals", HEALTH: "residuals", "recording": "recorder"}.get(kind, "timing")
