@@ -1,0 +1,152 @@
+"""Sessions of a batch summed up by rig: hours of work, fatigue damage and life, drift of figures over time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite, sqrt
+
+import numpy as np
+from scipy.stats import t as student
+
+from ..types import SECOND
+from .session_task import OK, Row
+
+HOUR, DAY = 3600.0, 86400.0  # s
+LIVES = (10, 20, 30)  # years for which the hours of work a year are given
+DAMAGE = "fatigue_damage_"
+"""Begin of the columns with the damage of a station."""
+DRIFTING = ("residual_mean_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
+"""First part of the names of figures of which the drift is given."""
+LEAST_SESSIONS = 4
+"""Sessions with a figure and its standard deviation that a drift needs: two degrees of freedom beside the line."""
+CHANCE = 1e-3
+"""Probability of a drift by chance below which it is reported as one, as by `boom_twin.report.compare.SIGNIFICANT`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """Change of a figure from the first to the last session, along the line of weighted least squares."""
+
+    name: str
+    sessions: int
+    days: float
+    first: float  # value of the line at the first session
+    change: float
+    sigma: float  # standard deviation of `change`, at least that of the scatter about the line
+    is_significant: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Life:
+    """Fatigue of the station of a rig with the largest damage, summed up over sessions."""
+
+    category: float  # detail category, MPa
+    station: str
+    damage: float
+    sigma: float | None  # standard deviation by the scatter of the sessions; None below `LEAST_SESSIONS`
+    largest_share: float  # of the damage, by one session; 0 without damage
+    sessions: int
+    hours: float  # of these sessions
+    has_heights: bool  # heights of the sections are in the scene
+    stations: dict[str, float]  # damage of every station
+
+    @property
+    def hours_to_end(self) -> float | None:
+        """Hours of such work to a damage of 1; None without damage."""
+        return self.hours / self.damage if self.damage > 0.0 else None
+
+    def hours_a_year(self, years: float) -> float | None:
+        """Return the hours of such work a year that use the life up in so many years; None without damage."""
+        return None if self.hours_to_end is None else self.hours_to_end / years
+
+
+@dataclass(frozen=True, slots=True)
+class RigSummary:
+    """Sessions of one rig. A session that stands twice in the batch counts once."""
+
+    rig: str
+    sessions: int
+    repeated: int  # sessions left out, because their files equal those of another one
+    hours: float
+    alarmed: int  # sessions with alarms
+    causes: dict[str, int]  # sessions in which a cause was named
+    life: Life | None  # None unless fatigue was asked for
+    drifts: list[Drift]
+
+
+def rigs_of(rows: Sequence[Row]) -> list[RigSummary]:
+    """Return the summaries of all rigs with a finished session, by name."""
+    rigs: dict[str, list[Row]] = {}
+    for row in sorted((row for row in rows if row["status"] == OK), key=lambda row: int(row["first_stamp_ns"])):
+        rigs.setdefault(row["rig"], []).append(row)
+    return [_summary(rig, found) for rig, found in sorted(rigs.items())]
+
+
+def as_dict(rig: RigSummary) -> dict[str, object]:
+    """Return a summary as plain values, with the hours that follow from it."""
+    life = rig.life
+    told = None if life is None else {
+        "detail_category_MPa": life.category, "station": life.station, "damage": life.damage, "damage_sigma": life.sigma,
+        "damage_largest_share": life.largest_share, "sessions": life.sessions, "hours": life.hours,
+        "section_heights_given": life.has_heights, "hours_to_damage_1": life.hours_to_end,
+        **{f"hours_a_year_for_{years}_years": life.hours_a_year(years) for years in LIVES},
+        "damage_by_station": life.stations,
+    }  # fmt: skip
+    return {
+        "rig": rig.rig, "sessions": rig.sessions, "repeated": rig.repeated, "hours": rig.hours, "with_alarms": rig.alarmed,
+        "causes": rig.causes, "fatigue": told, "drifts": rig.drifts,
+    }  # fmt: skip
+
+
+def _summary(rig: str, rows: list[Row]) -> RigSummary:
+    once = [*{row["file_sha256"]: row for row in reversed(rows)}.values()][::-1]
+    causes = Counter(cause for row in once for cause in {alarm["cause"] for alarm in row["alarms"]} if cause)
+    names = sorted({name for row in once for name in row if name.startswith(DRIFTING) and not name.endswith("_sigma")})
+    drifts = [drift for name in names if (drift := drift_of(name, once)) is not None]
+    hours, alarmed = sum(row["duration_s"] for row in once) / HOUR, sum(bool(row["alarms"]) for row in once)
+    return RigSummary(rig, len(once), len(rows) - len(once), hours, alarmed, dict(causes.most_common()), _life(once), drifts)
+
+
+def _life(rows: list[Row]) -> Life | None:
+    own = [row for row in rows if any(name.startswith(DAMAGE) for name in row)]
+    if not own:
+        return None
+    names = dict.fromkeys(name for row in own for name in row if name.startswith(DAMAGE))
+    sums = {name: sum(row.get(name, 0.0) for row in own) for name in names}
+    worst = max(sums, key=lambda name: sums[name])
+    damages, hours = np.array([row.get(worst, 0.0) for row in own]), np.array([row["duration_s"] / HOUR for row in own])
+    total, count, sigma = sums[worst], len(own), None
+    if count >= LEAST_SESSIONS:  # of a ratio: scatter about the mean damage an hour
+        sigma = float(np.sqrt(count / (count - 1) * np.sum((damages - total / hours.sum() * hours) ** 2)))
+    share, has_heights = damages.max() / total if total > 0.0 else 0.0, all(row["section_heights_given"] for row in own)
+    stations = {name.removeprefix(DAMAGE): value for name, value in sums.items()}
+    category, station = own[0]["fatigue_category_MPa"], worst.removeprefix(DAMAGE)
+    return Life(category, station, total, sigma, float(share), count, float(hours.sum()), has_heights, stations)
+
+
+def drift_of(name: str, rows: Sequence[Row]) -> Drift | None:
+    """Return the drift of a figure over sessions, None if it cannot be told.
+
+    The line is that of least squares, weighted by the standard deviations of the figure. Its own is enlarged by the scatter
+    about the line if that is larger, and tested by Student's t.
+    """
+    known = [row for row in rows if _is_number(row.get(name)) and _is_number(row.get(f"{name}_sigma"))]
+    found = np.array([(row["first_stamp_ns"] / SECOND / DAY, row[name], row[f"{name}_sigma"]) for row in known]).reshape(-1, 3)
+    days, values, sigmas = found[found[:, 2] > 0.0].T
+    if len(days) < LEAST_SESSIONS or not np.ptp(days) > 0.0:
+        return None
+    weights = sigmas**-2.0
+    away = days - weights @ days / weights.sum()
+    mean, size = float(weights @ values / weights.sum()), float(weights @ away**2)
+    slope, freedom = float(weights @ (away * (values - mean))) / size, len(days) - 2
+    scatter = float(weights @ (values - mean - slope * away) ** 2) / freedom
+    sigma = sqrt(max(1.0, scatter) / size)
+    chance = 2.0 * float(student.sf(abs(slope) / sigma, freedom))
+    span = float(np.ptp(days))
+    return Drift(name, len(days), span, mean + slope * float(away.min()), slope * span, sigma * span, chance < CHANCE)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, float | int) and isfinite(value)
