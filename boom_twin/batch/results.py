@@ -19,6 +19,7 @@ from urllib.parse import quote
 from .. import __version__
 from ..errors import BagError
 from ..plots.session import Trend, trends_picture
+from ..report.fatigue import LIVES, hours_as_text, yearly_as_text
 from ..report.html import Html, heading, image, page, paragraph, table
 from ..system.atomic_files import DRAFT, write_atomic
 from ..system.json_text import json_text
@@ -26,7 +27,7 @@ from ..system.received_files import real_path
 from ..system.result_folder import check_lasting
 from ..system.terminal_text import printable
 from ..types import SECOND, sensor_kind
-from .rigs import LEAST_SESSIONS, LIVES, Drift, RigSummary, as_dict
+from .rigs import LEAST_SESSIONS, Drift, RigSummary, as_dict
 from .session_task import ALARM, OK, Row
 
 MARK, TABLE, RIGS, PAGE = "batch.json", "sessions.parquet", "rigs.json", "batch.html"
@@ -220,7 +221,7 @@ def _cells(row: Row) -> tuple[object, ...]:
 
 
 RIG_COLUMNS = (
-    "rig", "sessions", "hours", "with alarms", "causes named, in sessions", "damage", "at station", "by one session, %",
+    "rig", "sessions", "hours", "with alarms", "causes named (sessions)", "damage", "at station", "by one session, %",
     "hours of such work to damage 1", *(f"h a year for {years} years" for years in LIVES),
 )  # fmt: skip
 DAMAGE_NOTE = (
@@ -245,13 +246,14 @@ def _by_rig(rigs: Sequence[RigSummary]) -> Iterator[str]:
 
 
 def _rig_cells(rig: RigSummary) -> tuple[object, ...]:
-    causes = ", ".join(f"{cause} {count}" for cause, count in rig.causes.items()) or "none"
+    causes = ", ".join(f"{cause} ({count})" for cause, count in rig.causes.items()) or "none"
     start: tuple[object, ...] = rig.rig, rig.sessions, rig.hours, rig.alarmed, causes
     if (life := rig.life) is None:
         return *start, *[None] * (len(RIG_COLUMNS) - len(start))
     damage = f"{life.damage:.3g}" + ("" if life.sigma is None else f" ± {life.sigma:.1g}")
-    years = (life.hours_a_year(years) for years in LIVES)
-    return *start, damage, life.station.replace("_", " "), 100.0 * life.largest_share, life.hours_to_end, *years
+    years = (yearly_as_text(life.hours_a_year(years)) for years in LIVES)
+    place = life.station.replace("_", " ") + " m"
+    return *start, damage, place, 100.0 * life.largest_share, hours_as_text(life.hours_to_end), *years
 
 
 DRIFT_NOTE = (

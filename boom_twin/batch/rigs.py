@@ -10,11 +10,11 @@ from math import isfinite, sqrt
 import numpy as np
 from scipy.stats import t as student
 
+from ..report.fatigue import LIVES, hours_to_end
 from ..types import SECOND
 from .session_task import OK, Row
 
 HOUR, DAY = 3600.0, 86400.0  # s
-LIVES = (10, 20, 30)  # years for which the hours of work a year are given
 DAMAGE = "fatigue_damage_"
 """Begin of the columns with the damage of a station."""
 DRIFTING = ("residual_mean_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
@@ -55,7 +55,7 @@ class Life:
     @property
     def hours_to_end(self) -> float | None:
         """Hours of such work to a damage of 1; None without damage."""
-        return self.hours / self.damage if self.damage > 0.0 else None
+        return hours_to_end(self.damage, self.hours)
 
     def hours_a_year(self, years: float) -> float | None:
         """Return the hours of such work a year that use the life up in so many years; None without damage."""
