@@ -120,7 +120,9 @@ class Metrics:
         words = "Irregular samples as the twin counts them; late, duplicate, empty, implausible ones are left out."
         yield self._counter("irregular_samples", words, rows, "stream", "event")
         swing = lamps["swing"].figures.get("swing_m") if "swing" in lamps else None
-        yield self._gauge("tip_swing_meters", "Swing of the tip, peak to peak.", [] if swing is None else [((), swing)])
+        yield self._gauge(
+            "tip_swing_meters", "Largest distance of the tip from its mean over 4 s.", [] if swing is None else [((), swing)]
+        )
 
     def _alarms(self) -> Iterator[Any]:
         active: dict[tuple[str, str, str], int] = {}
