@@ -23,7 +23,7 @@ def reading(way: Channel) -> str:
 
 
 def finding(verdict: Verdict, moved: bool) -> str:
-    """Return what was found about a channel."""
+    """Return the finding about a channel."""
     if not verdict.is_wrong:
         return "as declared"
     if not verdict.is_explained or verdict.best is None:
@@ -41,5 +41,5 @@ def likely(verdict: Verdict) -> str:
 
 
 def channel_name(verdict: Verdict) -> str:
-    """Return the sensor of a verdict as alarms name it."""
+    """Return the name that alarms give the sensor."""
     return "tip_imu" if SENSORS[verdict.stream].is_imu else verdict.channel

@@ -283,7 +283,7 @@ FAULTS = {
     "one is missing": (GOOD.replace("Zylinder 3", "Kran"), "no column for cylinder_3. Not used: 'Kran [mm]'"),
     "two times": (GOOD.replace("Zylinder 4 [mm]", "Zeit [s]"), "several columns 'Zeit [s]'"),
     "no header": (GOOD.partition("\n")[2], "numbers stand in its first line"),
-    "no table": ("nothing\nto see", "no table is found in it, which begins with 'nothing'"),
+    "no table": ("nothing\nto see", "no table found. The file begins with 'nothing'"),
     "no time": (GOOD.replace("Zeit", "Nr"), "no column of times among"),
     "ms or s": (table([TIMELESS], lambda row: f"{0.15 * row:.2f}", numbers(",", 4)), "the times may be in s or ms"),
     "day or month": (table([TIMELESS], lambda row: f"03/04/2026 10:00:{clock(row)}", numbers(",", 4)), "or month/day"),
@@ -308,7 +308,7 @@ def test_files_without_a_common_time_and_parts_of_one_recording(tmp_path: Path, 
     assert main(["import", a, late, *out]) == 1
     assert "late.csv: 100 to 100.59 s: no time in common with the strokes" in capsys.readouterr().err
     assert main(["import", a, a, *out]) == 1
-    assert "which overlap. Leave one out" in capsys.readouterr().err
+    assert " overlap. Leave one out" in capsys.readouterr().err
     (tmp_path / "b.csv").write_text(second + "1.20;62")  # the logger was switched off
     assert main(["import", b, a, *out, "--json"]) == 0
     told = capsys.readouterr()
@@ -358,7 +358,7 @@ def test_a_library_that_is_missing_is_named_with_the_extra(
     (tmp_path / "log.tdms").write_bytes(b"TDSm")
     monkeypatch.setitem(sys.modules, "nptdms", None)
     assert main(["import", str(tmp_path / "log.tdms"), "--out", str(tmp_path / "s")]) == 1
-    assert 'nptdms is not installed, and reads such files. Run `pip install "boom_twin[import]"`.' in capsys.readouterr().err
+    assert 'reading it needs nptdms, which is not installed. Run `pip install "boom_twin[import]"`.' in capsys.readouterr().err
 
 
 def test_the_columns_file_of_the_page_is_one_and_faults_are_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
