@@ -90,6 +90,11 @@ class Checked(NamedTuple):
     expected: Expected
     tables: Mapping[Stream, Table]
 
+    @property
+    def has_strokes_alone(self) -> bool:
+        """Return True if no other sensor was read: strokes that are swapped or shifted within the travels do not show."""
+        return set(self.tables) == {Stream.STROKES}
+
 
 class _Part(NamedTuple):
     """Best readings of one stream under an explanation.
