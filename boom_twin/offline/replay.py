@@ -84,10 +84,10 @@ class Replay(SummaryDisplay):
             The stretches were given away, see `replay_into`.
         """
         stretch, rows = self.recording.whole, RowsInMemory()
-        table = SampleTable(rows, stretch.joints)
+        table = SampleTable(lambda _: rows, stretch.joints, stretch.streams)
         table.add(stretch)
         table.finish()
-        return dict(zip(columns_of(stretch.joints), np.concatenate(rows.parts).T, strict=True))
+        return dict(zip(columns_of(stretch.joints, stretch.streams), np.concatenate(rows.parts).T, strict=True))
 
     def to_frame(self) -> Any:
         """Return `columns` as a ``pandas.DataFrame``; UsageError if pandas is not installed."""
@@ -197,7 +197,7 @@ def replay_into(
     truth = truth_in(options.window, session, given.topics, given.wanted)
     errors = None if truth is None else TipErrors(truth)
     taking = None if take is None else _Timed(take)
-    recording = Recording(joints, taking, errors, given.strokes.reading)
+    recording = Recording(joints, taking, errors, given.strokes.reading, given.streams)
     other_boom, refused = OtherBoom(), RefusedStrokes(given.scene, given.kept.source, given.strokes.reading)
     samples = SessionSamples(session, given.topics, given.wanted, joints, options.window)
     with ExitStack() as stack:

@@ -43,4 +43,5 @@ def likely(verdict: Verdict) -> str:
 
 def channel_name(verdict: Verdict) -> str:
     """Return the sensor of a verdict as alarms name it."""
-    return "tip_imu" if SENSORS[verdict.stream].is_imu else verdict.channel
+    kind = SENSORS[verdict.stream]
+    return kind.stem if kind.is_accelerometer else verdict.channel
