@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from enum import Enum, StrEnum
 from math import pi
 from typing import TYPE_CHECKING, Any, Literal
@@ -46,6 +46,17 @@ class Stream(Enum):
     ANGLES = "joint_angles"
     IMU = "tip_imu"
     FORCES = "cylinder_forces"
+    RATE = "tip_imu_rate"
+    IMU_2 = "imu_2"
+    RATE_2 = "imu_2_rate"
+    IMU_3 = "imu_3"
+    RATE_3 = "imu_3_rate"
+    IMU_4 = "imu_4"
+    RATE_4 = "imu_4_rate"
+    MOMENTS = "section_moments"
+    POINT = "points"
+    POINT_2 = "points_2"
+    PRESSURES = "cylinder_pressures"
 
     __hash__ = object.__hash__  # members are single; Enum's own is a Python function, called for every look-up
 
@@ -73,6 +84,28 @@ class StrokeReading(StrEnum):
         return Stream.ANGLES if self is StrokeReading.ANGLE else Stream.STROKES
 
 
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Place of a sensor in the plane of the boom.
+
+    Attributes
+    ----------
+    section : int or None
+        From 1 at the base; None is the last section.
+    at : float or None
+        Distance from the section's inboard pivot along it, m; None is its outboard pivot.
+    turned : float
+        Angle of the sensor's x axis to the section, positive anticlockwise (as a section is raised), rad.
+    """
+
+    section: int | None = None
+    at: float | None = None
+    turned: float = 0.0
+
+
+NO_PLACES: Mapping[str, Place] = {}
+"""Places of a boom whose only placed sensor is the tip IMU, at the tip."""
+
 G = 9.80665
 """Standard gravity, m/s^2."""
 
@@ -84,7 +117,7 @@ class SensorKind:
     title: str
     """Name for people."""
     message: str
-    """Type of its messages: a JointState, read by names, or an Imu, read by axes."""
+    """Type of its messages: a JointState, read by names, or another one, read by `axes`."""
     stem: str
     """Start of its channel names: ``joint`` gives ``joint_1`` .. ``joint_n``."""
     ends: tuple[str, ...]
@@ -97,7 +130,20 @@ class SensorKind:
     lack: str
     """What is missing without these sensors; empty if few rigs have them."""
     field: str = "position"
-    """Field of a JointState that is read: ``position`` or ``effort``."""
+    """Field that is read: of a JointState ``position`` or ``effort``, of another message the vector with the `axes`."""
+    axes: tuple[str, ...] = ()
+    """Axes of that vector, one for each channel; empty if messages are read by names."""
+    beside: str = ""
+    """Input whose messages hold these readings, too, if they have no topic of their own."""
+    gives: str = ""
+    """Stream that these readings are converted to when they are decoded; they have channels in messages only."""
+    is_placed: bool = False
+    """True if a boom has these sensors only where a mapping places them."""
+
+    def is_at(self, places: Collection[str]) -> bool:
+        """Return True if any of these sensors has a place; places are those of a stem, or of single channels of one."""
+        return self.stem in places or any(not self.ends and place.rpartition("_")[0] == self.stem for place in places)
+
     part: str = ""
     """Stem of the names in messages, if it differs: a force is that of ``cylinder_1``."""
     shown: str = ""
@@ -106,9 +152,14 @@ class SensorKind:
     """Alarms of a single sensor. Jumps, spikes and noise count only if its quantity changes little per reading."""
 
     @property
-    def is_imu(self) -> bool:
-        """Return True if its messages are read by axes."""
-        return self.message == "sensor_msgs/msg/Imu"
+    def is_accelerometer(self) -> bool:
+        """Return True for the accelerometers of an IMU."""
+        return self.field == "linear_acceleration"
+
+    @property
+    def is_named(self) -> bool:
+        """Return True if its messages are read by names."""
+        return not self.axes
 
     @property
     def named(self) -> str:
@@ -123,7 +174,7 @@ class SensorKind:
     @property
     def unit_suffix(self) -> str:
         """SI unit as the end of a key or of a column's name: ``rad``, ``m_s2``."""
-        return self.unit.replace("/", "_").replace("^", "")
+        return self.unit.replace("/", "_").replace("^", "").replace(" ", "")
 
     @property
     def shown_unit(self) -> tuple[float, str]:
@@ -133,7 +184,43 @@ class SensorKind:
 
     def channels(self, joints: int) -> tuple[str, ...]:
         """Return the names of the channels in the order of a sample, of a boom with so many joints."""
+        if self.gives:
+            return tuple(f"{self.stem}_{i}_{end}" for i in range(1, joints + 1) for end in self.ends)
         return tuple(f"{self.stem}_{end}" for end in self.ends or range(1, joints + 1))
+
+
+def _imu(stem: str, lack: str = "") -> SensorKind:
+    """Return the accelerometers of an IMU."""
+    return SensorKind(
+        title=stem.replace("tip_imu", "tip IMU").replace("imu_", "IMU "),
+        message="sensor_msgs/msg/Imu",
+        stem=stem,
+        ends=("x", "z"),
+        units={"m/s^2": 1.0, "g": G, "mg": 1e-3 * G},
+        noise="imu_sigma",
+        resolution="",
+        lack=lack,
+        field="linear_acceleration",
+        axes=("x", "z"),
+        is_placed=not lack,
+        alarms=("stuck",),
+    )
+
+
+def _gyro(imu: SensorKind) -> SensorKind:
+    """Return the gyro of an IMU, which reads how fast its place is raised."""
+    return replace(
+        imu,
+        title=f"{imu.title} gyro",
+        ends=("rate",),
+        units={"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": pi / 180.0},
+        noise="rate_sigma",
+        lack="",
+        field="angular_velocity",
+        axes=("y",),
+        beside=imu.stem,
+        shown="mrad/s",
+    )
 
 
 SENSORS: dict[Stream, SensorKind] = {
@@ -159,17 +246,7 @@ SENSORS: dict[Stream, SensorKind] = {
         lack="there are no joint residuals",
         shown="mrad",
     ),
-    Stream.IMU: SensorKind(
-        title="tip IMU",
-        message="sensor_msgs/msg/Imu",
-        stem="tip_imu",
-        ends=("x", "z"),
-        units={"m/s^2": 1.0, "g": G, "mg": 1e-3 * G},
-        noise="imu_sigma",
-        resolution="",
-        lack="there are no residuals of the tip's acceleration (optional)",
-        alarms=("stuck",),
-    ),
+    Stream.IMU: _imu("tip_imu", "there are no residuals of the tip's acceleration (optional)"),
     Stream.FORCES: SensorKind(
         title="cylinder forces",
         message="sensor_msgs/msg/JointState",
@@ -184,22 +261,83 @@ SENSORS: dict[Stream, SensorKind] = {
         alarms=("stuck", "dropout"),
     ),
 }
-"""Expected readings are in `boom_twin.deviation.step.write_expected_readings`, topics in ``topics.yaml``."""
+SENSORS[Stream.RATE] = _gyro(SENSORS[Stream.IMU])
+for _accelerometer, _rate in ((Stream.IMU_2, Stream.RATE_2), (Stream.IMU_3, Stream.RATE_3), (Stream.IMU_4, Stream.RATE_4)):
+    SENSORS[_accelerometer] = _imu(_accelerometer.value)
+    SENSORS[_rate] = _gyro(SENSORS[_accelerometer])
+SENSORS[Stream.MOMENTS] = SensorKind(
+    title="bending moments",
+    message="sensor_msgs/msg/JointState",
+    stem="moment",
+    ends=(),
+    units={"N m": 1.0, "kN m": 1e3},
+    noise="moment_sigma",
+    resolution="",
+    lack="",
+    field="effort",
+    is_placed=True,
+    shown="kN m",
+    alarms=("stuck",),
+)
+for _point in (Stream.POINT, Stream.POINT_2):
+    SENSORS[_point] = SensorKind(
+        title=_point.value.replace("_", " "),
+        message="geometry_msgs/msg/PointStamped",
+        stem=_point.value,
+        ends=("x", "z"),
+        units={"m": 1.0, "mm": 1e-3},
+        noise="point_sigma",
+        resolution="",
+        lack="",
+        field="point",
+        axes=("x", "z"),
+        is_placed=True,
+        shown="mm",
+        alarms=(),
+    )
+SENSORS[Stream.PRESSURES] = SensorKind(
+    title="cylinder pressures",
+    message="sensor_msgs/msg/JointState",
+    stem="cylinder",
+    ends=("cap", "rod"),
+    units={"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "psi": 6894.757293168},
+    noise="pressure_sigma",
+    resolution="",
+    lack="",
+    field="effort",
+    gives=Stream.FORCES.value,
+)
+"""In the order of `Stream`. Expected readings are in `boom_twin.deviation.channels`, topics in ``topics.yaml``."""
 
 
-def channels_of(joints: int) -> dict[Stream, tuple[str, ...]]:
-    """Return the names of the channels of every stream, in the order of its samples, of a boom with so many joints."""
-    return {stream: kind.channels(joints) for stream, kind in SENSORS.items()}
+USUAL_STREAMS = tuple(stream for stream, kind in SENSORS.items() if not (kind.is_placed or kind.beside or kind.gives))
+"""Streams that a boom has without a mapping, but for the gyro of its IMU."""
+
+
+def streams_of(places: Collection[str]) -> tuple[Stream, ...]:
+    """Return the streams of a boom whose mapping places these sensors, such as ``imu_2``."""
+    return tuple(stream for stream, kind in SENSORS.items() if not (kind.gives or (kind.is_placed and not kind.is_at(places))))
+
+
+def channels_of(joints: int, streams: Collection[Stream] = tuple(Stream)) -> dict[Stream, tuple[str, ...]]:
+    """Return the names of the channels of every stream, in the order of its samples, of a boom with so many joints.
+
+    Streams that are not among `streams` have no channels.
+    """
+    return {s: kind.channels(joints) if s in streams and not kind.gives else () for s, kind in SENSORS.items()}
 
 
 NUMBER = re.compile(r"[1-9]\d{0,3}")
+NUMBERED_SIDE = re.compile(rf"cylinder_{NUMBER.pattern}_(cap|rod)")
 
 
 def stream_of(channel: str) -> Stream | None:
     """Return the stream of a channel; None if there can be no such channel."""
     stem, _, end = channel.rpartition("_")
+    if NUMBERED_SIDE.fullmatch(channel):
+        return Stream.PRESSURES
     for stream, kind in SENSORS.items():
-        if stem == kind.stem and (end in kind.ends if kind.ends else NUMBER.fullmatch(end)):
+        if stem == kind.stem and not kind.gives and (end in kind.ends if kind.ends else NUMBER.fullmatch(end)):
             return stream
     return None
 
@@ -228,9 +366,10 @@ class Sample:
     stamp: int
     """Nanoseconds, `header.stamp` of the message."""
     values: Array
-    """``STROKES``: (n,) m. ``ANGLES``: (n,) rad, of an inclinometer to the horizontal. ``IMU``: (2,) m/s^2, specific force
-    along x and z of the tip. ``FORCES``: (n,) N, of the cylinders, positive in tension. NaN where the message had no value;
-    a value beyond `LIMIT` counts as none.
+    """``STROKES``: (n,) m. ``ANGLES``: (n,) rad, of an inclinometer to the horizontal. ``IMU``, ``IMU_2`` ..: (2,) m/s^2,
+    specific force along x and z of the sensor. ``RATE``, ``RATE_2`` ..: (1,) rad/s, positive when raised. ``FORCES``: (n,) N,
+    of the cylinders, positive in tension. ``MOMENTS``: (n,) N m, positive where the outboard end is bent up. ``POINT``,
+    ``POINT_2``: (2,) m, forward and up. NaN where the message had no value; a value beyond `LIMIT` counts as none.
     """
 
 

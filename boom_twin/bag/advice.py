@@ -20,14 +20,14 @@ from .session_model import mapping_of
 SKEW = 0.05
 """Threshold (s) for a reported clock difference. A boom moves by centimetres in that time."""
 
-JOINT_STATES = tuple(stream for stream, kind in SENSORS.items() if not kind.is_imu)
+JOINT_STATES = tuple(stream for stream, kind in SENSORS.items() if kind.is_named)
 
 
 def names_missing(info: BagInfo, topics: Topics, joints: int) -> list[str]:
     """Return a sentence for each channel (of `joints` joints) that is missing from some or all messages."""
     found: list[str] = []
     for stream, tally in _joint_states(info, topics):
-        own = [name for name in _names(topics, stream, joints) if name not in topics.absent]
+        own = [sensor.name for channel, sensor in topics.sensors_of(stream, joints).items() if not topics.lacks(channel)]
         its = {names: count for names, count in tally.names.items() if not topics.is_shared or set(own) & set(names)}
         has = {name: sum(count for names, count in its.items() if name in names) for name in own}
         most = max(has.values(), default=0) or sum(its.values())  # messages, or cycles of separate messages

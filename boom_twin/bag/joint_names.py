@@ -13,7 +13,7 @@ from .reader import Session, read
 NAMING_TIME = 5_000_000_000
 """Time from the first message of strokes or angles in which all names are checked, ns of log time."""
 
-KINDS = {stream: kind.named for stream, kind in SENSORS.items() if not kind.ends}
+KINDS = {stream: kind.named for stream, kind in SENSORS.items() if kind.is_named and not kind.ends}
 NAMES_TOLD = 12
 """Limit for the number of names in a sentence."""
 

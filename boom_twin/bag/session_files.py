@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..messages.topic_table import FRAME, load_topics
+from ..messages.topic_table import FRAME, every_input
 from ..messages.type_store import fill_header, new_message
-from ..types import SENSORS, Array, Sample, Stream, channels_of
+from ..types import SENSORS, Array, Sample, Stream
 from .writer import SessionWriter
 
-IMU_FRAME = "tip"
 _UNKNOWN = -1.0
 """First element of a covariance: the quantity is not measured (REP-145)."""
 
@@ -29,6 +28,7 @@ def write_session(
     description: Mapping[str, str],
     angle_stamps_ns: NDArray[np.int64] | None = None,
     forces: Array | None = None,
+    placed: Mapping[Stream, Array] | None = None,
 ) -> None:
     """Write the bag of one session in the order of its stamps. Log times are the stamps.
 
@@ -50,6 +50,8 @@ def write_session(
         Stamps of the joint angles, if other than the strokes'.
     forces : ndarray, shape (k, n), optional
         Cylinder forces, N, positive in tension.
+    placed : dict of Stream to ndarray, shape (k, channels), optional
+        Readings of further sensors.
 
     Raises
     ------
@@ -59,19 +61,30 @@ def write_session(
         If `directory` holds anything.
     """
     values = {Stream.STROKES: strokes, Stream.ANGLES: joints, Stream.IMU: imu, Stream.FORCES: forces}
+    values |= placed or {}
     there = {stream: rows for stream, rows in values.items() if rows is not None}
     _check_shapes(len(stamps_ns), strokes.shape[-1], there)
-    write_samples(directory, samples_of(stamps_ns, strokes, joints, imu, angle_stamps_ns, forces), there, description)
+    write_samples(directory, samples_of(stamps_ns, strokes, joints, imu, angle_stamps_ns, forces, placed), there, description)
 
 
 def write_samples(
     directory: Path, samples: Iterable[Sample], streams: Iterable[Stream], description: Mapping[str, str]
 ) -> None:
-    """Write the bag of one session from ordered `samples`, with the topics of `streams`. Else as `write_session`."""
-    inputs = load_topics().inputs
-    with SessionWriter(directory, {stream.value: inputs[stream] for stream in streams}, description) as bag:
+    """Write the bag of one session from ordered `samples`, with the topics of `streams`. Else as `write_session`.
+
+    Readings that come beside others, those of a gyro, are in the messages with the same stamp.
+    """
+    samples, inputs = list(samples), every_input()
+    beside = {
+        (SENSORS[sample.stream].beside, sample.stamp): sample.values for sample in samples if SENSORS[sample.stream].beside
+    }
+    topics = {stream.value: inputs[stream] for stream in streams if not SENSORS[stream].beside}
+    with SessionWriter(directory, topics, description) as bag:
         for sample in samples:
-            bag.write(sample.stream.value, sample.stamp, sensor_message(sample))
+            if sample.stream.value in topics:
+                bag.write(
+                    sample.stream.value, sample.stamp, sensor_message(sample, beside.get((sample.stream.value, sample.stamp)))
+                )
 
 
 def samples_of(
@@ -81,6 +94,7 @@ def samples_of(
     imu: Array | None,
     angle_stamps_ns: NDArray[np.int64] | None = None,
     forces: Array | None = None,
+    placed: Mapping[Stream, Array] | None = None,
 ) -> list[Sample]:
     """Return the samples of a session by stamp, strokes first at equal stamps, from arrays as in `write_session`.
 
@@ -92,6 +106,7 @@ def samples_of(
         (Stream.ANGLES, angle_stamps, joints),
         (Stream.IMU, stamps_ns, imu),
         (Stream.FORCES, stamps_ns, forces),
+        *((stream, stamps_ns, rows) for stream, rows in (placed or {}).items()),
     ]
     samples = [
         Sample(stream, stamp, row)
@@ -103,25 +118,34 @@ def samples_of(
     return sorted(samples, key=lambda sample: sample.stamp)
 
 
-def sensor_message(sample: Sample) -> Any:
-    """Return the message that a rig's sensor sends. An Imu has only the acceleration in the plane."""
+def sensor_message(sample: Sample, rate: Array | None = None) -> Any:
+    """Return the message that a rig's sensor sends. An Imu has the acceleration in the plane, and the `rate` (1,) if given."""
     kind = SENSORS[sample.stream]
     msg = new_message(kind.message)
-    if kind.is_imu:
-        fill_header(msg.header, sample.stamp, IMU_FRAME)
-        msg.linear_acceleration.x, msg.linear_acceleration.z = map(float, sample.values)
+    if not kind.is_named:
+        fill_header(msg.header, sample.stamp, kind.stem.removesuffix("_imu"))
+        if kind.field == "point":
+            msg.point.x, msg.point.z = map(float, sample.values)
+            return msg
         msg.orientation.w = 1.0
         msg.orientation_covariance[0] = msg.angular_velocity_covariance[0] = _UNKNOWN
+        if kind.beside:
+            rate, msg.linear_acceleration_covariance[0] = sample.values, _UNKNOWN
+        else:
+            msg.linear_acceleration.x, msg.linear_acceleration.z = map(float, sample.values)
+        if rate is not None:
+            msg.angular_velocity.y, msg.angular_velocity_covariance[0] = -float(rate[0]), 0.0
         return msg
     fill_header(msg.header, sample.stamp, FRAME)
-    msg.name = [f"{kind.named}_{end}" for end in kind.ends or range(1, 1 + len(sample.values))]
+    joints = len(sample.values) // (len(kind.ends) or 1)
+    msg.name = [*kind.channels(joints)] if kind.gives else [f"{kind.named}_{end}" for end in kind.ends or range(1, 1 + joints)]
     setattr(msg, kind.field, np.array(sample.values, dtype=float))
     return msg
 
 
 def _check_shapes(rows: int, joints: int, values: Mapping[Stream, Array]) -> None:
-    for stream, names in channels_of(joints).items():
-        shape = rows, len(names)
+    for stream, kind in SENSORS.items():
+        shape = rows, len(kind.channels(joints))
         if stream in values and values[stream].shape != shape:
-            found = f"{SENSORS[stream].title}: shape {values[stream].shape}, not {shape}"
+            found = f"{kind.title}: shape {values[stream].shape}, not {shape}"
             raise UsageError(f"{found}. Give one row for each of {rows} stamps.")

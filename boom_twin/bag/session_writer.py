@@ -13,7 +13,7 @@ from typing import Any, Self
 import numpy as np
 
 from .. import __version__
-from ..errors import BagError
+from ..errors import BagError, UsageError
 from ..messages.mapping import load_mapping
 from ..messages.topic_table import Topics, factor
 from ..messages.type_store import jazzy
@@ -63,7 +63,7 @@ def named_message(sample: Sample, names: Sequence[str]) -> Any:
         setattr(msg, kind.field, np.array([value for _, value in pairs]))
         return msg
     for axis, value in [*((axis, 0.0) for axis in "xyz"), *pairs]:
-        setattr(msg.linear_acceleration, axis, value)
+        setattr(getattr(msg, kind.field), axis, value)
     return msg
 
 
@@ -106,7 +106,7 @@ class SessionWriter:
         path = None if mapping is None else Path(mapping)
         self._topics = load_mapping(path, self._joints)
         text = None if path is None else path.read_text(encoding="utf-8-sig")
-        names = {self._topics.inputs[stream].absolute: self._topics.inputs[stream].type for stream in Stream}
+        names = {topic.absolute: topic.type for topic in self._topics.inputs.values()}
         self._sheet = SessionSheet(
             __version__, kept.text, mapping=text, topics=names, note=note, origin=origin, started=datetime.now(UTC)
         )
@@ -130,7 +130,10 @@ class SessionWriter:
         """
         samples = samples_of(sample, stamp_ns, self._joints) if isinstance(sample, Mapping) else [sample]
         for each in samples:
-            topic, message = self._topics.inputs[each.stream], self._sensors[each.stream].message(each)
+            topic = self._topics.inputs.get(Stream(SENSORS[each.stream].beside or each.stream))
+            if topic is None:
+                raise UsageError(f"{each.stream.value}: the mapping has no such sensor. Give its place there.")
+            message = self._sensors[each.stream].message(each)
             if topic.absolute not in self._keys:
                 self._keys[topic.absolute] = self._storage.add(recorded(topic))
             self._counts[topic.absolute] += 1

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
-from ..deviation.kalman import ANGLE_ZERO, IMU_ZERO
+from ..deviation.channels import IMU_ZERO
+from ..deviation.kalman import ANGLE_ZERO
 from ..deviation.predictor import BoomPredictor
 from ..scene.edit import with_parameters
 from ..scene.kinematics import gravity_in_base
@@ -49,7 +50,7 @@ class RestingBoom:
     """
 
     def __init__(self, scene: Scene, zeros: Array, rigging: Rigging, gravity: Array) -> None:
-        self._boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads)
+        self._boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads, rigging.places)
         self._zeros, self._gravity, self._inclination = zeros, gravity, scene.base.inclination
 
     def rest(self, period: RestPeriod) -> None:

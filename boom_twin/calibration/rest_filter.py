@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from ..deviation.channels import specific_force_row
 from ..deviation.kalman import FAST, correct, free_sensors, make_transition, transit
 from ..deviation.rows import (
     about_rest,
@@ -18,7 +19,7 @@ from ..deviation.rows import (
     length_of,
     length_row,
     read,
-    specific_force_row,
+    site_column,
 )
 from ..deviation.sensor_model import TURN, specific_force
 from ..deviation.states import PREDICTION, VALVES, all_states, drive_place, force_place, zero_place
@@ -104,7 +105,7 @@ def filter_rest(p, f, loads, zero2, gravity, inclination, times, channels, value
                 innovation -= inclination
                 innovation -= TURN * math.floor(innovation / TURN + 0.5)
         elif c < 2 * n + 2:
-            innovation = values[r] - expect_imu(p, f, c - 2 * n, x, size, gravity)
+            innovation = values[r] - expect_imu(p, f, c - n, x, size, gravity)
         else:
             i = c - 2 * n - 2
             force_row(p, i, f.row)
@@ -131,19 +132,22 @@ def weigh_and_correct(f, x, covariance, innovation, variance, size):
 
 
 @inner
-def expect_imu(p, f, axis, x, size, gravity):
-    """Write the row of an axis of the IMU at the state `x`; return the expected reading."""
-    n, zero = p.drives.shape[0], zero_place(p)
-    acceleration_row(p, n, f.rows[2])
-    acceleration_row(p, n + 1, f.rows[3])
-    column_row(p, p.readings, n + 2, 1.0, f.rows[4])
-    angle = p.read[n + 2] + about_rest(p, f.rows[4], x, size)
-    c, s = math.cos(angle), math.sin(angle)
+def expect_imu(p, f, c, x, size, gravity):
+    """Write the row of the measured channel `c`, an axis of the IMU, at the state `x`; return the expected reading."""
+    channel, zero = p.channels[c], zero_place(p)
+    at = site_column(p, channel.site)
+    acceleration_row(p, at, f.rows[2])
+    acceleration_row(p, at + 1, f.rows[3])
+    column_row(p, p.readings, at + 2, 1.0, f.rows[4])
+    angle = p.read[at + 2] + about_rest(p, f.rows[4], x, size)
+    f.motion[channel.site, 2] = angle
+    cosine, sine = math.cos(angle + channel.turned), math.sin(angle + channel.turned)
     along, up = read(f.rows[2], x, size) - gravity[0], read(f.rows[3], x, size) - gravity[1]
-    f.felt[0], f.felt[1] = specific_force(along, up, c, s)
-    specific_force_row(p, f, axis, c, s, f.row)
-    f.row[zero + axis] = 1.0
-    return f.felt[axis] * (1.0 + x[zero + 3]) + f.row[zero + 2] * x[zero + 2] + x[zero + axis]
+    first = c - channel.index
+    f.felt[first], f.felt[first + 1] = specific_force(along, up, cosine, sine)
+    specific_force_row(p, f, c, f.row)
+    f.row[zero + channel.index] = 1.0
+    return f.felt[c] * (1.0 + x[zero + 3]) + f.row[zero + 2] * x[zero + 2] + x[zero + channel.index]
 
 
 @inner

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..deviation.predictor import BoomPredictor
 from ..errors import BagError, SolverError
 from ..kernels.tables import OK, SENTENCES
 from ..scene.schema import Scene
-from ..types import NANO, SECOND, Array, Mount, Stream, StrokeReading, channels_of
+from ..types import NANO, SECOND, Array, Mount, Place, Stream, StrokeReading, channels_of
 from .rest_filter import note_drives
 from .sessions import MeasuredSession, Series
 
@@ -31,6 +32,7 @@ class Rigging:
     settings: Settings
     mounts: tuple[Mount | None, ...]
     reads: StrokeReading
+    places: Mapping[str, Place] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ def rest_periods(
     SolverError
         The boom has no equilibrium at its strokes.
     """
-    boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads)
+    boom = BoomPredictor(scene, rigging.settings, rigging.mounts, rigging.reads, rigging.places)
     strokes = session.series[Stream.STROKES]
     if until is not None:
         strokes = strokes.of(0, until)

@@ -145,8 +145,9 @@ def calibrate(
     progress(0.0, "reading")
     paths, joints = [Path(bag) for bag in bags], len(scene.joints)
     mapped = common_mapping(paths, Path(mapping) if mapping else None, joints)
-    rigging = Rigging(settings, tuple(mapped.topics.mounts(joints)), common_reading(paths, mapped))
-    sessions = read_sessions(paths, mapped.topics.of_joints(joint.range_deg for joint in scene.joints), joints, window)
+    topics = mapped.topics.of_scene(scene.joints)
+    rigging = Rigging(topics.noise_of(settings), tuple(topics.mounts(joints)), common_reading(paths, mapped), topics.places)
+    sessions = read_sessions(paths, topics, joints, window)
     _refuse_other_boom(scene, sessions)
     present = [stream for stream in Stream if any(stream in session.series for session in sessions)]
     names = choice.names or usual_names(scene, present, choice.load, choice.damping, choice.stiffness, choice.zeros)

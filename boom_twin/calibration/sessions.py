@@ -92,7 +92,7 @@ def _wanted(session: Session, topics: Topics) -> list[str]:
         found = session.find(topic.name)
         if stream in NEEDED:
             check_topic(session, topic.name, topic.type)
-        if stream in NEEDED or (found is not None and found.count):
+        if stream in NEEDED or (found is not None and found.count and topic.name in topics.heard):
             names.append(topic.name)
     return list(dict.fromkeys(names))
 

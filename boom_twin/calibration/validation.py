@@ -59,7 +59,7 @@ def judged(
     BagError
         The twin predicts nothing there.
     """
-    twin = Twin(scene, rigging.settings, rigging.mounts, reads=rigging.reads)
+    twin = Twin(scene, rigging.settings, rigging.mounts, reads=rigging.reads, places=rigging.places)
     found: dict[Stream, list[Residuals]] = {stream: [] for stream in Stream}
     for step in drive(twin, session.samples(zeros)):
         for residuals in (each for report in step.report.all for each in report.residuals):

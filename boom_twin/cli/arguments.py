@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from argparse import REMAINDER, SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable
-from math import inf
+from collections.abc import Callable, Sequence
+from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import UsageError
-from ..types import Stream
+from ..types import Place, Stream
 
 if TYPE_CHECKING:
     from ..bag.time_window import TimeWindow
+    from ..scene.schema import Scene
 
 
 SESSION = "a rosbag2 directory, a directory of its files, or one file: .mcap, .db3, .bag of ROS 1, .csv"
@@ -110,7 +111,7 @@ def refuse_given(args: Namespace, remedy: str, *names: str) -> None:
             raise UsageError(f"--{name.replace('_', '-')}{shown}: {remedy}")
 
 
-SENSORS = {"angles": Stream.ANGLES, "imu": Stream.IMU, "forces": Stream.FORCES}
+SENSORS = {"angles": Stream.ANGLES, "imu": Stream.IMU, "gyro": Stream.RATE, "forces": Stream.FORCES}
 """Sensors beside strokes by their names in ``--sensors``."""
 
 
@@ -120,6 +121,78 @@ def sensors_of(text: str) -> list[str]:
     if unknown := [name for name in names if name not in SENSORS]:
         raise UsageError(f"--sensors {text}: {', '.join(map(repr, unknown))} is no sensor. Give some of {', '.join(SENSORS)}.")
     return names
+
+
+PLACE = "SECTION:AT[:TURNED]"
+FURTHER = {"imu": ("imu_2", "imu_3", "imu_4"), "point": ("points", "points_2")}
+"""Sensors that a boom may have at a place beside the IMU at the tip, by kind; a moment is that of its section."""
+
+
+def place_of(text: str, scene: Scene) -> Place:
+    """Return the place that is written as `PLACE` says; UsageError if there is none on the boom."""
+    section, _, rest = text.partition(":")
+    at, _, turned = rest.partition(":")
+    try:
+        place = Place(int(section), float(at), float(turned or 0.0))
+    except ValueError:
+        raise UsageError(f"{text}: section, place (m) and turn (rad) must be numbers. Write {PLACE}.") from None
+    count = len(scene.sections)
+    if not 1 <= int(section) <= count:
+        raise UsageError(f"{text}: section = {section}, the boom has sections 1 to {count}. Give one of them.")
+    length = scene.sections[int(section) - 1].length
+    if not (0.0 <= float(at) <= length and isfinite(place.turned)):
+        raise UsageError(f"{text}: section {section} reaches from 0 to {length:g} m. Give the distance from its inboard pivot.")
+    return place
+
+
+def named_places(kind: str, texts: Sequence[str], scene: Scene) -> dict[str, Place]:
+    """Return the places of sensors of one kind by their names; UsageError for one off the boom or too many."""
+    places = [place_of(text, scene) for text in texts]
+    names = FURTHER.get(kind) or tuple(f"moment_{place.section}" for place in places)
+    if len(places) > len(names):
+        raise UsageError(f"{len(places)} places of {kind}, at most {len(names)} are possible. Leave some out.")
+    for text, place in zip(texts, places, strict=True):
+        beam = scene.sections[(place.section or 1) - 1].beam if scene.is_flexible((place.section or 1) - 1) else None
+        if kind == "moment" and not (beam and beam[0] < (place.at or 0.0) < beam[1]):
+            bends = f"bends from {beam[0]:g} to {beam[1]:g} m" if beam else "is rigid"
+            raise UsageError(f"--moment {text}: section {place.section} {bends}; strain is read on a beam only.")
+    if len(set(names)) < len(names):
+        raise UsageError("two strain gauges are on one section: one is possible. Leave the other out.")
+    return dict(zip(names, places, strict=False))
+
+
+PLACED = ("imu", "gyro", "moment", "point")
+
+
+def placed_sensors_of(text: str, scene: Scene) -> list[tuple[str, Stream, dict[str, Place]]]:
+    """Return name, stream and place of the sensors between commas; those with a place are written as imu@`PLACE`.
+
+    UsageError: see `sensors_of` and `named_places`.
+    """
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    sensors_of(",".join(name for name in names if name.partition("@")[0] not in PLACED or "@" not in name))
+    places, stems = dict[str, Place](), dict[tuple[str, str], str]()
+    for kind in ("imu", "moment", "point"):
+        texts = list(dict.fromkeys(at for name in names if _placed(name)[0] == kind and (at := _placed(name)[1])))
+        found = named_places(kind, texts, scene)
+        stems |= {(kind, at): stem for at, stem in zip(texts, found, strict=True)}
+        places |= found
+    chosen = []
+    for name in names:
+        kind, at = _placed(name)
+        stem = stems.get((kind, at), "")
+        if name.startswith("gyro@"):
+            stem += "_rate"
+        stream = Stream.MOMENTS if kind == "moment" else Stream(stem) if stem else SENSORS[name]
+        own = stems.get((kind, at))
+        chosen.append((name, stream, {own: places[own]} if own else {}))
+    return chosen
+
+
+def _placed(name: str) -> tuple[str, str]:
+    """Return kind and place of a sensor; a gyro is part of an IMU."""
+    kind, _, at = name.partition("@")
+    return "imu" if kind == "gyro" else kind, at
 
 
 def positive(text: str) -> float:

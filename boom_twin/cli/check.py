@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,9 +17,9 @@ from ..scene.schema import Base, Clearance
 from ..scene.segmentation import LEAST_PARTS
 from ..scene.summary import UNKNOWNS_BASE, UNKNOWNS_PIN, Account, JointAccount, SectionAccount, explain
 from ..system.atomic_files import check_target
-from ..types import StrokeReading
+from ..types import Place, Stream, StrokeReading
 from . import reduce as need
-from .arguments import SENSORS, add_file, add_json, add_scene, files_of, sensors_of
+from .arguments import PLACE, SENSORS, add_file, add_json, add_scene, files_of, placed_sensors_of
 from .output import columns, open_scene, print_result, tell
 
 if TYPE_CHECKING:
@@ -42,7 +42,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--sensors",
         metavar="NAME,..",
         help=f"also tell how accurate the estimate of the tip is with these and with fewer, at every posture of the scene: "
-        f"{', '.join(SENSORS)}; a name given twice is two such sensors (example: angles,imu,imu)",
+        f"{', '.join(SENSORS)}; a name given twice is two such sensors; imu@{PLACE}, gyro@.., moment@.., point@..: elsewhere "
+        f"(example: angles,imu,imu@2:3.1)",
     )
     driven = "what the sensors are beside: strokes (the default), or angles on a boom without stroke transducers"
     parser.add_argument("--drive", choices=["strokes", "angles"], default="strokes", help=driven)
@@ -53,10 +54,10 @@ def run(args: Namespace) -> int:
     need.refuse_misuse(args)
     if args.picture is not None:
         check_target(args.picture, files_of(args, "scene"), PNG)
-    sensors = None if args.sensors is None else sensors_of(args.sensors)
-    if args.drive == "angles" and sensors is not None and "angles" in sensors:
-        raise UsageError("--sensors angles: they drive the model. Name the sensors beside them.")
     scene, oddities = examine(args.scene)
+    sensors = None if args.sensors is None else placed_sensors_of(args.sensors, scene)
+    if args.drive == "angles" and any(stream is Stream.ANGLES for _, stream, _ in sensors or ()):
+        raise UsageError("--sensors angles: they drive the model. Name the sensors beside them.")
     name = args.scene or DEFAULT_NAME
     drawn = [] if args.picture is None else [f"Written: {_draw(args.picture, scene, name)}"]
     if args.strict and any(not oddity.is_note for oddity in oddities):
@@ -274,23 +275,28 @@ def _table(rows: list[list[str]], left: int = 1) -> list[str]:
     return [f"  {line}" for line in columns(rows, range(left))] if rows else []
 
 
-def _accuracy(scene: Scene, sensors: list[str], drive: str) -> tuple[dict[str, Any], list[str]]:
+def _accuracy(
+    scene: Scene, sensors: Sequence[tuple[str, Stream, Mapping[str, Place]]], drive: str
+) -> tuple[dict[str, Any], list[str]]:
     """Return the accuracy at every posture with every selection of `sensors`, as values for ``--json`` and as lines."""
     from ..deviation.accuracy import accuracy_at
 
     reads = StrokeReading.ANGLE if drive == "angles" else StrokeReading.LENGTH
     values: dict[str, Any] = {}
-    sets = dict.fromkeys(chosen for count in range(len(sensors) + 1) for chosen in combinations(sensors, count))
+    sets = {
+        ",".join(name for name, *_ in chosen) or f"{drive} only": chosen
+        for count in range(len(sensors) + 1)
+        for chosen in combinations(sensors, count)
+    }
     acting = "an unknown load of 0.25 % of the boom's weight comes and goes at the tip"
     lines = ["", f"Accuracy of the estimate at rest, while {acting} (standard deviations)"]
     titles = f"{'tip x, y mm':>16} {'pitch mrad':>11} {'acceleration':>13} {'load N':>14}"
     lines.append(f"  {'posture':12} {f'sensors beside {drive}':24} {titles}")
     for posture in scene.postures:
-        for chosen in sets:
-            name = ",".join(chosen) or f"{drive} only"
+        for name, chosen in sets.items():
             try:
-                beside = tuple(SENSORS[sensor] for sensor in chosen)
-                result = accuracy_at(scene, strokes_of_posture(scene, posture), beside, reads=reads)
+                streams, places = [stream for _, stream, _ in chosen], {k: v for *_, own in chosen for k, v in own.items()}
+                result = accuracy_at(scene, strokes_of_posture(scene, posture), streams, reads=reads, places=places)
             except BoomTwinError as error:
                 lines.append(f"  {posture:12} {name:24} {error}")
                 continue

@@ -25,6 +25,7 @@ from .arguments import (
 from .output import open_session_scene, open_session_settings, print_result, tell, warn_incomplete
 
 if TYPE_CHECKING:
+    from ..offline.recording import Stretch
     from ..report.evaluation import Evaluation
 
 
@@ -81,7 +82,14 @@ def run(args: Namespace) -> int:
     out, sources = Path(args.out), files_of(args, "bag", "scene", "params", "mapping")
     with result_folder(out, REPLAY, sources) as building:
         joints, name = len(scene.scene.joints), f"samples.{args.table}"
-        table = SampleTable(table_file(building.folder / name, joints), joints) if args.table else None
+        table: SampleTable | None = None
+
+        def add(stretch: Stretch) -> None:
+            nonlocal table
+            if table is None:  # the sensors of a session are known with its first stretch
+                table = SampleTable(partial(table_file, building.folder / name), joints, stretch.streams)
+            table.add(stretch)
+
         options = ReplayOptions(
             progress=partial(progress_of, unit="messages", name="replay"),
             mapping=args.mapping,
@@ -92,8 +100,9 @@ def run(args: Namespace) -> int:
             with_bag=not args.no_bag,
             causes=args.causes,
         )
-        also = None if table is None else table.add
-        found = evaluated_replay(building, args.bag, scene, settings, options, heights, args.fatigue, also)
+        found = evaluated_replay(
+            building, args.bag, scene, settings, options, heights, args.fatigue, add if args.table else None
+        )
         files = [path.name for path in _write(args, found, building.folder)]
         if table is not None:
             table.finish()

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from argparse import Action, ArgumentParser, Namespace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
 from .. import __version__
 from ..errors import UsageError
-from ..types import StrokeReading
-from .arguments import add_scene, files_of, positive, sensors_of
+from ..scene.schema import Scene
+from ..types import Place, Stream, StrokeReading
+from .arguments import PLACE, add_scene, files_of, named_places, positive, sensors_of
 from .output import tell, tell_oddities
 
 
@@ -40,8 +42,19 @@ def add_arguments(parser: ArgumentParser) -> None:
         "wind:DEVIATION[:TIME_SCALE] (N, s; gusts, horizontal), with @ONSET (s), for instance pump:0.43:130; may be repeated"
     )
     parser.add_argument("--load", action="append", default=[], metavar="KIND:NUMBERS[@ONSET]", help=load)
-    sensors = "what is recorded beside strokes, of angles, imu and forces, with commas between them (default angles,imu)"
+    sensors = "what is recorded beside strokes, of angles, imu, gyro (that of the tip IMU) and forces; default angles,imu"
     parser.add_argument("--sensors", default="angles,imu", metavar="LIST", help=sensors)
+    imu = (
+        "another IMU with a gyro, AT m along a SECTION from its inboard pivot, its x axis turned by TURNED rad against the "
+        "section; up to three times"
+    )
+    parser.add_argument("--imu", action="append", default=[], metavar=PLACE, help=imu)
+    gauge = "a strain gauge that reads the bending moment AT m along a SECTION; one on each section"
+    parser.add_argument("--moment", action="append", default=[], metavar="SECTION:AT", help=gauge)
+    point = "a point whose position is measured once a second, as by a total station; up to twice"
+    parser.add_argument("--point", action="append", default=[], metavar="SECTION:AT", help=point)
+    pressure = "pressures of both sides of every cylinder; bore and rod (m) of all, or, without a value, as in the scene's oil"
+    parser.add_argument("--pressures", nargs="?", const="", metavar="BORE:ROD", help=pressure)
     parser.add_argument("--rate", type=float, metavar="HZ", help="of all sensors, 50 to 1000 (default 200)")
 
 
@@ -63,6 +76,39 @@ def _refuse_unrecorded(causes: list[str], recorded: set[str]) -> None:
             if cause.startswith(stem) and sensors not in recorded:
                 enough = ",".join(sorted([*recorded, sensors]))
                 raise UsageError(f"fault {cause}: {sensors} are not recorded. Give --sensors {enough}.")
+
+
+def _mapping_text(places: Mapping[str, Place], cylinders: Sequence[tuple[float, float]]) -> str | None:
+    """Return the mapping that places these sensors; None without any."""
+    if not (places or cylinders):
+        return None
+    lines: dict[str, list[str]] = {"inputs": [], "sensors": []}
+    for name, p in places.items():
+        block = "sensors" if name.startswith("moment_") else "inputs"
+        lines[block].append(f"  {name}: {{place: {{section: {p.section}, at: {p.at}, turned: {p.turned}}}}}")
+    if cylinders:
+        bore, rod = map(list, zip(*cylinders, strict=True))
+        lines["inputs"].append(f"  cylinder_pressures: {{bore: {bore}, rod: {rod}}}")
+    return "\n".join(line for block, found in lines.items() if found for line in (f"{block}:", *found)) + "\n"
+
+
+def _cylinders(text: str | None, scene: Scene) -> list[tuple[float, float]]:
+    """Return bore and rod (m) of every cylinder whose pressures are recorded; UsageError if they are not known."""
+    if text is None:
+        return []
+    if not text:
+        found = [(oil.bore, oil.rod) for joint in scene.joints if (oil := joint.cylinder.oil) is not None]
+        if len(found) < len(scene.joints):
+            raise UsageError("--pressures: not every cylinder of the scene has `oil: {bore, rod, ..}`. Give BORE:ROD.")
+        return found
+    bore, _, rod = text.partition(":")
+    try:
+        one = float(bore), float(rod)
+    except ValueError:
+        one = 0.0, 0.0
+    if not 0.0 < one[1] < one[0] <= 1.0:
+        raise UsageError(f"--pressures {text}: write BORE:ROD, in m, the rod thinner than the bore.")
+    return [one] * len(scene.joints)
 
 
 def run(args: Namespace) -> int:
@@ -93,6 +139,11 @@ def run(args: Namespace) -> int:
     recorded = set(sensors_of(args.sensors))
     rate = RATE if args.rate is None else args.rate
     sensors = noise_free(rate) if args.clean else Sensors(rate)
+    asked = (("imu", args.imu), ("moment", args.moment), ("point", args.point))
+    places = {name: place for kind, texts in asked for name, place in named_places(kind, texts, scene).items()}
+    cylinders = _cylinders(args.pressures, scene)
+    if cylinders and "forces" in recorded:
+        raise UsageError("--pressures: they are read as forces, and a cylinder has one force. Leave forces out of --sensors.")
     wrong = [faults.parse(text) for text in args.fault]
     faults.check(wrong, scene, duration)
     _refuse_unrecorded([fault.cause for fault in wrong], recorded)
@@ -118,13 +169,18 @@ def run(args: Namespace) -> int:
         notes["forces"] = f"noise {sensors.force_sigma:g} N, resolution {sensors.force_resolution:g} N"
     with result_folder(out, RIG, files_of(args, "scene")) as building:
         tell(f"simulating {duration:g} s, about as long as that ..")
-        session = record_session(boom, drive, duration, sensors, args.seed, load=load, changes=changes)
+        session = record_session(
+            boom, drive, duration, sensors, args.seed, load=load, changes=changes, places=places, cylinders=cylinders
+        )
         session = faults.spoil(session, wrong, args.seed)
         readings = {"angles": session.joints, "imu": session.imu, "forces": session.forces}
         joints, imu, forces = (values if name in recorded else None for name, values in readings.items())
-        write_session(building.folder, session.stamps, session.strokes, joints, imu, notes, session.angle_stamps, forces)
+        placed = {stream: rows for stream, rows in session.placed.items() if stream is not Stream.RATE or "gyro" in recorded}
+        given = session.stamps, session.strokes, joints, imu, notes, session.angle_stamps, forces, placed
+        write_session(building.folder, *given)
         # not the boom that was simulated: what a twin is to assume
-        sheet = SessionSheet(__version__, assumed.text, origin=RIG_ORIGIN, strokes=StrokeReading.LENGTH)
+        own = _mapping_text(places, cylinders)
+        sheet = SessionSheet(__version__, assumed.text, mapping=own, origin=RIG_ORIGIN, strokes=StrokeReading.LENGTH)
         sheet.write(building.folder)
         session.save_truth(building.folder / FILE_NAME)
     print(out)

@@ -6,7 +6,7 @@ held. A covariance does not depend on what is measured.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,13 +16,14 @@ from ..config.settings import Settings
 from ..kernels.jit import kernel
 from ..kernels.result_row import results_in
 from ..scene.schema import Scene
-from ..types import SECOND, Array, Mount, Stream, StrokeReading, channels_of
+from ..types import NO_PLACES, SECOND, SENSORS, Array, Mount, Place, Stream, StrokeReading
 from .estimate_row import ACCELERATION_COVARIANCE, FORCE_VARIANCE, TIP_COVARIANCE, VARIANCES, WIDTH
 from .predictor import BoomPredictor
 from .sensors import take_sensor
 from .step import step_lengths, write_tip_estimate
 
 SETTLED = 20.0  # s
+POINT_RATE = 1.0  # Hz, of a total station
 
 
 class TipAccuracy(NamedTuple):
@@ -41,6 +42,7 @@ def accuracy_at(
     mounts: Sequence[Mount | None] = (),
     rate: float = 200.0,
     reads: StrokeReading = StrokeReading.LENGTH,
+    places: Mapping[str, Place] = NO_PLACES,
 ) -> TipAccuracy:
     """Return the accuracy of the estimate at rest, `SETTLED` s after nothing was known.
 
@@ -53,36 +55,41 @@ def accuracy_at(
     sensors : sequence of Stream
         Beside what drives the model; one that is named twice is there twice.
     rate : float
-        Of all of them, Hz.
+        Of all of them, Hz; positions of points come at `POINT_RATE`.
     reads : StrokeReading
         What drives the model.
+    places : mapping of str to Place
+        See `boom_twin.deviation.predictor.BoomPredictor`.
 
     Raises
     ------
     UsageError, SolverError
         Strokes out of reach; no equilibrium there.
     """
-    boom = BoomPredictor(scene, settings or Settings(), mounts, reads)
+    boom = BoomPredictor(scene, settings or Settings(), mounts, reads, places)
     driving = boom.readings_at(statics(scene, drives).lengths)
     boom.start(driving)
-    widths = [len(names) for stream, names in channels_of(boom.plan.joints).items() if stream is not Stream.STROKES]
+    widths = [len(names) for stream, names in boom.channels.items() if stream is not Stream.STROKES]
     counts = np.array([sum(each is stream for each in sensors) for stream in Stream])
+    counts[list(Stream).index(Stream.MOMENTS)] = min(1, sum(each is Stream.MOMENTS for each in sensors))  # all at once
+    every = np.array([round(rate / POINT_RATE) if SENSORS[stream].field == "point" else 1 for stream in Stream])
     first, zeros, out = np.cumsum([0, 0, *widths]), np.zeros(max(widths)), np.zeros(WIDTH)
     tables, anchor, live, work, posture, filters, _, row = boom.compiled
     filters.load2[:] = filters.noise.usual_load**2
     span, steps, gravity = round(SECOND / rate), round(SETTLED * rate), np.array(boom.plan.tables.gravity)
     settle_covariance(
-        tables, anchor, live, work, posture, filters, row, driving, gravity, counts, first, zeros, span, steps, out
+        tables, anchor, live, work, posture, filters, row, driving, gravity, counts, every, first, zeros, span, steps, out
     )
     tip, acceleration = (out[first + np.array(VARIANCES)] for first in (TIP_COVARIANCE, ACCELERATION_COVARIANCE))
     return TipAccuracy(np.sqrt(tip), np.sqrt(acceleration[:2]), np.sqrt(out[FORCE_VARIANCE:]))
 
 
 @kernel
-def settle_covariance(t, boom, live, work, p, f, row, lengths, gravity, counts, first, zeros, span, steps, out):
+def settle_covariance(t, boom, live, work, p, f, row, lengths, gravity, counts, every, first, zeros, span, steps, out):
     """Run the filter at rest for `steps` of `span` ns and write the estimate at the last one.
 
-    `counts` and `first` (streams,): how many sensors each stream has, and its first channel. Their residuals are `zeros`.
+    `counts`, `every` and `first` (streams,): how many sensors each stream has, steps from one reading to the next, and its
+    first channel. Their residuals are `zeros`.
     """
     usual2 = f.load2[0, 0]
     results = results_in(row, lengths.shape[0], t.clearances.shape[0])
@@ -90,7 +97,7 @@ def settle_covariance(t, boom, live, work, p, f, row, lengths, gravity, counts, 
         stamp = k * span
         step_lengths(t, boom, live, work, p, f, 1e-9 * span if k > 0 else 0.0, stamp, lengths, gravity, row)
         for stream in range(1, counts.shape[0]):
-            for _ in range(counts[stream]):
+            for _ in range(counts[stream] if k % every[stream] == 0 else 0):
                 take_sensor(p, f, stream, first[stream], zeros, stamp, stamp)
         write_tip_estimate(p, f, results, out)
         f.load2[:] = usual2  # readings without noise would let it fall

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner
+from .channels import IMU_DRIFT, IMU_SCALE, IMU_TURN, TIP_IMU_STATES
 from .rows import spread_of
 from .states import all_states, drive_place, force_place, zero_place
 
 FAST, SLOW = 0.1, 60.0  # s, time constants of the two parts of the load
 DRIVE_TIME = 0.12  # s, correlation time of a drive's acceleration
 LEAK = 1e-14  # m^2/s, random walk of a drive
-IMU_ZERO, IMU_DRIFT = 0.3, 3e-3  # m/s^2; m/s^2 in a root second
-IMU_TURN, IMU_SCALE = 0.1, 0.1  # rad, by which it may be mounted askew; share by which it may read too much
 ANGLE_ZERO, ANGLE_DRIFT = 2e-4, 1e-5  # rad; rad in a root second: sensors' zeros, and the error of the model's statics
 FORCE_ZERO, FORCE_DRIFT = 1.0, 0.03  # share of the force; in a root second
 
@@ -75,6 +74,10 @@ def make_transition(p, f, h):
     for i in range(n):
         f.variances[zero + 4 + i] = f.drift[4 + i] * ANGLE_DRIFT * ANGLE_DRIFT * h
         f.variances[zero + 4 + n + i] = f.drift[4 + n + i] * (FORCE_DRIFT * f.pulls[i]) ** 2 * h
+    further = TIP_IMU_STATES + 2 * n
+    for k in range(further, p.behind[0]):
+        walk = p.errors[k - further].walk
+        f.variances[zero + k] = f.drift[k] * walk * walk * h
 
 
 @inner
@@ -125,7 +128,7 @@ def multiply(f, right, found, size):
 
 @inner
 def free_sensors(p, f, covariance):
-    """Write the variances of unknown states of sensors: mount and scale of the IMU, zeros of the force sensors."""
+    """Write the variances of unknown states of sensors: mount and scale of the IMU, zeros of forces, errors of the others."""
     n, zero, largest = p.drives.shape[0], zero_place(p), 0.0
     covariance[zero + 2, zero + 2], covariance[zero + 3, zero + 3] = IMU_TURN * IMU_TURN, IMU_SCALE * IMU_SCALE
     for i in range(n):
@@ -133,6 +136,9 @@ def free_sensors(p, f, covariance):
     for i in range(n):
         at = zero + 4 + n + i
         covariance[at, at] = (FORCE_ZERO * (abs(f.pulls[i]) + 0.1 * largest)) ** 2
+    further = TIP_IMU_STATES + 2 * n
+    for k in range(further, p.behind[0]):
+        covariance[zero + k, zero + k] = p.errors[k - further].first ** 2
 
 
 @inner

@@ -12,7 +12,7 @@ a row of an angle stands in the place of that of a length: by the linkage, an en
 
 States: modal coordinates and rates of the vibration about static equilibrium; a fast and a slow part of the force at the tip
 that the model does not know (Gauss-Markov, `FAST` and `SLOW` seconds); length, rate and acceleration of the drives. The
-estimate adds zeros of IMU, angle sensors and force sensors.
+estimate adds zeros of IMU, angle sensors and force sensors, and errors of further sensors.
 
 A closed valve locks the oil, so its drive stands still: that is a reading of rate zero. Three models interact (H. Blom and
 Y. Bar-Shalom, IEEE Trans. Automat. Control 33 (1988), 780-783): valves as they are believed to be; all valves open; valves as
@@ -28,10 +28,11 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner, kernel
-from .kalman import ANGLE_ZERO, FAST, IMU_ZERO, correct, free_sensors, make_transition, transit
+from .channels import IMU_ZERO
+from .kalman import ANGLE_ZERO, FAST, correct, free_sensors, make_transition, transit
 from .learning import learn_jerk, learn_length_noise, learn_load, watch_valves
 from .mixture import copy_model, interact, mix, weigh_models
-from .rows import clear, column_row, drive_row, read, variance_of
+from .rows import SWAY_SHARE, clear, column_row, drive_row, read, variance_of
 from .states import (
     ALL_OPEN,
     ALL_VALVES,
@@ -51,7 +52,6 @@ JERK = 3e-3  # m^2/s^5, density of the jerk of a drive that begins to move
 CLOSED_RATE, CLOSED_ACCELERATION = 1e-5, 1e-3  # m/s, m/s^2, noise of the reading that a closed valve's drive stands still
 LONGEST_STEP = 0.02  # s of one transition
 CONTRADICTION = 8.0  # standard deviations of the predicted tip, by which the estimate may be off it
-SWAY_SHARE = 0.3  # share of the error of an inclinometer by its acceleration that is not known
 MOST_EXCESS = 1e6  # times the variance that a channel is stated to have
 
 
@@ -89,7 +89,7 @@ def start_models(p, f, speed, swing):
     copy_model(f, VALVES, OPEN, size)
     copy_model(f, VALVES, BURST, size)
     f.chances[VALVES], f.chances[OPEN], f.chances[BURST] = 0.8, 0.1, 0.1
-    f.excess[:], f.ratio[:], f.shaking[0] = 1.0, 1.0, 0.0
+    f.excess[:], f.ratio[:], f.shaking[:] = 1.0, 1.0, 0.0
     f.bends[:], f.sway2[:] = 0.0, 0.0
     mix(f, PREDICTION, zero_place(p))
     follow_prediction(p, f)

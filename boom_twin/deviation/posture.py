@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..analysis.equilibrium import LONGEST_INCREMENT, PASSES, TOLERANCE
 from ..compiler.plan import Plan
+from ..kernels.elements.beam import point_on_axis
 from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.elements.linkage import angle_of_length, cylinder_length
 from ..kernels.integrators import REST, prepare
@@ -32,6 +33,7 @@ from ..kernels.transfer.natural_frequency import condense
 from ..kernels.transfer.riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 from ..kernels.transfer.time_step import ANEW, advance
 from ..types import Array, StrokeReading
+from .channels import TIP_IMU_STATES, Measurement
 from .sensor_model import Mounting
 
 FORCE_SIZE = 1.0  # N
@@ -41,7 +43,6 @@ LOAD = 1e-9  # m, displacement whose inertia loads the boom in a step of subspac
 WIDEST = math.pi  # rad, range in which a joint angle is looked for
 CURVATURE_STEP = 1e-4  # rad
 SWEEPS = 30  # of Jacobi rotations, at most
-TIP = 3  # x, y and angle of the tip, behind the n angles in a row of `Posture.readings`; n angles of chords follow
 
 
 @by_reference
@@ -52,15 +53,18 @@ class Posture(NamedTuple):
 
     modes : (1,) how many. drives : (n,) strokes of the drives at rest, m. angles : (n,) of the rigid boom there, rad.
     rest : (u,) unknowns at rest. columns : (c, u) their changes. motions : (m, h) of every mass point.
-    readings : (c, w) changes of what angle sensors read (n, rad), of x, y, angle of the tip, and of the angles of the sections'
-    chords (n), from pivot to pivot; if any `sways`, then of x, y of the angle sensors' places (2 n). forces : (c, n) of the
-    cylinders, N. read, pulled : (w,), (n,) the same at rest; angles against the base.
+    readings : (c, 2 n + 3 sites) changes of what angle sensors read (rad), of x, y, angle of every site of
+    `boom_twin.deviation.channels`, the tip first, and of the angles of the sections' chords, from pivot to pivot.
+    forces : (c, n) of the cylinders, N. moments : (c, stations) of bending, N m.
+    read, pulled : (2 n + 3 sites,), (n,) angles to forces at rest.
     omega, decay : (m,) rad/s and 2 zeta omega, 1/s. compliance, lag : (n,) 1/k (m/N; 0 if rigid) and d/k (s).
     oil_read : (n,) the compliance where stroke transducers read lengths, 0 where they read drives (`reads_drive`).
     reads_angle : whether the model is driven by angles. tilt : (n,) angle of the base, for inclinometers. gravity : (2,) m/s^2.
     slope, curvature : (n,) change of a joint's angle by its stroke, rad/m, and of that, rad/m^2.
-    frames, pivots, absolute, sways : (n,) of angle sensors, see `Mounting`. roots : (n + 1,)
+    frames, absolute, sways : (n,) of angle sensors, see `Mounting`. roots : (n + 1,)
     frames of the pivots and of the tip. masses : (h,) kg, kg m^2. lengths : (n,) of the sections, m. closed : (n,) m.
+    channels, sites, errors, psi, weights, bending : see `boom_twin.deviation.channels.Measurement`.
+    behind : (1,) states that the estimate has beside those of the prediction.
     The other fields are scratch; `rate` (n,) stays zero.
     """
 
@@ -72,6 +76,7 @@ class Posture(NamedTuple):
     motions: Array
     readings: Array
     forces: Array
+    moments: Array
     read: Array
     pulled: Array
     omega: Array
@@ -86,13 +91,19 @@ class Posture(NamedTuple):
     slope: Array
     curvature: Array
     frames: NDArray[np.int64]
-    pivots: NDArray[np.int64]
     absolute: NDArray[np.bool_]
     sways: NDArray[np.bool_]
     roots: NDArray[np.int64]
     masses: Array
     lengths: Array
     closed: Array
+    channels: np.recarray
+    sites: np.recarray
+    errors: np.recarray
+    psi: Array
+    weights: Array
+    bending: Array
+    behind: NDArray[np.int64]
     still: Array
     position: Array
     hat: Array
@@ -104,27 +115,30 @@ class Posture(NamedTuple):
     rate: Array
 
 
-def new_posture(plan: Plan, most: int, lengths: Array, mounting: Mounting, reads: StrokeReading, inclination: float) -> Posture:
+def new_posture(
+    plan: Plan, most: int, lengths: Array, mounting: Mounting, measured: Measurement, reads: StrokeReading, inclination: float
+) -> Posture:
     """Return room for a boom whose sections are `lengths` (m) long, with `most` modes at most.
 
     `mounting` is that of the angle sensors. `reads` is the quantity that drives the model, `inclination` (rad) is the base's.
     """
     n, unknowns, histories = plan.joints, len(plan.names), len(plan.masses)
+    width = 2 * n + 3 * len(measured.sites)
     kinds, columns = plan.tables.operations.kind, 2 + n + most
     roots = np.append(np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1, len(kinds))
-    width = 2 * n + TIP + (2 * n if mounting.sways.any() else 0)
     return Posture(
         modes=np.zeros(1, np.int64), drives=np.full(n, np.inf), angles=np.zeros(n), rest=np.zeros(unknowns),
         columns=np.zeros((columns, unknowns)), motions=np.zeros((most, histories)), readings=np.zeros((columns, width)),
-        forces=np.zeros((columns, n)), read=np.zeros(width), pulled=np.zeros(n), omega=np.zeros(most),
+        forces=np.zeros((columns, n)), moments=np.zeros((columns, len(measured.bending))),
+        read=np.zeros(width), pulled=np.zeros(n), omega=np.zeros(most),
         decay=np.zeros(most), compliance=np.zeros(n), lag=np.zeros(n),
         oil_read=np.zeros(n), reads_drive=reads is StrokeReading.DRIVE, reads_angle=reads is StrokeReading.ANGLE,
         tilt=np.where(mounting.absolute, inclination, 0.0), gravity=np.array(plan.tables.gravity), slope=np.zeros(n),
-        curvature=np.zeros(n),
-        frames=mounting.frames.astype(np.int64), pivots=mounting.pivots.astype(np.int64), absolute=mounting.absolute,
-        sways=mounting.sways, roots=roots.astype(np.int64), masses=plan.masses,
-        lengths=lengths, closed=plan.closed_lengths, still=np.zeros(histories), position=np.zeros(histories),
-        hat=np.zeros(histories), response=np.zeros((most, unknowns)), sides=np.zeros((2, width)),
+        curvature=np.zeros(n), frames=mounting.frames.astype(np.int64), absolute=mounting.absolute, sways=mounting.sways,
+        roots=roots.astype(np.int64), masses=plan.masses,
+        lengths=lengths, closed=plan.closed_lengths, **measured._asdict(), behind=np.array([TIP_IMU_STATES + 2 * n]),
+        still=np.zeros(histories), position=np.zeros(histories), hat=np.zeros(histories),
+        response=np.zeros((most, unknowns)), sides=np.zeros((2, width)),
         shifted=np.zeros((most, histories)), small=np.zeros((4, most, most)), target=np.zeros(n), rate=np.zeros(n),
     )  # fmt: skip
 
@@ -173,11 +187,15 @@ def linearise(t, boom, work, p, drives, follow):
     for j in range(m):
         p.decay[j] = modal_loss(t, p, p.columns[2 + n + j])
     restore(t, boom, work, p)
-    read_sensors(boom, p, p.read)
+    read_sensors(t, boom, p, p.read)
     for k in range(2 + n + m):
         change_readings(t, boom, work, p, k)
         for i in range(n):
             p.forces[k, i] = p.columns[k, t.cylinders[i].z]
+        for i in range(p.bending.shape[0]):
+            p.moments[k, i] = 0.0
+            for j in range(boom.z.shape[0]):
+                p.moments[k, i] += p.bending[i, j] * p.columns[k, j]
     leave_modes_out(p)
     return OK
 
@@ -248,32 +266,41 @@ def change_readings(t, boom, work, p, k):
         for i in range(boom.z.shape[0]):
             boom.z[i] = p.rest[i] + (size - 2.0 * size * side) * p.columns[k, i]
         place(t, boom, work)
-        read_sensors(boom, p, p.sides[side])
+        read_sensors(t, boom, p, p.sides[side])
     for i in range(p.sides.shape[1]):
         p.readings[k, i] = (p.sides[0, i] - p.sides[1, i]) / (2.0 * size)
     restore(t, boom, work, p)
 
 
 @inner
-def read_sensors(boom, p, found):
-    """Write what angle sensors read, x, y, angle of the tip, angles of chords, and places; see `Posture.readings`."""
-    n, last = p.frames.shape[0], boom.frames.shape[0] - 1
+def read_sensors(t, boom, p, found):
+    """Write what angle sensors read (n, rad; to the base if absolute), x, y (m) and angle of sites, angles of chords (n)."""
+    n, sites = p.frames.shape[0], p.sites.shape[0]
     for i in range(n):
         root = p.roots[i]
         if p.absolute[i]:
             found[i] = boom.frames[p.frames[i], FRAME_ANGLE]
         else:
             found[i] = boom.frames[root, FRAME_ANGLE] - boom.frames[root - 1, FRAME_ANGLE]
-    found[n], found[n + 1] = boom.frames[last, FRAME_X], boom.frames[last, FRAME_Y]
-    found[n + 2] = boom.frames[last, FRAME_ANGLE]
+    for k in range(sites):
+        found[n + 3 * k], found[n + 3 * k + 1], found[n + 3 * k + 2] = locate(t, boom, p, k)
     for i in range(n):
         one, other = boom.frames[p.roots[i]], boom.frames[p.roots[i + 1]]
         x, y = other[FRAME_X] - one[FRAME_X], other[FRAME_Y] - one[FRAME_Y]
         # against the root's own angle, so that the difference of two is never near a whole turn
         c, s = one[FRAME_COS], one[FRAME_SIN]
-        found[n + 3 + i] = one[FRAME_ANGLE] + math.atan2(c * y - s * x, c * x + s * y)
-    for k in range(found.shape[0] - 2 * n - TIP):
-        found[2 * n + TIP + k] = boom.frames[p.frames[k // 2], FRAME_X if k % 2 == 0 else FRAME_Y]
+        found[n + 3 * sites + i] = one[FRAME_ANGLE] + math.atan2(c * y - s * x, c * x + s * y)
+
+
+@inner
+def locate(t, boom, p, k):
+    """Return x, y (m) and angle (rad) of site `k` of a boom whose frames are placed."""
+    site = p.sites[k]
+    frame, x, y, turn = boom.frames[site.frame], site.x, 0.0, 0.0
+    if site.beam >= 0:
+        x, y, turn = point_on_axis(t.beams[site.beam], t.psi[site.beam], boom.z, p.psi[k], p.weights[k])
+    c, s = frame[FRAME_COS], frame[FRAME_SIN]
+    return frame[FRAME_X] + c * x - s * y, frame[FRAME_Y] + s * x + c * y, frame[FRAME_ANGLE] + turn
 
 
 @inner
@@ -290,6 +317,8 @@ def leave_modes_out(p):
                 p.readings[a, i] -= share * p.readings[at, i]
             for i in range(n):
                 p.forces[a, i] -= share * p.forces[at, i]
+            for i in range(p.bending.shape[0]):
+                p.moments[a, i] -= share * p.moments[at, i]
 
 
 # -- modes ------------------------------------------------------------------------------------------------------------------

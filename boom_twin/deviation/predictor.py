@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -27,8 +27,10 @@ from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import joint_angles_of_strokes, strokes_of_angles
 from ..scene.schema import Scene
 from ..scene.summary import weight_of
-from ..types import GIVE, SENSORS, Array, Mount, Stream, StrokeReading, channels_of
+from ..types import GIVE, NO_PLACES, SENSORS, Array, Mount, Place, Stream, StrokeReading, channels_of, streams_of
+from .channels import READS_MOMENT, TIP_IMU_STATES, measurement_of
 from .estimate_row import MODES
+from .kalman import FORCE_DRIFT, FORCE_ZERO
 from .models import start_models
 from .posture import Posture, linearise, new_posture
 from .sensor_model import TURN, mounting_of
@@ -85,6 +87,8 @@ class BoomPredictor:
         Of the angle sensors.
     reads : StrokeReading
         What drives the model.
+    places : mapping of str to Place
+        Of sensors that have one, such as ``imu_2``. The tip IMU is at the tip if it is not among them.
 
     Attributes
     ----------
@@ -93,6 +97,8 @@ class BoomPredictor:
         The boom as predicted by the newest sample.
     posture : Posture
     filters : Filters
+    channels : dict of Stream to tuple of str
+        Channels of every stream; none of those that the boom does not have.
     compiled : CompiledBoom
     places : Places
         Where everything stands in a row of a prediction.
@@ -106,6 +112,7 @@ class BoomPredictor:
         settings: Settings,
         mounts: Sequence[Mount | None] = (),
         reads: StrokeReading = StrokeReading.LENGTH,
+        places: Mapping[str, Place] = NO_PLACES,
     ) -> None:
         self._scene, self.plan = scene, compile_scene(scene)
         self.live: State = self.plan.state()
@@ -115,13 +122,13 @@ class BoomPredictor:
         self._row, self.places = np.zeros(prediction_width(n, self.pins)), places_in(n, self.pins)
         self._bending = moments_by_unknowns(self.plan)
         lengths, self._reads = np.array([each.length for each in scene.sections]), reads
-        own = self.plan, MODES, lengths, mounting_of(self.plan, mounts), reads, scene.base.inclination
-        self.posture = new_posture(*own)
+        self.channels = channels_of(n, streams_of(places))
+        mounting = mounting_of(self.plan, mounts)
+        measured = measurement_of(self.plan, settings, mounting, places)
+        self.posture = new_posture(self.plan, MODES, lengths, mounting, measured, reads, scene.base.inclination)
         sizes = (USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD)
-        used = reads.stream, Stream.ANGLES, Stream.IMU, Stream.FORCES
-        variances = (settings.variance(SENSORS[stream]) for stream in used)
-        channels = sum(len(names) for stream, names in channels_of(n).items() if stream is not Stream.STROKES)
-        self.filters = new_filters(n, MODES, channels, SensorNoise(*variances, *(size * weight for size in sizes)))
+        noise = SensorNoise(settings.variance(SENSORS[reads.stream]), *(size * weight for size in sizes))
+        self.filters = new_filters(n, MODES, measured, noise)
         self._struts = compile_scene(with_rigid_cylinders(scene))
         tables, boom = self.plan.tables, (self._anchor, self.live, self._work)
         self.compiled = CompiledBoom(tables, *boom, self.posture, self.filters, self._bending, self._row)
@@ -188,6 +195,7 @@ class BoomPredictor:
         status = linearise(self.plan.tables, boom, self._work, p, drives, False)
         if status != OK:
             raise SolverError(SENTENCES[int(status)])
+        self._free_gauges()
         sag = float(np.hypot(*(boom.frames[-1, :2] - self._undeflected.at(rigid)[-1])))
         start_models(p, f, SPEED if may_move else 0.0, SWING * sag if may_move else 0.0)
         if self._reads is not StrokeReading.ANGLE:
@@ -233,6 +241,14 @@ class BoomPredictor:
         """Return what angle sensors read of a boom at rest, rad, shape (n,)."""
         p, angles = self.posture, state.frames[:, FRAME_ANGLE]
         return np.where(p.absolute, angles[p.frames], angles[p.roots[:-1]] - angles[p.roots[:-1] - 1]) + p.tilt
+
+    def _free_gauges(self) -> None:
+        """Write how far the zeros of strain gauges may be off, as of forces: by the moment that they bear."""
+        p = self.posture
+        bent = np.abs(p.bending @ p.rest)
+        for row in p.channels[p.channels.kind == READS_MOMENT]:
+            error = p.errors[int(row.zero) - TIP_IMU_STATES - 2 * self.plan.joints]
+            error.first, error.walk = FORCE_ZERO * (bent[row.index] + 0.1 * bent.max()), FORCE_DRIFT * bent[row.index]
 
     @property
     def angles(self) -> Array:
@@ -298,9 +314,8 @@ class BoomPredictor:
 
     def _zeros_of(self, channels: Collection[str]) -> list[int]:
         """Return the places of the zeros of these sensors among those of all."""
-        names = channels_of(self.plan.joints)  # mount and scale of the IMU stand between
-        places = [*names[Stream.IMU], "", "", *names[Stream.ANGLES], *names[Stream.FORCES]]
-        return [place for place, name in enumerate(places) if name in channels]
+        names = [name for stream, names in self.channels.items() if stream is not Stream.STROKES for name in names]
+        return sorted(int(row.zero) for name, row in zip(names, self.posture.channels, strict=True) if name in channels)
 
     def rebase(self, shift: int) -> None:
         """Shift stamps by `shift` (ns) from now on."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 from ..kernels.jit import inner
-from .states import PREDICTION, all_states, drive_place, force_place, zero_place
+from .states import all_states, drive_place, force_place, zero_place
 
-TIP = 3  # x, y and angle of the tip, behind the n angles in a row of `Posture.readings`
+SWAY_SHARE = 0.3  # share of the error of an inclinometer by its acceleration that is not known
+SHAKEN_TIME = 0.5  # s, over which the mean square of a place's acceleration is taken
 
 
 @inner
@@ -93,6 +94,12 @@ def length_of(p, i, row, x, size):
 
 
 @inner
+def site_column(p, site):
+    """Return the place of x of a site in a row of `Posture.readings`; y and angle follow."""
+    return p.drives.shape[0] + 3 * site
+
+
+@inner
 def drive_row(p, f, i, x, row, size):
     """Write the row at state `x` of sensor `i` of those that drive the model; return what it reads."""
     if p.reads_angle:
@@ -108,12 +115,12 @@ def add_sway(p, f, i, x, row):
     """Add the error of inclinometer `i` by its acceleration at state `x` to its row; return that error, rad."""
     if not p.sways[i]:
         return 0.0
-    n, size = p.drives.shape[0], zero_place(p)
-    at, g = 2 * n + TIP + 2 * i, math.hypot(p.gravity[0], p.gravity[1])
+    site, size = p.channels[i].site, zero_place(p)  # angle sensors are the first channels
+    at, g = site_column(p, site), math.hypot(p.gravity[0], p.gravity[1])
     up_x, up_y = -p.gravity[0] / g, -p.gravity[1] / g
     acceleration_row(p, at, f.rows[0])
     acceleration_row(p, at + 1, f.rows[1])
-    ax, ay = f.bends[i, 0] + read(f.rows[0], x, size), f.bends[i, 1] + read(f.rows[1], x, size)
+    ax, ay = f.bends[site, 0] + read(f.rows[0], x, size), f.bends[site, 1] + read(f.rows[1], x, size)
     level, lift = up_y * ax - up_x * ay, g + up_x * ax + up_y * ay
     square = level * level + lift * lift
     by_x, by_y = (lift * up_y - level * up_x) / square, -(lift * up_x + level * up_y) / square
@@ -124,7 +131,7 @@ def add_sway(p, f, i, x, row):
 
 @inner
 def rate_row(p, at, row):
-    """Write the row of the rate of the reading in column `at` of `Posture.readings`."""
+    """Write the row of the rate of column `at` of `Posture.readings`."""
     n, m = p.drives.shape[0], p.modes[0]
     clear(row, all_states(p))
     drive = drive_place(p)
@@ -136,7 +143,7 @@ def rate_row(p, at, row):
 
 @inner
 def acceleration_row(p, at, row):
-    """Write the row of the second derivative of that reading, less what its curved way needs at its speed."""
+    """Write the row of the acceleration of column `at` of `Posture.readings`, less what its curved way needs at its speed."""
     n, m = p.drives.shape[0], p.modes[0]
     clear(row, all_states(p))
     load, drive = force_place(p), drive_place(p)
@@ -152,24 +159,3 @@ def acceleration_row(p, at, row):
             row[load + 2 + b] += share
         for i in range(n):
             row[drive + 2 * n + i] -= motion * p.forces[mode, i] / omega2
-
-
-@inner
-def angle_row(p, f, i, row):
-    """Write the row of angle sensor `i` at the prediction; return its error by acceleration, rad."""
-    column_row(p, p.readings, i, 1.0, row)
-    return add_sway(p, f, i, f.mean[PREDICTION], row)
-
-
-@inner
-def specific_force_row(p, f, axis, c, s, row):
-    """Write the row of the IMU's x or z (`axis` 0 or 1) at a tip whose angle has cosine `c` and sine `s`."""
-    n = p.drives.shape[0]
-    acceleration_row(p, n, f.rows[0])
-    acceleration_row(p, n + 1, f.rows[1])
-    column_row(p, p.readings, n + 2, f.felt[1] if axis == 0 else -f.felt[0], row)
-    along, across = (c, s) if axis == 0 else (-s, c)
-    zero = zero_place(p)
-    for k in range(zero):
-        row[k] += along * f.rows[0, k] + across * f.rows[1, k]
-    row[zero + 2], row[zero + 3] = f.felt[1] if axis == 0 else -f.felt[0], f.felt[axis]

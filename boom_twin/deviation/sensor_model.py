@@ -45,14 +45,11 @@ class Mounting(NamedTuple):
     ----------
     frames : ndarray of int, shape (n,)
         Frames of the chain that the sensors are fixed to if they are inclinometers.
-    pivots : ndarray of int, shape (n,)
-        Pivots in these frames, counted from the base; the tip is the last.
     absolute, sways : ndarray of bool, shape (n,)
         True for an inclinometer, and for one that is not compensated.
     """
 
     frames: NDArray[np.int64]
-    pivots: NDArray[np.int64]
     absolute: NDArray[np.bool_]
     sways: NDArray[np.bool_]
 
@@ -72,8 +69,5 @@ def mounting_of(plan: Plan, mounts: Sequence[Mount | None]) -> Mounting:
     roots = np.flatnonzero((kinds == JOINT_A) | (kinds == JOINT_B)) + 1
     heads = np.append(roots[1:] - 1, len(kinds))
     is_head = np.array([str(mount).startswith("head") for mount in mounts])
-    absolute, sways = (
-        np.array([mount is not None for mount in mounts]),
-        np.array([mount in ("root", "head") for mount in mounts]),
-    )
-    return Mounting(np.where(is_head, heads, roots), np.arange(plan.joints) + is_head, absolute, sways)
+    absolute, sways = ([mount is not None for mount in mounts], [mount in ("root", "head") for mount in mounts])
+    return Mounting(np.where(is_head, heads, roots), np.array(absolute), np.array(sways))

@@ -1,34 +1,22 @@
-"""Corrections of the estimate by angles, IMU and cylinder forces."""
+"""Corrections of the estimate by readings of all sensors."""
 
 from __future__ import annotations
 
 import math
 
 from ..kernels.jit import inner, kernel
+from .channels import READS_ACCELERATION, READS_ANGLE, READS_COORDINATE, READS_RATE, TIP_IMU_STATES, measurement_row
 from .kalman import ANGLE_ZERO, correct
 from .learning import SURPRISE
 from .mixture import mix, weigh_models
-from .models import SWAY_SHARE
-from .rows import angle_row, force_row, specific_force_row, variance_of
-from .states import (
-    ALL_OPEN,
-    ALL_VALVES,
-    ANGLES,
-    ESTIMATE,
-    FED,
-    FED_STAMP,
-    FORCES,
-    IMU,
-    PREDICTION,
-    all_states,
-    drive_place,
-    zero_place,
-)
+from .rows import SWAY_SHARE, variance_of
+from .states import ALL_OPEN, ALL_VALVES, ESTIMATE, FED, FED_STAMP, PREDICTION, all_states, drive_place, zero_place
 
 INEXACT = 0.03  # share of the tip's acceleration that modes left out and those there are wrong by
 LEARN_NOISE = 0.02  # of a reading, by which the noise of its channel is learnt
 LEARN_RATIO = 0.005  # of a reading, by which the size of its channel's normalised innovations is learnt
 DOF = 4.0  # degrees of freedom of Student's t, by which innovations of the estimate are weighed
+SLOW = 5_000_000_000  # ns for which the position of a point keeps the estimate, beyond other readings
 OLDEST = 0.1  # s, most that a reading may be late
 
 
@@ -39,70 +27,80 @@ def take_sensor(p, f, stream, first, residuals, stamp, newest):
     Parameters
     ----------
     stream : int
-        By `boom_twin.twin.blocks.CODES`: angles (rad), IMU (m/s^2) or forces (N); the estimate leaves out all others.
+        By `boom_twin.twin.blocks.CODES`; the estimate leaves out one that no channel has.
     first : int
         First of its channels among the measured ones.
     residuals : ndarray, shape (k,)
-        NaN where missing.
+        Those of its channels first; NaN where missing.
     stamp, newest : int
         Of the sample, and of the newest lengths, ns.
     """
-    n, zero, age = p.drives.shape[0], zero_place(p), (newest - stamp) * 1e-9
-    if stream != ANGLES and stream != IMU and stream != FORCES:
-        return
-    channels = 2 if stream == IMU else n
-    usable = False
-    for i in range(channels):
-        usable |= math.isfinite(residuals[i]) and not f.masked[first + i]
+    age = (newest - stamp) * 1e-9
+    last, usable = first, False
+    while last < p.channels.shape[0] and p.channels[last].stream == stream:
+        usable |= math.isfinite(residuals[last - first]) and not f.masked[last]
+        last += 1
     if not usable or age > OLDEST:
         return
-    f.status[FED], f.status[FED_STAMP] = 1, newest
-    c, s = math.cos(f.angle[0]), math.sin(f.angle[0])
+    patience = SLOW if p.channels[first].kind == READS_COORDINATE else 0
+    f.status[FED], f.status[FED_STAMP] = 1, max(f.status[FED_STAMP], newest + patience)
     f.likely[ALL_VALVES] = f.likely[ALL_OPEN] = 0.0
-    for i in range(channels):
-        if f.masked[first + i]:
+    for c in range(first, last):
+        residual = residuals[c - first]
+        if f.masked[c] or not math.isfinite(residual):
             continue
-        if stream == ANGLES:
-            angle_row(p, f, i, f.row)
-            inexact2 = SWAY_SHARE * SWAY_SHARE * f.sway2[i]
-            take_reading(p, f, first + i, residuals[i], zero + 4 + i, f.noise.angle2 + inexact2, age)
-            if f.deaf[i] and math.isfinite(residuals[i]):
-                replace_length(p, f, i, residuals[i])
-        elif stream == IMU:
-            specific_force_row(p, f, i, c, s, f.row)
-            inexact2 = INEXACT * INEXACT * f.shaking[0]
-            take_reading(p, f, first + i, residuals[i], zero + i, f.noise.acceleration2 + inexact2, age)
-        else:
-            force_row(p, i, f.row)
-            take_reading(p, f, first + i, residuals[i], zero + 4 + n + i, f.noise.force2, age)
+        channel = p.channels[c]
+        admit_errors(p, f, channel.last + 1)
+        measurement_row(p, f, c, f.row)
+        variance = channel.noise2
+        if channel.kind == READS_ACCELERATION:
+            variance += INEXACT * INEXACT * f.shaking[channel.site, 0]
+        elif channel.kind == READS_RATE:
+            variance += INEXACT * INEXACT * f.shaking[channel.site, 1]
+        elif channel.kind == READS_ANGLE:
+            variance += SWAY_SHARE * SWAY_SHARE * f.sway2[channel.index]
+        take_reading(p, f, c, residual, variance, age)
+        if channel.kind == READS_ANGLE and f.deaf[channel.index]:
+            replace_length(p, f, c, residual)
     weigh_models(f, ESTIMATE)
     mix(f, ESTIMATE, all_states(p))
 
 
 @inner
-def replace_length(p, f, i, residual):
-    """Correct the prediction by the residual of angle sensor `i`, because the stroke transducer of its cylinder fails.
+def admit_errors(p, f, count):
+    """Let the estimate have at least `count` states behind those of the prediction; new ones are unknown."""
+    zero = zero_place(p)
+    while p.behind[0] < count:
+        at, p.behind[0] = zero + p.behind[0], p.behind[0] + 1
+        for k in range(ALL_VALVES, ALL_OPEN + 1):
+            f.x[k, at] = 0.0
+            for i in range(at + 1):
+                f.p[k, i, at] = f.p[k, at, i] = 0.0
+            f.p[k, at, at] = p.errors[at - zero - TIP_IMU_STATES - 2 * p.drives.shape[0]].first ** 2
+
+
+@inner
+def replace_length(p, f, c, residual):
+    """Correct the prediction by the residual of the angle sensor `c`, because the stroke transducer of its cylinder fails.
 
     The mean stays that of the prediction which the residual was taken against, until the next step.
     """
     size = zero_place(p)
-    angle_row(p, f, i, f.row)
+    measurement_row(p, f, c, f.row)
     for k in range(ALL_VALVES):
         innovation = residual
         for j in range(size):
             innovation -= f.row[j] * (f.x[k, j] - f.mean[PREDICTION, j])
-        correct(f.x[k], f.p[k], f.row, f.gain, innovation, f.noise.angle2 + ANGLE_ZERO * ANGLE_ZERO, size)
+        correct(f.x[k], f.p[k], f.row, f.gain, innovation, p.channels[c].noise2 + ANGLE_ZERO * ANGLE_ZERO, size)
 
 
 @inner
-def take_reading(p, f, channel, residual, zero, variance, age):
-    """Correct the estimate by a residual of the quantity in `f.row`, `age` s old, of a channel with its zero at place `zero`.
+def take_reading(p, f, channel, residual, variance, age):
+    """Correct the estimate by a residual of the quantity in `f.row`, `age` s old, of a measured channel.
 
     Its noise is learnt: innovations that are larger than expected raise it until they are as expected. The evidence takes
     innovations by the size that they have lately had, for a model is not better for expecting less of the same innovations.
     """
-    if not math.isfinite(residual):
-        return
     size, every, m = zero_place(p), all_states(p), p.modes[0]
     n, drive = p.drives.shape[0], drive_place(p)
     if age > 0.0:
@@ -111,7 +109,7 @@ def take_reading(p, f, channel, residual, zero, variance, age):
             f.row[j], f.row[m + j] = q + age * p.omega[j] * p.omega[j] * v, v - age * (q - p.decay[j] * v)
         for i in range(n):
             f.row[drive + n + i] -= age * f.row[drive + i]
-    f.row[zero] = 1.0
+    f.row[size + p.channels[channel].zero] = 1.0
     variance *= max(f.excess[channel], 1.0)
     shown, likelihood, ratio = 0.0, 0.0, f.ratio[channel]
     for k in range(ALL_VALVES, ALL_OPEN + 1):

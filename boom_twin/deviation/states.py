@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.jit import by_reference, inner
-from ..types import Array, Stream
+from ..types import Array
+
+if TYPE_CHECKING:
+    from .channels import Measurement
 
 VALVES, OPEN, BURST, ALL_VALVES, ALL_OPEN = range(5)  # models: three of the prediction, two of the estimate
-ANGLES, IMU, FORCES = map(list(Stream).index, (Stream.ANGLES, Stream.IMU, Stream.FORCES))  # codes of these streams
 PREDICTION, ESTIMATE = range(2)  # mixtures of these
 LOADS = 6  # states of the load at the tip: along x and y its fast part (2), its slow part (2), rates of the fast part (2)
 FED, FED_STAMP = range(2)  # of `status`
 
 
 class SensorNoise(NamedTuple):
-    """Variances of sensors, and sizes of loads (N): usual, least, at the start of a session, just come.
+    """Variances of what drives the model, and sizes of loads (N): usual, least, at the start of a session, just come.
 
-    length2 : of what drives the model, lengths or angles.
+    length2 : of lengths (m^2) or angles (rad^2).
     """
 
     length2: float
-    angle2: float
-    acceleration2: float
-    force2: float
     usual_load: float
     least_load: float
     first_load: float
@@ -46,11 +45,13 @@ class Filters(NamedTuple):
     excess : (c,) times the variance that channels are stated to have. ratio : (c,) mean square of their normalised innovations.
     drift : (z,) times the usual variance of the random walk of sensors' zeros. length2 : (n,) variances of lengths as learnt,
     m^2. before, interval : (n, 3), (1,) the three lengths before (m), and the time between the newest two, s.
-    bends : (n, 2) accelerations of the angle sensors' places on curved ways, m/s^2. sway2 : (n,) square of the largest angle by
+    bends : (sites, 2) accelerations that the curved ways of sites need, m/s^2. sway2 : (n,) square of the largest angle by
     which an inclinometer lately erred, rad^2.
     places, weights, counts : (s, k), (s, k), (s,) columns of the transition matrix by row. variances : (s,) of its noise.
-    felt : (2,) specific force predicted at the tip, m/s^2. shaking : (1,) mean square of its acceleration, m^2/s^4.
-    angle : (1,) of the tip, rad. strokes : (n, 3) predicted lengths (m), their rates and accelerations.
+    motion : (sites, 9) predicted x, y, angle of every site, m and rad, their rates, their accelerations.
+    shaking : (sites, 2) mean squares of its acceleration, m^2/s^4, and of its rate of turn, rad^2/s^2. felt : (c,) specific
+    force that channels of accelerometers read by that, m/s^2.
+    strokes : (n, 3) predicted lengths (m), their rates and accelerations.
     innovations : (n, 2) newest lengths less what the prediction's mixture expected before them (m), and their variances.
     Where angles drive the model, length2, before, strokes and innovations are of angles, in rad.
     pulls : (n,) predicted forces, N. evidence : (1,) logarithm of the likelihood of all that was read, up to a constant.
@@ -95,26 +96,28 @@ class Filters(NamedTuple):
     likely: Array
     switch: Array
     shaking: Array
-    angle: Array
+    motion: Array
     strokes: Array
     innovations: Array
 
 
-def new_filters(joints: int, modes: int, channels: int, noise: SensorNoise) -> Filters:
-    """Return filters of a boom with so many joints, modes at most, and measured channels."""
-    n, states = joints, 2 * modes + LOADS + 3 * joints + 4 + 2 * joints
+def new_filters(joints: int, modes: int, measured: Measurement, noise: SensorNoise) -> Filters:
+    """Return filters of a boom with so many joints, modes at most, and these measured channels."""
+    n, channels, sites, behind = joints, len(measured.channels), len(measured.sites), 4 + 2 * joints + len(measured.errors)
+    states = 2 * modes + LOADS + 3 * joints + behind
     return Filters(
         x=np.zeros((5, states)), p=np.zeros((5, states, states)), chances=np.zeros(5), mean=np.zeros((2, states)),
         spread=np.zeros((2, states, states)), load2=np.zeros((2, 2)), jerk=np.zeros(n), is_open=np.zeros(n, np.int64),
         still=np.zeros(n), status=np.zeros(2, np.int64), masked=np.zeros(channels, np.bool_),
-        deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(4 + 2 * joints),
-        length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(1), bends=np.zeros((n, 2)),
+        deaf=np.zeros(n, np.bool_), excess=np.ones(channels), ratio=np.ones(channels), drift=np.ones(behind),
+        length2=np.full(n, noise.length2), before=np.full((n, 3), np.nan), interval=np.zeros(1), bends=np.zeros((sites, 2)),
         sway2=np.zeros(n), noise=noise,
         places=np.zeros((states, 8 + n), np.int64), weights=np.zeros((states, 8 + n)), counts=np.zeros(states, np.int64),
-        variances=np.zeros(states), felt=np.zeros(2), pulls=np.zeros(n), evidence=np.zeros(1), half=np.zeros((states, states)),
-        turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)), mixed_p=np.zeros((3, states, states)),
+        variances=np.zeros(states), felt=np.zeros(channels), pulls=np.zeros(n), evidence=np.zeros(1),
+        half=np.zeros((states, states)), turned=np.zeros((states, states)), mixed_x=np.zeros((3, states)),
+        mixed_p=np.zeros((3, states, states)),
         row=np.zeros(states), gain=np.zeros(states), rows=np.zeros((9, states)), likely=np.zeros(5),
-        switch=np.zeros((3, 3)), shaking=np.zeros(1), angle=np.zeros(1), strokes=np.zeros((n, 3)),
+        switch=np.zeros((3, 3)), shaking=np.zeros((sites, 2)), motion=np.zeros((sites, 9)), strokes=np.zeros((n, 3)),
         innovations=np.zeros((n, 2)),
     )  # fmt: skip
 
@@ -133,11 +136,14 @@ def drive_place(p):
 
 @inner
 def zero_place(p):
-    """Return how many states the prediction has; zeros (2), mount, scale of the IMU, zeros of angles and forces follow."""
+    """Return how many states the prediction has.
+
+    Zeros (2), mount, scale of the tip IMU, zeros of angles and forces follow, then the errors of further sensors.
+    """
     return 2 * p.modes[0] + LOADS + 3 * p.drives.shape[0]
 
 
 @inner
 def all_states(p):
-    """Return the number of states of the estimate."""
-    return zero_place(p) + 4 + 2 * p.drives.shape[0]
+    """Return the number of states of the estimate; errors of further sensors are among them from their first reading on."""
+    return zero_place(p) + p.behind[0]

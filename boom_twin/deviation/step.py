@@ -10,6 +10,7 @@ from ..kernels.jit import inner, kernel
 from ..kernels.result_row import estimates_in, results_in
 from ..kernels.tables import FRAME_ANGLE, FRAME_X, FRAME_Y, NOT_FINITE, OK
 from ..kernels.transfer.forward_kinematics import place
+from .channels import READS_ACCELERATION
 from .estimate_row import (
     ACCELERATION,
     ACCELERATION_COVARIANCE,
@@ -23,12 +24,12 @@ from .estimate_row import (
     VELOCITY_COVARIANCE,
 )
 from .estimate_row import TIP as TIP_AT
-from .models import SWAY_SHARE, step_models
-from .posture import WIDEST, linearise
+from .models import step_models
+from .posture import WIDEST, linearise, locate
 from .rows import (
+    SHAKEN_TIME,
     about_rest,
     acceleration_row,
-    angle_row,
     column_row,
     drive_row,
     force_row,
@@ -36,7 +37,7 @@ from .rows import (
     length_row,
     rate_row,
     read,
-    specific_force_row,
+    site_column,
     spread_of,
     variance_of,
 )
@@ -44,7 +45,6 @@ from .sensor_model import specific_force
 from .states import ESTIMATE, FED, FED_STAMP, PREDICTION, drive_place, force_place, zero_place
 
 PATIENCE = 1_000_000_000  # ns without readings after which the estimate is the prediction again
-SHAKEN_TIME = 0.5  # s, over which the mean square of the tip's acceleration is taken
 ANGLE_STEP = 0.01  # rad that a joint turns by before the boom is linearised anew
 
 
@@ -132,7 +132,6 @@ def write_prediction(t, live, p, f, h, gravity, out):
     """Write results and estimates; see `kernels.result_row`."""
     n, size, pins = p.drives.shape[0], zero_place(p), t.clearances.shape[0]
     found, estimates = results_in(out, n, pins), estimates_in(out, n, pins)
-    last = live.frames.shape[0] - 1
     for i in range(n):
         root = p.roots[i]
         found.joints[i] = live.frames[root, FRAME_ANGLE] - live.frames[root - 1, FRAME_ANGLE]
@@ -150,22 +149,12 @@ def write_prediction(t, live, p, f, h, gravity, out):
         row = t.clearances[k]
         found.pins[k, 0], found.pins[k, 1] = live.z[row.z], live.z[row.z + 1]
         found.pins[k, 2], found.pins[k, 3] = 0.0, 1.0
-    found.tip[0, 0], found.tip[0, 1] = live.frames[last, FRAME_X], live.frames[last, FRAME_Y]
-    found.tip[0, 2] = live.frames[last, FRAME_ANGLE]
-    write_bend(live, p, f, found.tip[2])
+    move_sites(t, live, p, f, h, gravity)
+    for k in range(3):
+        for a in range(3):
+            found.tip[k, a] = f.motion[0, 3 * k + a]
     if p.reads_angle:
         write_driving_angles(p, f, estimates)
-    for a in range(3):
-        rate_row(p, n + a, f.row)
-        found.tip[1, a] = read(f.row, f.mean[PREDICTION], size)
-        acceleration_row(p, n + a, f.row)
-        found.tip[2, a] += read(f.row, f.mean[PREDICTION], size)
-    angle = f.angle[0] = found.tip[0, 2]
-    f.felt[0], f.felt[1] = specific_force(
-        found.tip[2, 0] - gravity[0], found.tip[2, 1] - gravity[1], math.cos(angle), math.sin(angle)
-    )
-    size2 = found.tip[2, 0] * found.tip[2, 0] + found.tip[2, 1] * found.tip[2, 1]
-    f.shaking[0] += min(h / SHAKEN_TIME, 1.0) * (size2 - f.shaking[0])
     estimates.rigid_tip[0], estimates.rigid_tip[1] = rigid_tip(t, p, estimates.strokes)
 
 
@@ -183,6 +172,32 @@ def write_driving_angles(p, f, estimates):
 
 
 @inner
+def move_sites(t, live, p, f, h, gravity):
+    """Write the predicted motion of all sites, how much they shake, and what accelerometers read there."""
+    size = zero_place(p)
+    for k in range(p.sites.shape[0]):
+        motion, at = f.motion[k], site_column(p, k)
+        motion[0], motion[1], motion[2] = locate(t, live, p, k)
+        write_bend(live, p, f, p.sites[k].section, motion)
+        f.bends[k, 0], f.bends[k, 1] = motion[6], motion[7]
+        for a in range(3):
+            rate_row(p, at + a, f.row)
+            motion[3 + a] = read(f.row, f.mean[PREDICTION], size)
+            acceleration_row(p, at + a, f.row)
+            motion[6 + a] += read(f.row, f.mean[PREDICTION], size)
+        share = min(h / SHAKEN_TIME, 1.0)
+        f.shaking[k, 0] += share * (motion[6] * motion[6] + motion[7] * motion[7] - f.shaking[k, 0])
+        f.shaking[k, 1] += share * (motion[5] * motion[5] - f.shaking[k, 1])
+    for c in range(p.channels.shape[0]):
+        channel = p.channels[c]
+        if channel.kind == READS_ACCELERATION:
+            motion = f.motion[channel.site]
+            angle = motion[2] + channel.turned
+            x, z = specific_force(motion[6] - gravity[0], motion[7] - gravity[1], math.cos(angle), math.sin(angle))
+            f.felt[c] = x if channel.index == 0 else z
+
+
+@inner
 def stroke_rate(p, f, i):
     """Return the rate of what the stroke transducer of cylinder `i` reads, m/s."""
     n, m, drive = p.drives.shape[0], p.modes[0], drive_place(p)
@@ -195,29 +210,29 @@ def stroke_rate(p, f, i):
 
 
 @inner
-def write_bend(live, p, f, found):
-    """Write the acceleration (x, y, angle) that the tip's curved way needs at constant rates of drives and modes.
+def write_bend(live, p, f, section, motion):
+    """Write the acceleration (x, y, angle) that a site's curved way needs at constant rates of drives and modes.
 
     With the turning rate w_i of the chord r_i of section i, and what w_i changes by the geometry of the linkages, a_i,
-    the tip has sum_i (a_i e_z x r_i - w_i^2 r_i), and every pivot the sum of the sections inboard.
+    the site has sum_i (a_i e_z x r_i - w_i^2 r_i). The chord of its own section ends at the site.
     """
     n, m, drive, change = p.drives.shape[0], p.modes[0], drive_place(p), 0.0
-    found[0], found[1], found[2] = 0.0, 0.0, 0.0
-    for i in range(n):
+    chords = site_column(p, p.sites.shape[0])
+    motion[6], motion[7] = 0.0, 0.0
+    for i in range(section + 1):
         rate, v = 0.0, f.mean[PREDICTION, drive + n + i]
         for k in range(n):
-            rate += p.readings[2 + k, n + 3 + i] * f.mean[PREDICTION, drive + n + k]
+            rate += p.readings[2 + k, chords + i] * f.mean[PREDICTION, drive + n + k]
         for j in range(m):
-            rate += p.readings[2 + n + j, n + 3 + i] * f.mean[PREDICTION, m + j]
+            rate += p.readings[2 + n + j, chords + i] * f.mean[PREDICTION, m + j]
         change += p.curvature[i] * v * v
         one, other = live.frames[p.roots[i]], live.frames[p.roots[i + 1]]
         x, y = other[FRAME_X] - one[FRAME_X], other[FRAME_Y] - one[FRAME_Y]
-        found[0] -= rate * rate * x + change * y
-        found[1] += change * x - rate * rate * y
-        for k in range(n):
-            if p.sways[k] and p.pivots[k] == i + 1:
-                f.bends[k, 0], f.bends[k, 1] = found[0], found[1]
-    found[2] = change
+        if i == section:
+            x, y = motion[0] - one[FRAME_X], motion[1] - one[FRAME_Y]
+        motion[6] -= rate * rate * x + change * y
+        motion[7] += change * x - rate * rate * y
+    motion[8] = change
 
 
 @inner
@@ -230,37 +245,6 @@ def rigid_tip(t, p, lengths):
         x += p.lengths[i] * math.cos(heading)
         y += p.lengths[i] * math.sin(heading)
     return x, y
-
-
-@inner
-def write_expected_readings(p, f, live, results, h, values, sigmas):
-    """Write the expected readings of all sensors for the newest prediction, and the residuals' standard deviations.
-
-    Parameters
-    ----------
-    results : Results
-        Of the prediction.
-    h : float
-        Time since the prediction before, s.
-    values, sigmas : ndarray, shape (measured channels,)
-        Angles (rad), then the tip IMU's x and z (m/s^2), then the cylinders' forces (N).
-    """
-    n, size = p.drives.shape[0], zero_place(p)
-    for i in range(n):
-        sway = angle_row(p, f, i, f.row)
-        values[i] = live.frames[p.frames[i], FRAME_ANGLE] + p.tilt[i] + sway if p.absolute[i] else results.joints[i]
-        f.sway2[i] = max(f.sway2[i] * max(1.0 - h / SHAKEN_TIME, 0.0), sway * sway)
-        noise2 = f.noise.angle2 + SWAY_SHARE * SWAY_SHARE * f.sway2[i]
-        sigmas[i] = math.sqrt(noise2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
-    at, angle = n, results.tip[0, 2]
-    for axis in range(2):
-        values[at + axis] = f.felt[axis]
-        specific_force_row(p, f, axis, math.cos(angle), math.sin(angle), f.row)
-        sigmas[at + axis] = math.sqrt(f.noise.acceleration2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
-    for i in range(n):
-        values[at + 2 + i] = results.cylinder_forces[i]
-        force_row(p, i, f.row)
-        sigmas[at + 2 + i] = math.sqrt(f.noise.force2 + variance_of(f.row, f.spread[PREDICTION], f.gain, size))
 
 
 @inner

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..analysis.bending_moments import stations
 from ..analysis.bending_stress import BendingStressModel
-from ..deviation.load_spectrum import TipLoadFinder
+from ..deviation.load_spectrum import LEAST, TipLoadFinder
 from ..health.alarms import Alarms, repeated, values_of
 from ..health.deviations import KIND as DEVIATION
 from ..health.sensor_monitor import noise_as_text
@@ -125,36 +125,37 @@ class LoadWatch:
 
     def __init__(self) -> None:
         self.explanation = ""  # of residuals larger than noise, in words; empty without a load at the last look
-        self._loads: deque[tuple[int, Array]] = deque()
+        self._loads: deque[Estimate] = deque()
 
     def is_due(self, stamp: int) -> bool:
         """Return True if no estimate was taken within the `LOAD_INTERVAL` before `stamp` (ns)."""
-        return not self._loads or not 0 <= stamp - self._loads[-1][0] < LOAD_INTERVAL
+        return not self._loads or not 0 <= stamp - self._loads[-1].stamp < LOAD_INTERVAL
 
     def took(self, estimate: Estimate) -> None:
         """Take an estimate that `is_due`."""
-        if self._loads and estimate.stamp < self._loads[-1][0]:  # the clock was set back
+        if self._loads and estimate.stamp < self._loads[-1].stamp:  # the clock was set back
             self._loads.clear()
-        self._loads.append((estimate.stamp, estimate.load))
-        while estimate.stamp - self._loads[0][0] > LOAD_WINDOW:
+        self._loads.append(estimate)
+        while estimate.stamp - self._loads[0].stamp > LOAD_WINDOW:
             self._loads.popleft()
 
     def status(self, judge: ComponentJudge) -> Status | None:
         """Return the status, in words and figures; None as long as nothing but strokes was measured."""
         finder = TipLoadFinder()
-        stamps, loads = [stamp for stamp, _ in self._loads], [load for _, load in self._loads]
-        finder.add(np.array(stamps, np.int64), np.array(loads).reshape(-1, 2))
+        stamps = np.array([each.stamp for each in self._loads], np.int64)
+        loads, variances = (np.array([getattr(each, name) for each in self._loads]) for name in ("load", "load_variance"))
+        finder.add(stamps, loads.reshape(-1, 2), variances.reshape(-1, 2))
         load, self.explanation = finder.load, ""
         if load is None:
             return None
-        if load.is_there:
+        if load.rms >= LEAST or load.is_there:
             self.explanation = "a load at the tip moves the boom"
-        judge.note({"rms_N": load.rms})
+        judge.note({"rms_N": load.rms, "rms_sigma_N": load.sigma})
         if (pulses := load.pulses) is not None:
             frequency = {"frequency_Hz": pulses.frequency, "frequency_sigma_Hz": pulses.frequency_sigma}
             judge.note({"pulses_N": pulses.height} | frequency)
         found = "pump pulses at the tip" if pulses is not None else "a load at the tip that the model does not know"
-        return judge.finish(found if load.is_there else "no load at the tip beside the known one")
+        return judge.finish(found if load.is_there else "no load at the tip above its uncertainty")
 
 
 class ResidualWindow:

@@ -14,6 +14,8 @@ from ..types import SENSORS, Mount, Stream
 from .levels import Bounds, ComponentJudge, Status
 from .stream_stats import ChannelStats
 
+SLOW = 2.0
+"""Usual times from one reading to the next that are no gap, whatever the rate."""
 RANGE_MARGIN = 5.0
 """Standard deviations of its noise by which a sensor may read beyond its range."""
 
@@ -40,19 +42,22 @@ def sensors_of(
 ) -> dict[Stream, list[SensorSpec]]:
     """Return the sensors of every stream, in the order of a sample's values.
 
-    Ranges are those of `boom_twin.health.sensor_check.sensor_ranges`. `required` says which streams the twin reads and needs,
-    `absent` which channels have no sensor.
+    Ranges are those of `boom_twin.health.sensor_check.sensor_ranges`. `required` says of every input that is read
+    if the twin needs it, `absent` which channels have no sensor.
     """
     found = {}
     ranges = sensor_ranges(scene, mounts)
     for stream, kind in SENSORS.items():
-        if stream not in required:
+        is_required = required.get(Stream(kind.beside or stream))
+        if is_required is None or kind.gives:
             continue
         sigma, resolution = settings.noise(kind)
         unit, over = kind.unit_suffix, RANGE_MARGIN * sigma
         bounds = zip(kind.channels(len(scene.joints)), *(bound.tolist() for bound in ranges[stream]), strict=True)
         found[stream] = [
-            SensorSpec(name, unit, low - over, high + over, sigma, resolution, required[stream] and name not in absent)
+            SensorSpec(
+                name, unit, low - over, high + over, sigma, resolution, is_required and not kind.beside and name not in absent
+            )
             for name, low, high in bounds
         ]
     return found
@@ -68,14 +73,15 @@ def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats
         return judge.finish("not there; optional")
     judge.note({f"value_{unit}": stats.value, "rate_Hz": stats.rate})
     judge.check_age(age, "no reading" if stats.stamp else "no reading yet")
-    judge.check("gap_s", stats.gap, Bounds(thresholds.gap_warn), "gap between readings", at_once=True)
+    period = 0.0 if isnan(stats.rate) or stats.rate == 0.0 else 1.0 / stats.rate
+    gap = Bounds(max(thresholds.gap_warn, SLOW * period))
+    judge.check("gap_s", stats.gap, gap, "gap between readings", at_once=True)
     judge.note({"gaps": stats.gaps})
     share = Bounds(thresholds.unusable_warn, thresholds.unusable_error)
     judge.check("missing_share", stats.missing, share, "messages without a value")
     if sensor.high < inf:
         judge.note({f"low_{unit}": sensor.low, f"high_{unit}": sensor.high})
         judge.check("outside_share", stats.outside, share, alarm_text(sensor.name, "range", None))
-    period = 0.0 if isnan(stats.rate) else 1.0 / stats.rate
     needed = readings_of_frozen(sensor.sigma, sensor.resolution, thresholds.frozen_false_alarm)
     stuck, unchanged = Bounds(error=max(thresholds.frozen_after, needed * period)), stats.unchanged * period
     judge.check("unchanged_s", unchanged, stuck, alarm_text(sensor.name, "stuck", None))

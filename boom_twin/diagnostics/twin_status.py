@@ -35,7 +35,7 @@ class TwinWatch:
     sensors : dict of Stream to sequence of SensorSpec
         In the order of a sample's values, first those that drive the model; empty before the node is configured.
     names : dict of Stream to str
-        Names of the input topics.
+        Names of the input topics; readings that come beside others have none.
     thresholds : Thresholds
         May be replaced while it runs.
     monotonic : callable
@@ -179,6 +179,8 @@ class TwinWatch:
         at = Evaluation(self.thresholds, self._monotonic(), clock)
         strokes = self._streams[self._drive].lag
         for stream, watch in self._streams.items():
+            if stream not in self._names:
+                continue
             topic, wrong = judge(self._names[stream], f"topic {stream.value}"), (wrong_names or {}).get(stream)
             is_required = self._sensors[stream][0].required
             found.append(topic_status(topic, watch, is_required, publishers[stream], watch.lag - strokes, wrong))

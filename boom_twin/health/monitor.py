@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..config.settings import Settings
 from ..scene.schema import Scene
-from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Stream, StrokeReading, channels_of
+from ..types import NANO, SENSORS, Alarm, Array, Health, Mount, Place, Stream, StrokeReading
 from .blocks import BLOCK, Block, BlockBuilder, MeasuredRows, PredictionRows
 from .causes import explains
 from .delay_monitor import DelayMonitor
@@ -39,8 +39,12 @@ class HealthMonitor:
         Mounts of the angle sensors.
     absent : collection of str
         Channels without a sensor, see `boom_twin.Twin`.
+    channels : mapping of Stream to tuple of str
+        Channels of every stream.
     reads : StrokeReading
         What drives the model. Angles that do are not compared with it.
+    places : mapping of str to Place
+        See `boom_twin.Twin`.
 
     Attributes
     ----------
@@ -53,12 +57,15 @@ class HealthMonitor:
         scene: Scene,
         settings: Settings,
         mounts: tuple[Mount | None, ...],
-        absent: Collection[str] = (),
-        reads: StrokeReading = StrokeReading.LENGTH,
+        absent: Collection[str],
+        channels: Mapping[Stream, tuple[str, ...]],
+        reads: StrokeReading,
+        places: Mapping[str, Place],
     ) -> None:
         self._reads, self._drive = reads, reads.stream
         self.fault_twins: FaultTwins | None = None
-        self._settings, self._channels = settings, channels_of(len(scene.joints))
+        self._settings = settings
+        self._channels = {stream: names for stream, names in channels.items() if names}
         self._ranges = sensor_ranges(scene, mounts)
         self._uncertain = UNCERTAIN * settings.variance(SENSORS[self._drive])
         self._sensors = {
@@ -66,10 +73,11 @@ class HealthMonitor:
             for stream, names in self._channels.items()
             if stream is not Stream.STROKES or stream is self._drive
         }
+        self._imus = [stream for stream in self._channels if SENSORS[stream].is_accelerometer]
         self._delay = DelayMonitor()
         compared = [stream for stream in SIGMAS if stream is not self._drive]
         self._deviations = {stream: DeviationMonitor(stream, scene, settings) for stream in compared}
-        self._wiring, self._load = WiringMonitor(scene, reads, mounts), TipLoadMonitor(settings.tip_load_limit)
+        self._wiring, self._load = WiringMonitor(scene, reads, mounts, places), TipLoadMonitor(settings.tip_load_limit)
         self._told = 0
         self.begin()
 
@@ -109,12 +117,9 @@ class HealthMonitor:
         Those are the channels of sensors and streams that are known to fail. An IMU is used once its mean is known, for no
         noise tells that its axes are wrong.
         """
-        is_unknown = self._surveys[Stream.IMU].slow.weight.max() < KNOWN
+        unknown = {stream for stream in self._imus if self._surveys[stream].slow.weight.max() < KNOWN}
         return np.concatenate(
-            [
-                self._masked(stream) | self._wiring.doubted(stream) | (stream is Stream.IMU and is_unknown)
-                for stream in self._surveys
-            ]
+            [self._masked(stream) | self._wiring.doubted(stream) | (stream in unknown) for stream in self._surveys]
         )
 
     @property

@@ -14,14 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scene.schema import Scene
-from ..types import SENSORS, Alarm, Array, Mount, Ranked, Stream, StrokeReading, channels_of
+from ..types import SENSORS, Alarm, Array, Mount, Place, Ranked, Stream, StrokeReading, channels_of, streams_of
 from ..wiring.check import Checked, check
-from ..wiring.readings import Channel, Series, Window
+from ..wiring.readings import Channel, Series, Window, is_checked
 from ..wiring.words import channel_name, likely
 from .blocks import Block
 
 KIND = "wiring"  # kind of all its alarms
 CHECKS = 6, 20, 50, 100, 200, 400  # blocks after a start, at the end of which all of them are checked
+NONE = np.zeros((), bool)  # of the channels of a stream that is not checked
 DELAY = 20  # blocks from a check until its answer is taken
 
 
@@ -36,12 +37,21 @@ class WiringMonitor:
         What stroke transducers read.
     mounts : sequence of Mount or None
         Of the angle sensors.
+    places : mapping of str to Place
+        See `boom_twin.Twin`.
     """
 
-    def __init__(self, scene: Scene, reads: StrokeReading, mounts: Sequence[Mount | None]) -> None:
-        self._scene, self._reads, self._channels = scene, reads, channels_of(len(scene.joints))
+    def __init__(self, scene: Scene, reads: StrokeReading, mounts: Sequence[Mount | None], places: Mapping[str, Place]) -> None:
+        self._scene, self._reads, self._places = scene, reads, places
+        self._channels = {
+            stream: names
+            for stream, names in channels_of(len(scene.joints), streams_of(places)).items()
+            if names and is_checked(stream)
+        }
         self._declared = {
-            stream: [Channel(name, SENSORS[stream].unit) for name in names] for stream, names in self._channels.items()
+            stream: [Channel(name, kind.unit, turned=places.get(kind.stem, Place()).turned) for name in self._channels[stream]]
+            for stream, kind in SENSORS.items()
+            if stream in self._channels
         }
         angles = self._declared[Stream.ANGLES]
         self._declared[Stream.ANGLES] = [each._replace(absolute=at) for each, at in zip(angles, mounts, strict=True)]
@@ -70,12 +80,12 @@ class WiringMonitor:
         return bool(self._wrong[Stream.STROKES].any())
 
     def wrong(self, stream: Stream) -> NDArray[np.bool_]:
-        """Return the channels of a stream that must not be compared with the prediction, shape (channels,)."""
-        return self._wrong[stream] | self.has_wrong_strokes
+        """Return the channels of a stream that must not be compared with the prediction, shape (channels,) or ()."""
+        return self._wrong.get(stream, NONE) | self.has_wrong_strokes
 
     def doubted(self, stream: Stream) -> NDArray[np.bool_]:
-        """Return the channels of a stream that are not read as declared, while it is looked for how, shape (channels,)."""
-        return self._doubted[stream]
+        """Return the channels of a stream not read as declared, while it is looked for how, shape (channels,) or ()."""
+        return self._doubted.get(stream, NONE)
 
     def explains(self, alarm: Alarm) -> bool:
         """Return True if an alarm of a single sensor is a consequence of its wiring."""
@@ -121,7 +131,7 @@ class WiringMonitor:
         After the first search, only its successors say that further channels are wrong.
         """
         window = self._window()
-        found = check(self._scene, self._reads, self._declared, window, is_quick=True)
+        found = check(self._scene, self._reads, self._declared, window, is_quick=True, places=self._places)
         if found is None:
             return
         is_sound = not any(verdict.is_wrong for verdict in found.verdicts)
@@ -132,7 +142,7 @@ class WiringMonitor:
             self._right[verdict.stream][place] |= not verdict.is_wrong
         if self._search is None and not is_sound:
             self._worker = self._worker or ThreadPoolExecutor(1, "wiring")
-            search = self._worker.submit(check, self._scene, self._reads, self._declared, window)
+            search = self._worker.submit(check, self._scene, self._reads, self._declared, window, places=self._places)
             self._search = self._age + DELAY, search
 
     def _window(self) -> Window:
@@ -168,7 +178,7 @@ class WiringMonitor:
     def _ended(self, end: int) -> list[Alarm]:
         """End the alarms of channels that are read as declared by now."""
         wrong = {name for stream, names in self._channels.items() for name in _chosen(names, self._wrong[stream])}
-        wrong |= {"tip_imu"} if self._wrong[Stream.IMU].any() else set()
+        wrong |= {SENSORS[s].stem for s, each in self._wrong.items() if SENSORS[s].is_accelerometer and each.any()}
         self._sure &= wrong
         return [replace(self._last.pop(name), until=end) for name in list(self._last) if name not in wrong]
 

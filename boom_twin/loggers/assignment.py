@@ -70,7 +70,8 @@ class Assignment:
         if (missing := [channel for channel in strokes if channel not in found]) and self.used:
             free = "; ".join(f"{self.header(use)} ({use.reason})" for use in self.unused) or "none"
             problems.append(
-                f"no column for {', '.join(missing)}. Not used: {free}. Give --column {missing[0]}=NAME:UNIT or --columns FILE."
+                f"no column for {', '.join(missing)}. Not used: {free}. Give --column {missing[0]}=NAME:UNIT or "
+                "--columns FILE; the twin needs the length of every cylinder."
             )
         if problems:
             raise BagError("\n  ".join([f"{len(problems)} fault{'s' * (len(problems) > 1)} in the columns:", *problems]))
@@ -105,13 +106,15 @@ def assign(tables: Sequence[LogTable], given: ColumnFile, joints: int | None) ->
             for place in range(len(table.headers))
             if table.headers[place] and place not in found.times[number] and (number, place) not in taken
         ]
-        own = [use.channel for use in uses if use.channel]
+        own = [use.channel for use in uses if use.channel and not _is_drive(table, use.place)]
         here = {use.channel for use in found.used if use.table == number}
         for use in uses:
             if not use.channel:
                 found.unused.append(use)
             elif use.channel in given.columns or use.channel in here:
                 found.unused.append(ColumnUse(number, use.place, reason=f"{use.channel} is given otherwise"))
+            elif _is_drive(table, use.place):
+                found.unused.append(ColumnUse(number, use.place, reason="a drive, as simulate writes it, beside its length"))
             elif own.count(use.channel) > 1:
                 found.unused.append(ColumnUse(number, use.place, reason=f"one of several columns that may be {use.channel}"))
                 header = table.headers[use.place]
@@ -122,6 +125,12 @@ def assign(tables: Sequence[LogTable], given: ColumnFile, joints: int | None) ->
             else:
                 _use(found, use)
     return found
+
+
+def _is_drive(table: LogTable, place: int) -> bool:
+    """Return True if a column is a drive with the cylinder's length beside it, as in a table of `simulate`."""
+    stem, _, number = table.names[place].rpartition("_")
+    return stem == "stroke" and f"length_{number}" in table.names
 
 
 def _given(found: Assignment, given: ColumnFile) -> set[tuple[int, int]]:

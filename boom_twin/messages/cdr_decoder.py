@@ -71,8 +71,8 @@ def _string(data: bytes, place: int, length: struct.Struct) -> tuple[str, int]:
 _LITTLE = b"\x00\x01"
 _ARRAYS = ("position", "velocity", "effort")
 _HEAD = _ORIGIN + 8  # behind the stamp
-_IMU_NUMBERS, _BEFORE_FORCE = 37, 25  # doubles of an Imu, and those before its linear acceleration
-_FORCE = struct.Struct("<4d")
+_IMU_NUMBERS, _BEFORE_RATE, _BEFORE_FORCE = 37, 13, 25  # doubles of an Imu, and those before its vectors
+_VECTOR = struct.Struct("<4d")
 
 
 class Joints(NamedTuple):
@@ -91,10 +91,12 @@ class Vector(NamedTuple):
     z: float
 
 
-class Force(NamedTuple):
-    """Fields read from a sensor_msgs/Imu."""
+class Axes(NamedTuple):
+    """Fields read from a sensor_msgs/Imu; of covariances the first element."""
 
     frame: str
+    angular_velocity: Vector
+    angular_velocity_covariance: tuple[float]
     linear_acceleration: Vector
     linear_acceleration_covariance: tuple[float]
 
@@ -109,7 +111,7 @@ class CdrDecoder:
     Parameters
     ----------
     type_name : str
-        ``sensor_msgs/msg/JointState`` or ``sensor_msgs/msg/Imu``.
+        Those of ``sensor_msgs/msg/JointState`` and ``sensor_msgs/msg/Imu`` are read in place, others are decoded.
     decode : callable, optional
         Decodes a message with a new head, or one that is not whole.
     field : str
@@ -128,12 +130,13 @@ class CdrDecoder:
         ValueError, or what `decode` raises
             The message is not whole.
         """
-        is_little, is_imu = data[:2] == _LITTLE, self._type == TYPES[Stream.IMU]
+        is_imu = self._type == TYPES[Stream.IMU]
+        is_little = data[:2] == _LITTLE and (is_imu or self._type == TYPES[Stream.STROKES])
         found = None
         if is_little:
             for head, end, text in self._heads:
                 if data[_HEAD:end] == head:
-                    found = _force(data, end, text) if is_imu else _joints(data, end, text, self._field)
+                    found = _axes(data, end, text) if is_imu else _joints(data, end, text, self._field)
                     break
         msg = self._decode(data, self._type) if found is None else found
         stamp = stamp_in(data)
@@ -162,10 +165,11 @@ def _joints(data: bytes, place: int, names: tuple[str, ...], field: str) -> Join
     return Joints(names, values) if field == _ARRAYS[0] else Joints(names, (), values)
 
 
-def _force(data: bytes, place: int, frame: str) -> Force | None:
+def _axes(data: bytes, place: int, frame: str) -> Axes | None:
     """Return the fields of an Imu whose frame ends at `place`, before numbers at fixed offsets; None if it is not whole."""
     place += -(place - _ORIGIN) % 8
     if not 0 <= len(data) - place - 8 * _IMU_NUMBERS <= PADDING:
         return None
-    x, y, z, covariance = _FORCE.unpack_from(data, place + 8 * _BEFORE_FORCE)
-    return Force(frame, Vector(x, y, z), (covariance,))
+    *rate, rate_covariance = _VECTOR.unpack_from(data, place + 8 * _BEFORE_RATE)
+    *force, covariance = _VECTOR.unpack_from(data, place + 8 * _BEFORE_FORCE)
+    return Axes(frame, Vector(*rate), (rate_covariance,), Vector(*force), (covariance,))

@@ -12,16 +12,18 @@ from pydantic_core import ErrorDetails
 
 from ..config.yaml_text import read_plain
 from ..errors import Fault, UsageError
-from ..types import SENSORS, Stream, channels_of, sensor_kind, stream_of
+from ..types import SENSORS, Stream, sensor_kind, stream_of
 from .topic_table import (
     TYPES,
     InputTopic,
     Qos,
     Sensor,
+    SensorPlace,
     Topic,
     Topics,
     default_document,
     load_topics,
+    used_inputs,
     usual,
 )
 
@@ -36,6 +38,12 @@ _REMEDIES = {
     "drive": "Give angles for a boom without stroke transducers; else leave it out.",
     "depth": "Give a number of messages.",
     "delay": "Give the seconds by which the stamps come after the readings.",
+    "section": "Give the number of a section, 1 at the base.",
+    "at": "Give the distance from the section's inboard pivot along it, m.",
+    "turned": "Give the angle of the sensor's x axis to the section, rad, positive anticlockwise.",
+    "bore": "Give a list of diameters, m, one for each cylinder.",
+    "rod": "Give a list of diameters, m, one for each cylinder.",
+    "place": "Give section, at and turned.",
     "reads": "Give length for a transducer in or on the cylinder; drive only for sessions of a simulated boom.",
     "frame": "Give the name of a frame without a leading slash: base_link.",
 }
@@ -77,6 +85,8 @@ def mapping_from(document: Any, source: str, joints: int | None = None) -> Topic
     absent = frozenset(channel for channel, given in sensors.items() if given == "none") if isinstance(sensors, dict) else ()
     sensors, names, found = _sensors(sensors, values.get("drive") == "angles")
     faults += found
+    if isinstance(values["inputs"], dict):
+        values["inputs"] = used_inputs(values["inputs"], sensors)
     topics: Topics | None = None
     try:
         topics = Topics.model_validate(values)
@@ -155,8 +165,10 @@ def _kind_faults(channel: str, given: Mapping[str, Any]) -> Iterator[Fault]:
         yield Fault(f"{place}.unit", unit, f"it must be one of {', '.join(kind.units)}", "Use scale for any other.")
     if kind is not SENSORS[Stream.ANGLES] and (mount := given.get("absolute")) is not None:
         yield Fault(f"{place}.absolute", mount, "only an angle (joint_i) can be absolute", "Remove the key.")
-    if kind.is_imu and (name := given.get("name", "x")) not in ("x", "y", "z"):
-        yield Fault(f"{place}.name", name, "it must be x, y or z", "Give the axis of linear_acceleration.")
+    if kind is not SENSORS[Stream.MOMENTS] and given.get("place") is not None:
+        yield Fault(f"{place}.place", "given", "only a moment_i has a place", "Give the place of an IMU under inputs.")
+    if not kind.is_named and (name := given.get("name", "x")) not in ("x", "y", "z"):
+        yield Fault(f"{place}.name", name, "it must be x, y or z", f"Give the axis of {kind.field}.")
 
 
 def _set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Iterator[Fault]:
@@ -164,7 +176,7 @@ def _set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Itera
 
     `names` are those that a mapping lists by channel; `is_shared` is True if strokes and angles come by one topic.
     """
-    known = channels_of(joints)
+    known = {stream: kind.channels(joints) for stream, kind in SENSORS.items()}
     for channel in names:
         if not any(channel in group for group in known.values()):
             bound = f"the scene has {joints} joints, so channels end at {sensor_kind(channel).stem}_{joints}"
@@ -183,7 +195,7 @@ def _set_faults(names: Mapping[str, str], joints: int, is_shared: bool) -> Itera
 def _known_channels() -> str:
     """Return all possible names of channels, for a message."""
     kinds = SENSORS.values()
-    *most, last = [name for kind in kinds for name in (kind.channels(0) or (f"{kind.stem}_1", f"{kind.stem}_2 .."))]
+    *most, last = [name for kind in kinds for name in (kind.channels(0) or (kind.channels(1)[0], f"{kind.channels(2)[-1]} .."))]
     return f"{', '.join(most)} and {last}"
 
 
@@ -199,6 +211,8 @@ def _fault(detail: ErrorDetails, *before: str) -> Fault:
 
 def _model_at(place: list[str]) -> type[BaseModel]:
     """Return the model that has the key at `place`."""
+    if "place" in place[:-1]:
+        return SensorPlace
     if place[0] == "sensors" and len(place) > 1:
         return Sensor
     if "qos" in place[:-1]:
@@ -222,8 +236,15 @@ def _name_faults(topics: Topics) -> Iterator[Fault]:
 
 
 def _input_faults(topics: Topics) -> Iterator[Fault]:
-    """Yield faults for a delay of what drives the model, whose stamps all outputs have, and for ``reads`` of another input."""
+    """Yield faults for a delay of what drives the model, whose stamps all outputs have, and for keys of another input."""
     for stream, topic in topics.inputs.items():
+        if (topic.bore or topic.rod) and stream is not Stream.PRESSURES:
+            yield Fault(f"inputs.{stream.value}.bore", topic.bore, "only cylinder_pressures has it", "Remove the key.")
+        if topic.place is not None and SENSORS[stream].is_named:
+            yield Fault(f"inputs.{stream.value}.place", "given", "only IMUs and points have a place", "Remove the key.")
+        if topic.place is None and SENSORS[stream].is_placed and not SENSORS[stream].is_named:
+            told = "it must be there: section, at (m), turned (rad)"
+            yield Fault(f"inputs.{stream.value}.place", None, told, "Give {} for the tip.")
         if topic.reads is not None and stream is not Stream.STROKES:
             yield Fault(f"inputs.{stream.value}.reads", topic.reads, "only cylinder_strokes has it", "Remove the key.")
     drive, named = (Stream.ANGLES, "an angle") if topics.drive == "angles" else (Stream.STROKES, "a stroke")

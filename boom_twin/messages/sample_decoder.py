@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..types import LIMIT, SECOND, SENSORS, Array, Sample, Stream
-from .cdr_decoder import Force
+from .cdr_decoder import Axes
 from .sample_assembler import Reading, SampleAssembler
 from .topic_table import Topics, factor, load_topics
 
@@ -69,7 +69,7 @@ class _Channels:
 
     def __init__(self, topics: Topics, stream: Stream, joints: int) -> None:
         sensors = topics.sensors_of(stream, joints)
-        self.wanted = np.array([channel not in topics.absent for channel in sensors])
+        self.wanted = np.array([not topics.lacks(channel) for channel in sensors])
         self.names = [sensor.name if wanted else "" for sensor, wanted in zip(sensors.values(), self.wanted, strict=True)]
         self.scales = [(sensor.zero, factor(channel, sensor)) for channel, sensor in sensors.items()]
         self.is_plain = all(scale == (0.0, 1.0) for scale in self.scales)  # readings are quantities
@@ -147,12 +147,14 @@ class SampleDecoder:
 
     def __init__(self, joints: int, topics: Topics | None = None) -> None:
         topics = topics or load_topics()
-        self._channels = {stream: _Channels(topics, stream, joints) for stream in topics.inputs}
+        streams = [stream for stream in Stream if stream is not Stream.STROKES or stream in topics.inputs]
+        self._channels = {stream: _Channels(topics, stream, joints) for stream in streams}
         pair = {Stream.STROKES: Stream.ANGLES, Stream.ANGLES: Stream.STROKES}
         self._sharing = pair if topics.is_shared else {}
-        self.delays = {stream: topics.delay(stream) for stream in topics.inputs}
+        self.delays = {stream: topics.delay(stream) for stream in self._channels}
+        self._areas = topics.areas
         self.refused = 0
-        self._by_axis = {stream for stream, kind in SENSORS.items() if kind.is_imu}
+        self._by_axis = {stream for stream, kind in SENSORS.items() if not kind.is_named}
         self.oddities: Counter[str] = Counter()
         wanted = {stream: each.wanted for stream, each in self._channels.items()}
         self.assembler = SampleAssembler(wanted, self.oddities, topics.stroke_reading.stream)
@@ -180,16 +182,18 @@ class SampleDecoder:
         if not (stamp_ns and 0 < taken < LATEST):
             self.oddities["impossible stamp" if stamp_ns else "no stamp"] += 1
             return None
-        raw, is_whole = self._by_name(msg, stream) if is_by_name else (self._force(msg, stream), True)
+        raw, is_whole = self._by_name(msg, stream) if is_by_name else (self._by_axes(msg, stream), True)
         if raw is None:
             return None
         channels = self._channels[stream]
         quantities = raw if channels.is_plain else channels.quantities(raw)
+        if SENSORS[stream].gives:
+            stream, quantities = Stream(SENSORS[stream].gives), self._forces(quantities)
         values = [value if -LIMIT <= value <= LIMIT else self._reject(value) for value in quantities]
         if isnan(values[0]) and all(map(isnan, values)):
             self.oddities["no usable value"] += 1
             return None
-        frame = "" if is_by_name else msg.frame if isinstance(msg, Force) else msg.header.frame_id
+        frame = "" if is_by_name else msg.frame if isinstance(msg, Axes) else msg.header.frame_id
         array = in_range(np.array(values), *channels.range) if stream is Stream.ANGLES else np.array(values)
         return Reading(Sample(stream, taken, array), is_whole, frame)
 
@@ -232,13 +236,22 @@ class SampleDecoder:
             self.oddities[name] += 1
         return None if places is None else [float(found[place]) if place >= 0 else _ABSENT for place in places], is_whole
 
-    def _force(self, msg: Any, stream: Stream) -> list[float] | None:
-        """Return the specific force (m/s^2) along the axes that the mapping takes for the tip's x and z."""
-        if msg.linear_acceleration_covariance[0] == NO_MEASUREMENT:
-            self.oddities["no measurement"] += 1
+    def _by_axes(self, msg: Any, stream: Stream) -> list[float] | None:
+        """Return readings along the axes that the mapping names; None if the message has none."""
+        kind = SENSORS[stream]
+        if hasattr(msg, f"{kind.field}_covariance") and getattr(msg, f"{kind.field}_covariance")[0] == NO_MEASUREMENT:
+            if not kind.beside:
+                self.oddities["no measurement"] += 1
             return None
-        force = msg.linear_acceleration
-        return [float(getattr(force, axis)) if axis else _ABSENT for axis in self._channels[stream].names]
+        vector = getattr(msg, kind.field)
+        return [float(getattr(vector, axis)) if axis else _ABSENT for axis in self._channels[stream].names]
+
+    def _forces(self, pressures: list[float]) -> list[float]:
+        """Return the forces (N, positive in tension) of cylinders by the pressures (Pa) of their cap and rod sides."""
+        pairs = zip(pressures[::2], pressures[1::2], self._areas, strict=True)
+        return [
+            _ABSENT if cap is _ABSENT or rod is _ABSENT else rod * ring - cap * piston for cap, rod, (piston, ring) in pairs
+        ]
 
     def _reject(self, value: float) -> float:
         """Return NaN and count the reason. An absent channel is counted elsewhere."""

@@ -3,18 +3,37 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
 from functools import cache
-from math import radians
+from math import hypot, pi, radians
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from ..config.settings import Settings
 from ..config.yaml_text import read_plain
 from ..errors import UsageError
-from ..types import GIVE, NUMBER, SECOND, SENSORS, Mount, Stream, StrokeReading, sensor_kind
+from ..types import GIVE, NUMBER, SECOND, SENSORS, Mount, Place, Stream, StrokeReading, sensor_kind, streams_of
+
+if TYPE_CHECKING:
+    from ..scene.schema import Joint
+
+
+class SensorPlace(BaseModel):
+    """Place of a sensor on the boom; see `boom_twin.types.Place`."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    section: Annotated[int, Field(ge=1)] | None = None
+    at: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
+    turned: Annotated[float, Field(ge=-2 * pi, le=2 * pi, allow_inf_nan=False)] = 0.0
+
+    @property
+    def value(self) -> Place:
+        """The place."""
+        return Place(self.section, self.at, self.turned)
 
 
 class Sensor(BaseModel):
@@ -28,19 +47,32 @@ class Sensor(BaseModel):
     zero: Annotated[float, Field(allow_inf_nan=False)] = 0.0
     scale: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
     absolute: Mount | None = None
+    place: SensorPlace | None = None
 
 
 def usual(channel: str) -> dict[str, Any]:
     """Return the default name and unit of a channel."""
     kind, end = sensor_kind(channel), channel.rpartition("_")[2]
-    return {"name": end if kind.is_imu else f"{kind.named}_{end}", "unit": kind.unit}
+    if kind.gives:
+        return {"name": channel, "unit": kind.unit}
+    name = f"{kind.named}_{end}" if kind.is_named else kind.axes[kind.ends.index(end)]
+    return {"name": name, "unit": kind.unit}
 
 
 def factor(channel: str, sensor: Sensor) -> float:
-    """Return the factor of (reading - zero): sign, scale and conversion of the unit to SI."""
-    return sensor.sign * sensor.scale * sensor_kind(channel).units[sensor.unit]
+    """Return the factor of (reading - zero): sign, scale and conversion of the unit to SI.
+
+    A gyro reads a turn about an axis that points to the right of a boom that is raised about the one to its left.
+    """
+    kind = sensor_kind(channel)
+    turn = -1.0 if kind.field == "angular_velocity" else 1.0
+    return turn * sensor.sign * sensor.scale * kind.units[sensor.unit]
 
 
+NO_AREAS = (
+    "inputs.cylinder_pressures: bore and rod of the cylinders are not known. Give `oil: {bore, rod, ..}` to each "
+    "cylinder of the scene, or bore and rod (lists, m) to inputs.cylinder_pressures in the mapping."
+)
 NODE = "boom_twin"
 FRAME = "base_link"
 """Frame of the base, in which outputs are given unless a mapping or a parameter names another."""
@@ -124,10 +156,14 @@ class InputTopic(Topic):
     """One topic of readings.
 
     ``delay`` is the time from reading to stamp, s. ``reads`` is the quantity that stroke transducers read, if known.
+    ``place`` is where an IMU sits or a point is. ``bore`` and ``rod`` are diameters of cylinders with pressures, m.
     """
 
     delay: Annotated[float, Field(ge=-10, le=10, allow_inf_nan=False)] = 0.0
     reads: Literal["length", "drive"] | None = None
+    place: SensorPlace | None = None
+    bore: tuple[Annotated[float, Field(gt=0, le=1)], ...] = ()
+    rod: tuple[Annotated[float, Field(gt=0, le=1)], ...] = ()
 
 
 class EventTopic(Topic):
@@ -153,6 +189,8 @@ class Topics(_Entry):
     """Channels without a sensor, marked by ``none`` in the mapping."""
     ranges: tuple[tuple[float, float], ...] = ()
     """Lowest and highest angle of every joint, rad; empty where the scene is not known."""
+    areas: tuple[tuple[float, float], ...] = ()
+    """Areas of piston and ring of every cylinder, m^2; empty where they are not known."""
 
     @property
     def is_shared(self) -> bool:
@@ -164,9 +202,17 @@ class Topics(_Entry):
     def heard(self) -> dict[str, list[Stream]]:
         """Streams of every input topic by its name; strokes first."""
         found: dict[str, list[Stream]] = {}
-        for stream in filter(self.inputs.__contains__, Stream):
-            found.setdefault(self.inputs[stream].name, []).append(stream)
+        pressures = [Stream.PRESSURES] if self.areas else []
+        for stream in [*streams_of(self.places), *pressures]:
+            if (topic := self.inputs.get(Stream(SENSORS[stream].beside or stream))) is not None:
+                found.setdefault(topic.name, []).append(stream)
         return found
+
+    @property
+    def places(self) -> dict[str, Place]:
+        """Places of the sensors that have one, by their names."""
+        found = {SENSORS[stream].stem: topic.place.value for stream, topic in self.inputs.items() if topic.place is not None}
+        return found | {channel: each.place.value for channel, each in self.sensors.items() if each.place is not None}
 
     def renamed(self, name: Callable[[Topic], str]) -> Topics:
         """Return these topics, each with the name that `name` returns for it."""
@@ -186,9 +232,54 @@ class Topics(_Entry):
         """Return these topics with the `ranges` (deg) of a scene's joints, which resolve the whole turns of an encoder."""
         return self.model_copy(update={"ranges": tuple((radians(low) - GIVE, radians(high) + GIVE) for low, high in ranges)})
 
+    def of_scene(self, joints: Sequence[Joint]) -> Topics:
+        """Return these topics of a scene: ranges of its joints, and areas of its cylinders, which turn pressures to forces.
+
+        Raises
+        ------
+        UsageError
+            The mapping says that there are pressures, but areas are not known.
+        """
+        topics = self.of_joints(joint.range_deg for joint in joints)
+        topic, oils = self.inputs[Stream.PRESSURES], [joint.cylinder.oil for joint in joints]
+        given: list[tuple[float, float] | None] = [None if oil is None else (oil.bore, oil.rod) for oil in oils]
+        if topic.bore or topic.rod:
+            if not len(topic.bore) == len(topic.rod) == len(oils):
+                told = f"bore and rod have {len(topic.bore)} and {len(topic.rod)} entries, the scene has {len(oils)} cylinders"
+                raise UsageError(f"inputs.cylinder_pressures: {told}. Give one for each, m.")
+            given = list(zip(topic.bore, topic.rod, strict=True))
+        areas = [(pi / 4 * bore**2, pi / 4 * (bore**2 - rod**2)) for bore, rod in filter(None, given) if rod < bore]
+        if len(areas) == len(oils):
+            return topics.model_copy(update={"areas": tuple(areas)})
+        if self.has_pressures:
+            raise UsageError(NO_AREAS)
+        return topics
+
+    @property
+    def has_pressures(self) -> bool:
+        """Return True if the mapping says that there are pressures."""
+        topic = self.inputs[Stream.PRESSURES]
+        return topic.required or bool(topic.bore)
+
+    def noise_of(self, settings: Settings) -> Settings:
+        """Return the settings with the noise of forces that come from pressures: that of the smallest cylinder.
+
+        The filter learns what is above it.
+        """
+        if not (self.areas and self.has_pressures):
+            return settings
+        sigma = settings.pressure_sigma * min(hypot(*areas) for areas in self.areas)
+        return settings.model_copy(update={"force_sigma": sigma, "force_resolution": 0.0})
+
+    def lacks(self, channel: str) -> bool:
+        """Return True if the mapping says that a channel has no sensor, or does not place one that needs a place."""
+        kind = sensor_kind(channel)
+        return channel in self.absent or (kind.is_placed and kind.is_named and channel not in self.places)
+
     def delay(self, stream: Stream) -> int:
         """Return the time from the readings of a stream to their stamps, ns."""
-        return round(self.inputs[stream].delay * SECOND)
+        topic = self.inputs.get(Stream(SENSORS[stream].beside or stream))
+        return 0 if topic is None else round(topic.delay * SECOND)
 
     def sensors_of(self, stream: Stream, joints: int) -> dict[str, Sensor]:
         """Return the sensors of a stream by channel, in the order of its samples."""
@@ -231,7 +322,22 @@ class Topics(_Entry):
 @cache
 def load_topics() -> Topics:
     """Return the topics of the package with default sensors; the file is read once."""
-    return Topics.model_validate(default_document())
+    return Topics.model_validate({**default_document(), "inputs": used_inputs(default_document()["inputs"], {})})
+
+
+@cache
+def every_input() -> dict[Stream, InputTopic]:
+    """Return all inputs of the package, with those that a boom has only if its mapping names them."""
+    return {Stream(role): InputTopic.model_validate(topic) for role, topic in default_document()["inputs"].items()}
+
+
+def used_inputs(inputs: Mapping[str, Any], sensors: Mapping[str, Sensor]) -> dict[str, Any]:
+    """Return the inputs without those of sensors that no place is given for: as in the package, or under `sensors`."""
+    usual = default_document()["inputs"]
+    placed = {stream.value for stream, kind in SENSORS.items() if kind.is_placed}
+    if any(sensor.place is not None for sensor in sensors.values()):
+        placed.discard(Stream.MOMENTS.value)
+    return {role: topic for role, topic in inputs.items() if role not in placed or topic != usual[role]}
 
 
 @cache

@@ -23,11 +23,11 @@ from ..scene.edit import loaded
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..twin.twin import Twin
-from ..types import SENSORS, Array, Change, Stream, StrokeReading
+from ..types import SENSORS, Array, Change, Place, Stream, StrokeReading
 from ..wiring.check import Checked, Verdict, check
 from ..wiring.lag import Lag, lag_of
-from ..wiring.readings import Channel, Series, Window
-from ..wiring.words import finding
+from ..wiring.readings import Channel, Series, Window, is_checked
+from ..wiring.words import STROKES_ALONE, finding
 from .session_samples import SessionSamples
 
 LOOK = 60.0  # s of a session that `wiring_of` reads
@@ -82,10 +82,12 @@ def wiring_of(bag: Path, scene: str | Path | None, mapping: Path | None, window:
         found = commission(bag, scene, mapping, TimeWindow(window.start, duration), with_lags=False)
     except (BagError, UsageError) as error:
         return f"not checked: {str(error).splitlines()[0]}"
+    if not found.wrong and found.checked.has_strokes_alone:
+        return STROKES_ALONE
     if not found.wrong:
         still = "" if found.checked.moved else f", as far as a boom tells that stands still for {duration:g} s"
         return f"as expected{still}"
-    told = "; ".join(f"{each.channel} {finding(each, found.checked.moved)}" for each in found.wrong)
+    told = "; ".join(f"{each.channel} {finding(each, found.checked)}" for each in found.wrong)
     return f"{told}. `boom_twin mapping --check {bag}` proposes a mapping"
 
 
@@ -127,7 +129,8 @@ def commission(
     reads = strokes_of(session.path, mapped).reading
     settings = settings_of(session.path).settings
     series = readings_of(session, mapped.topics, joints, window)
-    found = check(loaded(own.scene, *settings.load), reads, declared(mapped.topics, joints), series)
+    places = mapped.topics.places
+    found = check(loaded(own.scene, *settings.load), reads, declared(mapped.topics, joints), series, places=places)
     if found is None:
         lacking = f"{session.path}: no time in which all {joints} cylinders of the scene ({own.source}) have strokes"
         raise BagError(f"{lacking}. Give the boom's scene by --scene.")
@@ -135,8 +138,9 @@ def commission(
     _mend(document, found, None if told is reads else told)
     lags: dict[Stream, Lag] = {}
     if with_lags and all(v.is_sure or not v.is_wrong for v in found.verdicts if v.stream is Stream.STROKES):
-        topics = mapping_from(document, mapped.source, joints).of_joints(joint.range_deg for joint in own.scene.joints)
-        twin = Twin(own.scene, settings, topics.mounts(joints), reads=told or reads, absent=topics.absent)
+        topics = mapping_from(document, mapped.source, joints).of_scene(own.scene.joints)
+        mounts = topics.mounts(joints)
+        twin = Twin(own.scene, settings, mounts, reads=told or reads, absent=topics.absent, places=topics.places)
         lags = _lags(twin, session, topics, window, found)
         for stream, lag in lags.items():
             if is_late(lag):
@@ -157,8 +161,14 @@ def _mend(document: dict[str, Any], found: Checked, reads: StrokeReading | None)
     """Write everything that a check is sure of into the content of a mapping."""
     for verdict in found.verdicts:
         if verdict.is_sure and verdict.best is not None:
-            mended = "none" if verdict.has_no_gravity else _sensor(verdict.channel, verdict.best)
-            document.setdefault("sensors", {})[verdict.channel] = mended
+            is_turned = verdict.best.turned != verdict.declared.turned
+            if not is_turned or verdict.best._replace(turned=verdict.declared.turned) != verdict.declared:
+                mended = "none" if verdict.has_no_gravity else _sensor(verdict.channel, verdict.best)
+                document.setdefault("sensors", {})[verdict.channel] = mended
+            if is_turned:
+                entry = document.setdefault("inputs", {}).setdefault(verdict.stream.value, {})
+                turned = round(math.remainder(verdict.best.turned, math.tau), 4)
+                entry["place"] = {**(entry.get("place") or {}), "turned": turned}
     if reads is not None:
         document.setdefault("inputs", {}).setdefault(Stream.STROKES.value, {})["reads"] = reads.value
 
@@ -167,16 +177,19 @@ def _sensor(channel: str, way: Channel) -> dict[str, Any]:
     """Return the keys of a sensor that differ from the usual ones."""
     least = Sensor(**usual(channel)).model_dump()
     values = way._replace(zero=float(f"{way.zero:.6g}"))._asdict()
-    return {key: values[key] for key, value in least.items() if values[key] != value}
+    return {key: values[key] for key, value in least.items() if key in values and values[key] != value}
 
 
 def declared(topics: Topics, joints: int) -> dict[Stream, list[Channel]]:
     """Return how a mapping reads every channel."""
 
-    def channel(sensor: Sensor) -> Channel:
-        return Channel(sensor.name, sensor.unit, sensor.sign, sensor.zero, sensor.scale, sensor.absolute)
+    def channel(sensor: Sensor, place: Place) -> Channel:
+        return Channel(sensor.name, sensor.unit, sensor.sign, sensor.zero, sensor.scale, sensor.absolute, place.turned)
 
-    return {stream: [channel(each) for each in topics.sensors_of(stream, joints).values()] for stream in Stream}
+    return {
+        stream: [channel(each, topics.places.get(kind.stem, Place())) for each in topics.sensors_of(stream, joints).values()]
+        for stream, kind in SENSORS.items()
+    }
 
 
 def readings_of(session: Session, topics: Topics, joints: int, window: TimeWindow = WHOLE) -> Window:
@@ -189,7 +202,7 @@ def readings_of(session: Session, topics: Topics, joints: int, window: TimeWindo
     columns: dict[tuple[Stream, str], tuple[list[int], list[float]]] = defaultdict(lambda: ([], []))
     for name, _, message in read(session, types, window):
         stamp = message.header.stamp.sec * 1_000_000_000 + message.header.stamp.nanosec
-        for stream in heard[name]:
+        for stream in filter(is_checked, heard[name]):
             delay = topics.delay(stream)
             for key, value in _values(message, stream):
                 stamps, values = columns[stream, key]
@@ -203,7 +216,7 @@ def readings_of(session: Session, topics: Topics, joints: int, window: TimeWindo
     for (stream, key), (stamps, values) in columns.items():
         is_lacking = any((stream, name) not in columns for name in known[stream])
         others = {name for other in Stream if other is not stream for name in known[other]}
-        if key in known[stream] or (SENSORS[stream].is_imu and known[stream]) or (is_lacking and key not in others):
+        if key in known[stream] or (SENSORS[stream].is_accelerometer and known[stream]) or (is_lacking and key not in others):
             order = np.argsort(stamps, kind="stable")
             found[stream][key] = Series(np.array(stamps, np.int64)[order], np.array(values, float)[order])
     return found
@@ -211,7 +224,7 @@ def readings_of(session: Session, topics: Topics, joints: int, window: TimeWindo
 
 def _values(message: Any, stream: Stream) -> list[tuple[str, float]]:
     """Return names and readings of a message."""
-    if SENSORS[stream].is_imu:
+    if SENSORS[stream].is_accelerometer:
         return [(axis, float(getattr(message.linear_acceleration, axis))) for axis in AXES]
     return list(zip(message.name, map(float, getattr(message, SENSORS[stream].field)), strict=False))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..bag.joint_names import refuse_missing_drive, refuse_other_names
-from ..bag.reader import Session, scan
+from ..bag.reader import Session, read, scan
 from ..bag.session_model import (
     SessionScene,
     SessionStrokes,
@@ -20,11 +20,12 @@ from ..bag.session_model import (
 from ..bag.time_window import WHOLE, TimeWindow
 from ..config.settings import Settings
 from ..errors import BagError, UsageError
-from ..messages.topic_table import Topics
+from ..messages.sample_decoder import NO_MEASUREMENT
+from ..messages.topic_table import NO_AREAS, InputTopic, Topics
 from ..scene.load import SceneSource
 from ..scene.schema import Scene
 from ..twin.twin import Twin
-from ..types import NANO
+from ..types import NANO, SENSORS, Stream, streams_of
 from .progress import Progress
 
 
@@ -65,6 +66,8 @@ class ReplayInputs:
     wanted : list of str
         Input topics to read: that which drives the model, and those of other inputs with messages.
     strokes : SessionStrokes
+    streams : tuple of Stream
+        Of the sensors that the mapping has; gyros only if the session's messages hold their readings.
     health : bool
         True if the rig's health is judged.
     window : TimeWindow
@@ -77,6 +80,7 @@ class ReplayInputs:
     topics: Topics
     wanted: list[str]
     strokes: SessionStrokes
+    streams: tuple[Stream, ...]
     health: bool
     window: TimeWindow
 
@@ -108,8 +112,9 @@ class ReplayInputs:
 
     def twin(self, causes: bool = False) -> Twin:
         """Return a twin for the session, which names causes of faults if that is asked for."""
-        mounts, reads = self.topics.mounts(len(self.scene.joints)), self.strokes.reading
-        return Twin(self.scene, self.settings, mounts, self.health, reads, self.topics.absent, causes=causes)
+        topics, reads = self.topics, self.strokes.reading
+        mounts, settings = topics.mounts(len(self.scene.joints)), topics.noise_of(self.settings)
+        return Twin(self.scene, settings, mounts, self.health, reads, topics.absent, causes=causes, places=topics.places)
 
     def refuse(self, reason: str) -> None:
         """Raise BagError if there is a `reason` for which the session is of another boom than the scene."""
@@ -129,18 +134,33 @@ def replay_inputs(
     kept = scene_for(session.path, scene)
     joints = kept.scene.joints
     mapped = mapping_of(session.path, Path(options.mapping) if options.mapping else None, len(joints), options.namespace)
-    topics = mapped.topics.of_joints(joint.range_deg for joint in joints)
+    topics = mapped.topics.of_scene(joints)
+    if not topics.areas and (found := session.find(topics.inputs[Stream.PRESSURES].name)) is not None and found.count:
+        raise UsageError(f"{session.path}: {NO_AREAS}")
     drive = topics.stroke_reading.stream
-    topics_there = {name: session.find(name) for name in mapped.topics.heard}
+    topics_there = {name: session.find(name) for name in topics.heard}
     wanted = [
-        name
-        for name, topic in topics_there.items()
-        if drive in mapped.topics.heard[name] or (topic is not None and topic.count)
+        name for name, topic in topics_there.items() if drive in topics.heard[name] or (topic is not None and topic.count)
     ]
     strokes = strokes_of(session.path, mapped)
     refuse_missing_drive(session, topics)
     refuse_other_names(session, topics, len(joints), kept.source)
-    return ReplayInputs(session, kept, settings, mapped.source, topics, wanted, strokes, options.health, options.window)
+    streams = tuple(
+        stream
+        for stream in streams_of(topics.places)
+        if not SENSORS[stream].beside or _has_rates(session, topics.inputs[Stream(SENSORS[stream].beside)], wanted)
+    )
+    return ReplayInputs(
+        session, kept, settings, mapped.source, topics, wanted, strokes, streams, options.health, options.window
+    )
+
+
+def _has_rates(session: Session, topic: InputTopic, wanted: list[str]) -> bool:
+    """Return True if the first message of an IMU holds a rate."""
+    if topic.name not in wanted:
+        return False
+    first = next(iter(read(session, {topic.absolute: topic.type})), None)
+    return first is not None and first[2].angular_velocity_covariance[0] != NO_MEASUREMENT
 
 
 def scene_for(session: Path, scene: SceneSource | SessionScene) -> SessionScene:

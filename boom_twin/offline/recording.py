@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from ..analysis.column_statistics import ColumnStatistics
 from ..deviation.load_spectrum import TipLoadFinder
 from ..health.alarms import Alarms
 from ..twin.blocks import CODES, EstimateBlock, PredictionBlock, ReportBlock, SampleBlock, joined, report_block
-from ..types import HELD, NANO, Alarm, Array, Health, Report, Stream, StrokeReading, channels_of
+from ..types import HELD, NANO, USUAL_STREAMS, Alarm, Array, Health, Report, Stream, StrokeReading, channels_of
 from .ground_truth import TipErrors
 
 STRETCH = 2**14
@@ -60,6 +60,8 @@ class Stretch:
         That were read meanwhile.
     reads : StrokeReading
         Of the strokes of the predictions.
+    streams : collection of Stream
+        Of the session's sensors.
     """
 
     joints: int
@@ -68,6 +70,7 @@ class Stretch:
     first: int
     samples: list[SampleBlock]
     reads: StrokeReading
+    streams: Collection[Stream]
 
     @property
     def predictions(self) -> PredictionBlock:
@@ -122,7 +125,7 @@ class SessionTotals:
         if not len(predictions.stamps):
             return
         self.samples += len(predictions.stamps)
-        self.load.add(predictions.stamps, stretch.estimates.load)
+        self.load.add(predictions.stamps, stretch.estimates.load, stretch.estimates.load_variance)
         self.acceleration = float(np.fmax(self.acceleration, np.hypot(*predictions.tip_acceleration.T).max()))
 
     def _add_tip_sigmas(self, sigmas: Array) -> None:
@@ -144,6 +147,8 @@ class Recording:
         Told of all predictions for which the truth is known.
     reads : StrokeReading
         Of the twin's strokes.
+    streams : collection of Stream
+        Of the session's sensors.
 
     Attributes
     ----------
@@ -165,8 +170,9 @@ class Recording:
         take: Callable[[Stretch], None] | None = None,
         errors: TipErrors | None = None,
         reads: StrokeReading = StrokeReading.LENGTH,
+        streams: Collection[Stream] = USUAL_STREAMS,
     ) -> None:
-        self._joints, self._take, self._errors, self.reads = joints, take, errors, reads
+        self._joints, self._take, self._errors, self.reads, self._streams = joints, take, errors, reads, streams
         self._parts: list[ReportBlock] = []
         self._single: list[Report] = []
         self._health: list[Health] = []
@@ -273,7 +279,7 @@ class Recording:
     def _stretch(self) -> Stretch | None:
         self._close_single()
         parts = [part for part in self._parts if len(part.predictions.stamps) or len(part.residuals.stamps)]
-        own = self._health, self._first, self._samples, self.reads
+        own = self._health, self._first, self._samples, self.reads, self._streams
         return Stretch(self._joints, joined(parts), *own) if parts else None
 
     @property

@@ -32,7 +32,7 @@ from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
 from ..system.summary_display import SummaryDisplay, data_frame
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
-from ..twin.events import EVENTS
+from ..twin.events import CONSEQUENCES, EVENTS
 from ..twin.twin import Twin
 from ..types import Array, Change, Report, Stream, StrokeReading
 from .ground_truth import TipErrors, TipTruth, truth_in
@@ -84,10 +84,10 @@ class Replay(SummaryDisplay):
             The stretches were given away, see `replay_into`.
         """
         stretch, rows = self.recording.whole, RowsInMemory()
-        table = SampleTable(rows, stretch.joints)
+        table = SampleTable(lambda _: rows, stretch.joints, stretch.streams)
         table.add(stretch)
         table.finish()
-        return dict(zip(columns_of(stretch.joints), np.concatenate(rows.parts).T, strict=True))
+        return dict(zip(columns_of(stretch.joints, stretch.streams), np.concatenate(rows.parts).T, strict=True))
 
     def to_frame(self) -> Any:
         """Return `columns` as a ``pandas.DataFrame``; UsageError if pandas is not installed."""
@@ -197,7 +197,7 @@ def replay_into(
     truth = truth_in(options.window, session, given.topics, given.wanted)
     errors = None if truth is None else TipErrors(truth)
     taking = None if take is None else _Timed(take)
-    recording = Recording(joints, taking, errors, given.strokes.reading)
+    recording = Recording(joints, taking, errors, given.strokes.reading, given.streams)
     other_boom, refused = OtherBoom(), RefusedStrokes(given.scene, given.kept.source, given.strokes.reading)
     samples = SessionSamples(session, given.topics, given.wanted, joints, options.window)
     with ExitStack() as stack:
@@ -240,7 +240,7 @@ def replay_into(
         raise BagError(
             f"{session.path}: no {one} sample could be used ({_told(twin)}){refused.never_read}. "
             f"It needs names {names}_1..{joints}, or those of a mapping, values within {bounds}, "
-            f"and stamps.{_explained(samples.oddities)}{refused.told}"
+            f"and stamps.{_explained(twin.counts)}{refused.told}"
         )
     recording.close()
     if recording.totals.samples == 1 < recording.refused:
@@ -284,8 +284,9 @@ def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) 
 
 
 def _explained(counts: Counter[str]) -> str:
-    """Return a sentence on what was met most often; empty if nothing was."""
-    return "".join(f" Most often {name}: {(EVENTS | ODDITIES)[name]}." for name, _ in counts.most_common(1))
+    """Return a sentence on the most frequent event; empty without any. `CONSEQUENCES` count only without another."""
+    most = max(counts, key=lambda name: (name not in CONSEQUENCES, counts[name]), default=None)
+    return "" if most is None else f" Most often {most}: {(EVENTS | ODDITIES)[most]}."
 
 
 def _told(twin: Twin) -> str:

@@ -6,7 +6,7 @@ there is none. So a value stands once, and that of a sensor with the stamps of t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import IO, Any, Protocol
@@ -16,7 +16,7 @@ import numpy as np
 from ..deviation.estimate_row import MODES, VARIANCES
 from ..errors import UsageError
 from ..twin.blocks import CODES, Integers, SampleBlock
-from ..types import NANO, SENSORS, Array, Stream, channels_of
+from ..types import NANO, SENSORS, USUAL_STREAMS, Array, Stream, channels_of
 from .recording import Stretch
 
 DELAY = 2.0
@@ -43,23 +43,23 @@ def predicted_columns(joints: int) -> list[str]:
     ]
 
 
-def columns_of(joints: int) -> list[str]:
+def columns_of(joints: int, streams: Collection[Stream] = USUAL_STREAMS) -> list[str]:
     """Return the names of all columns: predicted, measured, residuals, modes, estimated, deviations of the estimate."""
     return [
         *predicted_columns(joints),
-        *chain.from_iterable(_channel_columns(joints, "measured").values()),
-        *chain.from_iterable(_channel_columns(joints, "residual").values()),
+        *chain.from_iterable(_channel_columns(joints, streams, "measured").values()),
+        *chain.from_iterable(_channel_columns(joints, streams, "residual").values()),
         *MODAL,
         *(f"estimate_{name}" for name in ESTIMATED),
         *(f"estimate_sigma_{name}" for name in ESTIMATED),
     ]
 
 
-def _channel_columns(joints: int, kind: str) -> dict[Stream, list[str]]:
+def _channel_columns(joints: int, streams: Collection[Stream], kind: str) -> dict[Stream, list[str]]:
     """Return the names of the columns of every stream's channels."""
     return {
         stream: [f"{kind}_{name}_{SENSORS[stream].unit_suffix}" for name in names]
-        for stream, names in channels_of(joints).items()
+        for stream, names in channels_of(joints, streams).items()
     }
 
 
@@ -143,15 +143,14 @@ def check_kind(kind: str | None) -> None:
         _arrow()
 
 
-def table_file(path: Path, joints: int) -> TableFile:
-    """Return the file of a table, by the end of its name ``.csv`` or ``.parquet``, of a boom with so many joints.
+def table_file(path: Path, columns: Sequence[str]) -> TableFile:
+    """Return the file of a table with these columns, by the end of its name ``.csv`` or ``.parquet``.
 
     Raises
     ------
     UsageError
         A package that is needed is not there.
     """
-    columns = columns_of(joints)
     return CsvFile(path, columns) if path.suffix == ".csv" else ParquetFile(path, columns)
 
 
@@ -160,19 +159,24 @@ class SampleTable:
 
     Parameters
     ----------
-    file : TableFile
-        Where its rows go.
+    open_file : callable
+        Is given the names of the columns, and returns the file that the rows go to.
     joints : int
         Of the boom.
+    streams : collection of Stream
+        Of its sensors.
     """
 
-    def __init__(self, file: TableFile, joints: int) -> None:
-        columns, self._file = columns_of(joints), file
+    def __init__(
+        self, open_file: Callable[[Sequence[str]], TableFile], joints: int, streams: Collection[Stream] = USUAL_STREAMS
+    ) -> None:
+        columns = columns_of(joints, streams)
+        self._file = open_file(columns)
         self._measured, self._residuals = (
-            {CODES[stream]: columns.index(names[0]) for stream, names in found.items()}
-            for found in (_channel_columns(joints, "measured"), _channel_columns(joints, "residual"))
+            {CODES[stream]: columns.index(names[0]) for stream, names in found.items() if names}
+            for found in (_channel_columns(joints, streams, kind) for kind in ("measured", "residual"))
         )
-        self._widths = {CODES[stream]: len(names) for stream, names in channels_of(joints).items()}
+        self._widths = {CODES[stream]: len(names) for stream, names in channels_of(joints, streams).items()}
         self._stamps: Integers = np.zeros(0, np.int64)  # of the rows that wait, ascending
         self._rows: Array = np.zeros((0, len(columns)))
         self._before = NEVER  # stamp of the row before them

@@ -66,7 +66,7 @@ class SensorZeros:
 
 
 FEWEST_RESIDUALS = 5  # readings that make a mean
-WHOLE = {kind.stem: kind.channels(0) for kind in SENSORS.values() if kind.ends}
+WHOLE = {kind.stem: kind.channels(0) for kind in SENSORS.values() if kind.ends and not (kind.beside or kind.gives)}
 """Sensors with a zero for each of their channels; all others have one for each joint."""
 
 

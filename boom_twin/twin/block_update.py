@@ -20,7 +20,7 @@ from ..kernels.jit import hold
 from ..kernels.result_row import PIN
 from ..predictions import Outline
 from ..scene.schema import Scene
-from ..types import GIVE, NANO, SECOND, SENSORS, Array, Health, Report, Residuals, Stream, StrokeReading, channels_of
+from ..types import GIVE, NANO, SECOND, SENSORS, Array, Health, Report, Residuals, Stream, StrokeReading
 from .blocks import CODES, STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
 from .load_shedding import LoadShedding
 from .regular import NOISE_REACH
@@ -36,7 +36,7 @@ SWAY = 0.5  # rad, by which an inclinometer that drives the model may be off its
 
 def limits_of(scene: Scene, boom: BoomPredictor, settings: Settings, absent: Collection[str], reads: StrokeReading) -> Limits:
     """Return the limits of the compiled update for `boom`, that of `scene` with its load, and for its sensors."""
-    channels = list(channels_of(boom.plan.joints).values())
+    channels = list(boom.channels.values())
     counts = np.array([len(names) for names in channels])
     far = NOISE_REACH * settings.variance(SENSORS[reads.stream]) ** 0.5
     low, high = np.zeros(boom.plan.joints), np.array([joint.cylinder.max_stroke for joint in scene.joints])

@@ -20,7 +20,7 @@ from ..errors import BoomTwinError
 from ..health.monitor import HealthMonitor
 from ..scene.edit import loaded
 from ..scene.schema import Scene
-from ..types import Mount, StrokeReading
+from ..types import Mount, Place, StrokeReading
 from .block_update import limits_of
 from .state import Limits
 
@@ -48,11 +48,12 @@ def loaded_model(
     health: bool,
     reads: StrokeReading,
     absent: Collection[str],
+    places: Mapping[str, Place],
 ) -> LoadedModel:
     """Return the model of `scene` under the load of `settings`; for the parameters see `boom_twin.Twin`."""
     scene = loaded(scene, *settings.load)
-    boom = BoomPredictor(scene, settings, mounts, reads)
-    judge = HealthMonitor(scene, settings, tuple(mounts), absent, reads) if health else None
+    boom = BoomPredictor(scene, settings, mounts, reads, places)
+    judge = HealthMonitor(scene, settings, tuple(mounts), absent, boom.channels, reads, places) if health else None
     _ = boom.held  # made here, where no sample waits for it
     return LoadedModel(scene, limits_of(scene, boom, settings, absent, reads), boom, judge)
 

@@ -37,7 +37,8 @@ def samples_of(readings: Mapping[str, Any], stamp_ns: int | None, joints: int) -
     """
     if stamp_ns is None:
         raise UsageError("stamp_ns is not given. Give the time of the readings in ns: stamp_ns=time.time_ns().")
-    channels, streams = channels_of(joints), {stream.value: stream for stream in Stream}
+    channels = channels_of(joints)
+    streams = {stream.value: stream for stream, names in channels.items() if names}
     found: dict[Stream, Array] = {}
     for name, value in readings.items():
         if (stream := streams.get(name)) is not None:

@@ -33,7 +33,7 @@ class SampleCheck:
     def __init__(self, channels: Mapping[Stream, tuple[str, ...]], drive: Stream) -> None:
         self._drive = drive
         self._shapes = {stream: (len(names),) for stream, names in channels.items()}
-        self._names = {stream: f"{names[0]}..{names[-1]}" for stream, names in channels.items()}
+        self._names = {stream: f"{names[0]}..{names[-1]}" for stream, names in channels.items() if names}
         self._count, self._low, self._high = 0, LARGEST_STAMP, -LARGEST_STAMP
         self.is_sure = False
 
@@ -97,6 +97,8 @@ class SampleCheck:
                 raise TypeError
             return values.astype(float)
         except (TypeError, ValueError):
+            if not count:
+                raise UsageError(f"{stream.value}: this boom has no such sensor. Give its place in a mapping.") from None
             wanted = f"{count} numbers, {self._names[stream]} of this boom, NaN where there is none"
             raise UsageError(f"values of {stream.value} are {repr_of(given)}. Give {wanted}.") from None
 

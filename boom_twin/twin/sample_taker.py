@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,7 +16,22 @@ from ..health.causes import Hypothesis
 from ..health.fault_twins import FaultTwins, Follower
 from ..kernels.tables import SENTENCES
 from ..scene.load import SceneSource, as_scene
-from ..types import LIMIT, NANO, SECOND, Array, Change, Mount, Report, Sample, Stream, StrokeReading, channels_of
+from ..types import (
+    LIMIT,
+    NANO,
+    NO_PLACES,
+    SECOND,
+    Array,
+    Change,
+    Mount,
+    Place,
+    Report,
+    Sample,
+    Stream,
+    StrokeReading,
+    channels_of,
+    streams_of,
+)
 from .adjustments import Requests, ResidualBuffer, SensorZeros
 from .block_update import BlockUpdate, limits_of
 from .blocks import CODES, SampleBlock
@@ -45,6 +60,7 @@ class SampleTaker:
         doubted: Collection[str] = (),
         causes: bool = False,
         is_live: bool = False,
+        places: Mapping[str, Place] = NO_PLACES,
     ) -> None:
         self.reads, self.absent, scene = reads, frozenset(absent), as_scene(scene)
         self._drive = reads.stream
@@ -52,7 +68,9 @@ class SampleTaker:
         self.counts: Counter[str] = Counter()
         self.shedding = LoadShedding()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
-        self._channels = channels_of(len(scene.joints))
+        self.places = dict(places)
+        self._channels = channels_of(len(scene.joints), streams_of(self.places))
+        self.absent |= {name for name in self._channels[Stream.MOMENTS] if name not in self.places}
         self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
         self._widths = [len(names) for names in self._channels.values()]
         self._edge = SampleCheck(self._channels, self._drive)
@@ -83,7 +101,7 @@ class SampleTaker:
 
         def make(each: Hypothesis) -> Follower:
             boom = each.scene, settings.tuned(each.load(*settings.load)), self.mounts
-            twin: Follower = kind(*boom, reads=self.reads, absent=self.absent, doubted=each.doubted)
+            twin: Follower = kind(*boom, reads=self.reads, absent=self.absent, doubted=each.doubted, places=self.places)
             return twin
 
         return make
@@ -108,7 +126,7 @@ class SampleTaker:
 
     def _model(self, settings: Settings) -> LoadedModel:
         self._former: BlockUpdate | None = None
-        return loaded_model(self.scene, settings, self.mounts, self._health, self.reads, self.absent)
+        return loaded_model(self.scene, settings, self.mounts, self._health, self.reads, self.absent, self.places)
 
     def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
         """Use this model, which has the present load, in place of that of `before`."""

@@ -45,6 +45,8 @@ class Twin(SampleTaker):
         With `health`, causes of faults are named, see `boom_twin.health.fault_twins`.
     is_live : bool
         True if no sample may wait for the name of a cause.
+    places : mapping of str to Place, optional
+        Of sensors that have one, such as ``imu_2``. The tip IMU is at the tip if it is not among them.
 
     Attributes
     ----------
@@ -155,7 +157,7 @@ class Twin(SampleTaker):
 
     def warm_up(self) -> None:
         """Compile every kernel, with a temporary twin of the same boom."""
-        other = Twin(self.scene, self.settings, reads=self.reads)
+        other = Twin(self.scene, self.settings, reads=self.reads, places=self.places)
         drive, beside = (self._drive, Stream.IMU) if self.reads is StrokeReading.ANGLE else (Stream.STROKES, Stream.ANGLES)
         middle = np.radians([sum(joint.range_deg) / 2 for joint in self.scene.joints])
         driving = middle if self.reads is StrokeReading.ANGLE else strokes_of_angles(self.scene, middle)

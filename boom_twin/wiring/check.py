@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..scene.schema import Scene
-from ..types import SENSORS, Stream, StrokeReading, channels_of
+from ..types import NO_PLACES, SENSORS, Place, Stream, StrokeReading, channels_of
 from .expected import Expected, RestModel
 from .hypotheses import (
     ANY_ZERO,
@@ -90,6 +90,11 @@ class Checked(NamedTuple):
     expected: Expected
     tables: Mapping[Stream, Table]
 
+    @property
+    def has_strokes_alone(self) -> bool:
+        """Return True if no other sensor was read. Strokes swapped or shifted within the travels are then not found."""
+        return set(self.tables) == {Stream.STROKES}
+
 
 class _Part(NamedTuple):
     """Best ways to read one stream under an explanation.
@@ -113,7 +118,14 @@ class _Explanation:
     cost: float
 
 
-def check(scene: Scene, reads: StrokeReading, declared: Declared, window: Window, is_quick: bool = False) -> Checked | None:
+def check(
+    scene: Scene,
+    reads: StrokeReading,
+    declared: Declared,
+    window: Window,
+    is_quick: bool = False,
+    places: Mapping[str, Place] = NO_PLACES,
+) -> Checked | None:
     """Check the declaration of a rig's sensors against readings.
 
     Parameters
@@ -128,6 +140,8 @@ def check(scene: Scene, reads: StrokeReading, declared: Declared, window: Window
         Readings by name (IMU: by axis). Strokes are required.
     is_quick : bool
         Flag channels not read as declared, without a correction.
+    places : mapping of str to Place
+        See `boom_twin.Twin`.
 
     Returns
     -------
@@ -139,7 +153,8 @@ def check(scene: Scene, reads: StrokeReading, declared: Declared, window: Window
     if strokes is None or not len(strokes.values) or len(strokes.names) < len(scene.joints):
         return None
     moved = bool((np.ptp(strokes.values, axis=0) > MOVED * np.abs(strokes.values).max()).any())
-    checker = _Checker(scene, reads, declared, tables, MOVED_WEIGHT if moved else STILL_WEIGHT, is_quick)
+    model, weight = RestModel(scene, reads, places), MOVED_WEIGHT if moved else STILL_WEIGHT
+    checker = _Checker(model, declared, tables, weight, is_quick)
     return Checked(checker.verdicts(), moved, checker.found[0].expected, tables) if checker.found else None
 
 
@@ -147,17 +162,10 @@ class _Checker:
     """Comparison of explanations."""
 
     def __init__(
-        self,
-        scene: Scene,
-        reads: StrokeReading,
-        declared: Declared,
-        tables: Mapping[Stream, Table],
-        weight: float,
-        is_quick: bool,
+        self, model: RestModel, declared: Declared, tables: Mapping[Stream, Table], weight: float, is_quick: bool
     ) -> None:
-        self._scene, self._declared, self._tables, self._weight = scene, declared, tables, weight
+        self._model, self._scene, self._declared, self._tables, self._weight = model, model.scene, declared, tables, weight
         self._limit = weight * (MOST - WRONG) + ANY_ZERO  # nats, largest cost of explained readings
-        self._model = RestModel(scene, reads)
         self._is_quick = is_quick
         usual, cost = tuple(declared[Stream.STROKES]), self._declared_cost()
         self.found = [] if cost is None else [self._explained(usual, cost)]
@@ -228,9 +236,10 @@ class _Checker:
             parts[Stream.FORCES] = self._part(
                 Stream.FORCES, expected, lambda: force_cube(forces, of_forces, expected, self._weight)
             )
-        imu, axes = self._tables.get(Stream.IMU), self._declared[Stream.IMU]
-        if imu is not None and axes and all(each.name in imu.names for each in axes):
-            parts[Stream.IMU] = self._gravity_part(gravity_hypotheses(imu, axes, expected, self._weight))
+        for stream, gravity in expected.gravity.items():
+            imu, axes = self._tables.get(stream), self._declared[stream]
+            if imu is not None and axes and all(each.name in imu.names for each in axes):
+                parts[stream] = self._gravity_part(gravity_hypotheses(imu, axes, gravity, self._weight))
         return _Explanation(strokes, expected, parts, prior + sum(part.cost for part in parts.values()))
 
     def _part(self, stream: Stream, expected: Expected, cube_of: Callable[[], Cube]) -> _Part:

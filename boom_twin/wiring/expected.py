@@ -1,7 +1,8 @@
-"""Expected readings at rest: angles, forces and gravity at the tip for measured strokes."""
+"""Expected readings at rest: angles, forces and gravity at the IMUs for measured strokes."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -10,12 +11,15 @@ from ..analysis.cylinder_drives import drives_as_read
 from ..analysis.equilibrium import settle
 from ..compiler.compile import compile_scene
 from ..compiler.plan import first_row, taken_apart
+from ..config.settings import Settings
+from ..deviation.channels import READS_ACCELERATION, measurement_of
+from ..deviation.posture import locate
 from ..deviation.sensor_model import mounting_of
 from ..errors import BoomTwinError
 from ..scene.edit import with_rigid_cylinders
 from ..scene.kinematics import gravity_in_base, joint_angles_of_strokes, stroke_curve
 from ..scene.schema import Scene
-from ..types import Array, Mount, StrokeReading
+from ..types import NO_PLACES, Array, Mount, Place, Stream, StrokeReading
 
 
 class Expected(NamedTuple):
@@ -27,15 +31,15 @@ class Expected(NamedTuple):
         Encoders (key None), and inclinometers at the root and at the head of each section, rad.
     forces : ndarray, shape (blocks, n)
         N.
-    gravity : ndarray of complex, shape (blocks,)
-        Specific force at the tip at rest, along the last head (real) and across it (imaginary), m/s^2.
+    gravity : dict of Stream to ndarray of complex, shape (blocks,)
+        Specific force at rest at every IMU, along its section (real) and across it (imaginary), m/s^2.
     compression : ndarray, shape (blocks, n)
         Rotation of each joint if the strokes are drives instead of lengths, rad. 0 without a posture.
     """
 
     angles: dict[Mount | None, Array]
     forces: Array
-    gravity: Array
+    gravity: dict[Stream, Array]
     compression: Array
 
 
@@ -48,9 +52,11 @@ class RestModel:
         Scene with load.
     reads : StrokeReading
         Quantity of the stroke readings.
+    places : mapping of str to Place
+        See `boom_twin.Twin`.
     """
 
-    def __init__(self, scene: Scene, reads: StrokeReading) -> None:
+    def __init__(self, scene: Scene, reads: StrokeReading, places: Mapping[str, Place] = NO_PLACES) -> None:
         self.scene = scene
         self._boom, self._struts = compile_scene(scene), compile_scene(with_rigid_cylinders(scene))
         self._plan = self._struts if reads is StrokeReading.LENGTH else self._boom
@@ -58,12 +64,16 @@ class RestModel:
         joints = self._plan.joints
         kinds: tuple[Mount, ...] = "root", "head"
         self._frames = {kind: mounting_of(self._plan, [kind] * joints).frames for kind in kinds}
+        self._measured = measurement_of(self._plan, Settings(), mounting_of(self._plan, ()), places)
+        streams, channels = tuple(Stream), self._measured.channels
+        self._imus = {streams[row.stream]: int(row.site) for row in channels[channels.kind == READS_ACCELERATION]}
 
     def expected(self, strokes: Array) -> Expected:
         """Return the expected readings for strokes (blocks, n), m."""
         blocks, n = strokes.shape
         angles: dict[Mount | None, Array] = {kind: np.full((blocks, n), np.nan) for kind in (None, "root", "head")}
-        forces, gravity, compression = np.full((blocks, n), np.nan), np.full(blocks, np.nan, complex), np.zeros((blocks, n))
+        gravity = {stream: np.full(blocks, np.nan, complex) for stream in self._imus}
+        forces, compression = np.full((blocks, n), np.nan), np.zeros((blocks, n))
         inclination = self.scene.base.inclination
         up = -complex(*gravity_in_base(self.scene))
         for row, values in enumerate(strokes):
@@ -76,7 +86,9 @@ class RestModel:
             angles[None][row], forces[row] = found.joints, found.cylinder_forces
             for kind, places in self._frames.items():
                 angles[kind][row] = frames[places, 2] + inclination
-            gravity[row] = up * np.exp(-1j * frames[-1, 2])
+            for stream, site in self._imus.items():
+                _, _, angle = locate(self._plan.tables, self._state, self._measured, site)
+                gravity[stream][row] = up * np.exp(-1j * angle)
             compression[row] = self._compression(values, near, found.cylinder_forces)
         return Expected(angles, forces, gravity, compression)
 

@@ -241,12 +241,12 @@ class GravityHypothesis(NamedTuple):
     has_no_gravity: bool = False
 
 
-def gravity_hypotheses(table: Table, declared: Sequence[Channel], expected: Expected, weight: float) -> list[GravityHypothesis]:
-    """Return all ways to read an IMU, the declared one first."""
+def gravity_hypotheses(table: Table, declared: Sequence[Channel], gravity: Array, weight: float) -> list[GravityHypothesis]:
+    """Return all ways to read an IMU if `gravity` (blocks,) is expected, the declared one first."""
     units = SENSORS[Stream.IMU].units
     places = {name: a for a, name in enumerate(table.names)}
     is_read = np.isfinite(table.values[:, [places[each.name] for each in declared]]).all(axis=1)
-    right, found = expected.gravity[is_read], list[GravityHypothesis]()
+    right, found = gravity[is_read], list[GravityHypothesis]()
     for x in table.names:
         for z in table.names:
             if x == z:

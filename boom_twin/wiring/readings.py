@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..types import Array, Mount, Stream
+from ..types import SENSORS, Array, Mount, Stream
 
 BLOCK = 100_000_000  # ns, averaging time of readings
 MEAN = 10  # blocks on each side in the mean of forces and accelerations, which removes vibration
@@ -26,6 +26,11 @@ class Channel(NamedTuple):
     scale: float = 1.0
     absolute: Mount | None = None
     turned: float = 0.0
+
+
+def is_checked(stream: Stream) -> bool:
+    """Return True if a commissioning check covers the stream."""
+    return stream in (Stream.STROKES, Stream.ANGLES, Stream.FORCES) or SENSORS[stream].is_accelerometer
 
 
 class Series(NamedTuple):
@@ -64,10 +69,10 @@ def tables_of(window: Window) -> dict[Stream, Table]:
     for numbers, _ in strokes[1:]:
         common = np.intersect1d(common, numbers)
     chosen = _chosen(common, [means[np.searchsorted(numbers, common)] for numbers, means in strokes])
-    reach = {Stream.IMU: MEAN, Stream.FORCES: MEAN}
     found = {}
     for stream, by_name in window.items():
-        columns = [_at(chosen, *_means(series), reach.get(stream, 0)) for series in by_name.values()]
+        reach = MEAN if stream is Stream.FORCES or SENSORS[stream].is_accelerometer else 0
+        columns = [_at(chosen, *_means(series), reach) for series in by_name.values()]
         values, spreads = np.moveaxis(np.array(columns).reshape(len(columns), 2, len(chosen)), 0, 2)
         there = np.flatnonzero(np.isfinite(values).any(axis=0))
         names = list(by_name)

@@ -43,7 +43,11 @@ def write(tmp_path: Path) -> Any:
 def test_what_is_left_out_is_as_usual(write: Any) -> None:
     topics, usual = load_mapping(write(EXAMPLE), 3), load_topics()
     shared = [Stream.STROKES, Stream.ANGLES]
-    assert topics.heard == {"/rig/joint_states": shared, "tip_imu": [Stream.IMU], "cylinder_forces": [Stream.FORCES]}
+    assert topics.heard == {
+        "/rig/joint_states": shared,
+        "tip_imu": [Stream.IMU, Stream.RATE],
+        "cylinder_forces": [Stream.FORCES],
+    }
     assert topics.is_shared and topics.outputs == usual.outputs
     assert topics.inputs[Stream.STROKES].qos.depth == usual.inputs[Stream.STROKES].qos.depth
     assert [sensor.name for sensor in topics.sensors_of(Stream.ANGLES, 3).values()] == ["slew_pitch", "incl_2", "joint_3"]

@@ -6,6 +6,7 @@ import csv
 import json
 import sqlite3
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -103,7 +104,7 @@ def moving(folder: Path) -> Path:
 
 def table_of(session: Path, out: Path) -> bytes:
     with result_folder(out, REPLAY, [session]) as building:
-        table = SampleTable(table_file(building.folder / "samples.csv", 4), 4)
+        table = SampleTable(partial(table_file, building.folder / "samples.csv"), 4)
         replay_into(building, session, load_scene(), options=ReplayOptions(health=False), take=table.add)
         table.finish()
     return (out / "samples.csv").read_bytes()

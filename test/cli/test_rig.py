@@ -124,7 +124,7 @@ def test_only_the_sensors_that_are_asked_for(scene: Path, tmp_path: Path) -> Non
     [
         (["--load", "pump:9:130"], "load pump:9:130:0.1: frequency = 9, must be from 0.05 to 2 Hz. Write pump:"),
         (["--load", "wind:15@3"], "load wind:15:5@3: begins at 3 s, must be before the end at 3 s."),
-        (["--sensors", "angles,gps"], "--sensors angles,gps: 'gps' is no sensor. Give some of angles, imu, forces."),
+        (["--sensors", "angles,gps"], "--sensors angles,gps: 'gps' is no sensor. Give some of angles, imu, gyro, forces."),
         (["--fault", "cylinder_force_1.sensor:stuck"], "forces are not recorded. Give --sensors angles,forces,imu."),
         (["--fault", "joint_2.sensor:stuck"], "the boom has joints, cylinders and sections 1 to 1."),
         (["--rate", "20"], "rate = 20, must be from 50 to 1000 Hz"),
@@ -168,3 +168,36 @@ def test_no_recording_is_written_over(scene: Path, tmp_path: Path, capsys: pytes
     )
     assert notes.read_text() == "t_s,stroke_1_m\n0,0.5\n"
     assert scene.read_bytes() == before and [path.name for path in tmp_path.iterdir()] == ["bag"]
+
+
+def test_further_sensors_are_recorded_with_the_mapping_that_places_them(scene: Path) -> None:
+    more = ["--imu", "1:1.5:0.5236", "--point", "1:3.0", "--pressures", "0.12:0.07", "--sensors", "angles,imu,gyro"]
+    bag = made(scene, scene.with_name("placed"), *more)
+    out = replayed_folder(scene, bag)
+    rows = [message for _, _, message in read(scan(out / "bag"), {"/boom_twin/residuals": "sensor_msgs/msg/JointState"})]
+    groups: dict[tuple[str, ...], list[Any]] = {}
+    for message in rows:
+        groups.setdefault(tuple(message.name), []).append(message.velocity)
+    wanted = {("tip_imu_rate",): 600, ("imu_2_x", "imu_2_z"): 600, ("imu_2_rate",): 600, ("points_x", "points_z"): 3}
+    assert {names: len(groups[names]) for names in wanted} == wanted
+    assert len(groups["cylinder_force_1",]) == 600, "by pressures"
+    for names, ratios in groups.items():
+        assert np.sqrt(np.nanmean(np.square(ratios))) < 2.5, names
+    assert summary_of(bag)["alarms"] == []
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--imu", "2:1.0"], "the boom has sections 1 to 1"),
+        (["--imu", "1:4"], "section 1 reaches from 0 to 3 m"),
+        (["--moment", "1:1.0"], "section 1 is rigid; strain is read on a beam only"),
+        (["--pressures"], "not every cylinder of the scene has `oil"),
+        (["--pressures", "0.1:0.07", "--sensors", "forces"], "a cylinder has one force"),
+    ],
+)
+def test_places_and_cylinders_that_cannot_be_are_told(
+    scene: Path, options: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["rig", str(scene), "--out", str(scene.with_name("never")), "--random", "up", *options]) == 1
+    assert told in capsys.readouterr().err

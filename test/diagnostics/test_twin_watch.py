@@ -20,10 +20,10 @@ from boom_twin.diagnostics.sensor_status import sensors_of
 from boom_twin.diagnostics.topic_status import Peers
 from boom_twin.diagnostics.twin_status import TwinWatch, all_pieces
 from boom_twin.twin.blocks import estimate_of
-from boom_twin.types import Residuals
+from boom_twin.types import USUAL_STREAMS, Residuals
 
-NAMES = {stream: stream.value for stream in Stream}
-REQUIRED = {stream: stream in (Stream.STROKES, Stream.ANGLES) for stream in Stream}
+NAMES = {stream: stream.value for stream in USUAL_STREAMS}
+REQUIRED = {stream: stream in (Stream.STROKES, Stream.ANGLES) for stream in USUAL_STREAMS}
 JOINTS = ("joint_1", "joint_2", "joint_3", "joint_4")
 
 
@@ -35,7 +35,7 @@ class Rig:
         sensors = sensors_of(load_scene(), Settings(), REQUIRED, [None] * 4)
         self.watch = TwinWatch(sensors, NAMES, Thresholds(), lambda: self.now)
         self.middle = {stream: np.array([0.5 * (s.low + s.high) for s in each]) for stream, each in sensors.items()}
-        self.peers = {stream: Peers(f"/{stream.value}", ("/driver",)) for stream in Stream}
+        self.peers = {stream: Peers(f"/{stream.value}", ("/driver",)) for stream in USUAL_STREAMS}
         self.behind = dict.fromkeys(Stream, 0.0)
         self.scale, self.took, self.failing, self.swing = 1.0, 1e-4, False, 0.0
 
@@ -88,7 +88,12 @@ def test_a_healthy_rig(rig: Rig) -> None:
     assert sick == {}
     names = ["model", *NAMES.values(), "outputs", "swing"]
     names += [f"sensor {kind}_{i}" for kind in ("cylinder", "joint") for i in (1, 2, 3, 4)]
-    names += ["sensor tip_imu_x", "sensor tip_imu_z", *(f"sensor cylinder_force_{i}" for i in (1, 2, 3, 4))]
+    names += [
+        "sensor tip_imu_x",
+        "sensor tip_imu_z",
+        *(f"sensor cylinder_force_{i}" for i in (1, 2, 3, 4)),
+        "sensor tip_imu_rate",
+    ]
     names += [*(f"residual {name}" for name in JOINTS)]
     assert list(found) == names
     assert found["tip_imu"].message == "not there; optional"

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from boom_twin import Sample, Stream
+from boom_twin import Sample, Stream, Twin, load_scene
+from boom_twin.types import Place
 
 from .recorded import Outcome, run, session
 
@@ -58,3 +59,18 @@ def test_a_sound_session_and_an_offset_are_no_wiring() -> None:
     offset = rewired(Stream.ANGLES, lambda v: v + np.array([0.0, 0.04, 0.0, 0.0]), 12.0)
     assert not run(session(12.0)).told()
     assert {alarm.kind for _, alarm in run(offset).states()} == {"deviation"}
+
+
+def test_an_imu_elsewhere_is_checked_at_its_place() -> None:
+    """The readings of the tip IMU, as those of another one at the tip; it is turned, by the mapping or against it."""
+    turn = np.exp(-0.52j)
+    samples = [
+        replace(each, stream=Stream.IMU_2, values=np.array([read.real, read.imag]))
+        if each.stream is Stream.IMU and (read := complex(*each.values) * turn)
+        else each
+        for each in session(8.0)
+    ]
+    for turned, wrong in ((0.52, set()), (0.0, {("imu_2", "wiring")})):
+        twin = Twin(load_scene(), health=True, places={"imu_2": Place(turned=turned)})
+        found = run(samples, twin=twin)
+        assert {(alarm.channel, alarm.kind) for time, alarm in found.states() if time > 4.0} == wrong

@@ -16,7 +16,7 @@ from loggers.logger_files import SESSION, readings, three_german_files
 from recordings import read, scan
 from ruamel.yaml import YAML
 
-from boom_twin import Sample, Stream, replay
+from boom_twin import Sample, Stream, load_scene, replay, statics
 from boom_twin.bag.session_files import write_samples
 from boom_twin.bag.session_sheet import kept
 from boom_twin.loggers.column_file import load_columns
@@ -171,6 +171,30 @@ def test_files_of_many_programs_are_read_without_options(tmp_path: Path, style: 
     for row, (_, values) in enumerate(found):
         expected = {f"cylinder_{i + 1}": 1e-3 * (value + row) for i, value in enumerate(STROKES)}
         assert values == pytest.approx(expected, abs=1e-8)
+
+
+def test_a_table_of_simulate_is_imported_by_its_lengths_and_strokes_alone_are_not_called_right(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The table has drives and lengths; strokes within their travels were told to be as declared, whatever their order."""
+    rest, motion = statics(load_scene(), "arch"), tmp_path / "motion.csv"
+    drive = [f"{0.05 * row:g}," + ",".join(f"{stroke:.6f}" for stroke in rest.strokes) for row in range(60)]
+    (tmp_path / "drive.csv").write_text("\n".join(["t_s," + ",".join(f"stroke_{i}_m" for i in range(1, 5)), *drive, ""]))
+    assert main(["simulate", "--drive", str(tmp_path / "drive.csv"), "--out", str(motion), "--no-error-estimate"]) == 0
+    capsys.readouterr()
+    assert main(["import", str(motion), "--out", str(tmp_path / "session"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [column for column in told["columns"] if "joint" not in column and "force" not in column] == [
+        f"length_{i}_m" for i in range(1, 5)
+    ]
+    lengths = dict(zip(told["columns"], told["first_values"], strict=True))
+    assert [lengths[f"length_{i}_m"] for i in range(1, 5)] == pytest.approx(rest.lengths, abs=1e-5)
+    assert main(["import", str(tmp_path / "drive.csv"), "--out", str(tmp_path / "alone")]) == 0
+    capsys.readouterr()
+    assert main(["mapping", "--check", str(tmp_path / "alone")]) == main(["info", str(tmp_path / "alone")]) == 0
+    told = capsys.readouterr().out
+    assert "cylinder_1  cylinder_1, m  within the travel" in told and "as declared\n" not in told
+    assert told.count("swapped or shifted ones show only beside angles, forces or an IMU") == 2
 
 
 def test_signals_of_a_bus_come_row_by_row_and_are_one_sample_a_cycle(tmp_path: Path) -> None:

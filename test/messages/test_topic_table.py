@@ -14,6 +14,7 @@ def test_defaults_are_those_of_the_interface() -> None:
         Stream.ANGLES: "joint_angles",
         Stream.IMU: "tip_imu",
         Stream.FORCES: "cylinder_forces",
+        Stream.PRESSURES: "cylinder_pressures",
     }
     assert {role: topic.absolute for role, topic in topics.outputs.items()} == {
         Output.TIP_DISPLACEMENT: "/boom_twin/tip/displacement",
@@ -33,6 +34,6 @@ def test_defaults_are_those_of_the_interface() -> None:
         Output.DIAGNOSTICS: "/diagnostics",
     }
     assert topics.inputs[Stream.IMU].absolute == "/tip_imu"
-    assert [topic.required for topic in topics.inputs.values()] == [True, True, False, False]
+    assert [topic.required for topic in topics.inputs.values()] == [True, True, False, False, False]
     assert {topic.qos.reliability for topic in topics.inputs.values()} == {"best_effort"}
     assert not topics.sensors and topics.mounts(3) == [None] * 3 and not topics.is_shared

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -125,3 +126,16 @@ def test_check_states_the_accuracy_beside_angles(capsys):
     assert '"accuracy_arch:angles only"' in found and '"accuracy_arch:imu"' in found
     assert main(["check", "--drive", "angles", "--sensors", "angles"]) == 1
     assert "they drive the model" in capsys.readouterr().err
+
+
+def test_an_imu_elsewhere_goes_with_angles(tmp_path):
+    """The readings of the tip IMU, as those of another one that the mapping places there."""
+    folder, mapping = tmp_path / "session", tmp_path / "mapping.yaml"
+    samples = samples_of(BAGS / "pump_session", [Stream.ANGLES, Stream.IMU])
+    placed = [replace(each, stream=Stream.IMU_2) if each.stream is Stream.IMU else each for each in samples]
+    write_samples(folder, placed, [Stream.ANGLES, Stream.IMU_2], {"origin": "synthetic"})
+    shutil.copy(BAGS / "pump_session" / "truth.csv.gz", folder)
+    mapping.write_text("drive: angles\ninputs: {imu_2: {place: {}}}\n")
+    found = replay(folder, None, tmp_path / "out", mapping=mapping)
+    assert found.summary["tip_estimate_acceleration_error_rms_m_s2"] < 0.1 and found.summary["alarms"] == []
+    assert np.nanstd(found.recording.of(Stream.IMU_2).values) > 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gzip
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +48,7 @@ def table(folder: Path, stretch: int, monkeypatch: pytest.MonkeyPatch) -> tuple[
     """The table of `samples` in stretches of so many predictions, and a recording of the whole."""
     monkeypatch.setattr(recording, "STRETCH", stretch)
     path = folder / "samples.csv"
-    made, found = SampleTable(table_file(path, 4), 4), Recording(4)
+    made, found = SampleTable(partial(table_file, path), 4), Recording(4)
     stretches: list[Stretch] = []
 
     def take(each: Stretch) -> None:

@@ -131,6 +131,26 @@ def test_a_late_stream_and_its_delay(rows: Rows, tmp_path: Path, capsys: pytest.
     assert yaml.safe_load(out.read_text()) == {"inputs": {"joint_angles": {"delay": pytest.approx(0.06, abs=0.003)}}}
 
 
+@pytest.mark.parametrize("stream", [Stream.IMU, Stream.IMU_2])
+def test_a_turned_imu_gets_the_turn_of_its_place(
+    stream: Stream, rows: Rows, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The readings are those of the tip IMU; its axes are turned by 0.52 rad."""
+    turned = (rows.imu @ np.array([1.0, 1.0j])) * np.exp(-0.52j)
+    readings, own, out = np.column_stack([turned.real, turned.imag]), tmp_path / "own.yaml", tmp_path / "mapping.yaml"
+    bag = written(rows._replace(imu=None), tmp_path / "bag", placed={stream: readings})
+    place = {"section": 4} if stream is Stream.IMU_2 else {}
+    own.write_text(yaml.safe_dump({"inputs": {stream.value: {"place": place}}}))
+    found = checked(capsys, bag, "--mapping", str(own), "--out", str(out))
+    assert {channel for channel, wrong in zip(found["channels"], found["wrong"], strict=True) if wrong} == {
+        f"{stream.value}_x",
+        f"{stream.value}_z",
+    }
+    right = place | {"turned": pytest.approx(0.52, abs=0.02)}
+    assert yaml.safe_load(out.read_text()) == {"inputs": {stream.value: {"place": right}}}
+    assert not any(checked(capsys, bag, "--mapping", str(out))["wrong"])
+
+
 def test_a_boom_at_rest_leaves_open_what_it_cannot_tell(rows: Rows, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     still = Rows(*(each[:100] for each in rows))
     bag = written(still._replace(joints=scaled(still.joints, 1, 1, -1, 1)), tmp_path / "bag")

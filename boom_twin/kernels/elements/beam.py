@@ -134,6 +134,31 @@ def beam_shape(row, part, sizes, z, turn, rho):
 
 
 @inner
+def point_on_axis(row, part_psi, z, psi, weights):
+    """Return place (m) and rotation (rad) of a point of a part in the frame of its input end.
+
+    Parameters
+    ----------
+    part_psi : ndarray, shape (P+1, n)
+        That of the part.
+    psi, weights : ndarray, shape (n,), (P,)
+        Rotation at the point by the coordinates; integral from the input end to it by the values at the Gauss points, m.
+    """
+    x, y, turn = 0.0, 0.0, 0.0
+    for j in range(row.points):
+        angle = 0.0
+        for k in range(row.bending):
+            angle += part_psi[j, k] * z[row.z + k]
+        c, s = cosine_and_sine(angle) if row.finite else (1.0, angle)
+        x += weights[j] * c
+        y += weights[j] * s
+    for k in range(row.bending):
+        turn += psi[k] * z[row.z + k]
+    stretch = 1.0 + z[row.z + row.bending] if row.axial else 1.0
+    return stretch * x, stretch * y, turn
+
+
+@inner
 def shape_derivatives(part, sizes, stretch):
     """Fill the part's `drho` from its `turn` and `rho`; only tangents need it."""
     psi, weights, rho, drho, turn, n = part.psi, part.weights, part.rho, part.drho, part.turn, sizes.bending

@@ -33,9 +33,19 @@ def integration_matrix(count: int) -> Array:
     Exact for polynomials of degree count - 1, the last row for 2 count - 1.
     """
     points, weights = gauss_points(count)
+    return np.vstack([integrals_to(count, points), weights])
+
+
+def integrals_to(count: int, places: Array) -> Array:
+    """Shape (places, count): integrals from 0 to each of the `places` in [0, 1] of a function known at the Gauss points."""
+    points, _ = gauss_points(count)
     values = legendre.legvander(2.0 * points - 1.0, count - 1)
-    integrals = np.stack([legendre.legval(2.0 * points - 1.0, _integral(k)) for k in range(count)], axis=1)
-    return np.vstack([np.linalg.solve(values.T, integrals.T).T, weights])
+    return np.asarray(np.linalg.solve(values.T, rotations_at(count, places).T).T)
+
+
+def rotations_at(n: int, places: Array) -> Array:
+    """Shape (places, n): psi of the default basis at the `places` in [0, 1]."""
+    return np.stack([legendre.legval(2.0 * places - 1.0, _integral(k)) for k in range(n)], axis=1)
 
 
 def _integral(degree: int) -> Array:
@@ -51,8 +61,7 @@ def end_shapes_and_bubbles(n: int, count: int) -> Basis:
     """
     points, _ = gauss_points(count)
     ends = np.append(points, 1.0)
-    psi = np.stack([legendre.legval(2.0 * ends - 1.0, _integral(k)) for k in range(n)], axis=1)
-    return Basis(np.asarray(psi, float), np.asarray(legendre.legvander(2.0 * points - 1.0, n - 1), float))
+    return Basis(rotations_at(n, ends), np.asarray(legendre.legvander(2.0 * points - 1.0, n - 1), float))
 
 
 CANTILEVER_ROOTS = (1.87510407, 4.69409113, 7.85475744, 10.99554073)

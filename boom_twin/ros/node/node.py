@@ -175,13 +175,15 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
         for oddity in found.oddities:
             self._log.warning(str(oddity))
         settings, joints = current(self, Settings), len(scene.joints)
-        topics = load_mapping(path_of(self, "mapping"), joints).of_joints(joint.range_deg for joint in scene.joints)
+        topics = load_mapping(path_of(self, "mapping"), joints).of_scene(scene.joints)
+        self._topics = self._topics.model_copy(update={"areas": topics.areas})
         health, causes = (self.get_parameter(key).value for key in ("health", "causes"))
         mounts, frame = topics.mounts(joints), frame_of(self, topics)
 
         def make() -> Twin:
             reads, absent = topics.stroke_reading, topics.absent
-            twin = Twin(scene, settings, mounts, health, reads, absent, causes=causes, is_live=True)
+            given = scene, topics.noise_of(settings), mounts, health, reads, absent
+            twin = Twin(*given, causes=causes, is_live=True, places=topics.places)
             twin.warm_up()
             import_module("scipy.special")  # the first alarm and the first pause need it; their samples would wait 0.3 s
             return twin
@@ -268,7 +270,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
             (stamp, msg), refused = decoder.read(data), self._decoder.refused
             samples = self._decoder.samples(streams, stamp, msg)
             for stream in streams if self._decoder.refused > refused else ():
-                self._diagnostics.watch.seen(stream, stamp - self._decoder.delays[stream])
+                self._diagnostics.watch.seen(Stream(SENSORS[stream].gives or stream), stamp - self._decoder.delays[stream])
             for sample in samples:
                 self._take(sample)
         except Exception as error:  # the last resort, such as a message that is not whole

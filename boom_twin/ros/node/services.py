@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 from ...errors import UsageError
 from ...twin.adjustments import WHOLE
 from ...twin.twin import Twin
-from ...types import SENSORS, Change, Report, Stream, StrokeReading
+from ...types import SENSORS, Change, Report, Stream, StrokeReading, streams_of
 from ..runtime import Log
 
 PAUSE = 1.0
@@ -57,9 +57,11 @@ class Services:
     ) -> None:
         self._node, self._twin, self._is_active, self._catch_up = node, twin, is_active, catch_up
         numbers = range(1, twin.plan.joints + 1)
-        driven = [SENSORS[Stream.STROKES], SENSORS[Stream.ANGLES]] if twin.reads is StrokeReading.ANGLE else []
-        single = [kind.stem for kind in SENSORS.values() if not kind.ends and kind not in driven]
-        sensors = [f"{stem}_{number}" for stem in single for number in numbers] + list(WHOLE)
+        driven = (Stream.STROKES, Stream.ANGLES) if twin.reads is StrokeReading.ANGLE else ()
+        there = [SENSORS[stream] for stream in streams_of(twin.places) if stream not in driven]
+        single = [kind.stem for kind in there if not kind.ends]
+        whole = [kind.stem for kind in there if kind.stem in WHOLE and not kind.beside]
+        sensors = [f"{stem}_{number}" for stem in single for number in numbers] + whole
         acts: dict[str, Callable[[], str]] = {"reset": self._reset, "acknowledge": acknowledge}
         acts |= {f"rezero/{sensor}": partial(self._rezero, sensor) for sensor in sensors}
         self._called: dict[str, float] = {}

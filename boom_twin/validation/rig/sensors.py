@@ -21,7 +21,7 @@ RATES = 50.0, 1000.0
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
-    """Sampling and noise: Hz, s, m, rad, m/s^2, N; a resolution of zero means no rounding.
+    """Sampling and noise: Hz, s, m, rad, m/s^2, rad/s, N, N m, Pa; a resolution of zero means no rounding.
 
     Standard deviations are those before rounding. Forces are as of load pins, or of pressures in both chambers: 100 N is a
     thousandth of what the largest cylinder of the default scene bears.
@@ -39,8 +39,12 @@ class Sensors:
     angle_sigma: float = math.radians(0.01)
     angle_resolution: float = math.radians(0.005)
     imu_sigma: float = 0.05
+    rate_sigma: float = 2e-3
     force_sigma: float = 100.0
     force_resolution: float = 20.0
+    moment_sigma: float = 50.0
+    point_sigma: float = 2e-3
+    pressure_sigma: float = 1e4
 
     def __post_init__(self) -> None:
         low, high = RATES

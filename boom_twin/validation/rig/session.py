@@ -6,8 +6,8 @@ Synthetic by construction: the scene's parameters are surrogates, and no hardwar
 from __future__ import annotations
 
 import gzip
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 
@@ -18,12 +18,15 @@ from scipy.interpolate import CubicSpline
 from ...scene.kinematics import gravity_in_base
 from ...scene.schema import Scene
 from ...system.atomic_files import write_atomic
-from ...types import SECOND, Array
-from .exudyn.solve import Change, Drive, TipLoad, simulate
+from ...types import NO_PLACES, SECOND, Array, Place, Stream
+from .exudyn.solve import SITE, Change, Drive, TipLoad, simulate
+from .exudyn.system import Site
 from .sensors import Sensors, read, sampling_stamps, specific_force
 
 EPOCH = 1_700_000_000 * SECOND
 """Stamp (ns) of the start of every session."""
+POINT_PERIOD = 1.0  # s, of a total station
+BACK_PRESSURE = 1e6  # Pa
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,8 @@ class RigSession:
         ``t`` (m,) s after the start; ``strokes`` (the lengths), ``drives`` (m, n) m; ``joints`` (m, n) rad; ``forces``
         (m, n) N; ``tip``, ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle`` (m,) rad; where there is one, the external force at the
         tip ``load`` (m, 2) N.
+    placed : dict of Stream to ndarray, shape (m, channels)
+        Readings of sensors that have a place, and of the gyro at the tip.
     """
 
     stamps: NDArray[np.int64]
@@ -53,6 +58,7 @@ class RigSession:
     angle_stamps: NDArray[np.int64]
     forces: Array
     truth: dict[str, Array]
+    placed: dict[Stream, Array] = field(default_factory=dict)
 
     def save_truth(self, path: Path) -> None:
         """Write the truth as a gzipped CSV; equal truths give equal bytes."""
@@ -103,11 +109,17 @@ def observe(
     sensors: Sensors,
     seed: int,
     load: TipLoad | None = None,
+    places: Mapping[str, Place] = NO_PLACES,
+    cylinders: Sequence[tuple[float, float]] = (),
 ) -> RigSession:
     """Sample a simulated motion; stamps depend on the seed alone, not on the noise.
 
     Parameters
     ----------
+    places : mapping of str to Place
+        Of IMUs beside that at the tip, strain gauges (``moment_1`` ..) and points; a point is seen once in `POINT_PERIOD`.
+    cylinders : sequence of (float, float)
+        Bore and rod (m) of every cylinder whose pressures are measured; empty without.
     rows : dict of ndarray
         What `simulate` gave for this drive and this load.
 
@@ -116,12 +128,35 @@ def observe(
     RigSession
         Samples of all sensors, and the truth beside them.
     """
-    clock, stroke_noise, angle_noise, imu_noise, force_noise = np.random.default_rng(seed).spawn(5)
+    clock, stroke_noise, angle_noise, imu_noise, force_noise, *others = np.random.default_rng(seed).spawn(7 + len(places))
     stamps = sampling_stamps(sensors, float(rows["t_s"][-1]), EPOCH, clock)
     times = (stamps - EPOCH) / SECOND
-    truth = {name: CubicSpline(rows["t_s"], values)(times) for name, values in motion_columns(rows).items()}
+
+    def at(values: Array) -> Array:
+        return np.asarray(CubicSpline(rows["t_s"], values)(times))
+
+    truth = {name: at(values) for name, values in motion_columns(rows).items()}
     truth |= {"t": times, "drives": drive(times)[0]} | ({} if load is None else {"load": load(times)})
     force = specific_force(truth["tip_acc"], truth["tip_angle"], gravity_in_base(scene))
+    placed = {Stream.RATE: read(at(rows["tip_angular_velocity_rad_s"])[:, None], sensors.rate_sigma, 0.0, others[0])}
+    for k, ((name, place), noise) in enumerate(zip(places.items(), others[1:-1], strict=True), start=1):
+        columns = {end: at(rows[f"site_{k}_{end}"]) for end in SITE if np.isfinite(rows[f"site_{k}_{end}"]).all()}
+        if name.startswith("moment_"):
+            of_all = placed.setdefault(Stream.MOMENTS, np.full(truth["joints"].shape, np.nan))
+            of_all[:, int(name.removeprefix("moment_")) - 1] = read(columns["moment_Nm"], sensors.moment_sigma, 0.0, noise)
+        elif name.startswith("points"):
+            position = np.column_stack([columns["x_m"], columns["y_m"]])
+            placed[Stream(name)] = np.full(position.shape, np.nan)
+            seen = np.unique(np.floor(times / POINT_PERIOD), return_index=True)[1]
+            placed[Stream(name)][seen] = read(position[seen], sensors.point_sigma, 0.0, noise)
+        else:
+            accelerations = np.column_stack([columns["ax_m_s2"], columns["ay_m_s2"]])
+            felt = specific_force(accelerations, columns["angle_rad"] + place.turned, gravity_in_base(scene))
+            placed[Stream(name)] = read(felt, sensors.imu_sigma, 0.0, noise)
+            placed[Stream(f"{name}_rate")] = read(columns["rate_rad_s"][:, None], sensors.rate_sigma, 0.0, noise)
+    if cylinders:
+        pressures = _pressures(truth["forces"], cylinders)
+        placed[Stream.PRESSURES] = read(pressures, sensors.pressure_sigma, 0.0, others[-1])
     return RigSession(
         stamps,
         read(truth["strokes"], sensors.stroke_sigma, sensors.stroke_resolution, stroke_noise),
@@ -130,6 +165,7 @@ def observe(
         stamps,
         read(truth["forces"], sensors.force_sigma, sensors.force_resolution, force_noise),
         truth,
+        placed,
     )
 
 
@@ -143,7 +179,24 @@ def record(
     elements: int = 16,
     load: TipLoad | None = None,
     changes: Sequence[Change] = (),
+    places: Mapping[str, Place] = NO_PLACES,
+    cylinders: Sequence[tuple[float, float]] = (),
 ) -> RigSession:
-    """Simulate the boom for `duration` (s) under a load, while it changes, and sample it."""
-    rows = simulate(scene, drive, duration, step, 2 * step, elements, load, changes)
-    return observe(scene, drive, rows, sensors or Sensors(), seed, load)
+    """Simulate the boom for `duration` (s) under a load, while it changes, and sample it; sensors are at `places`, too."""
+    sites = tuple(site_of(scene, place) for place in places.values())
+    rows = simulate(scene, drive, duration, step, 2 * step, elements, load, changes, sites)
+    return observe(scene, drive, rows, sensors or Sensors(), seed, load, places, cylinders)
+
+
+def _pressures(forces: Array, cylinders: Sequence[tuple[float, float]]) -> Array:
+    """Return pressures (m, 2 n; Pa) of cap and rod side by forces (m, n; N): the side that pulls less has `BACK_PRESSURE`."""
+    bore, rod = np.array(cylinders).T
+    piston, ring = np.pi / 4 * bore**2, np.pi / 4 * (bore**2 - rod**2)
+    cap = np.maximum((BACK_PRESSURE * ring - forces) / piston, BACK_PRESSURE)
+    return np.asarray(np.stack([cap, (forces + cap * piston) / ring], axis=2).reshape(len(forces), -1))
+
+
+def site_of(scene: Scene, place: Place) -> Site:
+    """Return the site of a place on the boom."""
+    section = len(scene.sections) if place.section is None else place.section
+    return Site(section - 1, scene.sections[section - 1].length if place.at is None else place.at)

@@ -51,8 +51,8 @@ SYNTHETIC = "Scene parameters are surrogates; nothing here was measured on a rig
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Return a Markdown table with a final newline. Floats have 3 digits or are whole; None and NaN are dashes."""
-    lines = [list(head), ["---"] * len(head), *([_text(value) for value in row] for row in rows)]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    lines = [f"| {' | '.join(line)} |\n" for line in (head, *([_text(value) for value in row] for row in rows))]
+    return "".join((lines[0], f"|{'---|' * len(head)}\n", *lines[1:]))
 
 
 def page(parts: Iterable[str]) -> str:

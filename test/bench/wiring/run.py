@@ -163,7 +163,7 @@ class Wired:
     def no_gravity(self) -> None:
         lengths = np.column_stack([self.columns[STROKES][name] for name in self.names[STROKES]])
         at = np.linspace(0, len(lengths) - 1, 60).astype(int)
-        g = RestModel(self.scene, StrokeReading.LENGTH).expected(lengths[at]).gravity
+        g = RestModel(self.scene, StrokeReading.LENGTH).expected(lengths[at]).gravity[IMU]
         for axis, part in (("x", g.real), ("z", g.imag)):
             self.columns[IMU][axis] = self.columns[IMU][axis] - np.interp(np.arange(len(lengths)), at, part)
         self.truth |= {"tip_imu_x": None, "tip_imu_z": None}

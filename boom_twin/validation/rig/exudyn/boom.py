@@ -26,7 +26,7 @@ from .lumped_masses import lump_masses
 from .masses import Lump, Lumps
 from .pin_clearance import Bush, contact_of, pin_with_play, refuse_other_pins
 from .six_bar import Link, six_bar
-from .system import Base, Boom, BuiltSection, Frame, Station, oil_stiffness, section_frames
+from .system import Base, Boom, BuiltSection, Frame, Site, Station, oil_stiffness, section_frames
 
 SAME_PLACE = 1e-9  # m
 SHEAR_OVER_AXIAL = 10.0  # GA = 10 EA: Euler-Bernoulli in effect; of the default boom's tip, shear is then 0.02 mm
@@ -39,7 +39,7 @@ def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSec
         return BuiltSection(None, [_station(boom, frame, 0.0, masses.rigid_section(boom.scene, index), [*borne.values()])])
     section = boom.scene.sections[index]
     assert section.beam is not None
-    inside = _bracket_places(boom.scene, index)
+    inside = _places_on_beam(boom, index)
     places = [section.beam[0], *inside, section.beam[1]]
     own = [masses.flexible_root(boom.scene, section), *([] for _ in inside), masses.flexible_head(boom.scene, index)]
     near = {x: int(np.argmin([abs(x - place) for place in places])) for x in borne}
@@ -47,10 +47,11 @@ def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSec
         _station(boom, frame, x, lumps, [borne[pin] for pin in borne if near[pin] == number])
         for number, (x, lumps) in enumerate(zip(places, own, strict=True))
     ]
+    beams: list[tuple[float, float, int]] = []
     for start, end in pairwise(stations):
         share = (end.x - start.x) / (section.beam[1] - section.beam[0])
-        _beam_part(boom, frame, index, (start, end), max(1, round(elements * share)))
-    return BuiltSection(section.beam, stations)
+        beams += _beam_part(boom, frame, index, (start, end), max(1, round(elements * share)))
+    return BuiltSection(section.beam, stations, beams)
 
 
 def _station(boom: Boom, frame: Frame, x: float, own: list[Lump], borne: list[Lumps]) -> Station:
@@ -61,11 +62,11 @@ def _station(boom: Boom, frame: Frame, x: float, own: list[Lump], borne: list[Lu
     return Station(x, node, boom.body(node, mass.mass, mass.com, mass.inertia, weight), frame.angle)
 
 
-def _bracket_places(scene: Scene, index: int) -> list[float]:
-    """Return the places (m) on the flexible part of a section where a cylinder is pinned to it."""
-    section = scene.sections[index]
+def _places_on_beam(boom: Boom, index: int) -> list[float]:
+    """Return the places (m) on the flexible part of a section where a cylinder is pinned to it, or a sensor sits."""
+    scene, section = boom.scene, boom.scene.sections[index]
     assert section.beam is not None
-    places = []
+    places = [site.at for site in boom.sites if site.section == index]
     if index == 0 and section.rod_pin is not None:
         places.append(section.rod_pin[0])
     if index + 1 < len(scene.joints):
@@ -76,7 +77,10 @@ def _bracket_places(scene: Scene, index: int) -> list[float]:
     return sorted({round(x, 9) for x in places if low < x < high})
 
 
-def _beam_part(boom: Boom, frame: Frame, index: int, ends: tuple[Station, Station], elements: int) -> None:
+def _beam_part(
+    boom: Boom, frame: Frame, index: int, ends: tuple[Station, Station], elements: int
+) -> list[tuple[float, float, int]]:
+    """Add the elements between two stations; return start and end of each, and its object."""
     section, scene = boom.scene.sections[index], boom.scene
     assert section.A is not None and section.I is not None
     axial, bending, beta = scene.material.E * section.A, scene.material.E * section.I, section.beta or 0.0
@@ -85,7 +89,8 @@ def _beam_part(boom: Boom, frame: Frame, index: int, ends: tuple[Station, Statio
     nodes = [ends[0].node, *inner, ends[1].node]
     length = float(places[1] - places[0])
     shear = shear_stiffness(boom.shear_over_axial * axial, bending, length if boom.nodally_exact else 0.0)
-    for pair in pairwise(nodes):
+    found = []
+    for pair, (start, end) in zip(pairwise(nodes), pairwise(places.tolist()), strict=True):
         beam = boom.system.AddObject(
             items.ObjectBeamGeometricallyExact2D(
                 nodeNumbers=[*pair],
@@ -101,6 +106,8 @@ def _beam_part(boom: Boom, frame: Frame, index: int, ends: tuple[Station, Statio
             )
         )
         boom.weigh(int(beam))
+        found.append((start, end, int(beam)))
+    return found
 
 
 def shear_stiffness(shear: float, bending: float, length: float) -> float:
@@ -247,6 +254,7 @@ def build(
     nodally_exact: bool = False,
     lumped: bool = False,
     shear_over_axial: float = SHEAR_OVER_AXIAL,
+    sites: tuple[Site, ...] = (),
 ) -> Boom:
     """Build the undeformed boom with its drives at absolute `strokes` (m), shape (n,). Sensors may still be added.
 
@@ -260,6 +268,8 @@ def build(
         True if cylinders and two-force links are no bodies, their masses lumped; see `lumped_masses`.
     shear_over_axial : float
         GA over EA.
+    sites : tuple of Site
+        Where sensors are.
 
     Raises
     ------
@@ -279,7 +289,7 @@ def build(
     lumps = lump_masses(scene, frames, strokes) if lumped else None
     gravity = [*gravity_in_base(scene).tolist(), 0.0]
     base = add_base(system, ground, scene)
-    boom = Boom(scene, container, system, gravity, base, nodally_exact, shear_over_axial, elements, lumps)
+    boom = Boom(scene, container, system, gravity, base, nodally_exact, shear_over_axial, elements, lumps, sites=sites)
     for index, frame in enumerate(frames):
         boom.sections.append(add_section(boom, frame, index, elements))
         add_pivot(boom, index)

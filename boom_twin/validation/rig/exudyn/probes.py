@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 
 from ....types import Array
 from . import exudyn, items
-from .system import Boom, Station
+from .system import Boom, Site, Station
 
 _FORCE = {"distance": exudyn.OutputVariableType.Force, "referenceLength": exudyn.OutputVariableType.ForceLocal}
 """Exudyn output with the cylinder force, by the name of the connector's length parameter."""
@@ -26,6 +27,10 @@ class Probes:
     heads: tuple[int, ...]
     forces: tuple[int, ...]
     lengths: tuple[int, ...]
+    moments: tuple[tuple[tuple[int, float], ...], ...]  # of every site: sensors of elements about it, and their shares
+    sites: tuple[
+        tuple[int, int, int, int], ...
+    ]  # position and acceleration of every site, coordinates of its frame, their rates
     pins: tuple[tuple[int, int], ...]  # positions of hole and journal, for every pin with play
     base: int | None  # of an elastic base
 
@@ -40,6 +45,8 @@ def attach(boom: Boom) -> Probes:
         heads=tuple(_on_node(boom, section.head, kind.Coordinates) for section in boom.sections),
         forces=tuple(_on_drive(boom, drive, _FORCE[name]) for drive, name in boom.drives),
         lengths=tuple(_on_drive(boom, drive, kind.Distance) for drive, _ in boom.drives),
+        moments=tuple(_about_site(boom, site) for site in boom.sites),
+        sites=tuple(_at_site(boom, site) for site in boom.sites),
         pins=tuple((_on_marker(boom, bush.sides[0]), _on_marker(boom, bush.sides[1])) for bush in boom.bushes),
         base=None if boom.base.node is None else _sensor(boom, kind.Coordinates, items.SensorNode, nodeNumber=boom.base.node),
     )
@@ -53,7 +60,9 @@ def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
     dict
         ``t`` (m,) s; ``tip``, ``tip_acc`` (m, 2) m, m/s^2; ``tip_angle``, ``tip_rate``, ``tip_rate_dot`` (m,) rad,
         rad/s, rad/s^2; ``joints`` (m, n) rad; ``forces`` (m, n) N, positive in tension; ``lengths`` (m, n) m, pin to pin
-        minus `closed_length`; ``pins`` (m, k, 2) m, offsets of the journals with play.
+        minus `closed_length`; ``sites`` (m, k, 7) x, y (m), their accelerations, angle (rad), its rate and the
+        bending moment by the curvature (N m; NaN off a beam);
+        ``pins`` (m, k, 2) m, offsets of the journals with play.
     """
     data = partial(_data, boom, at_rest=at_rest)
     roots = np.column_stack([_angle(data(p), s.root) for p, s in zip(probes.roots, boom.sections, strict=True)])
@@ -71,6 +80,14 @@ def read(boom: Boom, probes: Probes, at_rest: bool) -> dict[str, Array]:
         "joints": roots - before,
         "forces": np.column_stack([_force(boom, i, p, at_rest) for i, p in enumerate(probes.forces)]),
         "lengths": np.column_stack([data(p)[:, 1] - c.closed_length for p, c in zip(probes.lengths, cylinders, strict=True)]),
+        "sites": np.array(
+            [
+                np.column_stack([_motion(boom, site, *map(data, each)), _moment(boom, site, around, data, len(heads))])
+                for site, each, around in zip(boom.sites, probes.sites, probes.moments, strict=True)
+            ]
+        )
+        .reshape(len(boom.sites), len(heads), 7)
+        .swapaxes(0, 1),
         "pins": np.array([data(journal)[:, 1:3] - data(hole)[:, 1:3] for hole, journal in probes.pins])
         .reshape(len(probes.pins), len(heads), 2)
         .swapaxes(0, 1),
@@ -96,6 +113,40 @@ def _force(boom: Boom, index: int, number: int, at_rest: bool) -> Array:
     """
     force = _data(boom, number, at_rest)[:, 1]
     return -force if at_rest and not boom.scene.joints[index].cylinder.is_compressible else force
+
+
+def _motion(boom: Boom, site: Site, position: Array, acceleration: Array, frame: Array, rates: Array) -> Array:
+    """Return x, y (m), their accelerations, angle and rate (rad, rad/s) of a site, (m, 6)."""
+    angle = _angle(frame, boom.sections[site.section].at(site.at))
+    return np.column_stack([position[:, 1:3], acceleration[:, 1:3], angle, rates[:, 3]])
+
+
+def _moment(boom: Boom, site: Site, around: Sequence[tuple[int, float]], data: Callable[[int], Array], rows: int) -> Array:
+    """Return the bending moment (N m) at a site, (m,): EI times curvature, linear between the middles of elements."""
+    section = boom.scene.sections[site.section]
+    if not around or section.I is None:
+        return np.full(rows, np.nan)
+    return np.asarray(boom.scene.material.E * section.I * sum(share * data(number)[:, 3] for number, share in around))
+
+
+def _about_site(boom: Boom, site: Site) -> tuple[tuple[int, float], ...]:
+    """Add sensors of the curvature of the elements about a site; return them with their shares. There are none off a beam."""
+    built = boom.sections[site.section]
+    if built.beam is None or not built.beam[0] < site.at < built.beam[1]:
+        return ()
+    near = sorted(built.beams, key=lambda beam: abs(0.5 * (beam[0] + beam[1]) - site.at))[:2]
+    first, second = (0.5 * (start + end) for start, end, _ in near)
+    kind, share = exudyn.OutputVariableType.CurvatureLocal, (site.at - first) / (second - first)
+    numbers = [_sensor(boom, kind, items.SensorBody, bodyNumber=body, localPosition=[0.0, 0.0, 0.0]) for *_, body in near]
+    return (numbers[0], 1.0 - share), (numbers[1], share)
+
+
+def _at_site(boom: Boom, site: Site) -> tuple[int, int, int, int]:
+    kind, station = exudyn.OutputVariableType, boom.sections[site.section].at(site.at)
+    place = {"bodyNumber": station.body, "localPosition": [site.at - station.x, 0.0, 0.0]}
+    position, acceleration = (_sensor(boom, each, items.SensorBody, **place) for each in (kind.Position, kind.Acceleration))
+    frame, rates = (_on_node(boom, station, each) for each in (kind.Coordinates, kind.Coordinates_t))
+    return position, acceleration, frame, rates
 
 
 def _at_tip(boom: Boom, kind: Any) -> int:

@@ -22,9 +22,10 @@ from .parameter_changes import ParameterChanges
 from .pin_clearance import pin_with_play
 from .probes import Probes, attach, read
 from .stepping import Course, Effort, Scheme, step_through
-from .system import Boom, section_frames
+from .system import Boom, Site, section_frames
 
 PASSES = 40
+SITE = ("x_m", "y_m", "ax_m_s2", "ay_m_s2", "angle_rad", "rate_rad_s", "moment_Nm")  # ends of the columns of a site
 LAST_INCREMENT = 1e-6  # m and rad, last increment; what is left is near its square
 LONGEST_INCREMENT = 0.2  # m and rad, in one pass
 NUDGE = 1e-5  # m and rad, of the difference quotient
@@ -126,6 +127,7 @@ def simulate(
     elements: int = 16,
     load: TipLoad | None = None,
     changes: Sequence[Change] = (),
+    sites: tuple[Site, ...] = (),
 ) -> dict[str, Array]:
     """Integrate the motion from rest in the equilibrium of the drive's first strokes.
 
@@ -141,6 +143,8 @@ def simulate(
         External force at the tip, see `TipLoad`.
     changes : sequence of Change
         How the boom changes meanwhile.
+    sites : tuple of Site
+        Places whose motion is recorded, too.
 
     Returns
     -------
@@ -148,10 +152,12 @@ def simulate(
         The columns of a simulation (``t_s``, ``stroke_1_m``, .., ``joint_1_rad``, .., ``tip_x_m``, ``tip_y_m``,
         ``tip_ax_m_s2``, ``tip_ay_m_s2``, ``cylinder_force_1_N``, ..), then ``tip_angle_rad``,
         ``tip_angular_velocity_rad_s``, ``tip_angular_acceleration_rad_s2``, ``length_1_m``, .., and of pins with play the
-        journals' offsets, ``cylinder_1_rod_dx_m``, ``cylinder_1_rod_dy_m``, ..; each of shape (rows,).
+        journals' offsets, ``cylinder_1_rod_dx_m``, ``cylinder_1_rod_dy_m``, ..; each of shape (rows,). Of the first site
+        ``site_1_x_m``, ``site_1_y_m``, ``site_1_ax_m_s2``, ``site_1_ay_m_s2``, ``site_1_angle_rad``, ``site_1_rate_rad_s``,
+        ``site_1_moment_Nm``.
     """
     first = drive(np.zeros(1))[0][0]
-    return move(at_rest(scene, first, elements), drive, t_end, step, output_step, None, load, changes)[0]
+    return move(at_rest(scene, first, elements, sites=sites), drive, t_end, step, output_step, None, load, changes)[0]
 
 
 @dataclass(frozen=True)
@@ -170,9 +176,10 @@ def at_rest(
     nodally_exact: bool = False,
     lumped: bool = False,
     shear_over_axial: float = SHEAR_OVER_AXIAL,
+    sites: tuple[Site, ...] = (),
 ) -> Resting:
     """Build the boom with its drives at `strokes` (m), shape (n,), and let it come to rest; see `build`."""
-    boom = build(scene, strokes, elements, nodally_exact, lumped, shear_over_axial)
+    boom = build(scene, strokes, elements, nodally_exact, lumped, shear_over_axial, sites)
     probes = attach(boom)
     settle(boom, strokes)
     return Resting(boom, probes, read(boom, probes, at_rest=True)["forces"][-1])
@@ -205,7 +212,7 @@ def move(
 
 def _built_alike(boom: Boom, scene: Scene, strokes: Array) -> Boom:
     """Build the boom of another scene as `boom` was built."""
-    return build(scene, strokes, boom.elements, boom.nodally_exact, boom.lumps is not None, boom.shear_over_axial)
+    return build(scene, strokes, boom.elements, boom.nodally_exact, boom.lumps is not None, boom.shear_over_axial, boom.sites)
 
 
 def settle(boom: Boom, strokes: Array) -> None:
@@ -246,5 +253,10 @@ def _columns(found: dict[str, Array], drive: Drive, times: Array, pins: Sequence
         "tip_angular_velocity_rad_s": found["tip_rate"],
         "tip_angular_acceleration_rad_s2": found["tip_rate_dot"],
         **{f"length_{i}_m": found["lengths"][:, i - 1] for i in number},
+        **{
+            f"site_{k + 1}_{name}": found["sites"][:, k, j]
+            for k in range(found["sites"].shape[1])
+            for j, name in enumerate(SITE)
+        },
         **{f"{pin}_d{axis}_m": found["pins"][:, k, j] for k, pin in enumerate(pins) for j, axis in enumerate("xy")},
     }

@@ -41,6 +41,8 @@ class BuiltSection:
 
     beam: Point | None
     stations: list[Station]
+    beams: list[tuple[float, float, int]] = field(default_factory=list)
+    """Start and end (m) of every beam element, and its object."""
 
     @property
     def root(self) -> Station:
@@ -59,6 +61,14 @@ class BuiltSection:
         if x >= self.beam[1]:
             return self.head
         return min(self.stations, key=lambda station: abs(station.x - x))
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """Place of sensors: section, 0-based, and the distance from its inboard pivot, m."""
+
+    section: int
+    at: float
 
 
 @dataclass(slots=True)
@@ -86,6 +96,8 @@ class Boom:
         Pins with play.
     tip_load : int
         The external force at the tip.
+    sites : tuple of Site
+        Where sensors are; the beams there have nodes.
     """
 
     scene: Scene
@@ -101,6 +113,7 @@ class Boom:
     drives: list[tuple[int, str]] = field(default_factory=list)
     bushes: list[Bush] = field(default_factory=list)
     tip_load: int = -1
+    sites: tuple[Site, ...] = ()
 
     def marker(self, body: int, local: Point) -> int:
         """Add a marker on a rigid body, in the body's axes."""

@@ -1,0 +1,151 @@
+"""IMUs anywhere on the boom: expected readings by closed form, and every way to say the same place gives the same."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+
+from boom_twin import Sample, Scene, Settings, Stream, Twin, load_scene, statics
+from boom_twin.deviation.predictor import BoomPredictor
+from boom_twin.deviation.states import PREDICTION, drive_place
+from boom_twin.deviation.step import move_sites, place_live
+from boom_twin.errors import UsageError
+from boom_twin.messages.mapping import load_mapping
+from boom_twin.messages.sample_decoder import SampleDecoder
+from boom_twin.messages.type_store import new_message
+from boom_twin.scene.kinematics import gravity_in_base, strokes_of_angles, strokes_of_posture
+from boom_twin.scene.load import default_text
+from boom_twin.twin.blocks import CODES
+from boom_twin.types import Array, Place, Residuals
+
+SCENE = load_scene()
+ARCH = strokes_of_posture(SCENE, "arch")
+G = float(np.hypot(*gravity_in_base(SCENE)))
+LAST = SCENE.sections[-1].length
+STEP = 5_000_000  # ns
+
+
+def one_section(tmp_path: Path) -> Scene:
+    """A rigid section on an incompressible cylinder."""
+    document = dict(YAML(typ="safe").load(default_text()))
+    section = {"length": 3.0, "root": {"mass": 40.0, "com": [1.4, 0.1], "inertia": 30.0}, "rod_pin": [0.60, -0.12]}
+    joint = {"kind": "A", "range_deg": [-5, 85], "cylinder": {"closed_length": 1.08, "max_stroke": 0.79}}
+    path = tmp_path / "one.yaml"
+    with path.open("w") as file:
+        YAML().dump(document | {"sections": [section], "joints": [joint], "postures": {"up": [40]}}, file)
+    return load_scene(path)
+
+
+def moved(count: int) -> Array:
+    times = 1e-9 * STEP * np.arange(count)
+    return statics(SCENE, strokes=ARCH).lengths + 0.004 * np.sin(2.0 * np.outer(times, [1.0, 0.7, 1.3, 0.4]))
+
+
+def residuals_of(twin: Twin, stream: Stream, readings: Array) -> list[Residuals]:
+    """What a twin that moves makes of these readings of one stream."""
+    found = []
+    for k, (lengths, reading) in enumerate(zip(moved(len(readings)), readings, strict=True)):
+        twin.update(Sample(Stream.STROKES, k * STEP, lengths))
+        found += twin.update(Sample(stream, k * STEP, np.array(reading))).residuals
+    return [each for each in found if each.stream is stream]
+
+
+@pytest.mark.parametrize(("at", "turned"), [(0.0, 0.0), (1.3, 0.4), (3.0, -2.0)])
+def test_rest_and_a_turn_about_one_joint_read_as_their_closed_form(tmp_path: Path, at: float, turned: float) -> None:
+    scene, angle, speed = one_section(tmp_path), math.radians(30.0), 0.4
+    boom = BoomPredictor(scene, Settings(), places={"imu_2": Place(1, at, turned)})
+    boom.start(strokes_of_angles(scene, np.array([angle])))
+    p, f, gravity = boom.posture, boom.filters, gravity_in_base(scene)
+    drive, channels = drive_place(p), [row for row in range(len(p.channels)) if p.channels[row].stream == CODES[Stream.IMU_2]]
+    for rate in (0.0, speed):
+        stroke_rate = rate / p.slope[0]
+        f.mean[PREDICTION, drive + 1] = stroke_rate
+        f.mean[PREDICTION, drive + 2] = -p.curvature[0] * stroke_rate**2 / p.slope[0]  # at which the joint turns evenly
+        place_live(boom.plan.tables, boom.compiled.anchor, boom.live, boom.compiled.work, p, f)
+        move_sites(boom.plan.tables, boom.live, p, f, 0.0, gravity)
+        along, across = G * math.sin(angle) - at * rate**2, G * math.cos(angle)
+        c, s = math.cos(turned), math.sin(turned)
+        assert f.felt[channels] == pytest.approx([c * along + s * across, c * across - s * along], abs=1e-6)
+        assert f.motion[p.channels[channels[0]].site, 5] == pytest.approx(rate, rel=1e-7)
+
+
+def test_the_tip_is_one_place_among_others() -> None:
+    readings = np.random.default_rng(0).normal([5.0, 8.0], 0.1, (60, 2))
+    usual = residuals_of(Twin(SCENE), Stream.IMU, readings)
+    for places, stream in (({"tip_imu": Place(4, LAST)}, Stream.IMU), ({"imu_2": Place()}, Stream.IMU_2)):
+        for one, other in zip(usual, residuals_of(Twin(SCENE, places=places), stream, readings), strict=True):
+            assert (one.values == other.values).all() and (one.sigmas == other.sigmas).all()
+
+
+def test_a_quarter_turn_is_the_other_axis() -> None:
+    readings = np.random.default_rng(0).normal([5.0, 8.0], 0.1, (60, 2))
+    straight = residuals_of(Twin(SCENE, places={"imu_2": Place(2, 3.1)}), Stream.IMU_2, readings)
+    swapped = np.column_stack([readings[:, 1], -readings[:, 0]])
+    turned = residuals_of(Twin(SCENE, places={"imu_2": Place(2, 3.1, math.pi / 2)}), Stream.IMU_2, swapped)
+    for one, other in zip(straight, turned, strict=True):
+        assert other.values == pytest.approx([one.values[1], -one.values[0]], abs=1e-9)
+        assert other.sigmas == pytest.approx(one.sigmas[::-1], rel=1e-9)
+
+
+@pytest.mark.parametrize("at", [0.2, 2.0, 3.1])
+def test_a_place_on_a_beam_is_where_statics_have_it(at: float) -> None:
+    """Its angle at rest, by gravity, is continuous where parts meet, and lies between those of root and head."""
+    angles = []
+    for place in (at - 1e-7, at, at + 1e-7):
+        (first, *_) = residuals_of(Twin(SCENE, places={"imu_2": Place(2, place)}), Stream.IMU_2, np.zeros((1, 2)))
+        angles.append(math.atan2(-first.values[0], -first.values[1]))
+        assert math.hypot(*first.values) == pytest.approx(G, rel=1e-9)
+    assert angles == pytest.approx([angles[1]] * 3, abs=1e-6)
+
+
+def test_a_mapping_places_them_and_their_messages_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "mapping.yaml"
+    path.write_text(
+        "inputs:\n  imu_2: {name: /mid/imu, place: {section: 2, at: 3.1, turned: 0.5}}\nsensors:\n  imu_2_rate: {unit: deg/s}\n"
+    )
+    topics = load_mapping(path, 4)
+    assert topics.places == {"imu_2": Place(2, 3.1, 0.5)}
+    assert topics.heard["/mid/imu"] == [Stream.IMU_2, Stream.RATE_2]
+    msg = new_message("sensor_msgs/msg/Imu")
+    msg.header.stamp.sec = 5
+    msg.linear_acceleration.x, msg.linear_acceleration.z, msg.angular_velocity.y = 1.0, 9.0, -2.0
+    decoder = SampleDecoder(4, topics)
+    force, rate = decoder.samples(topics.heard["/mid/imu"], 5 * 10**9, msg)
+    assert force.values.tolist() == [1.0, 9.0] and rate.values == pytest.approx([math.radians(2.0)])
+    msg.angular_velocity_covariance[0] = -1.0
+    assert [each.stream for each in decoder.samples(topics.heard["/mid/imu"], 6 * 10**9, msg)] == [Stream.IMU_2]
+    assert not decoder.oddities
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("inputs: {imu_2: {place: {section: 0}}}", "inputs.imu_2.place.section"),
+        ("inputs: {imu_2: {place: {sektion: 1}}}", "nearest known key here is `section`"),
+        ("inputs: {joint_angles: {place: {section: 1}}}", "only IMUs and points have a place"),
+        ("inputs: {imu_5: {name: other}}", "nearest is `imu_"),
+        ("inputs: {imu_2: {name: other}}", "inputs.imu_2.place"),
+    ],
+)
+def test_a_wrong_place_is_told(tmp_path: Path, text: str, told: str) -> None:
+    path = tmp_path / "mapping.yaml"
+    path.write_text(text)
+    with pytest.raises(UsageError, match=told):
+        load_mapping(path, 4)
+
+
+@pytest.mark.parametrize(
+    ("place", "told"), [(Place(5, 1.0), "sections 1 to 4"), (Place(2, 9.0), "section 2 reaches from 0 to")]
+)
+def test_a_place_off_the_boom_is_told(place: Place, told: str) -> None:
+    with pytest.raises(UsageError, match=told):
+        Twin(SCENE, places={"imu_2": place})
+
+
+def test_a_sensor_without_a_place_is_told() -> None:
+    with pytest.raises(UsageError, match="imu_3: this boom has no such sensor"):
+        Twin(SCENE).update(Sample(Stream.IMU_3, 0, np.zeros(2)))
