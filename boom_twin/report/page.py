@@ -100,7 +100,7 @@ def _uncertainty(recording: Recording) -> list[tuple[str, object]]:
 
 
 def _verdict(result: Replay) -> list[str]:
-    """Return the verdict and all alarms, those that stop the boom first, then those with a cause."""
+    """Return the verdict and all alarms: first those that stop the boom, then those with a cause."""
     if not result.recording.is_judged:
         return [paragraph(NO_JUDGE, "note")]
     alarms = sorted(result.summary["alarms"], key=lambda alarm: (not _stops(alarm), alarm["cause"] is None, alarm["from_s"]))
@@ -118,7 +118,7 @@ WORST = 3  # stations named in the first lines
 
 
 def _worst_stations(found: Evaluation) -> list[str]:
-    """Return the stations with the largest stresses, and the hours of life that the damage leaves if it was asked for."""
+    """Return the stations with the largest stresses, and the life in hours if a detail category is given."""
     worst = [f"{load.station.name}: {_stress(load)} MPa at {load.time:.1f} s" for load in found.loads[:WORST]]
     parts = [paragraph(f"Largest bending stresses: {'; '.join(worst)}.")] if worst else []
     if found.category is not None and found.fatigue:
@@ -252,7 +252,7 @@ def _load(load: Load) -> tuple[object, ...]:
 
 
 def _stress(load: Load) -> str:
-    """Return the stress in MPa, with the standard deviation of what an unknown load adds if that is known."""
+    """Return the stress in MPa, with the standard deviation of the unknown load's part if it is known."""
     deviation = "" if np.isnan(load.sigma) else f" ± {1e-6 * load.sigma / load.modulus:.2g}"
     return f"{1e-6 * load.stress:.3g}{deviation}"
 
