@@ -1,4 +1,4 @@
-"""Sessions of a batch summed up by rig: hours of work, fatigue damage and life, drift of figures over time."""
+"""Summary of a batch by rig: hours of work, fatigue damage and life, drift of figures over time."""
 
 from __future__ import annotations
 
@@ -16,59 +16,59 @@ from .session_task import OK, Row
 
 HOUR, DAY = 3600.0, 86400.0  # s
 DAMAGE = "fatigue_damage_"
-"""Begin of the columns with the damage of a station."""
+"""Prefix of the columns with the damage of a station."""
 DRIFTING = ("residual_mean_", "frequency_ratio_mode_", "damping_mode_", "calibrated_")
-"""First part of the names of figures of which the drift is given."""
+"""Prefixes of the figures whose drift is computed."""
 LEAST_SESSIONS = 4
-"""Sessions with a figure and its standard deviation that a drift needs: two degrees of freedom beside the line."""
+"""Least number of sessions for a drift: a line with two residual degrees of freedom."""
 CHANCE = 1e-3
-"""Probability of a drift by chance below which it is reported as one, as by `boom_twin.report.compare.SIGNIFICANT`."""
+"""Largest p-value of a significant drift, as in `boom_twin.report.compare.SIGNIFICANT`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """Change of a figure from the first to the last session, along the line of weighted least squares."""
+    """Change of a figure from first to last session, by a line of weighted least squares."""
 
     name: str
     sessions: int
     days: float
     first: float  # value of the line at the first session
     change: float
-    sigma: float  # standard deviation of `change`, at least that of the scatter about the line
+    sigma: float  # standard deviation of `change`, at least that from the scatter
     is_significant: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Life:
-    """Fatigue of the station of a rig with the largest damage, summed up over sessions."""
+    """Fatigue of a rig's station with the largest damage, summed over sessions."""
 
     category: float  # detail category, MPa
     station: str
     damage: float
-    sigma: float | None  # standard deviation by the scatter of the sessions; None below `LEAST_SESSIONS`
-    largest_share: float  # of the damage, by one session; 0 without damage
+    sigma: float | None  # standard deviation from the scatter of sessions; None below `LEAST_SESSIONS`
+    largest_share: float  # largest share of `damage` by one session
     sessions: int
-    hours: float  # of these sessions
+    hours: float  # total of these sessions
     has_heights: bool  # heights of the sections are in the scene
     stations: dict[str, float]  # damage of every station
 
     @property
     def hours_to_end(self) -> float | None:
-        """Hours of such work to a damage of 1; None without damage."""
+        """Hours of the same work until the damage is 1; None without damage."""
         return hours_to_end(self.damage, self.hours)
 
     def hours_a_year(self, years: float) -> float | None:
-        """Return the hours of such work a year that use the life up in so many years; None without damage."""
+        """Return the hours per year of the same work until a damage of 1 in `years`; None without damage."""
         return None if self.hours_to_end is None else self.hours_to_end / years
 
 
 @dataclass(frozen=True, slots=True)
 class RigSummary:
-    """Sessions of one rig. A session that stands twice in the batch counts once."""
+    """Summary of one rig. Sessions with equal files count once."""
 
     rig: str
     sessions: int
-    repeated: int  # sessions left out, because their files equal those of another one
+    repeated: int  # sessions left out, because another one has equal files
     hours: float
     alarmed: int  # sessions with alarms
     causes: dict[str, int]  # sessions in which a cause was named
@@ -77,7 +77,7 @@ class RigSummary:
 
 
 def rigs_of(rows: Sequence[Row]) -> list[RigSummary]:
-    """Return the summaries of all rigs with a finished session, by name."""
+    """Return a summary of each rig with a finished session, sorted by name."""
     rigs: dict[str, list[Row]] = {}
     for row in sorted((row for row in rows if row["status"] == OK), key=lambda row: int(row["first_stamp_ns"])):
         rigs.setdefault(row["rig"], []).append(row)
@@ -85,7 +85,7 @@ def rigs_of(rows: Sequence[Row]) -> list[RigSummary]:
 
 
 def as_dict(rig: RigSummary) -> dict[str, object]:
-    """Return a summary as plain values, with the hours that follow from it."""
+    """Return a summary as plain values, including hours to damage 1."""
     life = rig.life
     told = None if life is None else {
         "detail_category_MPa": life.category, "station": life.station, "damage": life.damage, "damage_sigma": life.sigma,
@@ -118,7 +118,7 @@ def _life(rows: list[Row]) -> Life | None:
     worst = max(sums, key=lambda name: sums[name])
     damages, hours = np.array([row.get(worst, 0.0) for row in own]), np.array([row["duration_s"] / HOUR for row in own])
     total, count, sigma = sums[worst], len(own), None
-    if count >= LEAST_SESSIONS:  # of a ratio: scatter about the mean damage an hour
+    if count >= LEAST_SESSIONS:  # ratio estimate: scatter about the mean damage per hour
         sigma = float(np.sqrt(count / (count - 1) * np.sum((damages - total / hours.sum() * hours) ** 2)))
     share, has_heights = damages.max() / total if total > 0.0 else 0.0, all(row["section_heights_given"] for row in own)
     stations = {name.removeprefix(DAMAGE): value for name, value in sums.items()}
@@ -127,10 +127,10 @@ def _life(rows: list[Row]) -> Life | None:
 
 
 def drift_of(name: str, rows: Sequence[Row]) -> Drift | None:
-    """Return the drift of a figure over sessions, None if it cannot be told.
+    """Return the drift of a figure over sessions, or None if there are too few.
 
-    The line is that of least squares, weighted by the standard deviations of the figure. Its own is enlarged by the scatter
-    about the line if that is larger, and tested by Student's t.
+    A least-squares line is fitted, weighted by the figure's standard deviations. The standard deviation of its slope is
+    enlarged if the scatter about the line is larger. Student's t tests the slope.
     """
     known = [row for row in rows if _is_number(row.get(name)) and _is_number(row.get(f"{name}_sigma"))]
     found = np.array([(row["first_stamp_ns"] / SECOND / DAY, row[name], row[f"{name}_sigma"]) for row in known]).reshape(-1, 3)

@@ -37,11 +37,11 @@ def in_address(host: str) -> str:
 
 
 TOKEN = re.compile(r"[A-Za-z0-9_.~-]{24,200}")
-"""Token that may stand in a file: signs of an address and of a cookie, too many to guess."""
+"""Valid token in a file: characters of addresses and cookies, too long to be guessed."""
 
 
 def token_of(path: Path) -> str:
-    """Return the token in a file; raise UsageError if it cannot be read, or holds anything else."""
+    """Return the token in a file; raise UsageError if it is unreadable or holds no valid token."""
     try:
         with path.open(encoding="ascii") as file:
             found = file.read(1000).strip()
@@ -56,10 +56,10 @@ def token_of(path: Path) -> str:
 class AccessControl:
     """Access control of the page: checks Host, Origin and token of every request.
 
-    On loopback the `token` is empty, and the ``Host`` must be `host` or a usual name of this machine. So a page of another
-    name that resolves to this machine is refused. Elsewhere the token is needed, once in the address (``/?token=..``), from
-    then on in a cookie. Programs send it with every request (``Authorization: Bearer ..``). A WebSocket must come from a page
-    of this server (``Origin``). A `token` that is given is needed on loopback, too; by default it is made anew at each start.
+    Without a `token` on loopback, ``Host`` must be `host` or a usual name of this machine. So a page of another name that
+    resolves to this machine is refused. Elsewhere, a missing `token` is generated at each start. If there is a token, browsers
+    send it once in the address (``/?token=..``), then in a cookie. Programs send it with every request (``Authorization:
+    Bearer ..``). A WebSocket must come from a page of this server (``Origin``).
     """
 
     def __init__(self, host: str, token: str = "") -> None:
@@ -67,7 +67,7 @@ class AccessControl:
         self._names = LOCAL | {in_address(host)}
 
     def check(self, request: web.Request) -> None:
-        """Raise HTTPForbidden, or HTTPFound where a token is to be put into a cookie."""
+        """Raise HTTPForbidden or HTTPBadRequest, or HTTPFound to store the token in a cookie."""
         hosts = request.headers.getall("Host", [])
         if len(hosts) != 1 or request.raw_path[:1] not in ("/", "*"):
             raise web.HTTPBadRequest(text="a request names its host once, and its path alone")
@@ -84,7 +84,7 @@ class AccessControl:
             return
         if not self._fits(request.query.get("token", "")):
             raise web.HTTPForbidden(text="open the address that the monitor printed; it holds the token")
-        found = web.HTTPFound("/")  # whatever was asked for: no address that a request names is gone to
+        found = web.HTTPFound("/")  # never redirect to an address that the request names
         found.set_cookie(COOKIE, self.token, httponly=True, samesite="Strict")
         raise found
 

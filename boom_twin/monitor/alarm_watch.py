@@ -16,7 +16,7 @@ MICRO = 1000  # ns
 
 
 class AlarmWatch:
-    """Watch of the alarms of one feed that have a channel and a kind: those of the rig's health, and gaps.
+    """Watch of one feed's alarms with channel and kind: alarms of the rig's health, and gaps.
 
     Attributes
     ----------
@@ -26,17 +26,17 @@ class AlarmWatch:
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
-        self._known: dict[int, tuple[str | None, bool]] = {}  # cause and end, by the number of the alarm
+        self._known: dict[int, tuple[str | None, bool]] = {}  # (cause, has ended) by number of the alarm
         self.begun: Counter[tuple[str, str]] = Counter()
 
     def active(self) -> list[ListedAlarm]:
-        """Return the alarms that last."""
+        """Return the active alarms."""
         return [alarm for alarm in self._feed.store.alarms.all if alarm.fault and alarm.end is None]
 
     def changes(self) -> list[dict[str, Any]]:
         """Return the changes since the last call, as plain values for JSON, oldest alarm first.
 
-        While the origin of times is not known, after a clock was set back, changes wait for the next call.
+        After a clock was set back, changes wait until the origin of times is known.
         """
         if not self._feed.store.epoch:
             return []

@@ -1,4 +1,4 @@
-"""Figures of the live page at ``/metrics``, in the text format of Prometheus; names and units by its conventions."""
+"""Metrics of the live page at ``/metrics``, with the text format, names and units of Prometheus."""
 
 from __future__ import annotations
 
@@ -19,16 +19,15 @@ from .data.store import EVERY_STROKE, Table
 from .data.topic_rows import COMPARED, ESTIMATE, ESTIMATE_COLUMNS, RESIDUALS
 
 WINDOW = 10.0
-"""Seconds of residuals of which the root mean square is given."""
+"""Window (s) of the root mean square of residuals."""
 AXES = ("x", "z")
 REMEDY = 'prometheus_client is not installed, and /metrics needs it. Run `pip install "boom_twin[monitor]"`.'
 
 
 class Metrics:
-    """Figures of one feed. The package `prometheus_client` calls `collect`.
+    """Metrics of one feed. The package `prometheus_client` calls `collect`.
 
-    Figures of the tip and of residuals are left out once no sample has come for `SILENCE` seconds. `watch` has the alarms of
-    the feed.
+    Metrics of tip and residuals are left out if no sample came for `SILENCE` seconds. `watch` has the alarms of the feed.
     """
 
     def __init__(self, feed: Feed, watch: AlarmWatch) -> None:
@@ -37,7 +36,7 @@ class Metrics:
         self._grew = time.monotonic()
 
     def follow(self) -> None:
-        """Count the stroke samples that have come since the last call."""
+        """Count the stroke samples since the last call."""
         store = self._feed.store
         table = store.tables.get(EVERY_STROKE)
         count = 0 if table is None else table.count
@@ -47,7 +46,7 @@ class Metrics:
             self._samples, self._grew = self._samples + new, time.monotonic()
 
     def text(self) -> tuple[bytes, str]:
-        """Return all figures and their content type; raise UsageError if `prometheus_client` is not installed."""
+        """Return all metrics and their content type; raise UsageError if `prometheus_client` is not installed."""
         try:
             client = import_module("prometheus_client")
         except ImportError:
@@ -107,7 +106,7 @@ class Metrics:
                 yield from _rms(name, values)
 
     def _lamps(self) -> Iterator[Any]:
-        """Yield the levels of all components, and figures of the twin that they hold."""
+        """Yield the levels of all components, irregular samples, and the tip's swing."""
         now = self._feed.now()
         lamps: dict[str, StatusLamp] = {}
         for lamp in (each for group in self._feed.store.statuses(now).groups(now).values() for each in group):
@@ -136,7 +135,7 @@ class Metrics:
     # -- rows and families --------------------------------------------------------------------------------------------
 
     def _fresh(self, name: str) -> Table | None:
-        """Return a table with rows of the last `SILENCE` seconds, or None."""
+        """Return a table if its newest row is at most `SILENCE` old, else None."""
         store = self._feed.store
         table = store.tables.get(name)
         return table if table is not None and table.count and store.newest - table.newest <= SILENCE else None

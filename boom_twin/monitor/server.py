@@ -24,7 +24,7 @@ from .webhook import Webhook
 PAGE = Path(__file__).parent / "page"
 MAX_VIEWERS = 16
 MAX_REQUEST_BYTES = 4096
-"""Bytes of a request of the page."""
+"""Largest request of a page, bytes."""
 POLL_PERIOD = 1.0 / 60.0
 """Seconds between two polls of the feed."""
 PEAK_PERIOD = 10.0
@@ -38,9 +38,9 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """Server of the live page for one feed, which is the one of the `sessions` that is open, if there are several.
+    """Server of the live page for one feed. With several `sessions`, it is the open one.
 
-    Changes of alarms are posted by the `webhook`.
+    `webhook` posts changes of alarms.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Server:
         return web.FileResponse(PAGE / "index.html")
 
     async def _file(self, request: web.Request) -> web.FileResponse:
-        """Return one of the page's own files. The name asked for is only compared with theirs; no path is made of it."""
+        """Return one of the page's own files. The requested name is only compared; no path is made of it."""
         file = next((file for file in (*PAGE.iterdir(), TEXTS) if file.name == request.match_info["name"]), None)
         if file is None:
             raise web.HTTPNotFound(text="there is no such file of the page")
@@ -125,7 +125,7 @@ class Server:
             await asyncio.sleep(POLL_PERIOD)
 
     async def _follow_alarms(self) -> None:
-        """Follow alarms and counts; post what changed, of the feed that is shown."""
+        """Update counts and post changes of alarms of the feed shown."""
         while True:
             self._metrics.follow()
             for change in self._watch.changes():
@@ -134,7 +134,7 @@ class Server:
             await asyncio.sleep(ALARM_PERIOD)
 
     def _show(self, feed: Feed) -> None:
-        """Make `feed` the one that is shown, with alarms and counts of its own."""
+        """Show `feed`, with its own alarms and counts."""
         self._feed, self._watch = feed, AlarmWatch(feed)
         self._metrics = Metrics(feed, self._watch)
 
@@ -145,7 +145,7 @@ class Server:
             await asyncio.sleep(PEAK_PERIOD)
 
     def _choose(self, index: int) -> str:
-        """Start opening another session for all viewers; return in words what is done."""
+        """Start opening another session for all viewers; return a sentence for them."""
         assert self._sessions is not None
         if self._opening is not None and not self._opening.done():
             return "a session is being opened already"
@@ -153,9 +153,9 @@ class Server:
         return f"opening {self._sessions.names[index]} .."
 
     async def _open(self, sessions: SessionList, index: int) -> None:
-        """Show another session: close its viewers' sockets, upon which their pages connect again.
+        """Show another session: close the viewers' sockets, so that their pages connect again.
 
-        It is opened in a thread. The one before is read here, between two turns of this loop, so it is closed here, too.
+        A thread opens it. The previous session is read in this event loop, so it is closed here, too.
         """
         try:
             feed = await asyncio.to_thread(sessions.open, index)

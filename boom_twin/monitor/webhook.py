@@ -17,15 +17,15 @@ from ..errors import UsageError
 
 LOG = logging.getLogger("boom_twin.monitor.webhook")
 MAX_WAITING = 100
-"""Messages that may wait; a further one drives out the oldest."""
+"""Largest number of waiting messages; one more replaces the oldest."""
 PAUSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-"""Seconds before each further attempt."""
+"""Pauses (s) before further attempts."""
 POST_TIME = 10.0
-"""Seconds for one attempt."""
+"""Timeout (s) of one attempt."""
 CLOSING_TIME = 2.0
-"""Seconds at the end of the monitor for messages that still wait."""
+"""Time (s) for waiting messages when the monitor ends."""
 TRY_AGAIN = (HTTPStatus.REQUEST_TIMEOUT, HTTPStatus.TOO_EARLY, HTTPStatus.TOO_MANY_REQUESTS)
-"""Answers below 500 after which another attempt may succeed."""
+"""Status codes below 500 after which another attempt may succeed."""
 
 
 class Webhook:
@@ -60,7 +60,7 @@ class Webhook:
 
     @asynccontextmanager
     async def posting(self) -> AsyncIterator[None]:
-        """Post messages within a context; at its end those that wait have `CLOSING_TIME`."""
+        """Post messages within a context; at its end, waiting ones have `CLOSING_TIME`."""
         task = asyncio.create_task(self._post_all())
         try:
             yield
@@ -86,7 +86,7 @@ class Webhook:
                     self._waiting.task_done()
 
     async def _attempts(self, session: ClientSession, message: Mapping[str, Any]) -> str:
-        """Post a message and return why it was given up; empty if it was accepted."""
+        """Post a message; return the reason of failure, empty if it was accepted."""
         for pause in (*PAUSES, None):
             reason, may_succeed = await self._post(session, message)
             if not reason or not may_succeed:
@@ -96,7 +96,7 @@ class Webhook:
         return f"{reason}; {len(PAUSES) + 1} attempts"
 
     async def _post(self, session: ClientSession, message: Mapping[str, Any]) -> tuple[str, bool]:
-        """Make one attempt. Return why it failed, empty if it did not, and whether another may succeed."""
+        """Make one attempt. Return the reason of failure or "", and True if another attempt may succeed."""
         try:
             async with session.post(self._url, json={"host": self._host, **message}, allow_redirects=False) as response:
                 status = response.status
