@@ -1,7 +1,7 @@
-"""One table of alarm sentences, and one table of translations (``texts.json``) of all that an operator reads.
+"""Alarm sentences, and translations (``texts.json``) of all texts for operators.
 
-`/diagnostics`, the live page, report, ``summary.json`` and command line take their sentences about alarms from here. Sentences
-are constant: figures stand beside them, as evidence.
+The sentences are used by `/diagnostics`, live page, report, ``summary.json`` and command line. Sentences hold no figures:
+figures are the alarm's evidence.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 LANGUAGES = ("en", "de", "zh")
 FILE = Path(__file__).parent / "texts.json"
-"""English text to the texts in the other `LANGUAGES`. The live page reads the same file."""
+"""Translations of English texts, in the order of `LANGUAGES`. The live page reads this file."""
 
 THINGS = {
     "joint": "angle sensor of joint {n}",
@@ -28,11 +28,11 @@ THINGS = {
     "EI": "section {n}",
     "stiffness": "base",
 }
-"""Names of channels, and of parameters by their last part."""
+"""Names by kind of channel, or by last part of a parameter."""
 
 
 class Sentence(NamedTuple):
-    """Sentence about an alarm: what is wrong, and what to do. `stops`: the boom is to be stopped at once."""
+    """Alarm sentence: fault and remedy. `stops` is True if the boom must stop at once."""
 
     what: str
     remedy: str
@@ -76,9 +76,9 @@ SENTENCES = {
     "clock": Sentence("a clock was set", "Nothing, if it was on purpose"),
     "": Sentence("{thing} does not behave as the model", "Look at it"),
 }
-"""Sentences by kind of alarm, some of them by the kind of channel or parameter too; the last one is for kinds not known."""
+"""Sentences by kind of alarm, some by kind of channel or parameter too. The last one is for unknown kinds."""
 LIKELY = ((0.99, "almost certain"), (0.9, "very likely"), (0.66, "likely"), (0.33, "possible"), (0.0, "unlikely"))
-"""Words for probabilities from these on."""
+"""Least probability for each word."""
 
 _TRANSLATIONS: dict[str, list[str]] = {}
 
@@ -91,7 +91,7 @@ def translations() -> Mapping[str, list[str]]:
 
 
 def translated(english: str, language: str = "en") -> str:
-    """Return a text in a language; in English where the table does not have it."""
+    """Return the translation of a text, or the English text if there is none."""
     others = None if language == "en" else translations().get(english)
     return english if others is None else others[LANGUAGES.index(language) - 1]
 
@@ -108,7 +108,7 @@ def alarm_sentence(channel: str, kind: str, cause: str | None) -> Sentence:
 
 
 def alarm_text(channel: str, kind: str, cause: str | None, language: str = "en") -> str:
-    """Return what an operator is told of an alarm: what is wrong, and what to do."""
+    """Return the text of an alarm for an operator: fault and remedy."""
     sentence = alarm_sentence(channel, kind, cause)
     last, place = (cause or "").rpartition(".")[2], channel
     if last in THINGS:
@@ -122,7 +122,7 @@ def alarm_text(channel: str, kind: str, cause: str | None, language: str = "en")
 
 
 def _parts(channel: str) -> tuple[str, str]:
-    """Return kind and number of a channel: ``joint_3`` is a joint, 3; the axes of an IMU are one thing."""
+    """Return kind and number of a channel. All axes of the tip IMU are one channel."""
     if channel.startswith("tip_imu"):
         return "tip_imu", ""
     kind, _, number = channel.rpartition("_")

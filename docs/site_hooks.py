@@ -59,7 +59,7 @@ def room_page(room: str) -> str:
     """Markdown of a page of the reference."""
     place = ROOT / "boom_twin" / room
     head = f"# {room}\n\n{docstring(place / '__init__.py')}\n" if place.is_dir() else ""
-    return head + "".join(f"\n::: {module}\n" for module in modules(room))
+    return head + "".join(f"\n::: {module}\n    options: {{heading_level: 2}}\n" for module in modules(room))
 
 
 def notation_page() -> str:

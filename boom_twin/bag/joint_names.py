@@ -11,7 +11,7 @@ from ..types import SENSORS, Stream
 from .reader import Session, read
 
 NAMING_TIME = 5_000_000_000
-"""Time from the first message of strokes or angles in which all names are checked, ns of log time."""
+"""Log time (ns) from the first message of strokes or angles, in which all names are read."""
 
 KINDS = {stream: kind.named for stream, kind in SENSORS.items() if kind.is_named and not kind.ends}
 NAMES_TOLD = 12
@@ -41,13 +41,13 @@ DRIVE_REMEDY = (
 
 
 def refuse_missing_drive(session: Session, topics: Topics) -> None:
-    """Raise BagError if a session has no strokes to drive the model, but angles that could."""
+    """Raise BagError if strokes drive the model, and a session has angles but no strokes."""
     for sentence in missing_drive(session, topics):
         raise BagError(f"{session.path}: {sentence}")
 
 
 def missing_drive(session: Session, topics: Topics) -> Iterator[str]:
-    """Yield a sentence if a session has no strokes to drive the model, but angles that could."""
+    """Yield the error sentence of `refuse_missing_drive`, if any."""
     strokes = topics.inputs.get(Stream.STROKES)
     found = [session.find(topic.name) for topic in (strokes, topics.inputs[Stream.ANGLES]) if topic is not None]
     counts = [0 if topic is None else topic.count for topic in found]
@@ -57,10 +57,10 @@ def missing_drive(session: Session, topics: Topics) -> Iterator[str]:
 
 
 def other_names(topics: Topics, names: Mapping[Stream, Collection[str]], joints: int, scene: str) -> Iterator[str]:
-    """Yield a sentence for each conflict of a session's names, by stream, with a scene of `joints` joints.
+    """Yield an error sentence for each conflict between `names` of a session and a scene of `joints` joints.
 
-    No cylinder or joint beyond them may be named. Every sensor that drives the model must be named at some time: a boom may
-    lack an encoder, but without a stroke there is no prediction. Other names are ignored.
+    Cylinders and joints beyond the scene are a conflict. A sensor that drives the model and is never named is a conflict, too:
+    the prediction needs it. Other unknown or missing names are ignored.
     """
     for stream, found in names.items():
         if beyond := topics.beyond(stream, joints, found):
@@ -109,7 +109,7 @@ def _counted(number: int, kind: str) -> str:
 
 
 def _names(session: Session, topics: Topics, joints: int) -> dict[Stream, dict[str, None]]:
-    """Return the names in messages of strokes and angles, read for `NAMING_TIME` and on until all that drives was named."""
+    """Return the names in messages of strokes and angles, read for `NAMING_TIME` and until all driving sensors are named."""
     heard = {name: [stream for stream in streams if stream in KINDS] for name, streams in topics.heard.items()}
     present = {name: streams for name, streams in heard.items() if streams and (t := session.find(name)) and t.count}
     if not present:

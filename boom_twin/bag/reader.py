@@ -30,12 +30,17 @@ from .storages import summarise
 from .time_window import WHOLE, TimeWindow
 
 
+def refuse_absent(path: Path) -> None:
+    """Raise BagError if there is no file or folder at `path`."""
+    if not (path.is_file() or path.is_dir()):
+        raise BagError(f"{path}: there is no such file or directory. Give a rosbag2 directory or a file of a session.")
+
+
 def stored_files(path: Path, storage: str = "") -> list[Path]:
     """Return the files of a session without metadata, or only those of one storage. Raise BagError if there are none."""
     if path.is_file():
         return [path.resolve() if path.is_symlink() else path]  # the user's own word, unlike a link in a folder
-    if not path.is_dir():
-        raise BagError(f"{path}: there is no such file or directory. Give a rosbag2 directory or a file of a session.")
+    refuse_absent(path)
     kinds = {suffix for suffix, kind in STORAGES.items() if kind.startswith(storage)}
     files = sorted(file for file in path.iterdir() if file.suffix in kinds)
     if not files:

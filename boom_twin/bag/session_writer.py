@@ -1,4 +1,4 @@
-"""Write a session from samples of a live source, without ROS."""
+"""Writer of a session from samples of a live source, without ROS."""
 
 from __future__ import annotations
 
@@ -27,16 +27,17 @@ from .session_sheet import SessionSheet
 from .writer import BagWriter, recorded
 
 CLOCK_SET = SECOND
-"""Nanoseconds by which stamps step back where a clock was set; less is one late row."""
+"""Step back of a stamp (ns) above which a clock was set; a smaller one is a late row."""
 BY_NAME = "sensor_msgs/msg/JointState"
 CHECK_PERIOD = 0.5
-"""Seconds between two looks for a fault of the disk."""
+"""Time (s) between two checks of the disk."""
 
 
 class LogTimes:
-    """Log times of rows that come with stamps: the order is that of the rows.
+    """Log times of rows with stamps, in the order of the rows.
 
-    A row whose stamp steps back is logged with the row before. Where a clock was set back, the log goes on by a usual step.
+    A row whose stamp steps back has the log time of the row before. After a clock was set back, log times continue by the
+    last interval.
     """
 
     def __init__(self) -> None:
@@ -55,7 +56,7 @@ class LogTimes:
 
 
 def named_message(sample: Sample, names: Sequence[str]) -> Any:
-    """Return the message of a sensor with the names of a mapping, or the axes of an Imu. A value without a name is left out."""
+    """Return the message of a sensor with names by a mapping, or Imu axes. A value without a name is left out."""
     msg, kind = sensor_message(sample), SENSORS[sample.stream]
     pairs = [(name, float(value)) for name, value in zip(names, sample.values, strict=True) if name]
     if kind.message == BY_NAME:
@@ -68,7 +69,7 @@ def named_message(sample: Sample, names: Sequence[str]) -> Any:
 
 
 class SessionWriter:
-    """Context manager that writes samples of a live source as a session, as `boom_twin record` does of topics.
+    """Context manager that writes samples of a live source as a session like those of `boom_twin record`.
 
     Until the context ends, ``session.yaml`` marks the session as incomplete. It stays so after an exception or a kill, and
     `boom_twin recover` saves what was written.
@@ -78,10 +79,10 @@ class SessionWriter:
     out : path
         New or empty folder.
     scene : Scene, path or mapping, optional
-        Boom of the session, which it keeps. The default is the package's own.
+        Boom of the session, stored in it. The default is the package's own.
     mapping : path, optional
-        Names, units, signs and zeros of the rig's sensors, which the session keeps. Messages are as this rig publishes them, so
-        that a replay gives the samples that were written.
+        Names, units, signs and zeros of the rig's sensors, stored in the session. Messages are encoded with them. So a
+        replay gives the same samples.
     note, origin : str, optional
         Note of the operator, and origin of the session.
 
@@ -156,7 +157,7 @@ class SessionWriter:
 
 
 class _Sensors:
-    """Sensors of one stream: what they read of quantities in SI units."""
+    """Sensors of one stream: readings from quantities in SI units."""
 
     def __init__(self, topics: Topics, stream: Stream, joints: int) -> None:
         sensors = topics.sensors_of(stream, joints)
@@ -166,6 +167,6 @@ class _Sensors:
         self._delay = topics.delay(stream)
 
     def message(self, sample: Sample) -> Any:
-        """Return the message from which a decoder with the same mapping takes this sample."""
+        """Return the message that a decoder with the same mapping turns into this sample."""
         readings = np.asarray(sample.values, float) / self._factors + self._zeros
         return named_message(Sample(sample.stream, sample.stamp + self._delay, readings), self._names)

@@ -19,19 +19,22 @@ from urllib.parse import quote
 from .. import __version__
 from ..errors import BagError
 from ..plots.session import Trend, trends_picture
+from ..report.fatigue import LIVES, hours_as_text, yearly_as_text
 from ..report.html import Html, heading, image, page, paragraph, table
 from ..system.atomic_files import DRAFT, write_atomic
+from ..system.json_text import json_text
 from ..system.received_files import real_path
 from ..system.result_folder import check_lasting
 from ..system.terminal_text import printable
 from ..types import SECOND, sensor_kind
+from .rigs import LEAST_SESSIONS, Drift, RigSummary, as_dict
 from .session_task import ALARM, OK, Row
 
-MARK, TABLE, PAGE = "batch.json", "sessions.parquet", "batch.html"
+MARK, TABLE, RIGS, PAGE = "batch.json", "sessions.parquet", "rigs.json", "batch.html"
 ROWS, SESSIONS = "rows", "sessions"
 """Folders of the rows, and of the replays."""
 DIGEST = "row_sha256"  # key of a row's digest in its file, by which a change is detected
-_OWN = frozenset({MARK, TABLE, PAGE, ROWS, SESSIONS})
+_OWN = frozenset({MARK, TABLE, RIGS, PAGE, ROWS, SESSIONS})
 
 
 @contextmanager
@@ -116,7 +119,8 @@ _ALWAYS: dict[str, str] = {
     "joint_residual_rms_rad": "list", "joint_residual_normalised_mean": "list", "joint_residual_normalised_std": "list",
     "session_incomplete": "string", "file_sha256": "string", "output_sha256": "string", "scene": "string",
     "scene_sha256": "string", "mapping": "string", "version": "string", "fingerprint": "string",
-    "key": "string", "report": "bool", "calibration_reason": "string", "calibration_remarks": "string",
+    "key": "string", "report": "bool", "section_heights_given": "bool", "calibration_reason": "string",
+    "calibration_remarks": "string",
 }  # fmt: skip
 """Columns that every table has, with their types; the others are the figures of `boom_twin.report.quantities`, numbers."""
 
@@ -142,6 +146,11 @@ def write_table(path: Path, rows: Sequence[Row]) -> None:
     write_atomic(path, sink.getvalue().to_pybytes())
 
 
+def write_rigs(path: Path, rigs: Sequence[RigSummary]) -> None:
+    """Write the summaries of all rigs as one JSON object, with the list ``rigs``."""
+    write_atomic(path, json_text({"rigs": [as_dict(rig) for rig in rigs]}, indent=1) + "\n")
+
+
 def counts(rows: Sequence[Row]) -> tuple[int, int]:
     """Return the number of rows with a result and of failed rows."""
     right = sum(row["status"] == OK for row in rows)
@@ -159,7 +168,8 @@ document.querySelectorAll('.sorted th').forEach((head, column) => head.onclick =
 });
 </script>
 <style>
-body { max-width: 1400px } .sorted { overflow-x: auto } .sorted th { cursor: pointer } tr:has(.alarm) td { background: #fff0e6 }
+body { max-width: 1400px } .sorted, .wide { overflow-x: auto } .sorted th { cursor: pointer }
+tr:has(.alarm) td { background: #fff0e6 }
 .sorted td { white-space: nowrap } .sorted td:last-child { white-space: normal; min-width: 8em }
 @media (max-width: 1300px) { .sorted table { font-size: 13px } .sorted th, .sorted td { padding: .22em .4em } }
 </style>"""
@@ -172,16 +182,18 @@ TRENDS = ("residual_rms_", "frequency_ratio_mode_", "damping_mode_", "calibrated
 MAX_TRENDS = 24
 
 
-def write_page(path: Path, rows: Sequence[Row]) -> None:
+def write_page(path: Path, rows: Sequence[Row], rigs: Sequence[RigSummary]) -> None:
     """Write the page beside the folder of the replays. The page loads nothing from other files."""
     right, wrong = counts(rows)
     alarmed = sum(bool(row.get("alarms")) for row in rows)
     parts = [
         heading(f"Batch of {len(rows)} sessions", 1),
         paragraph(f"{right} right, of which {alarmed} with alarms; {wrong} failed.", "alarm" if wrong or alarmed else "well"),
+        *_by_rig(rigs),
+        heading("Sessions"),
         paragraph("A click on a column's title sorts by it. All figures are in sessions.parquet.", "note"),
         f'<div class="sorted">{table(COLUMNS, map(_cells, rows))}</div>',
-        *_trends(rows),
+        *_trends(rows, rigs),
         SORT,
     ]
     write_atomic(path, page("Batch of sessions", parts))
@@ -208,8 +220,74 @@ def _cells(row: Row) -> tuple[object, ...]:
     )
 
 
-def _trends(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield pictures of wear-related figures over time, for every rig with several sessions."""
+RIG_COLUMNS = (
+    "rig", "sessions", "hours", "with alarms", "causes named (sessions)", "damage", "at station", "by one session, %",
+    "hours of such work to damage 1", *(f"h a year for {years} years" for years in LIVES),
+)  # fmt: skip
+DAMAGE_NOTE = (
+    "Damage (Palmgren and Miner) is the sum of the sessions at the station where it is largest, by the predicted bending "
+    "stress for detail category {category:g} MPa of EN 1993-1-9, without partial factors. Hours are of work as in these "
+    "sessions. Work of other kinds, and vibration that only sensors show, such as by a pump, are NOT in it. "
+)
+ASSUMED = "Section heights are not in every scene: stresses are those of thin-walled boxes there. "
+
+
+def _by_rig(rigs: Sequence[RigSummary]) -> Iterator[str]:
+    yield heading("Rigs")
+    yield f'<div class="wide">{table(RIG_COLUMNS, map(_rig_cells, rigs))}</div>'
+    lives = [rig.life for rig in rigs if rig.life is not None]
+    if not lives:
+        yield paragraph("Damage is not known: give --fatigue, and sections that bend.", "note")
+    else:
+        told = DAMAGE_NOTE.format(category=lives[0].category) + ("" if all(life.has_heights for life in lives) else ASSUMED)
+        yield paragraph(told + f"± is the scatter of the sessions, not known below {LEAST_SESSIONS} of them.", "note")
+    if repeated := sum(rig.repeated for rig in rigs):
+        yield paragraph(f"Counted once: {repeated} sessions whose files equal those of another one.", "note")
+
+
+def _rig_cells(rig: RigSummary) -> tuple[object, ...]:
+    causes = ", ".join(f"{cause} ({count})" for cause, count in rig.causes.items()) or "none"
+    start: tuple[object, ...] = rig.rig, rig.sessions, rig.hours, rig.alarmed, causes
+    if (life := rig.life) is None:
+        return *start, *[None] * (len(RIG_COLUMNS) - len(start))
+    damage = f"{life.damage:.3g}" + ("" if life.sigma is None else f" ± {life.sigma:.1g}")
+    years = (yearly_as_text(life.hours_a_year(years)) for years in LIVES)
+    place = life.station.replace("_", " ") + " m"
+    return *start, damage, place, 100.0 * life.largest_share, hours_as_text(life.hours_to_end), *years
+
+
+DRIFT_NOTE = (
+    f"Change from the first session to the last, along a line of weighted least squares. It needs {LEAST_SESSIONS} sessions "
+    "with a standard deviation. DRIFTS: by chance less than once in a thousand. Other postures, loads and temperatures change "
+    "figures, too."
+)
+
+
+def _drifts(rig: RigSummary) -> Iterator[str]:
+    if not rig.drifts:
+        yield paragraph(f"Drift is not known: fewer than {LEAST_SESSIONS} sessions have one figure at different times.", "note")
+        return
+    rows = [
+        (_with_unit(each.name), each.sessions, each.days, each.first, f"{each.change:+.3g} ± {each.sigma:.1g}", _verdict(each))
+        for each in sorted(rig.drifts, key=lambda drift: not drift.is_significant)
+    ]
+    yield paragraph(DRIFT_NOTE, "note")
+    yield table(("figure", "sessions", "days", "at first", "change", "verdict"), rows)
+
+
+def _verdict(drift: Drift) -> object:
+    return Html('<span class="alarm">DRIFTS</span>') if drift.is_significant else "may be chance"
+
+
+def _with_unit(name: str) -> str:
+    """Return the name of a figure, with its unit where a channel has one."""
+    channel = name.removeprefix("residual_rms_").removeprefix("residual_mean_")
+    return name if channel == name else f"{name}, {sensor_kind(channel).unit}"
+
+
+def _trends(rows: Sequence[Row], summaries: Sequence[RigSummary]) -> Iterator[str]:
+    """Yield drift and pictures of wear-related figures over time, for every rig with several sessions."""
+    by_name = {rig.rig: rig for rig in summaries}
     rigs: dict[str, list[Row]] = {}
     for row in rows:
         if row["status"] == OK:
@@ -220,6 +298,7 @@ def _trends(rows: Sequence[Row]) -> Iterator[str]:
         trends = [trend for name in names if len((trend := _trend(name, found)).values) > 1][:MAX_TRENDS]
         if trends:
             yield heading(f"Over time: {rig}")
+            yield from _drifts(by_name[rig])
             yield paragraph("Sessions by the stamp of their first prediction; bars are standard deviations.", "note")
             with TemporaryDirectory() as folder:
                 picture = Path(folder) / "trends.png"
@@ -230,6 +309,4 @@ def _trends(rows: Sequence[Row]) -> Iterator[str]:
 def _trend(name: str, rows: Sequence[Row]) -> Trend:
     known = [row for row in rows if isinstance(row.get(name), float | int) and isfinite(row[name])]
     values, sigmas = [row[name] for row in known], [row.get(f"{name}_sigma") or 0.0 for row in known]
-    channel = name.removeprefix("residual_rms_")
-    label = name if channel == name else f"{name}, {sensor_kind(channel).unit}"
-    return Trend(label, [row["first_stamp_ns"] / SECOND for row in known], values, sigmas)
+    return Trend(_with_unit(name), [row["first_stamp_ns"] / SECOND for row in known], values, sigmas)

@@ -16,13 +16,14 @@ from ..errors import BoomTwinError
 from ..system.child_process import python_command
 
 if TYPE_CHECKING:
+    from ..bag.session_model import SessionScene
     from ..bag.time_window import TimeWindow
     from ..config.settings import Settings
     from ..scene.schema import Scene
 import signal
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from tempfile import TemporaryFile
 from threading import Thread
 
@@ -131,6 +132,7 @@ class SessionTask:
     start: float = 0.0  # of the window, s, see `boom_twin.bag.time_window.TimeWindow`
     duration: float | None = None
     calibrate: bool = False  # the scene's parameters from the session as well; that assumes a healthy rig
+    fatigue: float | None = None  # detail category, MPa, of the damage of all stations; None: it is not counted
 
 
 def run_task(task: SessionTask) -> Row:
@@ -176,7 +178,7 @@ def row_of(task: SessionTask) -> Row:
     window = TimeWindow(task.start, task.duration)
     options = ReplayOptions(mapping=task.mapping, window=window)
     with result_folder(Path(task.out), REPLAY, [session]) as building:
-        found = evaluated_replay(building, session, scene, settings, options)
+        found = evaluated_replay(building, session, scene, settings, options, category=task.fatigue)
         if task.report:
             draw(found.result, found.history, found.scene, building.folder)
             write_report(found, building.folder)
@@ -188,14 +190,22 @@ def row_of(task: SessionTask) -> Row:
     row |= {name: value for name, value in summary.items() if name not in ("events", "alarms")}
     row |= {
         "file_sha256": files_sha256(result.session),
-        "rig": scene.scene.description or scene.sha256[:12],
+        "rig": _rig(result.session.notes, scene),
         "report": task.report,
         "alarms": [{name: alarm[name] for name in ALARM} for alarm in summary["alarms"]],
         "events": [{"event": name, "count": count} for name, count in summary["events"].items()],
     }
     for each in quantities:
         row |= {each.name: each.value, f"{each.name}_sigma": each.sigma}
+    if found.fatigue:
+        row |= {"fatigue_category_MPa": task.fatigue, "section_heights_given": found.has_heights}
+        row |= {f"fatigue_damage_{each.station.key}": each.damage for each in found.fatigue}
     return row | (_calibrated(task, scene.scene, settings, window) if task.calibrate else {})
+
+
+def _rig(notes: Mapping[str, str], scene: SessionScene) -> str:
+    """Return the name of a session's rig: its note ``rig``, else description and digest of its scene."""
+    return notes.get("rig", "").strip() or f"{scene.scene.description} scene {scene.sha256[:12]}".strip()
 
 
 def _calibrated(task: SessionTask, scene: Scene, settings: Settings, window: TimeWindow) -> Row:

@@ -40,6 +40,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_window(parser)
     parser.add_argument("--report", action="store_true", help="write report.html with its pictures for every session")
     parser.add_argument("--calibrate", action="store_true", help="estimate the scene's parameters from every session as well")
+    fatigue = "damage of all stations, summed up by rig: detail category of EN 1993-1-9, MPa (default 71); extra fatigue"
+    parser.add_argument("--fatigue", nargs="?", type=positive, const=71.0, metavar="CATEGORY", help=fatigue)
     parser.add_argument("--keep-bags", action="store_true", help="keep the result bag of every session")
     parser.add_argument("--timeout", metavar="S", type=positive, default=3600.0, help="for one session, s (3600)")
     parser.add_argument("--memory", metavar="MB", type=positive, default=2000.0, help="for one session, MB (2000)")
@@ -50,11 +52,14 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Replay what is not done yet, and write the table of all; exit code 1 if a session failed."""
     from ..batch.cluster import REMEDY, connected, rows_of
-    from ..batch.results import PAGE, TABLE, batch_folder, counts, write_page, write_table
+    from ..batch.results import PAGE, RIGS, TABLE, batch_folder, counts, write_page, write_rigs, write_table
+    from ..batch.rigs import rigs_of
     from ..batch.sources import sessions_of
 
     if missing := [name for name in ("pyarrow", "psutil") if find_spec(name) is None]:
         raise UsageError(f"{missing[0]} is not installed, and batch needs it. {REMEDY}")
+    if args.fatigue is not None and find_spec("rainflow") is None:
+        raise UsageError("--fatigue: needs the package rainflow. Install it: pip install 'boom_twin[fatigue]'.")
     sessions = sessions_of(args.bags)
     with batch_folder(args.out, sessions) as folder:
         tasks = _tasks(args, sessions, folder)
@@ -73,14 +78,16 @@ def run(args: Namespace) -> int:
                     folder.mark(len(tasks), len(done))
         rows = [done[task.key] for task in tasks]
         write_table(folder.folder / TABLE, rows)
-        write_page(folder.folder / PAGE, rows)
+        rigs = rigs_of(rows)
+        write_rigs(folder.folder / RIGS, rigs)
+        write_page(folder.folder / PAGE, rows, rigs)
         folder.mark(len(tasks), len(done))
     right, wrong = counts(rows)
     print(f"{right} sessions right, {wrong} failed")
     for row in rows:
         if row["reason"]:
             print(f"  {row['path']}: {row['reason']}")
-    print(args.out / TABLE, args.out / PAGE, sep="\n")
+    print(args.out / TABLE, args.out / RIGS, args.out / PAGE, sep="\n")
     return 1 if wrong else 0
 
 
@@ -93,7 +100,7 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
     given = {name: getattr(args, name) for name in ("scene", "params", "mapping")}
     contents = [f"{name} {sha256_of(path.resolve())}" for name, path in given.items() if path is not None]
     window = window_of(args)
-    kinds = [str(args.report), str(args.keep_bags), str(args.calibrate)]
+    kinds = [str(args.report), str(args.keep_bags), str(args.calibrate), str(args.fatigue)]
     options = "\n".join([__version__, *kinds, str(window), *contents])
     paths = {name: None if path is None else str(path.resolve()) for name, path in given.items()}
     return [
@@ -106,6 +113,7 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
             start=window.start,
             duration=window.duration,
             calibrate=args.calibrate,
+            fatigue=args.fatigue,
             report=args.report,
             keep_bag=args.keep_bags,
             time=args.timeout,

@@ -61,6 +61,8 @@ def run(args: Namespace) -> int:
     with result_folder(args.out, IMPORT, [*args.files, *files_of(args, "scene", "columns", "mapping")]) as building:
         done = import_session(tables, building.folder, given, sheet, joints, args.mapping)
     _warn(done, scene is None, given.timezone)
+    if scene is not None:
+        tell(f"next: boom_twin info {args.out}; its line `wiring` says if units, signs and names fit the boom")
     print_result(args.json, as_json(done, args.out), as_text(done, args.out))
     return 0
 

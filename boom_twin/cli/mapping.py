@@ -55,13 +55,13 @@ def as_json(found: Commissioning, text: str) -> dict[str, Any]:
     """Return the result as a flat object; lists have an entry for each channel or stream."""
     from ..wiring.words import finding, reading
 
-    verdicts, moved = found.checked.verdicts, found.checked.moved
+    verdicts = found.checked.verdicts
     return {
         "channels": [each.channel for each in verdicts],
         "declared": [reading(each.declared) for each in verdicts],
-        "found": [finding(each, moved) for each in verdicts],
+        "found": [finding(each, found.checked) for each in verdicts],
         "wrong": [each.is_wrong for each in verdicts],
-        "sure": [each.is_sure or not each.is_wrong for each in verdicts],
+        "sure": [each.is_sure or not (each.is_wrong or found.checked.has_strokes_alone) for each in verdicts],
         "lag_streams": [stream.value for stream in found.lags],
         "lags_s": [lag.lag for lag in found.lags.values()],
         "lag_sigmas_s": [lag.sigma for lag in found.lags.values()],
@@ -72,17 +72,18 @@ def as_json(found: Commissioning, text: str) -> dict[str, Any]:
 
 def as_text(found: Commissioning, text: str, out: Path | None) -> list[str]:
     """Return a table of all channels, of lags, and the proposed mapping."""
-    from ..wiring.words import finding, reading
+    from ..wiring.words import STROKES_ALONE, finding, reading
     from .output import columns
 
     rows = [["channel", "declared as", "found"]]
-    rows += [[each.channel, reading(each.declared), finding(each, found.checked.moved)] for each in found.checked.verdicts]
+    rows += [[each.channel, reading(each.declared), finding(each, found.checked)] for each in found.checked.verdicts]
     rows += [[f"{stream.value}.delay", "", lag_words(lag.lag, lag.sigma)] for stream, lag in found.lags.items()]
     told = "not determined by the encoders" if found.reads is None else f"are {found.reads.value}s"
     lines = [*columns(rows, left=(0, 1, 2)), "", f"strokes {told}; declared as {found.declared_reads.value}s", ""]
     if not text:
         unknown = "; see the channels that are not as declared" if found.wrong else ""
-        return [*lines, f"nothing to propose{unknown}" if unknown else "wiring as expected: nothing to mend"]
+        right = STROKES_ALONE if found.checked.has_strokes_alone else "wiring as expected: nothing to mend"
+        return [*lines, f"nothing to propose{unknown}" if unknown else right]
     where = f"written to {out}" if out is not None else "save it as a file, and give it by --mapping or `-p mapping:=FILE`"
     return [*lines, f"# proposed mapping; {where}", *text.rstrip().splitlines()]
 

@@ -27,7 +27,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Identify, draw, and print a table."""
+    """Identify modes, draw diagrams, print a table."""
     import json
 
     import numpy as np

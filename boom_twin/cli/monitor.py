@@ -39,6 +39,11 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_window(parser)
     parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
     parser.add_argument("--host", default="127.0.0.1", help="listen here (127.0.0.1); elsewhere a token is needed, and printed")
+    token = "the token is the one in FILE, on this machine, too; without it, a new one at each start"
+    parser.add_argument("--token-file", metavar="FILE", type=Path, help=token)
+    parser.add_argument(
+        "--webhook", metavar="URL", help="post a JSON object here when an alarm begins, changes its cause, or ends"
+    )
     parser.add_argument(
         "--allow",
         nargs="*",
@@ -125,12 +130,14 @@ def _live_feed(args: Namespace) -> Iterator[Feed]:
 def _serve(args: Namespace, feed: Feed, actions: Any, sessions: SessionList | None = None) -> None:
     import asyncio
 
-    from ..monitor.access_control import AccessControl
+    from ..monitor.access_control import AccessControl, token_of
     from ..monitor.server import Server
+    from ..monitor.webhook import Webhook
 
-    access = AccessControl(args.host)
+    access = AccessControl(args.host, "" if args.token_file is None else token_of(args.token_file))
+    webhook = None if args.webhook is None else Webhook(args.webhook)
     try:
-        asyncio.run(_run(args, Server(feed, actions, access, sessions), access))
+        asyncio.run(_run(args, Server(feed, actions, access, sessions, webhook), access))
     except OSError as error:
         raise BoomTwinError(f"cannot listen on {args.host}:{args.port}: {error.strerror}. Choose another --port.") from None
 

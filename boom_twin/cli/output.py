@@ -64,8 +64,10 @@ def open_scene(source: str | None) -> Scene:
 
 def open_session_scene(session: str | Path, source: str | None) -> SessionScene:
     """Return the scene of a session, see `boom_twin.bag.session_model.scene_of`; print source and warnings on stderr."""
+    from ..bag.reader import refuse_absent
     from ..bag.session_model import scene_of
 
+    refuse_absent(Path(session))  # before the model is compiled
     found = scene_of(Path(session), source)
     tell(f"scene: {found.source} (sha256 {found.sha256[:12]}..)")
     tell_oddities(found.oddities, found.source)

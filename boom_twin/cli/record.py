@@ -51,6 +51,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--params", metavar="FILE", type=Path, help="ROS parameter file, copied too (the package's own)")
     parser.add_argument("--mapping", metavar="FILE", type=Path, help="topics and sensors, copied and used (the package's own)")
     parser.add_argument("--note", metavar="TEXT", help="kept in session.yaml and in the bag")
+    parser.add_argument("--rig", metavar="NAME", help="kept in the bag: name of the rig, by which `batch` sums up")
     parser.add_argument("--origin", metavar="TEXT", help="kept there too: where this comes from")
     add_ros_args(parser)
 
@@ -71,7 +72,7 @@ def run(args: Namespace) -> int:
     on_stop_signal(lambda: signals.append(True))
     known = load_mapping(args.mapping)
     wanted, sheet = _wanted(args, known), _sheet(args)
-    given = {"origin": args.origin, "note": args.note}
+    given = {"origin": args.origin, "note": args.note, "rig": args.rig}
     check_lasting(args.out)
     if args.out.is_dir() and (reason := incompleteness(args.out)):
         raise BoomTwinError(f"{args.out}: {reason} Record into a new directory.")

@@ -52,24 +52,40 @@ class Pulses:
 
 @dataclass(frozen=True, slots=True)
 class TipLoad:
-    """Load at the tip that the model does not know: root mean square (N), and its pulses if they stand out."""
+    """Load at the tip that the model does not know.
+
+    Attributes
+    ----------
+    rms, sigma : float
+        Root mean squares of the estimate and of its standard deviation, N.
+    pulses : Pulses or None
+        Periodic part, if it stands out.
+    """
 
     rms: float
+    sigma: float
     pulses: Pulses | None
 
     @property
+    def bound(self) -> float:
+        """Root mean square below which the load cannot be told from none, N."""
+        return max(LEAST, 2.0 * self.sigma)
+
+    @property
     def is_there(self) -> bool:
-        """Return True if the load is `LEAST` or more."""
-        return self.rms >= LEAST or (self.pulses is not None and self.pulses.height >= LEAST)
+        """Return True if the load is `bound` or more, or has pulses of `LEAST` or more."""
+        return self.rms >= self.bound or (self.pulses is not None and self.pulses.height >= LEAST)
 
     @property
     def text(self) -> str:
-        """Load in words: ``pulses of 128 N at 0.430 Hz (+- 0.001)``, ``45 N rms, no main frequency`` or ``none above 20 N``."""
+        """Load in words: ``pulses of 128 N at 0.430 Hz (+- 0.001)``, or its size, or ``none above 20 N``."""
         if self.pulses is not None and self.pulses.height >= LEAST:
             digits = min(max(1, int(np.ceil(-np.log10(self.pulses.frequency_sigma)))), 4)
             sure = f"{self.pulses.frequency:.{digits}f} Hz (+- {self.pulses.frequency_sigma:.{digits}f})"
             return f"pulses of {self.pulses.height:.0f} N at {sure}"
-        return f"{self.rms:.0f} N rms, no main frequency" if self.rms >= LEAST else f"none above {LEAST:.0f} N"
+        if self.rms >= self.bound:
+            return f"{self.rms:.0f} N rms (+- {self.sigma:.0f}), no main frequency"
+        return f"none above {self.bound:.0f} N"
 
 
 def find_pulses(load: Array, interval: float) -> Pulses | None:
@@ -147,17 +163,21 @@ class TipLoadFinder:
     """
 
     def __init__(self) -> None:
-        self._squares, self._count = 0.0, 0
+        self._squares, self._variances, self._count = 0.0, 0.0, 0
         self._strongest: Pulses | None = None
         self._first: int | None = None  # stamp with which the window begins, ns
         self._newest = 0
         self._places: NDArray[np.int64] = np.zeros(0, np.int64)  # bin of every load that is kept
         self._loads: Array = np.zeros((0, 2))
 
-    def add(self, stamps: NDArray[np.int64], loads: Array) -> None:
-        """Add loads (k, 2) in N at `stamps` (k,) in ns. Loads of exactly zero, from before any measurement, are skipped."""
+    def add(self, stamps: NDArray[np.int64], loads: Array, variances: Array) -> None:
+        """Add loads (k, 2) in N and their variances (k, 2) at `stamps` (k,) in ns.
+
+        Loads of exactly zero, from before any measurement, are skipped.
+        """
         known = loads.any(axis=1)
         stamps, loads = stamps[known], loads[known]
+        self._variances += float(variances[known].sum())
         self._squares += float(np.square(loads).sum())
         self._count += len(loads)
         steps = np.diff(stamps, prepend=self._newest) * NANO
@@ -195,7 +215,8 @@ class TipLoadFinder:
         if not self._count:
             return None
         newest = _pulses_in_bins(self._places, self._loads)
-        return TipLoad(sqrt(self._squares / self._count), _stronger(self._strongest, newest))
+        rms, sigma = sqrt(self._squares / self._count), sqrt(self._variances / self._count)
+        return TipLoad(rms, sigma, _stronger(self._strongest, newest))
 
 
 def _stronger(one: Pulses | None, other: Pulses | None) -> Pulses | None:
@@ -212,8 +233,8 @@ def _pulses_in_bins(places: NDArray[np.int64], loads: Array) -> Pulses | None:
     return find_pulses(np.stack([np.interp(every, bins, column) for column in means.T], axis=1), BIN)
 
 
-def tip_load(times: Array, loads: Array) -> TipLoad | None:
-    """Return the load in estimates (k, 2) in N at `times` (k,) in s; None without any."""
+def tip_load(times: Array, loads: Array, variances: Array) -> TipLoad | None:
+    """Return the load in estimates (k, 2) in N with their variances at `times` (k,) in s; None without any."""
     finder = TipLoadFinder()
-    finder.add(np.round(np.asarray(times) / NANO).astype(np.int64), np.asarray(loads, float))
+    finder.add(np.round(np.asarray(times) / NANO).astype(np.int64), np.asarray(loads, float), np.asarray(variances, float))
     return finder.load

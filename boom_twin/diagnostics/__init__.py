@@ -1,1 +1,1 @@
-"""States for ``/diagnostics`` (REP-107), judged without ROS."""
+"""Statuses for ``/diagnostics`` (REP-107), without ROS."""

@@ -1,4 +1,4 @@
-"""Check whether strokes and angles fit one another on the scene: if not, they are of another boom."""
+"""Test for strokes and angles of another boom than the scene."""
 
 from __future__ import annotations
 
@@ -11,26 +11,24 @@ from ..health.wiring_monitor import KIND as WIRING
 from ..types import Array, Health, Report, Sample, Stream
 
 JUDGED_TIME = 5_000_000_000
-"""Time (ns) over which angles are judged together."""
+"""Window (ns) of the test."""
 FEWEST_RESIDUALS = 10
-"""Residuals of a joint within it that are judged."""
+"""Least number of a joint's residuals in the window."""
 LARGEST_RESIDUAL = radians(10.0)
-"""Residual of an angle that no sag, load or wrong stiffness exceeds, and few encoders' zeros."""
+"""Largest residual by sag, load, wrong stiffness, and most encoders' zeros."""
 
 
 class OtherBoom:
     """Test for a session of another boom, by the medians of the angles' residuals.
 
-    It judges the first window in which most encoders give information.
-
-    An encoder that stands still to the last bit may be dead, and tells nothing about the boom. One that is far off may be
-    wrong. If more than half of them are, it is the scene. The test is made once, because a later difference is a
-    fault of the rig. If health says that sensors are wired otherwise than declared, it is not made.
+    The test uses the first window in which the readings of most encoders change. A constant encoder may be dead and is not
+    used. A single large residual may be an encoder fault. If more than half are large, the scene is wrong. The test is made
+    once, because a later difference is a fault of the rig. It is not made if health reports wrong wiring.
 
     Attributes
     ----------
     is_judged : bool
-        True after that test: no more samples are needed.
+        True after the test: no more samples are needed.
     """
 
     def __init__(self) -> None:
@@ -40,7 +38,7 @@ class OtherBoom:
         self._residuals: list[Array] = []
 
     def took(self, sample: Sample, report: Report) -> str:
-        """Take the `report` of `sample`; return why the session is of another boom, empty as long as nothing shows that."""
+        """Take the `report` of `sample`; return the evidence of another boom, empty without evidence."""
         for part in report.all:
             self.hear(part.health)
         values = [sample.values] if sample.stream is Stream.ANGLES else []
@@ -48,11 +46,11 @@ class OtherBoom:
         return self.take(sample.stamp, values, found)
 
     def hear(self, health: Health | None) -> None:
-        """Take the health of the rig: sensors that are wired otherwise explain what is off."""
+        """Take the health of the rig: wrong wiring explains large residuals."""
         self.is_judged |= health is not None and any(alarm.kind == WIRING for alarm in health.alarms)
 
     def take(self, stamp: int, values: Iterable[Array], residuals: Iterable[Array]) -> str:
-        """Take rows of angles and of their residuals (n,) in rad up to a `stamp` (ns); return as `took`."""
+        """Take rows of angles and of their residuals (n,) in rad up to a `stamp` (ns); return the same as `took`."""
         if self.is_judged:
             return ""
         self._values.extend(values)
@@ -61,7 +59,7 @@ class OtherBoom:
         return self.judge() if stamp - self._begin > JUDGED_TIME else ""
 
     def judge(self) -> str:
-        """Return why the session up to now is of another boom, empty if it is not shown; forget what was judged."""
+        """Return the evidence of another boom, empty without evidence; clear the window."""
         values, residuals = self._values, self._residuals
         self._begin, self._values, self._residuals = 0, [], []
         if self.is_judged or len(values) < FEWEST_RESIDUALS or len(residuals) < FEWEST_RESIDUALS:

@@ -1,4 +1,4 @@
-"""Diagnostic levels: the status of a component (REP-107), hysteresis in value and time, several quantities judged into one."""
+"""Diagnostic levels: status of a component (REP-107) by several quantities, hysteresis, debounce time."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ class Status:
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """Limits above which a quantity has a level, or below which if it is `low` that is bad; NaN is no limit."""
+    """Limits of the levels: upper limits, or lower limits if `low`. NaN is no limit."""
 
     warn: float = nan
     error: float = nan
     low: bool = False
 
     def level(self, value: float, held: Level, release: float) -> Level:
-        """Return the level of `value`. A level that is `held` is left at `release` times its limit (if low: over `release`)."""
+        """Return the level of `value`. Levels up to `held` end at `release` times their limit, or divided by it if `low`."""
         for level, limit in ((Level.ERROR, self.error), (Level.WARN, self.warn)):
             share = release if level <= held else 1.0
             if value < limit / share if self.low else value > limit * share:
@@ -52,14 +52,14 @@ class Bounds:
 
 
 class Hysteresis:
-    """Level of one quantity with hysteresis and debounce time; a NaN never makes it worse."""
+    """Level of one quantity with hysteresis and debounce time; NaN never raises it."""
 
     def __init__(self) -> None:
         self.level = Level.OK
         self._agreed: float | None = None
 
     def update(self, value: float, bounds: Bounds, thresholds: Thresholds, now: float, at_once: bool = False) -> Level:
-        """Return the level at the time `now` (s, of a clock that only goes forward); `at_once`: a worse level need not last."""
+        """Return the level at the monotonic time `now` (s); `at_once`: no debounce time for a worse level."""
         seen = bounds.level(value, self.level, thresholds.release)
         if seen == self.level or self._agreed is None:
             self._agreed = now
@@ -71,7 +71,7 @@ class Hysteresis:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """Thresholds and time of an evaluation: `now` (s) of a clock that only goes forward, `clock` (s) of the one people know."""
+    """Thresholds and times of an evaluation: `now` (s) of a monotonic clock, `clock` (s) of the stamps' clock."""
 
     thresholds: Thresholds
     now: float
@@ -79,9 +79,9 @@ class Evaluation:
 
 
 class ComponentJudge:
-    """Judge of one component, used again and again: `begin`, any number of `check`, `note` and `fault`, `finish`.
+    """Judge of one component. Each evaluation is `begin`, any number of `check`, `note` and `fault`, `finish`.
 
-    Its `level` is the one reported last, None before the first report; `at` is the evaluation that was begun last.
+    `level` is the last one reported, None before the first report. `at` is the present evaluation.
     """
 
     def __init__(self, name: str) -> None:
@@ -96,13 +96,13 @@ class ComponentJudge:
         return self
 
     def note(self, values: Mapping[str, Value]) -> None:
-        """Report values that are not judged."""
+        """Report values without judging them."""
         self._values |= values
 
     def check(self, key: str, value: float, bounds: Bounds, words: str, at_once: bool = False) -> None:
-        """Judge a value, and report it with its bounds; with `at_once` a worse level needs no debounce time.
+        """Judge a value and report it with its bounds; `at_once`: no debounce time for a worse level.
 
-        `words` say what is wrong if it is. They are constant: figures are in the values.
+        `words` describe the fault without figures: figures are in the values.
         """
         limits = {f"{key}_warn": bounds.warn, f"{key}_error": bounds.error}
         self._values |= {key: value} | {name: limit for name, limit in limits.items() if isfinite(limit)}
@@ -117,12 +117,12 @@ class ComponentJudge:
             self.fault(Level.STALE, words)
 
     def fault(self, level: Level, words: str) -> None:
-        """Set a level that needs no judging."""
+        """Set a level without hysteresis."""
         if level != Level.OK:
             self._faults.append((level, words))
 
     def finish(self, message: str) -> Status:
-        """Return the status with the worst level of this evaluation; `message` if all is well."""
+        """Return the status with the worst level of this evaluation, or with `message` if all is OK."""
         faults = sorted(self._faults, key=lambda fault: -fault[0])
         level = faults[0][0] if faults else Level.OK
         if level != self.level:

@@ -1,4 +1,4 @@
-"""Status of the model: its pace, residuals against noise, what health has found, load at the tip, stresses."""
+"""Statuses of the model: run time, normalised residuals, health alarms, tip load, stresses."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from ..analysis.bending_moments import stations
 from ..analysis.bending_stress import BendingStressModel
-from ..deviation.load_spectrum import TipLoadFinder
+from ..deviation.load_spectrum import LEAST, TipLoadFinder
 from ..health.alarms import Alarms, repeated, values_of
 from ..health.deviations import KIND as DEVIATION
 from ..health.sensor_monitor import noise_as_text
@@ -20,23 +20,23 @@ from ..types import SECOND, Alarm, Array, Health, Report, StrokeReading
 from .levels import Bounds, ComponentJudge, Level, Status, Value
 
 FAILURE_SHOWN = 1.0
-"""Seconds for which a failure is shown."""
+"""Time (s) for which a failure is shown."""
 LOAD_WINDOW, LOAD_INTERVAL = 40 * SECOND, SECOND // 50
 """Window and interval of the estimates of the load at the tip, ns."""
 MEGA = 1e6
 
 
 class ModelWatch:
-    """Counts of the model's predictions and failures from `now` on, s of a clock that only goes forward.
+    """Counts of the model's predictions and failures since the monotonic time `now` (s).
 
-    `drive` names what drives it.
+    `drive` names the input that drives it.
     """
 
     def __init__(self, now: float, drive: str = "strokes") -> None:
         self._drive = drive
         self._predictions = self._failures = self._broken = 0
-        self._predicted_at = self._unfed_at = now  # newest looks with a prediction, and without strokes
-        self._counts: Mapping[str, Value] = {}  # of that with a prediction
+        self._predicted_at = self._unfed_at = now  # newest look with a prediction, and without strokes
+        self._counts: Mapping[str, Value] = {}  # at `_predicted_at`
         self._is_deflected = False
         self._failure, self._failed_at, self.has_news = "", -FAILURE_SHOWN, False
         self._looked, self._steps = now, 0
@@ -55,7 +55,7 @@ class ModelWatch:
             self._failure, self.has_news = report.status, True
 
     def worked(self, duration: float) -> None:
-        """Add `duration` seconds for which the twin was busy beside its samples."""
+        """Add `duration` seconds of the twin's work outside its samples."""
         self._busy += duration
 
     def break_down(self, reason: str) -> None:
@@ -66,10 +66,10 @@ class ModelWatch:
     def status(
         self, judge: ComponentJudge, counts: Mapping[str, Value], idle: str, is_fed: bool, words: Mapping[str, str]
     ) -> Status:
-        """Return the status of the model; strokes come if it `is_fed`.
+        """Return the status of the model; `is_fed`: True while strokes arrive.
 
-        `idle` is why the twin does not listen, empty if it does. `counts` are reported too.
-        `words` describe those of irregular samples.
+        `idle` is the reason why the twin does not listen, or empty. `counts` are reported too. `words` describe the counts of
+        irregular samples.
         """
         now, stale_after = judge.at.now, judge.at.thresholds.stale_after
         judge.note(counts)
@@ -97,7 +97,7 @@ class ModelWatch:
         return judge.finish(f"following the {self._drive}")
 
     def _why(self, counts: Mapping[str, Value], words: Mapping[str, str]) -> str:
-        """Return in words what was counted most since the newest prediction; empty if nothing was."""
+        """Return in words the event counted most since the newest prediction, or empty."""
         new = {key: value - int(self._counts.get(key, 0)) for key, value in counts.items() if isinstance(value, int)}
         most = max(new, key=lambda key: new[key], default="")
         if not most or new[most] <= 0:
@@ -121,46 +121,47 @@ class ModelWatch:
 
 
 class LoadWatch:
-    """Disturbance force at the tip, as estimated in the last `LOAD_WINDOW`; it is never a fault."""
+    """Estimated disturbance force at the tip in the last `LOAD_WINDOW`. It is never a fault."""
 
     def __init__(self) -> None:
-        self.explanation = ""  # of residuals larger than noise, in words; empty without a load at the last look
-        self._loads: deque[tuple[int, Array]] = deque()
+        self.explanation = ""  # reason of residuals above noise; empty without a load at the last look
+        self._loads: deque[Estimate] = deque()
 
     def is_due(self, stamp: int) -> bool:
         """Return True if no estimate was taken within the `LOAD_INTERVAL` before `stamp` (ns)."""
-        return not self._loads or not 0 <= stamp - self._loads[-1][0] < LOAD_INTERVAL
+        return not self._loads or not 0 <= stamp - self._loads[-1].stamp < LOAD_INTERVAL
 
     def took(self, estimate: Estimate) -> None:
         """Take an estimate that `is_due`."""
-        if self._loads and estimate.stamp < self._loads[-1][0]:  # the clock was set back
+        if self._loads and estimate.stamp < self._loads[-1].stamp:  # the clock was set back
             self._loads.clear()
-        self._loads.append((estimate.stamp, estimate.load))
-        while estimate.stamp - self._loads[0][0] > LOAD_WINDOW:
+        self._loads.append(estimate)
+        while estimate.stamp - self._loads[0].stamp > LOAD_WINDOW:
             self._loads.popleft()
 
     def status(self, judge: ComponentJudge) -> Status | None:
-        """Return the status, in words and figures; None as long as nothing but strokes was measured."""
+        """Return the status; None if only strokes are measured."""
         finder = TipLoadFinder()
-        stamps, loads = [stamp for stamp, _ in self._loads], [load for _, load in self._loads]
-        finder.add(np.array(stamps, np.int64), np.array(loads).reshape(-1, 2))
+        stamps = np.array([each.stamp for each in self._loads], np.int64)
+        loads, variances = (np.array([getattr(each, name) for each in self._loads]) for name in ("load", "load_variance"))
+        finder.add(stamps, loads.reshape(-1, 2), variances.reshape(-1, 2))
         load, self.explanation = finder.load, ""
         if load is None:
             return None
-        if load.is_there:
+        if load.rms >= LEAST or load.is_there:
             self.explanation = "a load at the tip moves the boom"
-        judge.note({"rms_N": load.rms})
+        judge.note({"rms_N": load.rms, "rms_sigma_N": load.sigma})
         if (pulses := load.pulses) is not None:
             frequency = {"frequency_Hz": pulses.frequency, "frequency_sigma_Hz": pulses.frequency_sigma}
             judge.note({"pulses_N": pulses.height} | frequency)
         found = "pump pulses at the tip" if pulses is not None else "a load at the tip that the model does not know"
-        return judge.finish(found if load.is_there else "no load at the tip beside the known one")
+        return judge.finish(found if load.is_there else "no load at the tip above its uncertainty")
 
 
 class ResidualWindow:
-    """Normalised residuals of one channel: their root mean square is 1 if noise explains all.
+    """Normalised residuals of one channel: with noise only, their root mean square is 1.
 
-    `since` (s, of a clock that only goes forward) is when the first began to come: the window is no longer than that.
+    The window begins at the monotonic time `since` (s) at the earliest.
     """
 
     def __init__(self, since: float) -> None:
@@ -168,16 +169,16 @@ class ResidualWindow:
         self._window: deque[tuple[float, Array]] = deque()
 
     def take(self, normalised: Array, now: float) -> None:
-        """Take normalised residuals, shape (k,), that became known since the last look; NaN where not measured."""
+        """Take the normalised residuals since the last look, shape (k,); NaN where not measured."""
         self._window.append((now, normalised[np.isfinite(normalised)]))
 
     def status(
         self, judge: ComponentJudge, alarm: tuple[Level, str] | None, explained: str = "", is_judged: bool = False
     ) -> Status:
-        """Return the status of the channel, with level and words of its alarm if there is one.
+        """Return the status of the channel, with level and words of its `alarm`, if any.
 
-        The size of the residual is not judged if it is `explained` by an alarm or a load, in words. If the rig's health
-        `is_judged`, health says what is a fault, and the size is a warning at most.
+        The residual is not judged if `explained` names an alarm or a load as its reason. If the rig's health `is_judged`,
+        health reports faults, and a large residual is a warning at most.
         """
         thresholds, now = judge.at.thresholds, judge.at.now
         while self._window and self._window[0][0] <= now - thresholds.residual_window:
@@ -205,7 +206,7 @@ class HealthWatch:
 
     def __init__(self) -> None:
         self._alarms, self._noise = Alarms(), dict[str, float]()
-        self._before = Counter[tuple[str, str, str | None]]()  # of ended alarms: how often they had come and gone before
+        self._before = Counter[tuple[str, str, str | None]]()  # number of earlier alarms
         self.has_news = False  # an alarm began since the last look
 
     def took(self, health: Health) -> None:
@@ -217,7 +218,7 @@ class HealthWatch:
         self._before.update(map(repeated, self._alarms.fold_ended()))
 
     def acknowledge(self) -> str:
-        """Release alarms that have ended; return in words which."""
+        """Release ended alarms; return them in words."""
         ended = [alarm for alarm in self._alarms.all if alarm.until is not None]
         self._alarms.forget_ended()
         self._before.clear()
@@ -235,7 +236,7 @@ class HealthWatch:
 
     @property
     def explained(self) -> str:
-        """Return a reference to the alarms that large residuals raised; empty without one."""
+        """Return a reference to alarms raised by large residuals; empty without one."""
         found = (alarm for alarm in self._alarms.lasting if alarm.ranked or alarm.kind == DEVIATION)
         channels = dict.fromkeys(alarm.channel for alarm in found)
         return f"judged by health: alarm of {', '.join(channels)}" if channels else ""
@@ -262,16 +263,16 @@ def _level_of(alarm: Alarm) -> Level:
 
 
 def stress_model(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> BendingStressModel | None:
-    """Return the model for `stress_status`; `reads`: how strokes of predictions are read. None if no section bends."""
+    """Return the model for `stress_status`, None if no section bends. `reads` is the type of strokes."""
     return BendingStressModel(scene, reads=reads) if stations(scene) else None
 
 
 def stress_status(
     judge: ComponentJudge, model: BendingStressModel, prediction: Prediction, estimate: Estimate | None
 ) -> Status:
-    """Return moment, stress and its deviation at every station at the newest stamp.
+    """Return the status with moment, stress and its standard deviation at every station.
 
-    They are never a fault, because no limit is known.
+    It is never a fault, because no limit is known.
     """
     found = model.at(prediction, estimate)
     columns = found.moments, found.stresses, found.stress_sigmas

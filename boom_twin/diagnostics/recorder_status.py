@@ -29,7 +29,7 @@ class DiskState:
 
 @dataclass(frozen=True, slots=True)
 class TopicCount:
-    """Message counts of one topic; `missed` ones were left out or not received, None unless there was one publisher."""
+    """Message counts of one topic. `missed`: left out or not received; None unless there was one publisher."""
 
     topic: str
     received: int
@@ -38,7 +38,7 @@ class TopicCount:
 
 
 def recording_status(judge: ComponentJudge, counts: Sequence[TopicCount], disk: DiskState, end: str | None) -> Status:
-    """Return the status of a recording. `end` is the fault that ended it; empty if none, None while it runs."""
+    """Return the status of a recording. `end` is the fault that ended it, empty without one, None while it runs."""
     thresholds, missed = judge.at.thresholds, sum(count.missed or 0 for count in counts)
     if end:
         judge.fault(Level.ERROR, end)

@@ -1,4 +1,4 @@
-"""Status of every sensor: it measures, is stuck, or is silent."""
+"""Status of a sensor: measuring, stuck or silent."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .levels import Bounds, ComponentJudge, Status
 from .stream_stats import ChannelStats
 
 SLOW = 2.0
-"""Usual times from one reading to the next that are no gap, whatever the rate."""
+"""Largest step of stamps that is no gap at any rate, in sampling periods."""
 RANGE_MARGIN = 5.0
-"""Standard deviations of its noise by which a sensor may read beyond its range."""
+"""Tolerance of a sensor's range, in standard deviations of its noise."""
 
 
 @dataclass(frozen=True, slots=True)
 class SensorSpec:
-    """Specification of a sensor: name of its channel; unit as the end of a key (``m_s2``); range, noise, resolution."""
+    """Specification of a sensor: channel, unit as suffix of a key (``m_s2``), range, noise, resolution."""
 
     name: str
     unit: str
@@ -42,8 +42,8 @@ def sensors_of(
 ) -> dict[Stream, list[SensorSpec]]:
     """Return the sensors of every stream, in the order of a sample's values.
 
-    Ranges are those of `boom_twin.health.sensor_check.sensor_ranges`. `required` says of every input that is read
-    if the twin needs it, `absent` which channels have no sensor.
+    Ranges are those of `boom_twin.health.sensor_check.sensor_ranges`. `required` has the inputs that the twin reads, True if
+    it needs them. `absent` are channels without a sensor.
     """
     found = {}
     ranges = sensor_ranges(scene, mounts)
@@ -64,9 +64,9 @@ def sensors_of(
 
 
 def sensor_status(judge: ComponentJudge, sensor: SensorSpec, stats: ChannelStats, age: float) -> Status:
-    """Return the status of a sensor by its statistics; `age` (s): since its last reading.
+    """Return the status of a sensor by its statistics and the `age` (s) of its last reading.
 
-    A fault has the words of its alarm in `boom_twin.health`.
+    Faults have the texts of alarms of `boom_twin.health`.
     """
     thresholds, unit = judge.at.thresholds, sensor.unit
     if not stats.stamp and not sensor.required:

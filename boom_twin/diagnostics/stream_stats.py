@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..types import NANO, Array, Sample
 
 LONGEST_PAUSE = 10.0
-"""Longest step between two stamps (s) that is a pause of the sensor; a longer one is a jump of its clock."""
+"""Longest step of stamps (s) that is a pause of the sensor; a longer one is a jump of its clock."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,9 +24,9 @@ class ChannelStats:
     value: float
     """Newest reading, in the sensor's unit; NaN before the first one."""
     stamp: int
-    """Its stamp, ns; 0 before the first one."""
+    """Stamp of `value`, ns; 0 before the first one."""
     rate: float
-    """Readings a second, by their stamps; NaN of fewer than two."""
+    """Readings a second, by their stamps; NaN if fewer than two."""
     gap: float
     """Longest step between their stamps, s."""
     gaps: int
@@ -36,7 +36,7 @@ class ChannelStats:
     outside: float
     """Share of the messages with a value out of range; NaN without messages."""
     unchanged: int
-    """Readings, up to the newest, that repeat the one before."""
+    """Consecutive readings, up to the newest, that repeat the one before."""
 
 
 class Channel:
@@ -49,7 +49,7 @@ class Channel:
     def look(self, stamps: NDArray[np.int64], values: Array, refused: int, longest: float) -> ChannelStats:
         """Return the statistics of `values` (k,) with `stamps` (k,) in ns; NaN where the message had no value.
 
-        `refused` messages more held nothing of use for any sensor; `longest` (s) is the largest permitted step of stamps.
+        `refused` further messages had no usable value; `longest` (s) is the largest permitted step of stamps.
         """
         messages, usable = len(values) + refused, np.isfinite(values)
         stamps, values, steps = stamps[usable], values[usable], np.zeros(0)
@@ -75,7 +75,7 @@ class Channel:
 
 
 class Rows:
-    """Rows of `width` numbers in plain memory, in which Python's garbage collector has nothing to search."""
+    """Rows of `width` numbers in plain memory, which Python's garbage collector need not search."""
 
     def __init__(self, width: int) -> None:
         self._width, self._numbers = width, array("d")
@@ -85,19 +85,19 @@ class Rows:
         self._numbers.frombytes(row.tobytes())
 
     def table(self) -> Array:
-        """Return all rows, shape (k, width). No row can be added as long as the result exists."""
+        """Return all rows, shape (k, width). No row can be added while the result exists."""
         return np.frombuffer(self._numbers).reshape(-1, self._width)
 
 
 class StreamWatch:
-    """Statistics of one stream: messages are counted as they come, statistics computed when asked; times in s, stamps in ns.
+    """Statistics of one stream, computed when `look` is called. Times are in s, stamps in ns.
 
     Parameters
     ----------
     ranges : ndarray, shape (n, 2)
         Least and greatest reading of each channel, in the sensor's unit.
     monotonic : callable
-        The time, s, of a clock that only goes forward.
+        Monotonic clock, s.
 
     Attributes
     ----------
@@ -106,8 +106,8 @@ class StreamWatch:
     newest : int or None
         Stamp of the newest message.
     lag : float
-        Least time from a stamp to its arrival between the last two looks, s; NaN without messages. Its two clocks need not
-        agree, but the difference of two streams' lags shows how far their clocks are apart.
+        Least time from stamp to arrival between the last two looks, s; NaN without messages. It contains an unknown clock
+        offset. The difference of two streams' lags is the offset between their clocks.
     """
 
     def __init__(self, ranges: Array, monotonic: Callable[[], float] = time.monotonic) -> None:
@@ -116,7 +116,7 @@ class StreamWatch:
         self.begin()
 
     def begin(self) -> None:
-        """Start listening; everything but the count is forgotten."""
+        """Start listening; reset everything but the count."""
         self.newest: int | None = None
         self._heard, self._looked_count, self._least, self.lag = self._monotonic(), self.count, nan, nan
         self._counted = nan, 0
@@ -133,7 +133,7 @@ class StreamWatch:
             self._least = lag
 
     def took(self, sample: Sample) -> None:
-        """Take the sample of a message. A message that is refused has none."""
+        """Take the sample of a message. A refused message has none."""
         self._stamps.append(sample.stamp)
         self._values.append(sample.values)
 
@@ -142,7 +142,10 @@ class StreamWatch:
         return now - self._heard
 
     def age_of(self, stats: ChannelStats, now: float) -> float:
-        """Return the time since the last reading of a channel, or since listening began; by stamps beyond the last message."""
+        """Return the time since a channel's last reading, or since listening began.
+
+        Up to the newest message, time is taken from stamps.
+        """
         if self.newest is None or not stats.stamp:
             return self.age(now)
         return self.age(now) + max(0, self.newest - stats.stamp) * NANO

@@ -1,4 +1,4 @@
-"""Status of the tip: how far it swings, against limits that are settings."""
+"""Status of the tip's swing, against limits from the settings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..types import SECOND, Array, Report
 from .levels import Bounds, ComponentJudge, Status
 
 WINDOW, INTERVAL = 4 * SECOND, SECOND // 50
-"""Window and interval of the displacements, ns: four periods of a slow boom."""
+"""Window (four periods of a slow boom) and interval of displacements, ns."""
 
 
 class SwingWatch:

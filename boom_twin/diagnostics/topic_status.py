@@ -1,4 +1,4 @@
-"""Status of the topics: publishers and subscribers at the other ends, rates, ages, clocks, messages lost or left waiting."""
+"""Statuses of the topics: publishers, subscribers, rates, ages, clocks, lost and waiting messages."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ OTHER_USER = (
     "If it sends as another user of this machine, which shared memory keeps apart: run both as one user, or set "
     "FASTDDS_BUILTIN_TRANSPORTS=UDPv4 for it and leave ROS_AUTOMATIC_DISCOVERY_RANGE unset"
 )
-"""Why endpoints of Fast DDS match and nothing arrives; measured with rmw_fastrtps 8.4.3."""
-FOLLOWED = "Followed is the one whose stamps go on, and which of them that is ROS does not tell. End all but one"
+"""Possible reason if Fast DDS matches endpoints, but nothing arrives; measured with rmw_fastrtps 8.4.3."""
+FOLLOWED = "The twin follows the one whose stamps increase; ROS does not report which one it is. End all but one"
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,20 +23,20 @@ class Peers:
     """Publishers of an input, or subscribers of an output."""
 
     address: str = ""
-    """Name of the topic as it is resolved."""
+    """Resolved name of the topic."""
     names: Sequence[str] = ()
-    """Their nodes."""
+    """Names of their nodes."""
     incompatible: Sequence[str] = ()
-    """Those of them whose quality of service prevents a connection, and why, in words."""
+    """Peers whose quality of service prevents a connection, with the reason in words."""
     ids: Sequence[str] = ()
     """Their hexadecimal GIDs, in the order of `names`."""
     rivals: int = 0
     """Publishers of an output beside the node's own."""
     mistyped: Sequence[str] = ()
-    """Others at this topic whose type of message prevents a connection, with that type, in words."""
+    """Other endpoints whose message type prevents a connection, with that type in words."""
 
     def warn(self, judge: ComponentJudge, prefix: str = "") -> None:
-        """Warn of those that cannot be connected."""
+        """Warn of peers that cannot connect."""
         for fault, found in (("incompatible QoS", self.incompatible), ("another type of message", self.mistyped)):
             if found:
                 judge.fault(Level.WARN, f"{prefix}{fault}: {'; '.join(found)}")
@@ -57,8 +57,8 @@ def topic_status(
 ) -> Status:
     """Return the status of one input topic, after the look of its `stream`.
 
-    Its stamps are `offset` (s) behind those of the strokes; NaN is not known. `wrong_names` is the fault of the names in its
-    messages, if any.
+    `offset` (s) is the delay of its stamps against those of the strokes; NaN if unknown. `wrong_names` is the fault of the
+    names in its messages, if any.
     """
     at, age = judge.at, stream.age(judge.at.now)
     judge.note({"topic": publishers.address, "messages": stream.count, "rate_Hz": stream.arrival_rate(at.now)})
@@ -95,9 +95,9 @@ def outputs_status(judge: ComponentJudge, subscribers: Iterable[Peers]) -> Statu
 
 
 def publishers_status(judge: ComponentJudge, publishers: Mapping[Stream, Peers], followed: Mapping[Stream, str]) -> Status:
-    """Return the status of the sources. A second one makes all predictions doubtful, so it is reported first.
+    """Return the status of all publishers. It is reported first: a second publisher makes all predictions doubtful.
 
-    Streams that come by one topic may have a publisher each. `followed` has the stamp (s) of the newest sample of each.
+    Each stream of one topic may have its own publisher. `followed` is the stamp (s) of the newest sample of each stream.
     """
     streams: dict[str, list[Stream]] = {}
     for stream, peers in publishers.items():
@@ -121,38 +121,38 @@ class Reception:
     lost: int = 0
     """Messages that never arrived, by the publisher's sequence numbers; valid if `is_numbered`."""
     dropped: int = 0
-    """Messages that gave way to newer ones before they were read."""
+    """Messages dropped unread to make room for newer ones."""
     waiting: int = 0
-    """Messages that wait now."""
+    """Messages waiting now."""
     wait: float = nan
     """Longest time (s) from arrival to being read since the last look; NaN without any."""
     latency: float = nan
-    """Longest time (s) from arrival to being answered since the last look; NaN without any."""
+    """Longest time (s) from arrival to the report since the last look; NaN without any."""
     is_numbered: bool = True
     """True if the sequence numbers since the last look are those of one publisher."""
 
 
 class ReceptionWatch:
-    """Judge of the reception of all input topics by what changed since the last look."""
+    """Judge of the reception of all input topics since the last look."""
 
     def __init__(self) -> None:
         self._before: dict[str, Reception] = {}
         self._left_out: dict[str, int] = {}
 
     def status(self, judge: ComponentJudge, topics: Mapping[str, Reception], left_out: Mapping[str, int]) -> Status:
-        """Return the status; `left_out` counts, by kind and in all, what was left out for lack of time."""
+        """Return the status; `left_out` is the total work left out for lack of time, by kind."""
         for name, each in topics.items():
             self._check(judge, name, each)
         for name, count in left_out.items():
             new = count - self._left_out.get(name, 0)
-            told = f"too many messages for the time there is: {name} left out, no prediction"
+            told = f"too many messages for the time there is: {name} left out, predictions complete"
             judge.check(f"{name} left_out", new, Bounds(warn=0), told, at_once=True)
         self._before, self._left_out = dict(topics), dict(left_out)
         return judge.finish("all that arrives is read at once")
 
     def _check(self, judge: ComponentJudge, name: str, each: Reception) -> None:
         before, thresholds = self._before.get(name, Reception()), judge.at.thresholds
-        if each.received < before.received:  # counted anew
+        if each.received < before.received:  # count was reset
             before = Reception()
         lost, dropped = each.lost - before.lost, each.dropped - before.dropped
         published = each.received - before.received + lost

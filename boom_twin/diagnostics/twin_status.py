@@ -1,4 +1,4 @@
-"""Status of the whole twin and of all that it listens to."""
+"""Status of the twin and its inputs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .topic_status import Peers, Reception, ReceptionWatch, outputs_status, publ
 
 
 def all_pieces(look: Generator[None, None, list[Status]]) -> list[Status]:
-    """Do all pieces of a look at once and return the result, see `TwinWatch.look`."""
+    """Run all parts of `TwinWatch.look` at once and return its result."""
     while True:
         try:
             next(look)
@@ -28,20 +28,20 @@ def all_pieces(look: Generator[None, None, list[Status]]) -> list[Status]:
 
 
 class TwinWatch:
-    """Judge of the twin and its inputs. It takes every message and judges when asked; a message alone costs no computation.
+    """Judge of the twin and its inputs. It stores messages as they arrive; only `look` judges them.
 
     Parameters
     ----------
     sensors : dict of Stream to sequence of SensorSpec
-        In the order of a sample's values, first those that drive the model; empty before the node is configured.
+        Sensors in the order of a sample's values. The first stream drives the model. Empty before the node is configured.
     names : dict of Stream to str
-        Names of the input topics; readings that come beside others have none.
+        Names of the input topics. Streams in the messages of another one have none.
     thresholds : Thresholds
-        May be replaced while it runs.
+        Replaceable at run time.
     monotonic : callable
-        The time, s, of a clock that only goes forward.
+        Monotonic clock, s.
     stress : BendingStressModel, optional
-        If the boom's sections bend.
+        Model of the stress, if sections bend.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class TwinWatch:
         self.begin()
 
     def begin(self) -> None:
-        """Start listening and reset all that is counted and judged."""
+        """Start listening and reset all counts and levels."""
         for stream in self._streams.values():
             stream.begin()
         self._looked = self._monotonic()
@@ -69,9 +69,9 @@ class TwinWatch:
         self._model, self._load, self._swing = ModelWatch(self._looked, drive), LoadWatch(), SwingWatch()
         self._rows: dict[tuple[str, ...], Rows] = {}  # normalised residuals, by channels
         self._residuals: dict[str, ResidualWindow] = {}
-        self._newest: Report | None = None  # that has a prediction
+        self._newest: Report | None = None  # newest with a prediction
         self._silent: set[Stream] = set()
-        self.health: HealthWatch | None = None  # until the rig's health was judged
+        self.health: HealthWatch | None = None  # None until health was judged
 
     # -- one message --------------------------------------------------------------------------------------------------
 
@@ -95,14 +95,14 @@ class TwinWatch:
             self.judged(each.health, 0.0)
 
     def judged(self, health: Health | None, duration: float) -> None:
-        """Take the result of a look at the rig's health, which took `duration` seconds; None if there is no news."""
+        """Take the rig's `health`, computed in `duration` seconds; None without news."""
         self._model.worked(duration)
         if health is not None:
             self.health = self.health or HealthWatch()
             self.health.took(health)
 
     def acknowledge(self) -> str:
-        """Acknowledge the alarms of the rig's health; return in words which of them have ended and are released."""
+        """Acknowledge the alarms of the rig's health; return the ended ones, now released, in words."""
         return "health is not judged" if self.health is None else self.health.acknowledge()
 
     def broken(self, reason: str) -> None:
@@ -117,9 +117,9 @@ class TwinWatch:
         return self._streams[self._drive].newest
 
     def is_urgent(self) -> bool:
-        """Return True if the model failed, an alarm began, or a stream fell silent or is heard again.
+        """Return True if the model failed, an alarm began, or a stream stopped or resumed.
 
-        A look should not wait for its turn then.
+        The next look should then be made at once.
         """
         now = self._monotonic()
         before, self._silent = self._silent, {s for s, each in self._streams.items() if self._is_silent(each, now)}
@@ -139,26 +139,26 @@ class TwinWatch:
         left_out: Mapping[str, int] | None = None,
         words: Mapping[str, str] | None = None,
     ) -> Generator[None, None, list[Status]]:
-        """Return the states of model, topics, health, sensors and residuals; of the model alone while the twin does not listen.
+        """Return the statuses of model, topics, health, sensors and residuals; while `idle`, of the model only.
 
-        It yields between pieces of a millisecond or two, so that a live node takes samples in between.
+        It yields between parts of one or two milliseconds, so that a live node can take samples.
 
         Parameters
         ----------
         counts, words : dict
-            Counts reported with the model; what they are of, by the last part of their names.
+            Counts reported with the model; descriptions of counts by the last part of their names.
         idle : str
-            Why the twin does not listen; empty if it does.
+            Reason why the twin does not listen, or empty.
         publishers, subscribers : dict of Stream to Peers, iterable of Peers
             Peers of every input, and of all outputs.
         clock : float
-            Time that people know, s.
+            Time of the stamps' clock, s.
         reception : dict of str to Reception, optional
             Reception by name of the topic; None if nothing is received live.
         wrong_names : dict of Stream to tuple of Level and str, optional
-            Faults of inputs whose messages have names that the scene does not have.
+            Faults of inputs whose messages have names unknown to the scene.
         left_out : dict of str to int, optional
-            Counts of what was left out for lack of time since the node was configured.
+            Work left out for lack of time since the node was configured, by kind.
         """
         at = Evaluation(self.thresholds, self._monotonic(), clock)
 
@@ -194,7 +194,7 @@ class TwinWatch:
         if (load := self._load.status(judge("tip load"))) is not None:
             found.append(load)
         if self._newest is not None:
-            found.append(self._swing.status(judge("tip")))
+            found.append(self._swing.status(judge("swing")))
         yield
         if self._stress is not None and self._newest is not None and self._newest.prediction is not None:
             bending = judge("bending")
@@ -213,7 +213,6 @@ class TwinWatch:
         return stream.newest is None or stream.age(now) > self.thresholds.stale_after
 
     def _residual(self, judge: ComponentJudge, channel: str) -> Status:
-        """Return the status of a channel that ever had a residual."""
         window, health = self._residuals[channel], self.health
         if health is None:
             return window.status(judge, None)

@@ -1,13 +1,12 @@
-"""Faults of a boom as hypotheses, and the decision which of them is named.
+"""Fault hypotheses of a boom, and the decision which of them is named.
 
-Every second has a gain of each hypothesis: the logarithm of its likelihood less that of the boom as it is believed to be. What
-a hypothesis gains from the best onset on until now is its evidence. A cause is named if its posterior probability is high.
-Three facts decide how much a gain counts.
+Every second gives each hypothesis a gain: its log likelihood less that of the boom as believed. The evidence of a hypothesis is
+the sum of its gains since the best onset. A cause is named if its posterior probability is high. Three facts limit the gains.
 
-- Innovations of one sample are not independent of those of the next: likelihoods are raised to the power `TEMPER`.
-- What no hypothesis has, such as a valve that opens under a load, may rule a second: its likelihood ratio is bounded by the
-  chance of that, exp(-`MOST_GAIN`).
-- A load that the boom has had from the start is its scene's. Only what gains faster than before is a load that came.
+- Successive innovations are not independent. So likelihoods are raised to the power `TEMPER`.
+- An effect outside all hypotheses, such as a valve that opens under a load, may dominate a second. Its probability,
+  exp(-`MOST_GAIN`), bounds the likelihood ratio of a second.
+- A load from the start belongs to the scene. A new load must gain faster than before its onset.
 """
 
 from __future__ import annotations
@@ -25,22 +24,22 @@ from ..scene.summary import explain
 from ..types import Alarm, Array, Stream, StrokeReading, channels_of
 from .alarms import UNKNOWN
 
-LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # shares: of k or EI, of k of all cylinders, of the boom's mass
-LATE = 0.02  # s
-HEAD_START = 30.0  # nats of the hypothesis that nothing is wrong: parameters that are 2 % off gain as much
+LOSS, OIL_LOSS, LOAD = 0.25, 0.1, 0.02  # relative loss of a k or EI, of k of all cylinders; load over the boom's mass
+LATE = 0.02  # s, delay of the angles
+HEAD_START = 30.0  # nats of the hypothesis without a fault; parameters with 2 % of error gain as much
 TEMPER = math.log(20.0) / 25.0  # power of likelihoods: 25 nats more make a cause 20 times as probable
-MOST_GAIN = 12.0  # nats that a second may count for
-FASTER = 1.5  # times as fast as before that a load has to gain
-KNOWN_LOAD = 10  # s from a start, before which no load can be told from that of the scene
+MOST_GAIN = 12.0  # nats, limit of the gain of a second
+FASTER = 1.5  # ratio of gain rates after and before the onset, which a load must exceed
+KNOWN_LOAD = 10  # s at the beginning of the gains kept, without onset of a load: it could be the scene's
 MEMORY = 60  # s of gains that are kept
 
 
 class Fault(NamedTuple):
     """Fault of a boom.
 
-    cause : parameter of the scene, a sensor, or the delay of a stream. kind : ``softer``, ``more``, ``less``, ``off`` or
-    ``late``. size : share that is lost, kg, kg/m, s; or the change of a sensor's zero, rad, m/s^2 or N. The hypothesis of such
-    a fault lets the zero drift by any amount. is_told : False if it is believed only so that no other is named for it.
+    cause : parameter of the scene, sensor, or delay of a stream. kind : ``softer``, ``more``, ``less``, ``off`` or
+    ``late``. size : relative loss, kg, kg/m, s; or the change of a sensor's zero, rad, m/s^2 or N. The hypothesis ``off``
+    lets the zero drift by any amount. is_told : False if it gives no alarm, and only keeps others from being named for it.
     """
 
     cause: str
@@ -50,7 +49,7 @@ class Fault(NamedTuple):
 
     @property
     def is_load(self) -> bool:
-        """Return True if the boom carries more or less."""
+        """Return True for a fault of the load."""
         return self.kind in ("more", "less")
 
     @property
@@ -62,8 +61,8 @@ class Fault(NamedTuple):
 class Hypothesis(NamedTuple):
     """Boom with faults.
 
-    scene : with them. payload, line_fill : how much more it carries, kg and kg/m. doubted : channels whose zeros may drift by
-    any amount. delays : by which stamps of streams are late, s.
+    scene : with its parameters changed. payload, line_fill : additional load, kg and kg/m. doubted : channels whose zeros may
+    drift by any amount. delays : delay of the stamps of a stream, s.
     """
 
     scene: Scene
@@ -73,7 +72,7 @@ class Hypothesis(NamedTuple):
     delays: tuple[tuple[Stream, float], ...] = ()
 
     def load(self, payload: float, line_fill: float) -> dict[str, float]:
-        """Return the load (kg, kg/m) of a twin where the load is said to be this; below 0 it is that of the scene."""
+        """Return the load of this boom from a set load (kg, kg/m; below 0: that of the scene)."""
         told = loaded(self.scene, payload, line_fill)
         return {
             "payload": max(parameter(told, "tip.payload") + self.payload, 0.0),
@@ -103,10 +102,10 @@ def _springs(scene: Scene) -> list[str]:
 
 
 def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -> list[Fault]:
-    """Return every single fault that is compared for a boom. Angles that drive the model have no zeros and no delay in it.
+    """Return all single faults that are compared for a boom, without zeros and delay of angles that drive the model.
 
-    Not told are warm oil, which softens all cylinders; the outermost section, which bends mostly in modes that the filter
-    leaves out; and the zero of the IMU, for errors of the model in fast moves look like it.
+    Three give no alarm. Warm oil softens all cylinders. The outermost section bends mostly in modes that the filter leaves out.
+    The zero of the IMU looks like model errors in fast moves.
     """
     mass, sections = explain(scene).mass, [name for name in parameter_names(scene) if name.endswith(".EI")]
     base = [name for name in parameter_names(scene) if name == "base.stiffness"]
@@ -127,8 +126,8 @@ def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -
 class Verdict(NamedTuple):
     """Named fault.
 
-    place : of the fault among those compared. onset : stamp (ns) of the second from which on it gains. ranked : the
-    three most probable causes with their posterior probabilities, then `UNKNOWN`; together one.
+    place : index among the faults compared. onset : stamp (ns) of the first second of its evidence. ranked : the three
+    most probable causes with their posterior probabilities, then `UNKNOWN` with the rest.
     """
 
     place: int
@@ -137,13 +136,13 @@ class Verdict(NamedTuple):
 
 
 class Evidence:
-    """Evidence of faults, second by second.
+    """Evidence of faults, updated every second.
 
     Parameters
     ----------
     faults : sequence of Fault
     odds : float
-        Posterior probability from which on a cause is named.
+        Posterior probability required to name a cause.
     """
 
     def __init__(self, faults: Sequence[Fault], odds: float) -> None:
@@ -153,7 +152,7 @@ class Evidence:
         self._gains, self._stamps = deque([none], maxlen=MEMORY), deque([0], maxlen=MEMORY)
 
     def take(self, stamp: int, gains: Array) -> Verdict | None:
-        """Take the gains of a second that begins at a stamp (ns); return the fault that is named by then, if any.
+        """Take the gains of a second that begins at a stamp (ns); return the verdict if a fault is named.
 
         Parameters
         ----------
@@ -177,7 +176,7 @@ class Evidence:
         return Verdict(best, self._stamps[min(onsets[best] + 1, len(self._stamps) - 1)], tuple(shown))
 
     def _rises(self) -> tuple[Array, list[int]]:
-        """Return how much each fault has gained from its best onset on, and the place of that onset among the seconds kept."""
+        """Return the evidence of each fault since its best onset, and the index of that onset among the seconds kept."""
         gains, seconds = np.array(self._gains), np.arange(len(self._gains))[:, None]
         before = (gains - np.minimum.accumulate(gains, axis=0)) / np.maximum(seconds, 1)  # nats per s
         rises = gains[-1] - gains - np.where(self._comes, FASTER * before, 0.0) * (len(gains) - 1 - seconds)
@@ -187,7 +186,7 @@ class Evidence:
 
 
 def evidence_of(fault: Fault, spread: float) -> str:
-    """Return size and standard deviation of a fault in figures."""
+    """Return size and standard deviation of a fault as text."""
     size = fault.size
     if fault.kind == "softer":
         k = fault.cause.rpartition(".")[2]
@@ -204,6 +203,6 @@ def evidence_of(fault: Fault, spread: float) -> str:
 
 
 def explains(named: Alarm, stream: Stream, deviation: Alarm) -> bool:
-    """Return True if a named fault is what makes a channel of a stream deviate: a load for forces, the sensors of a joint."""
+    """Return True if a named fault explains a deviation: a load those of forces, a sensor that of its channel."""
     is_load = named.kind in ("more", "less") and stream is Stream.FORCES
     return is_load or (named.channel == deviation.channel and named.kind == "off")

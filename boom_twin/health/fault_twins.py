@@ -1,10 +1,10 @@
-"""Fault twins: twins of a changed boom that take the same samples as the twin of the boom as it is believed to be.
+"""Fault twins: one twin for each fault hypothesis, and one of the boom as believed, on the same samples.
 
-The filter of a twin tells the logarithm of the likelihood of all that was read (`BoomPredictor.evidence`). A fault twin has a
-scene with one fault, or lets a sensor's zero drift; `causes` decides by its gains. A twin with the named fault becomes the one
-that others are compared with: so a second fault, and the end of the first, are named in the same way.
+The filter of a twin gives the log likelihood of all readings (`BoomPredictor.evidence`). A fault twin has a scene with one
+fault, or lets a sensor's zero drift. `causes` decides by the gains in likelihood. A named fault becomes part of the boom as
+believed. So a second fault, and the end of the first, are named in the same way.
 
-The twins run in a thread of their own, a second of samples at a time. A verdict is given `DELAY` after that second, so a live
+The twins run in a thread of their own, a second of samples at a time. A verdict is given `DELAY` after that second. So a live
 node and a replay give it with the same sample.
 """
 
@@ -24,12 +24,12 @@ from ..types import SECOND, Alarm, Array, Change, Ranked, Stream, StrokeReading
 from .causes import MEMORY, TEMPER, Evidence, Fault, Hypothesis, Verdict, evidence_of, hypothesis, possible_faults
 from .sensor_check import Flags
 
-SIZES = 0.4, 0.7, 1.0, 1.4, 1.8  # times the size of a named fault, by which its true size is found
-CERTAIN = 3.0  # standard deviations of its size that a named fault has at least
-CAME_BACK = 0.3  # of the change of a zero, below which it has come back
-SPACING = 18_000_000  # ns between samples of a stream that fault twins take: 50 Hz tell all that the boom does
-SETTLING = 2  # s from a start in which the filters find vibration and zeros
-DELAY = 2 * SECOND  # ns after the end of a second, at which its verdict is given
+SIZES = 0.4, 0.7, 1.0, 1.4, 1.8  # trial sizes over the hypothesised size, to estimate the size of a named fault
+CERTAIN = 3.0  # least size of a named fault in its standard deviations
+CAME_BACK = 0.3  # remaining share of a zero's change, below which the fault has ended
+SPACING = 18_000_000  # ns, least time between samples of a stream: 50 Hz suffice for all motion of the boom
+SETTLING = 2  # s after a start without verdicts: the filters settle on vibration and zeros
+DELAY = 2 * SECOND  # ns from the end of a second to its verdict
 
 
 class Follower(Protocol):
@@ -54,7 +54,7 @@ class Follower(Protocol):
 
 
 class _Second(NamedTuple):
-    """Samples of a second that begins at a stamp (ns), without channels that fail; or a change before those that follow."""
+    """Samples of a second that begins at `stamp` (ns), and the failing channels to leave out; or a change."""
 
     stamp: int
     block: Any = None
@@ -68,15 +68,15 @@ class FaultTwins:
     Parameters
     ----------
     scene : Scene
-        With its load.
+        Boom with its load.
     make : callable
         Hypothesis -> its twin.
     odds : float
-        Posterior probability from which on a cause is named.
+        Posterior probability required to name a cause.
     is_live : bool
-        True if nobody may wait for a verdict: on a busy processor it is given later than `DELAY`.
+        True if the caller must not wait. On a busy processor verdicts then come later than `DELAY`.
     reads : StrokeReading
-        What drives the model.
+        Quantity that drives the model.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class FaultTwins:
         self._scene, self._make, self._odds, self._is_live = scene, make, odds, is_live
         self._lasting: dict[str, Alarm] = {}
         self._pending: list[Any] = []
-        self._second = 0  # of the samples that are pending
+        self._second = 0  # whole seconds of the pending samples' stamps
         self._left_out: tuple[Flags, Flags] | None = None
         self._taken: dict[tuple[int, int], int] = {}  # stamp of the newest sample taken, by stream and channels
         self._worker = ThreadPoolExecutor(1, "fault twins")
@@ -105,7 +105,7 @@ class FaultTwins:
     # -- samples in
 
     def reach(self, stamp: int, left_out: Callable[[], tuple[Flags, Flags]]) -> None:
-        """Note the stamp (ns) of the next sample; if a second ends there, ask for the channels that are left out by then."""
+        """Note the stamp (ns) of the next sample. If a second ends there, get the channels that are left out now."""
         second = stamp // SECOND
         if self._pending and not self._second - 1 <= second <= self._second:
             self._left_out = left_out()
@@ -123,7 +123,7 @@ class FaultTwins:
         self._hand_over(_Second(change.stamp, change=change))
 
     def _thinned(self, block: Any) -> Any:
-        """Return the samples of a block that come at least `SPACING` after the one before of the same channels."""
+        """Return the samples of a block at least `SPACING` after the last taken one of the same channels."""
         streams, stamps, values = block.streams, block.stamps, block.values
         channels = np.isfinite(values) @ (1 << np.arange(values.shape[1]))
         chosen = list[int]()
@@ -134,7 +134,7 @@ class FaultTwins:
         return block._replace(streams=streams[chosen], stamps=stamps[chosen], values=values[chosen])
 
     def _close(self) -> None:
-        """Give the samples of the last second to the twins."""
+        """Hand the pending samples to the twins."""
         if parts := [part for part in self._pending if len(part.stamps)]:
             columns = zip(*((part.streams, part.stamps, part.values) for part in parts), strict=True)
             streams, stamps, values = map(np.concatenate, columns)
@@ -148,7 +148,7 @@ class FaultTwins:
     # -- alarms out
 
     def news(self, stamp: int) -> list[Alarm]:
-        """Return the alarms that begin or end, by all seconds that ended `DELAY` before a stamp (ns)."""
+        """Return alarms that begin or end, by the seconds whose verdicts are due at a stamp (ns)."""
         found = list[Alarm]()
         while self._results and self._results[0][0] <= stamp and (not self._is_live or self._results[0][1].done()):
             found += self._results.popleft()[1].result()
@@ -167,7 +167,7 @@ class FaultTwins:
     # -- in the worker's thread
 
     def _begin(self) -> None:
-        """Make twins of the boom as believed, without each fault that it is known to have, and with each other fault."""
+        """Make twins of the boom as believed, without each named fault (except ``off``), and with each other fault."""
         known = tuple(self._named)
         causes = {fault.cause for fault in known}
         fewer = [(fault, tuple(each for each in known if each is not fault)) for fault in known if fault.kind != "off"]
@@ -177,7 +177,7 @@ class FaultTwins:
             try:
                 each = hypothesis(self._scene, faults)
                 self._twins.append(self._made(each))
-            except BoomTwinError:  # a boom that cannot be, such as one that its softer part cannot hold
+            except BoomTwinError:  # an impossible boom, such as one with a part too soft to hold it
                 continue
             self._hypotheses.append(each)
             self._faults += [] if fault is None else [fault]
@@ -191,7 +191,7 @@ class FaultTwins:
         return twin
 
     def _follow(self, second: _Second) -> list[Alarm]:
-        """Let all twins take a second or a change; return the alarm that it begins or ends, if any."""
+        """Let all twins take a second or a change; return the alarms that begin or end."""
         if second.change is not None:
             self._recent.clear()
             self._change = second.change
@@ -212,7 +212,7 @@ class FaultTwins:
         return [] if verdict is None else self._name(verdict)
 
     def _name(self, verdict: Verdict) -> list[Alarm]:
-        """Believe in a fault, or in the end of one; return its alarm."""
+        """Name the fault of a verdict, or end it if it is named; return its alarm."""
         fault = self._faults[verdict.place]
         if fault in self._named:
             return self._ended(fault, verdict.onset)
@@ -228,13 +228,13 @@ class FaultTwins:
         return [alarm] if fault.is_told else []
 
     def _ended(self, fault: Fault, stamp: int) -> list[Alarm]:
-        """Believe that a named fault has ended at a stamp (ns); return its alarm."""
+        """End a named fault at a stamp (ns); return its alarm."""
         alarm = replace(self._named.pop(fault), until=stamp)
         self._begin()
         return [alarm] if fault.is_told else []
 
     def _back_again(self) -> Fault | None:
-        """Return a named fault of a sensor whose zero is nearly what it was before the onset."""
+        """Return a named sensor fault whose zero is nearly back at its value before the onset."""
         for fault in self._named:
             if fault.kind == "off":
                 axis, before = self._zeros_before[fault.cause]
@@ -244,7 +244,7 @@ class FaultTwins:
         return None
 
     def _sized(self, fault: Fault, onset: int) -> tuple[Fault, float]:
-        """Return a fault with its most likely size, and the standard deviation of that, by twins over the recent seconds."""
+        """Return a fault with its most likely size, and the standard deviation, by twins over the recent seconds."""
         if fault.kind == "off":
             return self._change_of_zero(fault, onset)
         sizes = np.array(SIZES) * fault.size
@@ -258,7 +258,7 @@ class FaultTwins:
         return fault._replace(size=size), float((-2.0 * TEMPER * curve) ** -0.5)
 
     def _total(self, fault: Fault, onset: int) -> float:
-        """Return the log likelihood of the recent seconds from the onset on; very low if no boom can have that fault."""
+        """Return the log likelihood of the recent seconds since the onset; -1e9 for an impossible boom."""
         start = now = 0.0
         try:
             for stamp, twin in self._repeated(fault):
@@ -269,7 +269,7 @@ class FaultTwins:
         return now - start
 
     def _change_of_zero(self, fault: Fault, onset: int) -> tuple[Fault, float]:
-        """Return a fault of a sensor with the change of its zero since the onset; of an IMU, that of the axis that shows it."""
+        """Return a sensor fault with its zero's change since the onset (IMU: clearest axis), and the standard deviation."""
         doubted = hypothesis(self._scene, (fault,)).doubted
         before: Any = None
         for stamp, twin in self._repeated(fault):
@@ -281,7 +281,7 @@ class FaultTwins:
         return fault._replace(size=float(change[axis])), float(spread[axis])
 
     def _repeated(self, fault: Fault) -> Iterator[tuple[int, Follower]]:
-        """Run a twin that has a fault over the recent seconds; yield the stamp of each, and the twin after it."""
+        """Run a twin with a fault over the recent seconds; yield each stamp with the twin after that second."""
         each = hypothesis(self._scene, (*self._named, fault))
         twin = self._made(each)
         for second in self._recent:
@@ -290,14 +290,13 @@ class FaultTwins:
 
 
 def _feed(twin: Follower, each: Hypothesis, second: _Second) -> None:
-    """Let the twin of a hypothesis take the samples of a second."""
     if second.left_out is not None:
         twin.leave_out(*second.left_out)
     twin.update_block(_in_time(second.block, each))
 
 
 def _in_time(block: Any, each: Hypothesis) -> Any:
-    """Return a block as it comes if streams are as late as a hypothesis says, in the order of time."""
+    """Return a block with stamps corrected by the delays of a hypothesis, in the order of time."""
     if not each.delays:
         return block
     stamps = block.stamps.copy()
@@ -308,6 +307,6 @@ def _in_time(block: Any, each: Hypothesis) -> Any:
 
 
 def _changed(change: Change, each: Hypothesis) -> Change:
-    """Return a change with the load that the boom of a hypothesis has then."""
+    """Return a change with the load of a hypothesis."""
     load = each.load(change.settings["payload"], change.settings["line_fill"])
     return replace(change, settings=change.settings | load)

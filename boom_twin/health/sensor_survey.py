@@ -13,7 +13,7 @@ from ..types import NANO, Array
 
 Integers = NDArray[np.int64]
 
-ROOM = 32  # readings of a block for which callers make room at first
+ROOM = 32  # readings of a block for which callers allocate memory at first
 COUNTS, OFF, RATES = range(3)  # rows of `ReadingsWork.numbers`
 SLOW_READ, SLOW_EXPECTED, SLOW_SQUARES, SLOW_VARIANCE, SLOW_RATE, WEIGHT = range(6)  # of `ReadingsWork.slow`
 VARIANCE, BENT, WHITE = range(3)  # of `ReadingsWork.limits`
@@ -23,10 +23,10 @@ FIRST, ROWS, NOISE, LASTING = range(4)  # of `CheckWork.lately`
 
 @by_reference
 class ReadingsWork(NamedTuple):
-    """State of `summarise`, of one stream.
+    """State of `summarise` for one stream.
 
-    limits : (3,) stated variance of the noise; times of it by which readings of a moving boom bend; share of that power which
-    third differences of noise have.
+    limits : (3,) VARIANCE, stated variance of the noise. BENT, multiple of it above which second differences show motion.
+    WHITE, ratio of third to second differences (`rough2`, `bend2`) below which they show motion.
     numbers : (3, channels) of the newest block, see `boom_twin.health.stream_readings.StreamReadings`.
     slow : (6, channels) see `boom_twin.health.stream_readings.SlowMeans`.
     """
@@ -38,20 +38,19 @@ class ReadingsWork(NamedTuple):
 
 @by_reference
 class CheckWork(NamedTuple):
-    """State of `survey`, of one stream.
+    """State of `survey` for one stream.
 
-    limits : (10,) readings that lie farther apart (s) are no neighbours; what a single outlier counts at most, and what noise
-    is stated to have, as variances; times (s) over which the noise of a channel and the usual one are taken. What no channel
-    has where nothing is to be found: a larger change from one reading to the next, more than that many times the usual
-    variance, which counts up to the next one; a larger share that is missing; a reading repeated as often.
-    lately : (4,) time (s) of the first reading, and how many the newest block had; variance of the noise, as it is with most
-    channels: now, and lately.
-    times, raw, left : (3 + k,), (3 + k, channels), (3 + k, channels) readings, the newest three before a block first: s, as
-    measured, less what the model has.
+    limits : (10,) GAP, time (s) between readings above which they are not compared. CUT, largest variance that one outlier
+    adds. STATED, stated variance of the noise. WINDOW, LONG_WINDOW, averaging times (s) of a channel's noise and of the usual
+    noise. A block with less than these has no finding: LEAP, change between two readings. LOUD, multiple of the usual
+    variance, bounded by LOUDEST_USUAL. LACK, share of missing readings. PATIENCE, repetitions of a reading.
+    lately : (4,) time (s) of the first reading; readings in the newest block; usual variance of the noise, now and averaged.
+    times, raw, left : (3 + k,), (3 + k, channels), (3 + k, channels) stamps (s), readings, residuals. The newest three before
+    the block are first.
     low, high : (channels,) the range of the sensors.
     heard : (channels,) time of the newest reading, s; NaN before the first.
-    power, run, since, missing, outside : (channels,) variance of the noise, see `noise2_at`; times that the newest
-    reading was repeated, and since when (s); share of readings that are missing; readings of the newest block out of range.
+    power, run, since : (channels,) variance of the noise, see `noise2_at`; repetitions of the newest reading; first stamp (s).
+    missing, outside : (channels,) share of missing readings; number of readings of the newest block out of range.
     """
 
     limits: Array
@@ -71,14 +70,14 @@ class CheckWork(NamedTuple):
 
 @inner
 def bend2(values, t, i):
-    """Return the square of the second difference at row t of channel i; its mean is the variance of white noise."""
+    """Return the squared second difference at row t of channel i, scaled to have the variance of white noise as its mean."""
     bend = values[t, i] - 2.0 * values[t - 1, i] + values[t - 2, i]
     return bend * bend / 6.0
 
 
 @inner
 def rough2(values, t, i):
-    """Return the square of the third difference likewise: for a swing at w rad/s 0.3 (w dt)^2 times the second one."""
+    """Return the squared third difference, scaled as in `bend2`. An oscillation at w rad/s has 0.3 (w dt)^2 times `bend2`."""
     step = values[t - 1, i] - values[t - 2, i]
     third = (values[t, i] - values[t - 1, i] - step) - (step - (values[t - 2, i] - values[t - 3, i]))
     return third * third / 20.0
@@ -86,10 +85,10 @@ def rough2(values, t, i):
 
 @inner
 def noise2_at(times, values, t, i):
-    """Return the variance of white noise by row t of channel i and the three before it, while values move as a parabola.
+    """Return the variance of white noise in rows t - 3 to t of channel i, on values that follow a parabola.
 
-    The less of what third differences say and of what Newton's divided ones do: stamps that are uneven are either those of when
-    readings were taken, or of readings that were taken evenly and came so.
+    It is the smaller one by third differences and by Newton's divided differences. Uneven stamps may be true sampling times, or
+    arrival times of evenly sampled readings.
     """
     a, b, c = times[t - 2] - times[t - 3], times[t - 1] - times[t - 2], times[t] - times[t - 1]
     even = rough2(values, t, i)
@@ -109,18 +108,18 @@ def survey(sensors, stamps, raw, expected, now):
     Parameters
     ----------
     sensors : CheckWork
-        The readings follow the newest three before them there.
+        Updated with the block.
     stamps, raw, expected : ndarray, shape (k,), (k, channels), (k, channels)
-        s, as measured, as the model has it; k > 0.
+        Stamps (s), readings, readings by the model; k > 0.
     now : float
         End of the block, s.
 
     Returns
     -------
     is_calm : bool
-        No channel can have a finding.
+        True if no channel can have a finding.
     largest : float
-        Change of `left` from one reading to the next, but for those across a gap.
+        Largest change of `left` between two readings, except across a gap.
     """
     limits, lately, rows = sensors.limits, sensors.lately, stamps.shape[0]
     keep_newest(sensors)
@@ -153,9 +152,9 @@ def keep_newest(sensors):
 
 @inner
 def usual_power(power, stated):
-    """Return the variance of the noise, as it is with most channels; at least what is stated, of a single channel just that.
+    """Return the usual variance of the noise: the median of the channels, at least `stated`; `stated` for one channel.
 
-    A sensor is faulty that is noisier than its like, not than a data sheet.
+    So a sensor is noisy by comparison with the others, not with its data sheet.
     """
     known = 0
     for i in range(power.shape[0]):
@@ -175,10 +174,10 @@ def usual_power(power, stated):
 
 @inner
 def go_on(sensors, stamps, raw, expected, share):
-    """Take the readings, which have a weight of `share`.
+    """Take the readings of a block, with weight `share` in the averages.
 
-    Return the largest change of `left` from one to the next, but for those across a gap; the largest of `power`, `run`,
-    `missing` and `outside`; and whether no reading is missing.
+    Return the largest change of `left` except across a gap, the largest `power`, `run`, `missing` and `outside`, and True if no
+    reading is missing.
     """
     times, all_raw, left, count = sensors.times, sensors.raw, sensors.left, 3 + stamps.shape[0]
     gap, cut, variance = sensors.limits[GAP], sensors.limits[CUT], sensors.limits[STATED]
@@ -232,10 +231,7 @@ def go_on(sensors, stamps, raw, expected, share):
 
 @kernel
 def summarise(work, stamps, raw, left, sigmas, masked, share):
-    """Work out the numbers of a block of readings, and update the slow means; return True if readings bend.
-
-    Readings bend if those of a channel that is not masked bend more than noise does, and smoothly: there is a motion that is
-    quick against their rate.
+    """Compute the numbers of a block of readings and update the slow means; return `is_bent`.
 
     Parameters
     ----------
@@ -243,7 +239,7 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
     stamps, raw, left, sigmas : ndarray, shape (k,), (k, channels), (k, channels), (k, channels)
         See `boom_twin.health.blocks.MeasuredRows`; NaN where a reading is missing; k > 0.
     masked : ndarray of bool, shape (channels,)
-        Channels that are not to be trusted; their slow means begin anew.
+        Channels that are not trusted. Their slow means restart at 0.
     share : float
         Weight of the block in the slow means.
     """
@@ -276,7 +272,10 @@ def summarise(work, stamps, raw, left, sigmas, masked, share):
 
 @inner
 def is_bent(work, raw, masked):
-    """Return True if readings of a channel that is not masked bend more than noise does, by second and third differences."""
+    """Return True if a channel that is not masked shows motion that is fast for the sampling rate.
+
+    Its second differences exceed those of noise, and its third differences are smaller than those of noise.
+    """
     count, found = raw.shape[0], False
     for i in range(raw.shape[1]):
         power, rougher = 0.0, 0.0

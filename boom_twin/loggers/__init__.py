@@ -1,1 +1,1 @@
-"""Tables of other programs (loggers, spreadsheets, data frames) as sessions."""
+"""Import of logger files, spreadsheets and data frames as sessions."""

@@ -1,4 +1,4 @@
-"""Assign the columns of tables to channels: as given, else by their names."""
+"""Assignment of table columns to channels, given or recognised by name."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .times import time_places
 
 @dataclass(frozen=True, slots=True)
 class ColumnUse:
-    """Use of one column: the channel and its unit; without a channel, the reason why it is not used."""
+    """Channel and unit of one column (index `place` of `table`), or the reason why it is unused."""
 
     table: int
     place: int
@@ -27,7 +27,7 @@ class ColumnUse:
 
 @dataclass(frozen=True)
 class Assignment:
-    """Columns of channels and unused ones, places of the times by table, and what keeps them from being read."""
+    """Used and unused columns, indices of the time columns by table, and problems that `check` raises."""
 
     tables: Sequence[LogTable]
     used: list[ColumnUse]
@@ -37,7 +37,7 @@ class Assignment:
 
     @property
     def joints(self) -> int:
-        """Highest number of a cylinder or joint; 1 without any."""
+        """Highest cylinder or joint number, 1 if there is none."""
         ends = [use.channel.rpartition("_")[2] for use in self.used]
         return max((int(end) for end in ends if end.isdigit()), default=1)
 
@@ -53,7 +53,7 @@ class Assignment:
             if times and [table.names.count(table.names[place]) for place in times] != [1] * len(times):
                 name = table.headers[times[0]]
                 problems.append(
-                    f"{table.source}: several columns {name!r}. Export each time with its channels as a file of its own."
+                    f"{table.source}: several columns {name!r}. Export each time column with its channels to its own file."
                 )
             if not times:
                 told = ", ".join(header for header in table.headers if header)
@@ -70,27 +70,28 @@ class Assignment:
         if (missing := [channel for channel in strokes if channel not in found]) and self.used:
             free = "; ".join(f"{self.header(use)} ({use.reason})" for use in self.unused) or "none"
             problems.append(
-                f"no column for {', '.join(missing)}. Not used: {free}. Give --column {missing[0]}=NAME:UNIT or --columns FILE."
+                f"no column for {', '.join(missing)}. Not used: {free}. Give --column {missing[0]}=NAME:UNIT or "
+                "--columns FILE; the twin needs the length of every cylinder."
             )
         if problems:
             raise BagError("\n  ".join([f"{len(problems)} fault{'s' * (len(problems) > 1)} in the columns:", *problems]))
 
 
 def assign(tables: Sequence[LogTable], given: ColumnFile, joints: int | None) -> Assignment:
-    """Assign all columns of some tables.
+    """Assign the columns of tables to channels.
 
     Parameters
     ----------
     tables : sequence of LogTable
     given : ColumnFile
-        Assignments that are given. Other columns are recognised by their names.
+        Columns that the user gives. The others are recognised by name.
     joints : int or None
         Number of joints of the boom, if it is known.
 
     Raises
     ------
     BagError
-        A given column is not there, or a table has no time.
+        A given column does not exist, or exists twice.
     """
     for entry in given.time:
         named = [table for table in tables if entry.is_of(table)]
@@ -105,13 +106,15 @@ def assign(tables: Sequence[LogTable], given: ColumnFile, joints: int | None) ->
             for place in range(len(table.headers))
             if table.headers[place] and place not in found.times[number] and (number, place) not in taken
         ]
-        own = [use.channel for use in uses if use.channel]
+        own = [use.channel for use in uses if use.channel and not _is_drive(table, use.place)]
         here = {use.channel for use in found.used if use.table == number}
         for use in uses:
             if not use.channel:
                 found.unused.append(use)
             elif use.channel in given.columns or use.channel in here:
                 found.unused.append(ColumnUse(number, use.place, reason=f"{use.channel} is given otherwise"))
+            elif _is_drive(table, use.place):
+                found.unused.append(ColumnUse(number, use.place, reason="a drive, as simulate writes it, beside its length"))
             elif own.count(use.channel) > 1:
                 found.unused.append(ColumnUse(number, use.place, reason=f"one of several columns that may be {use.channel}"))
                 header = table.headers[use.place]
@@ -124,8 +127,14 @@ def assign(tables: Sequence[LogTable], given: ColumnFile, joints: int | None) ->
     return found
 
 
+def _is_drive(table: LogTable, place: int) -> bool:
+    """Return True if a column is a drive with the cylinder's length beside it, as in a table of `simulate`."""
+    stem, _, number = table.names[place].rpartition("_")
+    return stem == "stroke" and f"length_{number}" in table.names
+
+
 def _given(found: Assignment, given: ColumnFile) -> set[tuple[int, int]]:
-    """Use the given columns; return their tables and places."""
+    """Add the given columns to `found` and return their indices."""
     taken: set[tuple[int, int]] = set()
     for channel, column in given.columns.items():
         if not isinstance(column, ChannelColumn):

@@ -1,4 +1,4 @@
-"""Columns file: which column of a logger's files is which channel, in which unit, and which is the time."""
+"""Columns file: column and unit of each channel in a logger's files, and column of the time."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class _Entry(BaseModel):
     file: Text = "*"
 
     def is_of(self, table: LogTable) -> bool:
-        """Return True if the entry is for the file of a table."""
+        """Return True if the table's file name matches `file`."""
         return fnmatchcase(Path(table.source).name, self.file)
 
 
 class ChannelColumn(_Entry):
-    """Column of one channel, by its name with or without unit; `file` is a pattern for names of files."""
+    """Column of one channel: header with or without unit, in files that match the pattern `file`."""
 
     column: Text
     unit: Text | None = None
@@ -50,7 +50,7 @@ class TimeEntry(_Entry):
 
 
 class ColumnFile(BaseModel):
-    """Content of a columns file. A channel that is ``none`` is not looked for."""
+    """Content of a columns file. A channel set to ``none`` has no column."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -59,7 +59,7 @@ class ColumnFile(BaseModel):
     columns: dict[str, ChannelColumn | Literal["none"]] = {}
 
     def time_of(self, table: LogTable) -> TimeColumn:
-        """Return what is given for the time of a table."""
+        """Return the given time column of a table."""
         entry = next((entry for entry in self.time if entry.is_of(table)), None)
         return TimeColumn() if entry is None else TimeColumn(entry.names, unit_of(entry.unit), entry.order)
 
@@ -70,7 +70,7 @@ def load_columns(path: Path) -> ColumnFile:
 
 
 def columns_from(document: Any, source: str) -> ColumnFile:
-    """Return a columns file from its values. UsageError lists all faults."""
+    """Return a columns file from its parsed values. UsageError lists all faults."""
     if isinstance(document, dict) and isinstance(document.get("time"), dict):
         document = {**document, "time": [document["time"]]}
     try:
@@ -102,13 +102,13 @@ def _faults(found: ColumnFile) -> list[Fault]:
             faults.append(Fault(f"columns.{channel}", channel, f"no channel; channels are {known} ..", "Name one of them."))
         elif column != "none" and column.unit is not None and unit_of(column.unit) not in sensor_kind(channel).units:
             units = ", ".join(sensor_kind(channel).units)
-            remedy = "Use that of the column; a mapping has scale for any other."
+            remedy = "Give the column's unit. For any other, set scale in a mapping."
             faults.append(Fault(f"columns.{channel}.unit", column.unit, f"it must be one of {units}", remedy))
     return faults
 
 
 def columns_of_options(given: ColumnFile, options: list[str], timezone: str | None) -> ColumnFile:
-    """Return a columns file with the values of ``--column CHANNEL=NAME[:UNIT]`` and ``--timezone`` in it."""
+    """Return the columns file updated by ``--column CHANNEL=NAME[:UNIT]`` and ``--timezone``."""
     columns: dict[str, Any] = {channel: _plain(column) for channel, column in given.columns.items()}
     for option in options:
         channel, separator, name = option.partition("=")

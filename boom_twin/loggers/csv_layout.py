@@ -1,4 +1,4 @@
-"""Find out how a logger's CSV file is written: encoding, separator, preamble, header, units, decimal mark."""
+"""Detection of a CSV file's layout: encoding, separator, preamble, header, units, decimal mark."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from ..errors import BagError
 from ..system.csv_table import NOTHING, CsvLayout, marked_encoding
 from .headers import guess, is_time, split_header, unit_of
 
-HEAD = 2**18  # bytes from which the layout is found
+HEAD = 2**18  # bytes read to detect the layout
 SEPARATORS = {"\t": "tab", ";": ";", ",": ",", "|": "|"}
-"""Separators with their names, those first that are never a decimal mark."""
+"""Names of separators in order of trial: first tab and ; (never decimal marks)."""
 BLANKS = NOTHING | {"--", "---", "-nan", "1.#qnan", "-1.#ind", "#nv", "#wert!", "#div/0!", "#num!", "#value!", "inf", "-inf"}
 """Texts of cells without a value, in lower case."""
-NUMERIC_SHARE = 0.6  # share of a column's filled cells that are numbers or times, from which the column is one of numbers
+NUMERIC_SHARE = 0.6  # least share of numbers and times among the filled cells of a numeric column
 _NUMBER = re.compile(r"[+-]?(\d[\d'. ]*([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?", re.IGNORECASE)
 _MOMENT = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}.*|.*\d{1,2}:\d{2}.*")
 _GROUPING = re.compile(r"(?<=\d)[ '\u00a0\u202f](?=\d{3})")
@@ -32,11 +32,11 @@ class LoggerLayout(CsvLayout):
     """Layout of a logger's file, with the units of its columns and its first rows."""
 
     units: list[str]
-    """Units of the columns from a row of units, by the names in this package; unknown ones as they are; empty without one."""
+    """Units from the row of units, or empty strings. Known units have this package's spelling."""
     is_comma: bool
     """True if the decimal mark is a comma."""
     samples: list[list[str]]
-    """First rows."""
+    """First rows of data."""
     header_line: int
 
     @property
@@ -63,13 +63,13 @@ def layout_of(path: Path) -> LoggerLayout:
             return found
     first = next((line for line in text.splitlines() if line.strip()), "")[:60]
     raise BagError(
-        f"{path}: no table is found in it, which begins with {first!r}. It needs a line with the names of the columns, "
+        f"{path}: no table found. The file begins with {first!r}. It needs a line with the names of the columns, "
         "then rows of numbers, with tab, ; , or | between them."
     )
 
 
 def _encoding(path: Path) -> str:
-    """Return the encoding by the mark of a file, else by its bytes."""
+    """Return the encoding by the byte order mark, else by the bytes."""
     if marked := marked_encoding(path):
         return marked
     decoder = codecs.getincrementaldecoder("utf-8")()
@@ -89,7 +89,7 @@ def _encoding(path: Path) -> str:
 
 
 def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout | None:
-    """Return the layout of a file by its first text, if its lines are a table with this separator."""
+    """Return the layout if `text` is a table with this separator, else None."""
     try:
         reader = csv.reader(StringIO(text, newline=""), delimiter=separator, skipinitialspace=True)
         rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(cell.strip() for cell in row)]
@@ -122,7 +122,7 @@ def _table(path: Path, text: str, separator: str, encoding: str) -> LoggerLayout
 
 
 def _headers(above: list[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
-    """Yield lines and names that may be a header: the nearest to the data first, names joined of two lines last."""
+    """Yield possible headers (line, names): nearest to the data first, names joined from two lines last."""
     yield from reversed(above)
     for (_, groups), (line, names) in zip(reversed(above[:-1]), reversed(above), strict=False):
         group, joined = "", []
@@ -133,7 +133,7 @@ def _headers(above: list[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str
 
 
 def _recognised(names: list[str], units: Mapping[int, str]) -> int:
-    """Return the number of names that are those of channels or times."""
+    """Return the number of names recognised as channels or times."""
     pairs = [(*split_header(name), place) for place, name in enumerate(names)]
     return sum(is_time(name) or bool(guess(name, unit or units.get(place, ""), None).channel) for name, unit, place in pairs)
 
@@ -148,13 +148,13 @@ def _is_value(cell: str) -> bool:
 
 
 def _is_data(row: Sequence[str], numeric: list[int]) -> bool:
-    """Return True for a row of values, of which a wrong one may be some text."""
+    """Return True if most filled numeric cells of the row are values."""
     filled = [row[place] for place in numeric if place < len(row) and row[place].lower() not in BLANKS]
     return bool(filled) and sum(map(_is_value, filled)) > 0.5 * len(filled)
 
 
 def _units(row: Sequence[str], numeric: list[int]) -> dict[int, str]:
-    """Return the units of a row of units by their places; empty for another row."""
+    """Return units by column index, or an empty dict if this is no row of units."""
     cells = {place: row[place] for place in range(len(row)) if row[place] not in ("", "-", "1", "[-]")}
     own = {place: cell for place, cell in cells.items() if place in numeric[1:] or (place in numeric and unit_of(cell))}
     known = {place: unit_of(cell) for place, cell in own.items() if unit_of(cell)}
@@ -162,7 +162,7 @@ def _units(row: Sequence[str], numeric: list[int]) -> dict[int, str]:
 
 
 def _has_decimal_comma(path: Path, cells: Sequence[str], separator: str) -> bool:
-    """Return True if the decimal mark of the cells is a comma; BagError if it may be a separator of thousands, too."""
+    """Return True if the decimal mark is a comma. Raise BagError if it may be a separator of thousands."""
     with_comma = [cell for cell in cells if "," in cell]
     if both := [cell for cell in with_comma if "." in cell]:
         return all(cell.rfind(",") > cell.rfind(".") for cell in both)
@@ -174,7 +174,7 @@ def _has_decimal_comma(path: Path, cells: Sequence[str], separator: str) -> bool
 
 
 def number_in(cell: str, is_comma: bool) -> float:
-    """Return the number of a cell, NaN for a blank one. Raise ValueError for any other text, or one that may be two numbers."""
+    """Return the number of a cell, NaN if blank. Raise ValueError for any other text or an ambiguous number."""
     text = _GROUPING.sub("", cell.strip())
     if text.lower() in BLANKS:
         return float("nan")

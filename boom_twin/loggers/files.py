@@ -1,4 +1,4 @@
-"""Open the files of loggers: CSV and its kin, Parquet, TDMS, MDF."""
+"""Readers of logger files: CSV, Parquet, TDMS and MDF."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EXTRA = 'Run `pip install "boom_twin[import]"`.'
 
 
 def tables_of(path: Path) -> list[LogTable]:
-    """Return the tables of a file: one, or of TDMS and MDF one for each group of channels.
+    """Return the tables of a file: one for each group of channels in TDMS and MDF, else one.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def _parquet(path: Path) -> list[LogTable]:
 
 
 def _tdms(path: Path) -> list[LogTable]:
-    """Return a table for the channels of equal length of every group. Waveforms without a column of times get one."""
+    """Return one table per group and length of channels. Waveforms without a column `time` get one."""
     groups = _read(path, "nptdms", lambda library: library.TdmsFile.read(path).groups())
     tables: list[LogTable] = []
     for group in groups:
@@ -80,7 +80,7 @@ def _mdf(path: Path) -> list[LogTable]:
 
 
 def _since(begin: Any, seconds: Any) -> Any:
-    """Return times as `datetime64` from a begin, or seconds without one."""
+    """Return `begin` + `seconds`, or `seconds` if `begin` is None."""
     if begin is None:
         return seconds
     if getattr(begin, "tzinfo", None) is not None:
@@ -92,10 +92,10 @@ def _read(path: Path, module: str, read: Callable[[Any], Any]) -> Any:
     try:
         library = import_module(module)
     except ImportError:
-        raise UsageError(f"{path}: {module.partition('.')[0]} is not installed, and reads such files. {EXTRA}") from None
+        raise UsageError(f"{path}: reading it needs {module.partition('.')[0]}, which is not installed. {EXTRA}") from None
     try:
         return read(library)
-    except Exception as error:  # of the library's own kinds
+    except Exception as error:  # libraries raise types of their own
         raise BagError(f"{path}: cannot be read ({type(error).__name__}: {error}). Export it as CSV.") from None
 
 

@@ -1,4 +1,4 @@
-"""Recognise channels and units in the headers of loggers, in English and German."""
+"""Recognition of channels and units in English and German logger headers."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ _WORDS = {
 }
 """Patterns of the words for each stream."""
 _OVER = (Stream.FORCES, Stream.IMU)
-"""Streams whose words decide beside those of others: a force is that of a cylinder."""
+"""Streams that take precedence if a header names several, as in 'cylinder force'."""
 _NOT_READINGS = (
     r"soll|setpoint|target|command|\bcmd|desired|\bref\b|speed|veloc|geschw|\brate\b|temp|druck|pressure|status|fehler|error"
     r"|alarm|quality|\bmin\b|\bmax\b|mittel|\bmean|\bavg|\brms\b|\bstd\b|offset|strom\b|current|spannung|volt|diff|abweich"
@@ -73,7 +73,7 @@ _TIME = (
 
 @dataclass(frozen=True, slots=True)
 class Guess:
-    """Channel that a header names and the unit of its column, or the reason why there is none."""
+    """Channel and unit of a column by its header, or the reason why none is recognised."""
 
     channel: str = ""
     unit: str = ""
@@ -81,12 +81,12 @@ class Guess:
 
 
 def unit_of(text: str) -> str:
-    """Return the name of a unit in this package; empty for a text that is no known unit."""
+    """Return this package's name of a unit, empty if the text is no known unit."""
     return _KNOWN.get(re.sub(r"\s+", "", text.strip("[](){}<> \t\n")).lower(), "")
 
 
 def split_header(text: str) -> tuple[str, str]:
-    """Return name and unit of a header such as ``Kraft 3 in kN`` or ``Winkel 2 (deg)``; the unit may be empty or unknown."""
+    """Return name and unit of a header such as ``Kraft 3 in kN`` or ``Winkel 2 (deg)``. The unit may be empty or unknown."""
     text = " ".join(text.split())
     if found := _BRACKETS.match(text):
         name, *units = found.groups()
@@ -105,12 +105,12 @@ def is_time(name: str) -> bool:
 
 
 def guess(name: str, unit: str, joints: int | None) -> Guess:
-    """Return the channel of a column, if name and unit leave one possibility.
+    """Return the channel of a column if name and unit fit only one.
 
     Parameters
     ----------
     name, unit : str
-        Of `split_header`.
+        From `split_header`.
     joints : int or None
         Number of joints of the boom, if it is known.
     """
@@ -148,7 +148,7 @@ def _named(words: str) -> set[Stream]:
 
 
 def _end(words: str, stream: Stream) -> str:
-    """Return the end of the channel's name: an axis, or the number beside the word or the only one; empty if not known."""
+    """Return the suffix of a channel: axis, number beside the word, or only number. It is empty if unknown."""
     numbers = [text.lstrip("0") for text in re.findall(r"\d+", words)]
     if ends := SENSORS[stream].ends:
         axes = re.findall(rf"\b({'|'.join(ends)})\b", words)

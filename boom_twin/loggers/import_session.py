@@ -1,7 +1,7 @@
-"""Write tables of loggers as a session: the messages that the rig would have published.
+"""Conversion of logger tables into a session of the messages that the rig would have published.
 
-A reading is in the unit that the mapping names, SI units by default. Signs, zeros and mounts are in the mapping alone,
-which the session keeps.
+Readings are in the units of the mapping, SI by default. Signs, zeros and mounts are only in the mapping. The session
+keeps it.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from .column_file import ColumnFile
 from .log_table import LogRows, LogTable
 from .times import Stamps, TableTimes, read_times, zone_of
 
-TOGETHER = 4096  # messages that are encoded together
-WHOLE_SHARE = 0.5  # share of the rows with a value in all columns of a stream, below which its channels come row by row
+TOGETHER = 4096  # messages encoded at once
+WHOLE_SHARE = 0.5  # share of complete rows of a stream below which each message has only the channels of its row
 
 
 class ReadTable(NamedTuple):
@@ -58,13 +58,13 @@ class ReadTable(NamedTuple):
 
 @dataclass(frozen=True)
 class ImportedSession:
-    """What was imported.
+    """Result of an import.
 
     Attributes
     ----------
     assignment : Assignment
     read : dict of int to ReadTable
-        Rows of the tables with channels, by the numbers of the tables.
+        Rows and times by table index, for tables with channels.
     counts : dict of str to int
         Messages by topic.
     """
@@ -75,9 +75,9 @@ class ImportedSession:
 
 
 class _Readings(NamedTuple):
-    """Readings of one stream in one table: log times and stamps (ns), values (rows, channels), and the channels it has.
+    """Readings of one stream in one table: log times and stamps (ns), values (rows, channels).
 
-    `is_apart` is True if each row has some of the channels only, as signals of a bus come.
+    `own` is True for channels of the table. `is_apart` is True if most rows lack a channel (signals of a bus).
     """
 
     stream: Stream
@@ -96,16 +96,16 @@ def import_session(
     joints: int | None = None,
     mapping: Path | None = None,
 ) -> ImportedSession:
-    """Write the session of some tables into the new or empty folder `out`.
+    """Write tables as a session into the new or empty folder `out`.
 
     Parameters
     ----------
     tables : sequence of LogTable
     out : Path
     given : ColumnFile
-        Columns, times and time zone that the names do not tell.
+        Columns, times and time zone that headers do not give.
     sheet : SessionSheet
-        Version, scene and note that the session keeps.
+        Session metadata: version, scene and note.
     joints : int, optional
         Number of joints of the scene, if there is one.
     mapping : Path, optional
@@ -138,7 +138,7 @@ def import_session(
 
 
 def _mapping(path: Path | None, assignment: Assignment, joints: int) -> tuple[str, Topics]:
-    """Return the mapping that the session keeps, in which channels without a column have no sensor."""
+    """Return the session's mapping, with ``none`` as sensor of channels without a column."""
     topics = load_mapping(path, joints)
     text = "" if path is None else path.read_text(encoding="utf-8-sig")
     there = {use.channel for use in assignment.used}
@@ -166,7 +166,7 @@ def _read(assignment: Assignment, given: ColumnFile, zone: tzinfo | None) -> dic
 
 
 def _check_spans(assignment: Assignment, read: dict[int, ReadTable]) -> None:
-    """Raise BagError for a channel twice at a time, and for a table without a time in common with the strokes."""
+    """Raise BagError if columns of a channel overlap in time, or a table has no time in common with the strokes."""
     spans = {number: each.span for number, each in read.items()}
     told = {number: f"{assignment.tables[number].source}: {each.span_text}" for number, each in read.items()}
     if len({each.times.is_absolute for each in read.values()}) > 1:
@@ -179,7 +179,7 @@ def _check_spans(assignment: Assignment, read: dict[int, ReadTable]) -> None:
         for (_, end, first), (start, _, second) in zip(sorted(parts), sorted(parts)[1:], strict=False):
             if start <= end:
                 raise BagError(
-                    f"{channel}: {told[first]}, and {told[second]}, which overlap. Leave one out, or give column and file of "
+                    f"{channel}: {told[first]} and {told[second]} overlap. Leave one out, or give column and file of "
                     f"{channel} in --columns FILE."
                 )
     strokes = {use.table for use in assignment.used if stream_of(use.channel) is Stream.STROKES}
@@ -217,7 +217,7 @@ def _readings(
 
 
 def _write(out: Path, readings: list[_Readings], topics: Topics, joints: int, origin: str) -> dict[str, int]:
-    """Write all messages in the order of log times, strokes first; return their counts by topic."""
+    """Write all messages by log time, strokes first, and return their counts by topic."""
     kinds = [kind for each in readings for kind in _kinds(each, topics, joints)]
     logs, stamps = (np.concatenate([getattr(kind, name) for kind in kinds]) for name in ("logs", "stamps"))
     numbers = np.repeat(np.arange(len(kinds)), [len(kind.logs) for kind in kinds])
@@ -241,7 +241,7 @@ def _write(out: Path, readings: list[_Readings], topics: Topics, joints: int, or
 
 
 class _Kind(NamedTuple):
-    """Messages with the same names: places of their rows in the table, log times, stamps, values of the names."""
+    """Messages with the same sensor names: indices of their rows, log times and stamps (ns), values."""
 
     topic: str
     rank: int
@@ -253,7 +253,7 @@ class _Kind(NamedTuple):
 
 
 def _kinds(readings: _Readings, topics: Topics, joints: int) -> list[_Kind]:
-    """Return the readings of a stream by the names that their messages have."""
+    """Return the readings of a stream grouped by their sensor names."""
     stream, sensors = readings.stream, topics.sensors_of(readings.stream, joints)
     named = np.array([channel not in topics.absent for channel in sensors]) & readings.own
     masks = np.broadcast_to(named, readings.values.shape)

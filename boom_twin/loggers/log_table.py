@@ -23,7 +23,7 @@ Times = list[str] | NDArray[Any]
 
 @dataclass
 class LogRows:
-    """Rows of a table: numbers and times by the places of their columns; lines in the file, if it has lines."""
+    """Rows of a table: numbers and times by column index, and line numbers if the file is text."""
 
     numbers: dict[int, Array]
     times: dict[int, Times]
@@ -36,18 +36,18 @@ class LogRows:
 
 
 class LogTable(ABC):
-    """Table with rows of one clock.
+    """Table whose rows share a clock.
 
     Parameters
     ----------
     source : str
-        File, or what else the table comes from, for messages.
+        File or other origin, for messages.
     headers : sequence of str
-        Names of the columns as they are written.
+        Column names as written in the file.
     units : sequence of str
-        Units that stand elsewhere than in the headers; empty without one.
+        Units given outside the headers, empty strings if none.
     layout : str
-        How the file is written, in words.
+        Description of the file format.
     """
 
     def __init__(self, source: str, headers: Sequence[str], units: Sequence[str], layout: str) -> None:
@@ -77,7 +77,7 @@ class CsvLogTable(LogTable):
         return [row[place] for row in self._layout.samples if place < len(row) and row[place]]
 
     def read(self, numbers: Sequence[int], times: Sequence[int]) -> LogRows:
-        """See `LogTable`. A last line that was cut off is left out, and a header that is repeated."""
+        """See `LogTable`. A truncated last line and repeated headers are left out."""
         parts: dict[int, list[Array]] = {place: [] for place in numbers}
         found = LogRows({}, {place: [] for place in times})
         for piece in read_csv_pieces(self._path, BagError, layout=self._layout):
@@ -91,7 +91,7 @@ class CsvLogTable(LogTable):
         return found
 
     def _usable(self, piece: CsvTable, found: LogRows) -> tuple[list[list[str]], list[int]]:
-        """Return rows as long as the header with their lines, blank at their end where a program leaves that out."""
+        """Return rows padded with blanks to the length of the header, and their line numbers."""
         width, rows, lines = len(piece.names), list[list[str]](), list[int]()
         for row, line in zip(piece.rows, piece.lines, strict=True):
             if not any(cell.strip() for cell in row) or [cell.strip() for cell in row] == piece.names[: len(row)]:
@@ -123,7 +123,7 @@ class CsvLogTable(LogTable):
 
 
 class ArrayTable(LogTable):
-    """Table of arrays in memory, one for each column; a `datetime64` array holds times.
+    """Table of arrays in memory, one for each column. A `datetime64` array holds times.
 
     Raises
     ------
@@ -179,7 +179,7 @@ def _times(array: NDArray[Any]) -> Times:
 
 
 def table_of_frame(frame: Any, source: str = "table") -> ArrayTable:
-    """Return the table of a data frame (pandas, polars) or of a dict of arrays. A pandas index of times is its first column."""
+    """Return the table of a data frame (pandas, polars) or dict of arrays. A named index or time index is its first column."""
     columns: dict[str, Any] = {}
     if not (isinstance(frame, Mapping) or hasattr(frame, "columns")):
         raise UsageError(

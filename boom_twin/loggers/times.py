@@ -1,4 +1,4 @@
-"""Stamps from the times of a logger: numbers in a unit, ISO stamps, local date and time in one column or two."""
+"""Conversion of logger times to stamps: numbers with unit, ISO stamps, local date and time in one or two columns."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from .log_table import LogRows, LogTable, Times
 
 Stamps = NDArray[np.int64]
 ORDERS = ("dmy", "mdy", "ymd")
-STEPS = 1e-4, 0.2  # s from row to row of a rig's logger, by which the unit of the times is known
-LATE_1904, EXCEL_DAYS = 3.0e9, (3.0e4, 8.0e4)  # s since 1904 (LabVIEW), days since 1899 (spreadsheets) of this century
-SINCE_1904, SINCE_1899 = 2_082_844_800 * SECOND, 25_569 * 86_400 * SECOND  # ns from these days to 1970
-QUARTER = 900 * SECOND  # ns; offsets of time zones change at quarters of an hour
+STEPS = 1e-4, 0.2  # s, usual range of the step between rows, used to infer the unit
+LATE_1904, EXCEL_DAYS = 3.0e9, (3.0e4, 8.0e4)  # least s since 1904 (LabVIEW), range of days since 1899 (spreadsheets)
+SINCE_1904, SINCE_1899 = 2_082_844_800 * SECOND, 25_569 * 86_400 * SECOND  # ns from 1904 and 1899 to 1970
+QUARTER = 900 * SECOND  # ns, offsets of time zones change only at multiples of it
 _DATE = r"(?P<a>\d{1,4})(?P<mark>[-./ ])(?P<b>\d{1,2}|[A-Za-zÄä]{3,9}\.?)[-./ ](?P<c>\d{1,4})"
 _MONTHS = ("jan", "feb", "mar mär mrz", "apr", "may mai", "jun", "jul", "aug", "sep", "oct okt", "nov", "dec dez")
 """Beginnings of the names of months, English and German."""
@@ -34,7 +34,7 @@ _MOMENT = re.compile(rf"(?:{_DATE})?[T ,;]*(?:{_CLOCK})?\s*(?P<zone>Z|UTC|[+-]\d
 
 @dataclass(frozen=True, slots=True)
 class TimeColumn:
-    """Columns that hold the time of a table: one, or date and time of day; unit of numbers, order of dates."""
+    """Column of the time, or columns of date and time of day, with unit of numbers and order of dates."""
 
     names: tuple[str, ...] = ()
     unit: str = ""
@@ -55,7 +55,7 @@ class TableTimes:
 
 
 def zone_of(name: str) -> tzinfo:
-    """Return a time zone by its name; UsageError if there is none."""
+    """Return a time zone by name. Raise UsageError if it is unknown."""
     try:
         return ZoneInfo(name)
     except (ValueError, OSError, KeyError):
@@ -65,7 +65,7 @@ def zone_of(name: str) -> tzinfo:
 
 
 def time_places(table: LogTable, given: TimeColumn) -> list[int]:
-    """Return the places of the columns with the time, as given or by their names; empty without one."""
+    """Return the indices of the time columns, given or recognised by name, empty if none."""
     if given.names:
         places = [
             next((i for i, names in enumerate(zip(table.headers, table.names, strict=True)) if name in names), -1)
@@ -88,7 +88,7 @@ def time_places(table: LogTable, given: TimeColumn) -> list[int]:
 
 
 def read_times(table: LogTable, rows: LogRows, places: Sequence[int], given: TimeColumn, zone: tzinfo | None) -> TableTimes:
-    """Return the stamps of a table. Raise BagError with line and value for a cell that is no time, or an unknown unit."""
+    """Return the stamps of a table. Raise BagError for a cell that is no time and for an unknown unit."""
     header = " + ".join(table.headers[place] for place in places)
     cells = rows.times[places[0]]
     if isinstance(cells, np.ndarray) and cells.dtype.kind == "M":
@@ -104,7 +104,7 @@ def read_times(table: LogTable, rows: LogRows, places: Sequence[int], given: Tim
 
 
 def _kinds(text: str) -> set[str]:
-    """Return the parts that a text has of ``date`` and ``clock``; none for a number."""
+    """Return which of ``date`` and ``clock`` a text has, empty for a number."""
     found = _MOMENT.fullmatch(text.strip())
     return {kind for kind, part in (("date", "a"), ("clock", "h")) if found and found[part] is not None}
 
@@ -151,7 +151,7 @@ def _numbers(table: LogTable, rows: LogRows, cells: Times, header: str, unit: st
 
 
 def _integers(table: LogTable, rows: LogRows, cells: Times, header: str, size: int) -> Stamps:
-    """Return numbers of a unit with `size` ns as whole ns."""
+    """Return times in a unit of `size` ns as integers, ns."""
     if isinstance(cells, np.ndarray):
         if cells.dtype.kind in "iu":
             return cells.astype(np.int64) * size
@@ -202,7 +202,7 @@ def _moments(table: LogTable, rows: LogRows, texts: list[str], header: str, orde
 
 
 def _order(table: LogTable, matches: list[re.Match[str]], header: str) -> str:
-    """Return the order of day, month and year; BagError if nothing tells it."""
+    """Return the order of day, month and year. Raise BagError if ambiguous."""
     if len(matches[0]["a"]) == 4:
         return "ymd"
     if matches[0]["mark"] == "." or matches[0]["b"][0].isalpha():
@@ -217,7 +217,7 @@ def _order(table: LogTable, matches: list[re.Match[str]], header: str) -> str:
 
 @cache
 def _day(a: str | None, b: str, c: str, order: str) -> int:
-    """Return the ns from 1970 to the begin of a date; 0 without a date."""
+    """Return the ns from 1970 to the start of a date, 0 without a date."""
     if a is None:
         return 0
     if b[0].isalpha():
@@ -244,7 +244,7 @@ def _offset(zone: str | None) -> int:
 
 
 def _to_utc(naive: Stamps, zone: tzinfo | None) -> Stamps:
-    """Return local times as UTC. An hour that comes twice is taken by the step back between its two runs."""
+    """Return local times as UTC. A step back in time marks the second run of a repeated hour."""
     if zone is None:
         return naive
     quarters, places = np.unique(naive // QUARTER, return_inverse=True)

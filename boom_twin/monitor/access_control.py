@@ -6,8 +6,11 @@ import hmac
 import re
 import secrets
 from ipaddress import ip_address
+from pathlib import Path
 
 from aiohttp import web
+
+from ..errors import UsageError
 
 COOKIE = "boom_twin_monitor"
 SOURCES = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; frame-ancestors 'none'"
@@ -33,20 +36,38 @@ def in_address(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
+TOKEN = re.compile(r"[A-Za-z0-9_.~-]{24,200}")
+"""Valid token in a file: characters of addresses and cookies, too long to be guessed."""
+
+
+def token_of(path: Path) -> str:
+    """Return the token in a file; raise UsageError if it is unreadable or holds no valid token."""
+    try:
+        with path.open(encoding="ascii") as file:
+            found = file.read(1000).strip()
+    except (OSError, ValueError) as error:
+        raise UsageError(f"--token-file {path}: cannot be read ({error}). Give a file with a token.") from None
+    if not TOKEN.fullmatch(found):
+        bound = "it holds no token of 24 to 200 letters, digits, or signs -_.~"
+        raise UsageError(f"--token-file {path}: {bound}. Make one: openssl rand -hex 24 > {path}")
+    return found
+
+
 class AccessControl:
     """Access control of the page: checks Host, Origin and token of every request.
 
-    On loopback the `token` is empty, and the ``Host`` must be `host` or a usual name of this machine. So a page of another
-    name that resolves to this machine is refused. Elsewhere the token is needed, once in the address (``/?token=..``), from
-    then on in a cookie. A WebSocket must come from a page of this server (``Origin``).
+    Without a `token` on loopback, ``Host`` must be `host` or a usual name of this machine. So a page of another name that
+    resolves to this machine is refused. Elsewhere, a missing `token` is generated at each start. If there is a token, browsers
+    send it once in the address (``/?token=..``), then in a cookie. Programs send it with every request (``Authorization:
+    Bearer ..``). A WebSocket must come from a page of this server (``Origin``).
     """
 
-    def __init__(self, host: str) -> None:
-        self.token = "" if is_loopback(host) else secrets.token_urlsafe(24)
+    def __init__(self, host: str, token: str = "") -> None:
+        self.token = token or ("" if is_loopback(host) else secrets.token_urlsafe(24))
         self._names = LOCAL | {in_address(host)}
 
     def check(self, request: web.Request) -> None:
-        """Raise HTTPForbidden, or HTTPFound where a token is to be put into a cookie."""
+        """Raise HTTPForbidden or HTTPBadRequest, or HTTPFound to store the token in a cookie."""
         hosts = request.headers.getall("Host", [])
         if len(hosts) != 1 or request.raw_path[:1] not in ("/", "*"):
             raise web.HTTPBadRequest(text="a request names its host once, and its path alone")
@@ -58,11 +79,12 @@ class AccessControl:
             raise web.HTTPForbidden(text="only a page of this monitor may connect")
 
     def _check_token(self, request: web.Request) -> None:
-        if self._fits(request.cookies.get(COOKIE, "")):
+        kind, _, sent = request.headers.get("Authorization", "").partition(" ")
+        if self._fits(request.cookies.get(COOKIE, "")) or (kind.lower() == "bearer" and self._fits(sent.strip())):
             return
         if not self._fits(request.query.get("token", "")):
             raise web.HTTPForbidden(text="open the address that the monitor printed; it holds the token")
-        found = web.HTTPFound("/")  # whatever was asked for: no address that a request names is gone to
+        found = web.HTTPFound("/")  # never redirect to an address that the request names
         found.set_cookie(COOKIE, self.token, httponly=True, samesite="Strict")
         raise found
 

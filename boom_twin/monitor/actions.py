@@ -67,11 +67,11 @@ NO_TEXT = ("Cc", "Cs")
 """Unicode categories that cannot be published: control characters and surrogates."""
 ACTS = ("mark", "acknowledge", "record")
 AT_NODE = "acknowledge-at-node"
-"""Permission for ``acknowledge`` that also releases ended alarms at the node."""
+"""Permission to release ended alarms at the node, too, by ``acknowledge``."""
 
 
 class ViewerActions:
-    """Actions of viewers of the page: those of `ACTS` and `AT_NODE` permitted at start."""
+    """Actions of viewers: those of `ACTS` and `AT_NODE` that are permitted at start."""
 
     def __init__(self, feed: Feed, permitted: frozenset[str], recording: RecorderProcess | None = None) -> None:
         self._feed, self._recording = feed, recording
@@ -96,7 +96,7 @@ class ViewerActions:
         return self._recording is not None and self._recording.is_running
 
     def act(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Carry out a request and return the answer to the page; ValueError if it is unknown."""
+        """Carry out a request and return the answer; raise ValueError if it is unknown."""
         name = request.get("do")
         if name not in self._acts:
             raise ValueError("unknown request")

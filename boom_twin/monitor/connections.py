@@ -1,8 +1,8 @@
-"""Limit what a peer can cause: how long a connection may be idle, how many an address may have, lines of the log.
+"""Limits on peers: idle time of a connection, number of connections of an address, lines of the log.
 
-A connection that has sent no whole request has few seconds and few places, in which the newest drives out
-the oldest. A page sends its request at once, so a thousand silent connections do not keep it out. Connections whose request was
-accepted have places of their own. A viewer's WebSocket needs neither, see `boom_twin.monitor.server.MAX_VIEWERS`.
+A silent connection (no complete request yet) is closed after a timeout. If there are too many, a new one replaces the
+oldest. A page sends its request at once, so a thousand silent connections do not keep it out. Accepted connections are counted
+separately. Viewers' WebSockets are not counted here, see `boom_twin.monitor.server.MAX_VIEWERS`.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from .access_control import POLICY
 
 LOG = logging.getLogger("boom_twin.monitor.connections")
 REQUEST_TIME = 5.0
-"""Seconds that a connection may take for its first whole request, and for each further one."""
+"""Timeout (s) of a connection's first complete request, and of each further one."""
 LOGGED_LENGTH = 200
-"""Characters of what the log says of one."""
+"""Largest length of a logged error message."""
 MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64
-"""Connections of one kind, silent or let in; as many of one address."""
+"""Largest number of silent or accepted connections: in total, and of one address."""
 
 
 class Connections:
-    """All connections to one server: those that sent no whole request yet, and those whose request was accepted.
+    """All connections to one server: silent ones (no complete request yet), and accepted ones.
 
-    Each kind is in the order of its last use, and the oldest makes room for a new one. The `server` answers their requests.
+    Each kind is in order of last use. If it is full, a new one replaces the oldest. `server` answers the requests.
     """
 
     def __init__(self, server: web.Server) -> None:
@@ -54,7 +54,7 @@ class Connections:
         self._count(self._accepted, connection)
 
     def end(self, connection: Connection) -> None:
-        """Stop counting a connection that is closed or has become a viewer's."""
+        """Stop counting a connection that is closed or became a viewer's."""
         for kind in (self._silent, self._accepted):
             if connection in kind:
                 kind.remove(connection)
@@ -64,7 +64,7 @@ class Connections:
         self._cut_off(connection, f"it sent no request within {REQUEST_TIME:g} s")
 
     def _count(self, kind: list[Connection], connection: Connection) -> None:
-        """Add the newest connection of a kind, and close the one that must make room for it, if any."""
+        """Add a connection of a kind, and close the oldest one if a limit is reached."""
         same = [each for each in kind if each.address == connection.address]
         if len(same) >= MAX_OF_ADDRESS or len(kind) >= MAX_CONNECTIONS:
             self._cut_off(same[0] if len(same) >= MAX_OF_ADDRESS else kind[0], "a newer one")
@@ -77,7 +77,7 @@ class Connections:
 
 
 class Connection(web.RequestHandler):
-    """Connection whose requests aiohttp reads. Every answer has the headers of `POLICY`, also that to an invalid request."""
+    """Connection whose requests aiohttp reads. Every answer has the headers of `POLICY`, even if the request is invalid."""
 
     __slots__ = ("_all", "_deadline", "address")
 
@@ -96,18 +96,18 @@ class Connection(web.RequestHandler):
         self._all.begin(self)
 
     def connection_lost(self, exc: BaseException | None) -> None:
-        """Give the place of the closed connection to another."""
+        """Stop counting the closed connection."""
         self._cancel_deadline()
         self._all.end(self)
         super().connection_lost(exc)
 
     def accept(self) -> None:
-        """Note that a whole request arrived and was accepted."""
+        """Count the connection as accepted."""
         self._cancel_deadline()
         self._all.accept(self)
 
     def become_viewer(self) -> None:
-        """Give up its place, because it is a WebSocket from now on."""
+        """Stop counting the connection, because it is now a WebSocket."""
         self._all.end(self)
 
     def abort(self) -> None:
@@ -119,9 +119,9 @@ class Connection(web.RequestHandler):
     def handle_error(
         self, request: web.BaseRequest, status: int = 500, exc: BaseException | None = None, message: str | None = None
     ) -> web.StreamResponse:
-        """Return the answer to an invalid request, which is logged in one line, or to a failing handler.
+        """Return the answer to an invalid request or a failing handler.
 
-        A peer that has disconnected is neither.
+        An invalid request is logged in one line, a disconnected peer is not.
         """
         if isinstance(exc, ConnectionError):
             return web.Response(status=status)
@@ -141,9 +141,9 @@ class Connection(web.RequestHandler):
 
 
 LOG_PERIOD = 10.0
-"""Seconds."""
+"""Period (s) of the log's rate limit."""
 MAX_LOG_LINES = 3
-"""Records of one logger written in a `LOG_PERIOD`."""
+"""Largest number of records of one logger in a `LOG_PERIOD`."""
 
 
 class LogRateLimit(logging.Filter):
@@ -170,7 +170,7 @@ class LogRateLimit(logging.Filter):
 
 
 def write_log() -> None:
-    """Write warnings of all loggers of this process to its standard error, at the rate of `LogRateLimit`."""
+    """Write warnings of all loggers of this process to standard error, limited by `LogRateLimit`."""
     handler = logging.StreamHandler(sys.stderr)
     handler.addFilter(LogRateLimit())
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler])

@@ -31,9 +31,9 @@ from .serving import serving
 CAPACITY = 150_000
 """Rows kept of every table: twelve minutes at 200 Hz."""
 MOST_WAITING = 20_000
-"""Samples that may wait for the page; the oldest make room."""
+"""Largest number of waiting samples; beyond it the oldest are dropped."""
 MOST_AT_ONCE = 200
-"""Samples shown in one look, so that the pages have their turn."""
+"""Largest number of samples in one poll, so that pages are served."""
 
 
 class SourceFeed(Feed):
@@ -45,16 +45,16 @@ class SourceFeed(Feed):
         self._waiting: deque[Step] = deque(maxlen=MOST_WAITING)
 
     def put(self, step: Step) -> None:
-        """Show a sample and its report at the next look."""
+        """Queue a sample and its report for the next poll."""
         self._waiting.append(step)
 
     def poll(self) -> None:
-        """Show the samples that wait."""
+        """Show the waiting samples."""
         for _ in range(min(len(self._waiting), MOST_AT_ONCE)):
             self._view.took(self._waiting.popleft())
 
     def now(self) -> float:
-        """Return the time (s) of a clock that only goes forward."""
+        """Return the time (s) of a monotonic clock."""
         return time.monotonic()
 
     def publish(self, words: str) -> None:
@@ -62,25 +62,25 @@ class SourceFeed(Feed):
         self.store.alarms.add("event", Severity.OK, text(words), self.store.newest, self.store.newest)
 
     def release_alarms(self) -> str:
-        """Return that there is no node to ask."""
+        """Return a refusal: there is no node."""
         return "there is no node to let go of it"
 
 
 class LivePage:
     """Context manager that serves the live page of a twin from a thread, see `boom_twin monitor`. It needs aiohttp.
 
-    Give samples to `update` of the page in place of that of the twin. It takes about three times the computing time of the
-    twin itself, in the same process. The context begins when the model is compiled.
+    Call `update` of the page in place of the twin's. It takes about three times the computing time of the twin, in the same
+    process. The context first compiles the model.
 
     Parameters
     ----------
     twin : Twin
     host : str
-        Address to listen at. Elsewhere than at 127.0.0.1 viewers need the token in `address`.
+        Address to listen at. Unless it is 127.0.0.1, viewers need the token in `address`.
     port : int, optional
         0 is any free port. The default is 8420, or any free port if that is taken.
     allow : collection of str
-        What viewers may do: ``mark``, ``acknowledge``.
+        Permitted actions of viewers: ``mark``, ``acknowledge``.
 
     Attributes
     ----------

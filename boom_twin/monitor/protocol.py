@@ -1,12 +1,12 @@
 """Protocol of the live page: binary and text messages to the browser.
 
-A message is a sequence of blocks, each of a multiple of 8 bytes, all numbers little endian:
+A binary message is a sequence of blocks. A block has a multiple of 8 bytes. Numbers are little endian:
 
 ======  =====================  ========================================================================================
 offset  type                   meaning
 ======  =====================  ========================================================================================
 0       uint8                  kind: 1 = rows of a table, 2 = spectrum, 3 = columns of the spectrogram, 4 = response
-1       uint8                  kinds 1, 2: number of the table, its place in the newest ``layout`` message; kind 3: of the
+1       uint8                  kinds 1, 2: index of the table in the newest ``layout`` message; kind 3: index of the
                                signal in `boom_twin.monitor.data.analyst.SIGNALS`; kind 4: 0
 2       uint16                 columns, c
 4       uint32                 rows, k
@@ -14,10 +14,10 @@ offset  type                   meaning
 8 + 8k  float32 x k x c        values column by column, then zeros up to a multiple of 8 bytes
 ======  =====================  ========================================================================================
 
-A spectrum has two columns, for the directions that the message ``lines`` before it names; a spectrogram one for each of
-`boom_twin.monitor.data.spectrum.FREQUENCIES`; a response one for each load that the message ``loads`` before it names. All
-else is JSON in text messages, with a key ``kind``: ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``,
-``loads``, ``answer``.
+A spectrum has two columns: the directions named by the message ``lines`` before it. A spectrogram has one column for each of
+`boom_twin.monitor.data.spectrum.FREQUENCIES`. A response has one for each load named by the message ``loads`` before it.
+Text messages are JSON with a key ``kind``: ``hello``, ``layout``, ``reset``, ``state``, ``alarms``, ``lines``, ``loads``,
+``answer``.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def pack(kind: int, table: int, times: NDArray[np.float64], values: NDArray[np.f
 def state(store: Store, now: float, time: float, dropped: DroppedMessages | None = None) -> dict[str, Any]:
     """Return the message ``state``: lamps at `now` (s, on the lamps' clock), time (s) of the newest data, dropped messages.
 
-    The level is at least WARN if messages were dropped, because they may have changed the lamps. `action` is what to do:
-    ``go``, ``look``, ``stop``, or ``unknown``. `alarm` is the number of the alarm that is the reason, if it is one.
+    The level is at least WARN if messages were dropped, because they may have changed the lamps. `action` is the advice:
+    ``go``, ``look``, ``stop``, or ``unknown``. `alarm` is the number of the alarm in `reason`, or None.
     """
     groups = store.statuses(now).groups(now)
     groups["residuals"] = _with_alarms(groups["residuals"], list(store.alarms.lamps(time)))
@@ -77,12 +77,12 @@ def state(store: Store, now: float, time: float, dropped: DroppedMessages | None
 ACTIONS = {
     Severity.OFF: "unknown", Severity.OK: "go", Severity.WARN: "look", Severity.STALE: "unknown", Severity.ERROR: "look",
 }  # fmt: skip
-SWING = "tip"
-"""Status whose error stops the boom."""
+SWING = "swing"
+"""Status whose ERROR means: stop the boom."""
 
 
 def layout(store: Store) -> dict[str, Any]:
-    """Return the message ``layout``: all tables; for tables of residuals also title, unit and factor of display."""
+    """Return the message ``layout``: all tables, residuals with title, unit and display factor."""
     tables = [{"name": name, "columns": table.columns, **_residuals(name)} for name, table in store.tables.items()]
     return {"kind": "layout", "epoch_ns": str(store.epoch), "tables": tables}
 
@@ -106,7 +106,7 @@ def dump(message: Any) -> str:
 
 
 def _with_alarms(lamps: list[StatusLamp], alarms: list[StatusLamp]) -> list[StatusLamp]:
-    """Return the lamps with active alarms in place of the lamp of the rig's health, unless that lamp's node is silent."""
+    """Return the lamps with active alarms in place of the health lamp, unless that is STALE."""
     health = next((lamp for lamp in lamps if lamp.name == HEALTH), None)
     if not alarms or (health is not None and health.level == Severity.STALE):
         return lamps

@@ -4,28 +4,33 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import suppress
+from contextlib import AsyncExitStack, suppress
 from pathlib import Path
 
 from aiohttp import web
 
-from ..errors import BoomTwinError
+from ..errors import BoomTwinError, UsageError
 from ..texts import FILE as TEXTS
 from .access_control import POLICY, AccessControl
 from .actions import ViewerActions
+from .alarm_watch import AlarmWatch
 from .connections import Connection
 from .data.analyst import Analyst
 from .data.feed import Feed, SessionList
+from .metrics import Metrics
 from .viewer import Viewer
+from .webhook import Webhook
 
 PAGE = Path(__file__).parent / "page"
 MAX_VIEWERS = 16
 MAX_REQUEST_BYTES = 4096
-"""Bytes of a request of the page."""
+"""Largest request of a page, bytes."""
 POLL_PERIOD = 1.0 / 60.0
 """Seconds between two polls of the feed."""
 PEAK_PERIOD = 10.0
 """Seconds between two spectra of a live session while no page is open."""
+ALARM_PERIOD = 1.0
+"""Seconds between two looks for changes of alarms."""
 HEARTBEAT = 60.0
 """Seconds without an answer after which the connection of a viewer is closed."""
 
@@ -33,18 +38,29 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """Server of the live page for one feed, which is the one of the `sessions` that is open, if there are several."""
+    """Server of the live page for one feed. With several `sessions`, it is the open one.
 
-    def __init__(self, feed: Feed, actions: ViewerActions, access: AccessControl, sessions: SessionList | None = None) -> None:
-        self._feed, self._actions, self._access = feed, actions, access
-        self._sessions = sessions
+    `webhook` posts changes of alarms.
+    """
+
+    def __init__(
+        self,
+        feed: Feed,
+        actions: ViewerActions,
+        access: AccessControl,
+        sessions: SessionList | None = None,
+        webhook: Webhook | None = None,
+    ) -> None:
+        self._actions, self._access = actions, access
+        self._sessions, self._webhook = sessions, webhook
+        self._show(feed)
         self._opening: asyncio.Task[None] | None = None
         self._viewers: set[web.WebSocketResponse] = set()
 
     def application(self) -> web.Application:
         """Return the application for `aiohttp.web`."""
         application = web.Application(middlewares=[self._guard], client_max_size=MAX_REQUEST_BYTES)
-        routes = {"/": self._index, "/socket": self._connect, "/page/{name}": self._file}
+        routes = {"/": self._index, "/socket": self._connect, "/page/{name}": self._file, "/metrics": self._answer_metrics}
         application.add_routes([web.get(path, handler) for path, handler in routes.items()])
         application.on_response_prepare.append(_add_policy)
         application.cleanup_ctx.append(self._run)
@@ -62,11 +78,18 @@ class Server:
         return web.FileResponse(PAGE / "index.html")
 
     async def _file(self, request: web.Request) -> web.FileResponse:
-        """Return one of the page's own files. The name asked for is only compared with theirs; no path is made of it."""
+        """Return one of the page's own files. The requested name is only compared; no path is made of it."""
         file = next((file for file in (*PAGE.iterdir(), TEXTS) if file.name == request.match_info["name"]), None)
         if file is None:
             raise web.HTTPNotFound(text="there is no such file of the page")
         return web.FileResponse(file)
+
+    async def _answer_metrics(self, request: web.Request) -> web.Response:
+        try:
+            body, kind = self._metrics.text()
+        except UsageError as error:
+            raise web.HTTPNotImplemented(text=str(error)) from None
+        return web.Response(body=body, headers={"Content-Type": kind})
 
     async def _connect(self, request: web.Request) -> web.StreamResponse:
         if len(self._viewers) >= MAX_VIEWERS:
@@ -85,18 +108,35 @@ class Server:
     async def _run(self, application: web.Application) -> AsyncIterator[None]:
         """Poll the feed as long as the server runs."""
         self._analyst = Analyst(self._feed)
-        tasks = [asyncio.create_task(each()) for each in (self._poll, self._track_peaks)]
-        tasks[0].add_done_callback(_stop_on_fault)
-        yield
-        for task in tasks:
-            task.cancel()
-            with suppress(asyncio.CancelledError):
-                await task
+        async with AsyncExitStack() as stack:
+            if self._webhook is not None:
+                await stack.enter_async_context(self._webhook.posting())
+            tasks = [asyncio.create_task(each()) for each in (self._poll, self._track_peaks, self._follow_alarms)]
+            tasks[0].add_done_callback(_stop_on_fault)
+            yield
+            for task in tasks:
+                task.cancel()
+                with suppress(asyncio.CancelledError):
+                    await task
 
     async def _poll(self) -> None:
         while True:
             self._feed.poll()
             await asyncio.sleep(POLL_PERIOD)
+
+    async def _follow_alarms(self) -> None:
+        """Update counts and post changes of alarms of the feed shown."""
+        while True:
+            self._metrics.follow()
+            for change in self._watch.changes():
+                if self._webhook is not None:
+                    self._webhook.put(change)
+            await asyncio.sleep(ALARM_PERIOD)
+
+    def _show(self, feed: Feed) -> None:
+        """Show `feed`, with its own alarms and counts."""
+        self._feed, self._watch = feed, AlarmWatch(feed)
+        self._metrics = Metrics(feed, self._watch)
 
     async def _track_peaks(self) -> None:
         """Follow the peaks of a live session from its beginning, also while no page is open."""
@@ -105,7 +145,7 @@ class Server:
             await asyncio.sleep(PEAK_PERIOD)
 
     def _choose(self, index: int) -> str:
-        """Start opening another session for all viewers; return in words what is done."""
+        """Start opening another session for all viewers; return a sentence for them."""
         assert self._sessions is not None
         if self._opening is not None and not self._opening.done():
             return "a session is being opened already"
@@ -113,9 +153,9 @@ class Server:
         return f"opening {self._sessions.names[index]} .."
 
     async def _open(self, sessions: SessionList, index: int) -> None:
-        """Show another session: close its viewers' sockets, upon which their pages connect again.
+        """Show another session: close the viewers' sockets, so that their pages connect again.
 
-        It is opened in a thread. The one before is read here, between two turns of this loop, so it is closed here, too.
+        A thread opens it. The previous session is read in this event loop, so it is closed here, too.
         """
         try:
             feed = await asyncio.to_thread(sessions.open, index)
@@ -123,7 +163,7 @@ class Server:
             self._feed.trouble = str(error)
             return
         sessions.show(index, feed)
-        self._feed = feed
+        self._show(feed)
         self._actions, self._analyst = self._actions.of(self._feed), Analyst(self._feed)
         for socket in set(self._viewers):
             await socket.close()

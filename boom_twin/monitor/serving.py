@@ -1,4 +1,4 @@
-"""Listen for the pages of a server, within a context."""
+"""Context in which a server listens for pages."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .connections import Connections
 from .server import Server
 
 BACKLOG = 128
-"""Connections that may wait to be taken; the kernel turns away more."""
+"""Connections that may wait to be accepted; the kernel refuses more."""
 
 
 @asynccontextmanager
 async def serving(server: Server, access: AccessControl, host: str, port: int | None) -> AsyncIterator[str]:
     """Serve pages within the context; provide their address.
 
-    Without a `port` it is `PORT`, or any free one if that is taken. 0 is any free one. Raises OSError if the port is taken.
+    If `port` is None, it is `PORT`, or any free port if that is taken. 0 is any free port. Raise OSError if `port` is taken.
     """
     runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=1.0)
     await runner.setup()

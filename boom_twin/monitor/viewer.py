@@ -1,7 +1,7 @@
 """Viewer of the live page: messages sent to it, and its requests.
 
-No message is queued. The rows to send follow from the numbers of the rows already sent; lamps and alarms are sent as they are
-now. A page that does not keep up loses rows, and no state of the lamps.
+No message is queued. The rows to send follow from the numbers of the rows already sent. Lamps and alarms are sent in their
+present state. A slow page loses rows, but no state of the lamps.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ PERIOD = 1.0 / 30.0
 STATE_PERIOD = 0.5
 SPECTRUM_PERIOD = 1.0
 CHUNK = 8000
-"""Rows of one block at most."""
+"""Largest number of rows in a block."""
 BEHIND = 5.0
-"""Seconds by which a page may be behind before it is skipped to the newest rows."""
+"""Largest delay (s) of a page; beyond it, older rows are skipped."""
 HISTORY = 600.0
-"""Seconds that a page is given when it is opened, or goes elsewhere in a session."""
+"""Seconds of data that a page gets when it opens or seeks."""
 NEWEST_ROW_ONLY = "shape"
-"""Table of which the newest row is enough."""
+"""Table of which only the newest row is sent."""
 MAX_REQUESTS = 40
-"""Requests of a page in a second."""
+"""Largest number of requests of a page in a second."""
 
 
 class Viewer:
-    """Viewer served over one prepared WebSocket until it is closed; all else is common to all viewers.
+    """Viewer of one prepared WebSocket. Feed, actions and analyst are common to all viewers.
 
-    `choose` opens another of the `sessions` by its index and returns in words what is done.
+    `choose` opens one of the `sessions` by its index and returns a sentence for the viewer.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class Viewer:
         self._response: TipResponses | None = None
 
     async def serve(self) -> None:
-        """Send and receive until one of the two ends."""
+        """Send and receive until one task ends."""
         tasks = [asyncio.create_task(each()) for each in (self._send, self._send_spectra, self._send_responses, self._receive)]
         _, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         for task in others:
@@ -125,7 +125,7 @@ class Viewer:
             await self._socket.send_str(told)
 
     async def _send_rows(self, position: float) -> None:
-        """Send all rows that are not sent yet, in messages of bounded size.
+        """Send all unsent rows, in messages of bounded size.
 
         Rows that arrive meanwhile wait for the next turn.
         """
@@ -145,7 +145,7 @@ class Viewer:
                 await self._socket.send_bytes(b"".join(blocks))
 
     def _unsent(self, table: Table, position: float) -> tuple[int, int]:
-        """Return the numbers of the first row to send and of the one after the last."""
+        """Return the numbers of the first unsent row and of the one after the last."""
         end = table.count if self._playback is None else table.until(position)
         first = self._sent.get(table.name)
         if first is None:
@@ -168,7 +168,7 @@ class Viewer:
             await asyncio.sleep(SPECTRUM_PERIOD)
 
     async def _send_spectrogram(self, position: float) -> None:
-        """Send the columns of the spectrogram that are not sent yet."""
+        """Send the unsent columns of the spectrogram."""
         generation = self._generation
         found = await self._analyst.spectrogram_between(max(self._spectrogram_until, position - HISTORY), position)
         if found is not None and generation == self._generation == self._feed.store.generation:
@@ -176,7 +176,7 @@ class Viewer:
             await self._socket.send_bytes(block)
 
     async def _send_responses(self) -> None:
-        """Send the response in the posture shown whenever it differs from the one that the page has."""
+        """Send the response in the posture shown if the page does not have it."""
         while not self._socket.closed:
             found = await self._analyst.response_at(self._position)
             if found is not self._response:
@@ -188,7 +188,7 @@ class Viewer:
 
     @property
     def _position(self) -> float:
-        """Session time (s) that is shown: up to it the page is to have all data."""
+        """Session time (s) shown: the page gets all data up to it."""
         return self._feed.store.newest if self._playback is None else self._playback.position
 
     async def _send_text(self, message: dict[str, Any]) -> None:

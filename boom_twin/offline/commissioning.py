@@ -27,7 +27,7 @@ from ..types import SENSORS, Array, Change, Place, Stream, StrokeReading
 from ..wiring.check import Checked, Verdict, check
 from ..wiring.lag import Lag, lag_of
 from ..wiring.readings import Channel, Series, Window, is_checked
-from ..wiring.words import finding
+from ..wiring.words import STROKES_ALONE, finding
 from .session_samples import SessionSamples
 
 LOOK = 60.0  # s of a session that `wiring_of` reads
@@ -82,10 +82,12 @@ def wiring_of(bag: Path, scene: str | Path | None, mapping: Path | None, window:
         found = commission(bag, scene, mapping, TimeWindow(window.start, duration), with_lags=False)
     except (BagError, UsageError) as error:
         return f"not checked: {str(error).splitlines()[0]}"
+    if not found.wrong and found.checked.has_strokes_alone:
+        return STROKES_ALONE
     if not found.wrong:
         still = "" if found.checked.moved else f", as far as a boom tells that stands still for {duration:g} s"
         return f"as expected{still}"
-    told = "; ".join(f"{each.channel} {finding(each, found.checked.moved)}" for each in found.wrong)
+    told = "; ".join(f"{each.channel} {finding(each, found.checked)}" for each in found.wrong)
     return f"{told}. `boom_twin mapping --check {bag}` proposes a mapping"
 
 

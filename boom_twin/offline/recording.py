@@ -125,7 +125,7 @@ class SessionTotals:
         if not len(predictions.stamps):
             return
         self.samples += len(predictions.stamps)
-        self.load.add(predictions.stamps, stretch.estimates.load)
+        self.load.add(predictions.stamps, stretch.estimates.load, stretch.estimates.load_variance)
         self.acceleration = float(np.fmax(self.acceleration, np.hypot(*predictions.tip_acceleration.T).max()))
 
     def _add_tip_sigmas(self, sigmas: Array) -> None:

@@ -32,7 +32,7 @@ from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
 from ..system.summary_display import SummaryDisplay, data_frame
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
-from ..twin.events import EVENTS
+from ..twin.events import CONSEQUENCES, EVENTS
 from ..twin.twin import Twin
 from ..types import Array, Change, Report, Stream, StrokeReading
 from .ground_truth import TipErrors, TipTruth, truth_in
@@ -240,7 +240,7 @@ def replay_into(
         raise BagError(
             f"{session.path}: no {one} sample could be used ({_told(twin)}){refused.never_read}. "
             f"It needs names {names}_1..{joints}, or those of a mapping, values within {bounds}, "
-            f"and stamps.{_explained(samples.oddities)}{refused.told}"
+            f"and stamps.{_explained(twin.counts)}{refused.told}"
         )
     recording.close()
     if recording.totals.samples == 1 < recording.refused:
@@ -284,8 +284,9 @@ def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) 
 
 
 def _explained(counts: Counter[str]) -> str:
-    """Return a sentence on what was met most often; empty if nothing was."""
-    return "".join(f" Most often {name}: {(EVENTS | ODDITIES)[name]}." for name, _ in counts.most_common(1))
+    """Return a sentence on the most frequent event; empty without any. `CONSEQUENCES` count only without another."""
+    most = max(counts, key=lambda name: (name not in CONSEQUENCES, counts[name]), default=None)
+    return "" if most is None else f" Most often {most}: {(EVENTS | ODDITIES)[most]}."
 
 
 def _told(twin: Twin) -> str:

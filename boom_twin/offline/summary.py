@@ -84,6 +84,7 @@ def _load(load: TipLoad | None) -> dict[str, Any]:
     return {
         "tip_load": load.text,
         "tip_load_rms_N": load.rms,
+        "tip_load_sigma_N": load.sigma,
         "tip_load_pulses_N": None if pulses is None else pulses.height,
         "tip_load_pulses_sigma_N": None if pulses is None else pulses.height_sigma,
         "tip_load_frequency_Hz": None if pulses is None else pulses.frequency,

@@ -1,7 +1,7 @@
 """Threads of a replay beside the twin: one reads ahead, one writes the result bag.
 
-Kernels and compression release the interpreter's lock, so two cores are used. Each thread has one reader and one writer, so
-order and bytes are those of doing it all in one place.
+Kernels and compression release the interpreter's lock, so two cores are used. Each queue has one producer and one consumer, so
+order and bytes are those of a single thread.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from ..types import Report
 ITEMS_AHEAD = 8
 """Blocks of samples, or of reports, that wait between two threads."""
 SWITCH_INTERVAL = 2e-5
-"""Time (s) that a thread keeps the interpreter's lock while another wants it: a call of the twin's kernel takes 1 ms."""
+"""Time (s) that a thread keeps the interpreter's lock while another waits; a call of the twin's kernel takes 1 ms."""
 Item = TypeVar("Item")
 
 
 @contextmanager
 def quick_switches() -> Iterator[None]:
-    """Let threads take turns so quickly that the twin does not wait for the decoder of messages."""
+    """Shorten the switch interval of threads, so that the twin does not wait for the decoder of messages."""
     usual = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_INTERVAL)
     try:
@@ -41,7 +41,7 @@ def quick_switches() -> Iterator[None]:
 
 
 def read_ahead(items: Iterable[Item]) -> Generator[Item]:
-    """Yield the items of an iterable, which a thread takes from it up to `ITEMS_AHEAD` items early."""
+    """Yield the items of an iterable; a thread reads up to `ITEMS_AHEAD` of them in advance."""
     iterator, end = iter(items), object()
     thread = ThreadPoolExecutor(1, "read")
     try:
@@ -57,7 +57,9 @@ def read_ahead(items: Iterable[Item]) -> Generator[Item]:
 def result_bag(
     directory: Path, notes: Mapping[str, str], topics: Topics, scene: Scene, settings: Settings
 ) -> Iterator[Callable[[list[ReportBlock | Report]], None]]:
-    """Yield a function that has a thread write reports to a bag; the bag is complete if the block ends without an exception.
+    """Yield a function that queues reports for a thread, which writes them to a bag.
+
+    The bag is complete if the block ends without an exception.
 
     Parameters
     ----------
@@ -66,16 +68,16 @@ def result_bag(
     notes : mapping of str to str
         Kept in the bag.
     topics : Topics
-        How its topics and the frame of its outputs are named.
+        Names of the output topics and of their frame.
     scene : Scene
-        What the reports are about.
+        Scene of the twin.
     settings : Settings
-        How it is drawn.
+        Settings of the drawing.
 
     Raises
     ------
     BagError
-        The bag cannot be written; also from the function.
+        The bag cannot be written. The function raises it, too.
     """
     encoder = ReportEncoder(scene, settings, topics.frame)
     outputs: dict[str, Topic] = {key: topic for key, topic in topics.outputs.items() if key is not Output.DIAGNOSTICS}

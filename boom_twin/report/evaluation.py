@@ -29,7 +29,7 @@ class Evaluation:
     scene: Scene
     history: History
     rests: list[RestPeriod]
-    loads: list[Load]  # of the flexible sections
+    loads: list[Load]  # of all stations, that of the largest stress first
     has_heights: bool  # the stresses are by heights that the scene or the user gave
     fatigue: list[Fatigue]  # of all stations, if it was asked for
     category: float | None  # detail category (MPa) that it was asked for

@@ -29,6 +29,9 @@ CATEGORY = 71.0  # MPa, of a welded box where nothing better is known
 CUT_OFF_CYCLES = 1e8
 KNEE_CYCLES = 5e6
 CATEGORY_CYCLES = 2e6
+LIVES = (10, 20, 30)  # years of life for which the hours of work a year are given
+YEAR = 8760.0  # hours
+HUNDRED = 100.0  # hours, from which on no tenths are shown
 NOISE_RANGE = 1e5  # Pa; cycles below are noise, and do no damage in any category
 BIN = 1e4  # Pa, in which ranges are added up
 
@@ -62,6 +65,21 @@ def damage_of(cycles: Iterable[tuple[float, float]], category: float) -> float:
     """Return the damage of cycles, given range (Pa) and count of each."""
     table = np.array([*cycles], float).reshape(-1, 2)
     return float(np.sum(table[:, 1] / endured(table[:, 0], category)))
+
+
+def hours_to_end(damage: float, hours: float) -> float | None:
+    """Return the hours of such work to a damage of 1, from the damage of so many `hours`; None without damage."""
+    return hours / damage if damage > 0.0 else None
+
+
+def hours_as_text(hours: float | None) -> str:
+    """Return hours to three digits, in groups of thousands; a dash for None."""
+    return "-" if hours is None else f"{float(f'{hours:.3g}'):,.{0 if hours >= HUNDRED else 1}f}".replace(",", " ")
+
+
+def yearly_as_text(hours: float | None) -> str:
+    """Return hours a year; more than a year has are not written out."""
+    return f"> {YEAR:g}" if hours is not None and hours > YEAR else hours_as_text(hours)
 
 
 class RainflowCounter:

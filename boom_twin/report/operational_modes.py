@@ -1,8 +1,8 @@
-"""Natural frequencies, damping ratios and mode shapes of a session's rest periods, under whatever load excites the boom.
+"""Natural frequencies, damping ratios and mode shapes of a session's rest periods, under any excitation.
 
 Stochastic subspace identification with covariances (B. Peeters and G. De Roeck, Mech. Syst. Signal Process. 13 (1999),
 855-878), by pyOMA-2. Poles are computed for model orders up to `HIGHEST_ORDER`. A pole that stays the same from one order to
-the next is stable; stable poles of one frequency are a mode. Deviations follow from the covariance of the output covariances.
+the next is stable. Stable poles of one frequency are a mode. Deviations follow from the covariance of the output covariances.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from ..errors import BagError, UsageError
 from ..scene.schema import Scene
 from ..types import Array
 
-RATE = 40.0  # Hz, to which samples are averaged
+RATE = 40.0  # Hz, rate of the averaged samples
 SHORTEST_REST = 20.0  # s
-SETTLING = 1.0  # s, left out where a rest period begins
+SETTLING = 1.0  # s, left out at the start of a rest period
 BLOCK_ROWS, HIGHEST_ORDER, RECORD_PARTS = 25, 40, 10
-LARGEST_DAMPING, LARGEST_VARIATION = 0.1, 0.05  # of a pole; its deviation over its frequency
-APART = 0.02  # relative distance of frequencies that belong to two modes
-FEWEST_ORDERS = 10  # at which a mode has a stable pole
-LINE_DAMPING = 0.002  # a free vibration of a boom loses more; a pump does not
-NEAR = 0.2  # relative distance up to which a measured mode belongs to the nearest one of the model
+LARGEST_DAMPING, LARGEST_VARIATION = 0.1, 0.05  # damping ratio; relative deviation of the frequency
+APART = 0.02  # relative difference that separates two modes
+FEWEST_ORDERS = 10  # model orders with a stable pole of a mode
+LINE_DAMPING = 0.002  # damping ratio below which it is a pump's line
+NEAR = 0.2  # largest relative distance of a measured mode from its mode of the model
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class OperationalMode:
     is_line : bool
         True if it hardly decays: the line of a pump rather than a mode.
     shape : ndarray, shape (channels,)
-        Amplitudes at the sensors over the largest, each in standard deviations of the sensor in the rest period.
+        Amplitudes in standard deviations of each sensor in the rest period, relative to the largest.
     model : float or None
         Natural frequency of the nearest mode of the model, Hz.
     """
@@ -128,7 +128,7 @@ def _measured(name: str, period: RestPeriod, scene: Scene, rigging: Rigging) -> 
 
 
 def _even(period: RestPeriod, channel: int) -> Array | None:
-    """Return means of a channel's readings over steps of 1 / `RATE`, of mean 0 and deviation 1; None if it stands still."""
+    """Return readings of a channel averaged to `RATE`, with mean 0 and deviation 1, or None if they are constant."""
     own = (period.channels == channel) & (period.times >= SETTLING)
     count = int((period.times[-1] - SETTLING) * RATE)
     places = np.minimum(((period.times[own] - SETTLING) * RATE).astype(int), count - 1)
@@ -142,7 +142,7 @@ def _even(period: RestPeriod, channel: int) -> Array | None:
 
 
 def _identified(values: Array, leading: int, with_deviations: bool) -> tuple[Array, ...]:
-    """Return frequencies (Hz), damping ratios, labels, deviations of both, and shapes of the poles by row and order."""
+    """Return frequencies (Hz), damping ratios, labels, deviations of the first two, shapes, by row and order of the poles."""
     try:
         from pyoma2.algorithms.ssi import SSI
         from pyoma2.setup.single import SingleSetup
@@ -156,7 +156,7 @@ def _identified(values: Array, leading: int, with_deviations: bool) -> tuple[Arr
     silenced, setup = logging.root.manager.disable, SingleSetup(values, fs=RATE)
     logging.disable(logging.INFO)
     try:
-        with redirect_stderr(StringIO()):  # its progress bars
+        with redirect_stderr(StringIO()):  # hides progress bars
             setup.add_algorithms(method)
             setup.run_by_name("ssi")
     finally:
@@ -179,7 +179,7 @@ def _stable_groups(values: Array) -> tuple[Array, list[Array]]:
 
 
 def _shapes(values: Array, leading: int, frequencies: list[float]) -> list[Array]:
-    """Return the real shape at all channels of the pole nearest to each frequency, at the highest order."""
+    """Return, for each frequency, the real shape at all channels of the nearest pole of the highest order."""
     if not frequencies:
         return []
     found, _, _, _, _, shapes = _identified(values, leading, False)

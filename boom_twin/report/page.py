@@ -17,15 +17,17 @@ from ..offline.replay import Replay
 from ..plots import AlarmSpan
 from ..plots.health import frequency_picture, moment_picture, timeline_picture
 from ..system.atomic_files import write_atomic
+from ..texts import alarm_sentence
 from ..twin.events import EVENTS
 from ..types import SECOND, SENSORS, Stream
 from .evaluation import Evaluation
-from .fatigue import NOISE_RANGE
+from .fatigue import LIVES, NOISE_RANGE, hours_as_text, hours_to_end, yearly_as_text
 from .html import heading, image, page, paragraph, table
 from .quantities import Load
 from .vibration import MODE_DISTANCE, SHORTEST_REST, course
 
 FILE_NAME = "report.html"
+HOUR = 3600.0  # s
 NO_JUDGE = "The rig's health was not judged."
 ASSUMED = f"Heights are not in the scene: assumed are {BOX:g} radii of gyration, as of thin-walled boxes; see --section-height."
 
@@ -34,7 +36,7 @@ def write_report(found: Evaluation, folder: Path) -> Path:
     """Write the report into `folder` beside the pictures of the replay; return its path."""
     parts = [
         *_head(found),
-        *_alarms(found, folder),
+        *_alarm_times(found, folder),
         *_residuals(folder),
         *_vibration(found, folder),
         *_tip(found, folder),
@@ -69,9 +71,10 @@ def _head(found: Evaluation) -> list[str]:
     scene = f"{summary['scene']}: {len(found.scene.sections)} sections. {found.scene.description}".strip()
     return [
         heading(f"Session {found.name}", 1),
+        *_verdict(found.result),
+        *_worst_stations(found),
         paragraph(found.origin or "The session does not say where it comes from.", "origin"),
         paragraph(f"Scene {scene}"),
-        _verdict(found.result),
         table((), rows),
         heading("Joint angles", 3),
         table(
@@ -96,13 +99,40 @@ def _uncertainty(recording: Recording) -> list[tuple[str, object]]:
     return [("standard deviation of the predicted tip at worst, m", f"{x:.2g} forward, {z:.2g} up")]
 
 
-def _verdict(result: Replay) -> str:
+def _verdict(result: Replay) -> list[str]:
+    """Return the verdict and all alarms: first those that stop the boom, then those with a cause."""
     if not result.recording.is_judged:
-        return paragraph(NO_JUDGE, "note")
-    count = len(result.summary["alarms"])
-    if count:
-        return paragraph(f"{count} alarm{'s' if count > 1 else ''}.", "alarm")
-    return paragraph("No alarm: no sensor gives itself away, and no residual is beyond its limit.", "well")
+        return [paragraph(NO_JUDGE, "note")]
+    alarms = sorted(result.summary["alarms"], key=lambda alarm: (not _stops(alarm), alarm["cause"] is None, alarm["from_s"]))
+    if not alarms:
+        return [paragraph("No alarm: no sensor gives itself away, and no residual is beyond its limit.", "well")]
+    stop = "STOP. " if any(map(_stops, alarms)) else ""
+    return [paragraph(f"{stop}{len(alarms)} alarm{'s' if len(alarms) > 1 else ''}.", "alarm"), *map(_alarm, alarms)]
+
+
+def _stops(alarm: dict[str, Any]) -> bool:
+    return alarm_sentence(alarm["channel"], alarm["kind"], alarm["cause"]).stops
+
+
+WORST = 3  # stations named in the first lines
+
+
+def _worst_stations(found: Evaluation) -> list[str]:
+    """Return the stations with the largest stresses, and the life in hours if a detail category is given."""
+    worst = [f"{load.station.name}: {_stress(load)} MPa at {load.time:.1f} s" for load in found.loads[:WORST]]
+    parts = [paragraph(f"Largest bending stresses: {'; '.join(worst)}.")] if worst else []
+    if found.category is not None and found.fatigue:
+        row, hours = max(found.fatigue, key=lambda row: row.damage), found.result.summary["duration_s"] / HOUR
+        end = hours_to_end(row.damage, hours)
+        told = "No damage: all ranges of stress are below the cut-off."
+        if end is not None:
+            years = ", ".join(f"{yearly_as_text(end / years)} in {years} years" for years in LIVES)
+            told = (
+                f"Life at {row.station.name}, detail category {found.category:g} MPa: {hours_as_text(end)} hours of such work. "
+            )
+            told += f"Hours a year that use it up: {years}."
+        parts.append(paragraph(f"{told} Vibration that only sensors show is NOT in it, see Fatigue."))
+    return parts
 
 
 def _joints(summary: dict[str, Any]) -> list[tuple[object, ...]]:
@@ -114,16 +144,15 @@ def _joints(summary: dict[str, Any]) -> list[tuple[object, ...]]:
 # -- alarms and residuals ---------------------------------------------------------------------------------------------
 
 
-def _alarms(found: Evaluation, folder: Path) -> list[str]:
+def _alarm_times(found: Evaluation, folder: Path) -> list[str]:
     recording, history = found.result.recording, found.history
     if not recording.is_judged:
-        return [heading("Alarms"), paragraph(NO_JUDGE)]
+        return []
     gaps = [AlarmSpan("cylinder_strokes", start, stop, "gap") for start, stop in history.gaps]
     spans = sorted([*gaps, *history.alarms], key=lambda alarm: alarm.start)
     path, end = folder / "timeline.png", float(history.stamps_s[-1])
     timeline_picture(path, found.name, end, spans, found.origin)
-    told = [_alarm(alarm) for alarm in found.result.summary["alarms"]] or [paragraph("None.")]
-    return [heading("Alarms"), *told, image(path, "alarms over time")]
+    return [heading("Alarms over time"), image(path, "alarms over time")]
 
 
 def _alarm(alarm: dict[str, Any]) -> str:
@@ -132,9 +161,9 @@ def _alarm(alarm: dict[str, Any]) -> str:
     evidence = f"{alarm['evidence']}; " if alarm["evidence"] else ""
     rows = [(rank["cause"], f"{100.0 * rank['probability']:.0f} %") for rank in alarm["ranked"]]
     causes = table(("possible cause", "probability"), rows) if len(rows) > 1 else ""
-    title = heading(f"{alarm['channel']}: {alarm['cause'] or alarm['kind']}", 3)
-    note = paragraph(f"{evidence}from {alarm['from_s']:.2f} s, {end}", "note")
-    return f'<div class="block">{title}{paragraph(alarm["told"])}{note}{causes}</div>'
+    cause = alarm["cause"] or f"{alarm['kind']}, its cause is not known"
+    note = paragraph(f"{alarm['channel']}: {cause}; {evidence}from {alarm['from_s']:.2f} s, {end}.", "note")
+    return f'<div class="block">{paragraph(alarm["told"])}{note}{causes}</div>'
 
 
 def _residuals(folder: Path) -> list[str]:
@@ -200,8 +229,8 @@ def _moments(found: Evaluation, folder: Path) -> list[str]:
     if not found.loads:
         return [title, paragraph("All sections of the scene are rigid: their bending is not in the model.")]
     path = folder / "moments.png"
-    rows = [(load.station.name, load.column) for load in found.loads]
-    moment_picture(path, found.name, found.history, rows, found.origin)
+    worst = {load.station.section: (load.station.name, load.column) for load in reversed(found.loads)}
+    moment_picture(path, found.name, found.history, [worst[section] for section in sorted(worst)], found.origin)
     told = (
         "Moments are those of the model's bending coordinates (EI times curvature), static and dynamic together, at the ends "
         "and middles of the flexible parts; positive ones bend the outboard end up. Stress is M / W with W = 2 I / h, of "
@@ -218,9 +247,14 @@ def _moments(found: Evaluation, folder: Path) -> list[str]:
 
 def _load(load: Load) -> tuple[object, ...]:
     unknown = "-" if np.isnan(load.sigma) else f"{1e-3 * load.unknown:+.3g} ± {1e-3 * load.sigma:.2g}"
+    moments = 1e-3 * load.moment, load.time, 1e-3 * load.static
+    return load.station.name, *moments, unknown, 1e6 * load.modulus, _stress(load)
+
+
+def _stress(load: Load) -> str:
+    """Return the stress in MPa, with the standard deviation of the unknown load's part if it is known."""
     deviation = "" if np.isnan(load.sigma) else f" ± {1e-6 * load.sigma / load.modulus:.2g}"
-    stress = f"{1e-6 * load.stress:.3g}{deviation}"
-    return load.station.name, 1e-3 * load.moment, load.time, 1e-3 * load.static, unknown, 1e6 * load.modulus, stress
+    return f"{1e-6 * load.stress:.3g}{deviation}"
 
 
 def _fatigue(found: Evaluation) -> list[str]:
@@ -232,11 +266,12 @@ def _fatigue(found: Evaluation) -> list[str]:
         "factors. Damage grows with the third to fifth power of stress. What only sensors know of is NOT in it: of a boom that "
         "a pump shakes this counts the moves alone, and the damage is more."
     )
+    hours = found.result.summary["duration_s"] / HOUR
     rows = [
-        (row.station.name, row.cycles, 1e-6 * row.largest, row.damage, 1.0 / row.damage if row.damage else None)
+        (row.station.name, row.cycles, 1e-6 * row.largest, row.damage, hours_as_text(hours_to_end(row.damage, hours)))
         for row in found.fatigue
     ]
-    head = ("station", "cycles", "largest range, MPa", "damage", "sessions to a damage of 1")
+    head = ("station", "cycles", "largest range, MPa", "damage", "hours of such work to a damage of 1")
     return [heading("Fatigue", 3), paragraph(told, "note"), table(head, rows)]
 
 

@@ -202,7 +202,7 @@ def digest(scene: Scene) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """Most loaded station of a section."""
+    """Largest bending moment of a station in a session."""
 
     station: Station
     column: int  # column of `History.moments`
@@ -220,52 +220,53 @@ class Load:
 
 
 class SectionLoads:
-    """Largest bending moment of every flexible section over the blocks of a session."""
+    """Largest bending moment of every station over the blocks of a session."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._places = scene, stations(scene)
-        self._largest: dict[int, _Largest] = {}  # by section
+        self._largest: dict[int, _Largest] = {}  # by column
 
     def add(self, history: History, load: Array, variance: Array) -> None:
         """Add the next block of m rows; `load` (N) at the tip, estimated, and its `variance` (N^2), each (m, 2)."""
-        for section in sorted({station.section for station in self._places}):
-            columns = [i for i, station in enumerate(self._places) if station.section == section]
-            size = np.abs(history.moments[:, columns])
-            row, best = np.unravel_index(int(size.argmax()), size.shape)
-            column = columns[int(best)]
+        if not self._places:
+            return
+        for column, row in enumerate(np.abs(history.moments).argmax(axis=0).tolist()):
             moment = float(history.moments[row, column])
-            if section not in self._largest or abs(moment) > abs(self._largest[section].moment):
+            if column not in self._largest or abs(moment) > abs(self._largest[column].moment):
                 when, static = float(history.stamps_s[row]), float(history.slow_moments[row, column])
                 about = (each[row].copy() for each in (history.strokes, history.joints, load, variance))
-                self._largest[section] = _Largest(column, moment, when, static, *about)
+                self._largest[column] = _Largest(moment, when, static, *about)
 
     @property
     def moments(self) -> dict[int, float]:
         """Size (N m) of the largest moment so far by section, counted from 0."""
-        return {section: abs(own.moment) for section, own in self._largest.items()}
+        found: dict[int, float] = {}
+        for column, own in self._largest.items():
+            section = self._places[column].section
+            found[section] = max(found.get(section, 0.0), abs(own.moment))
+        return found
 
     def most_loaded(self, heights: Array | None) -> list[Load]:
-        """Return the load of every flexible section.
+        """Return the load of every station, that of the largest stress first.
 
         `heights` (n,) are the section heights, m. None: those of the scene, else those of thin-walled boxes.
         """
         if not self._largest:
             return []
         model, found = BendingStressModel(self._scene, heights), []
-        for own in self._largest.values():
+        for column, own in self._largest.items():
             unknown = sigma = math.nan
             if own.load.any():
-                influence = model.influence(own.strokes, own.joints)[own.column]
+                influence = model.influence(own.strokes, own.joints)[column]
                 unknown, sigma = float(influence @ own.load), math.sqrt(float(influence**2 @ own.variance))
-            place, modulus = self._places[own.column], float(model.moduli[own.column])
-            found.append(Load(place, own.column, own.moment, own.time, own.static, unknown, sigma, modulus))
-        return found
+            place, modulus = self._places[column], float(model.moduli[column])
+            found.append(Load(place, column, own.moment, own.time, own.static, unknown, sigma, modulus))
+        return sorted(found, key=lambda load: -load.stress)
 
 
 class _Largest(NamedTuple):
-    """Largest moment of a section so far (fields as in `Load`), and the state at that time."""
+    """Largest moment of a station so far (fields as in `Load`), and the state at that time."""
 
-    column: int
     moment: float
     time: float
     static: float

@@ -50,7 +50,7 @@ class TopicFeed(Feed):
     def __init__(self, topics: Topics, scene: Scene | None = None) -> None:
         self._node = rclpy.create_node(NAME)
         topics = resolved_topics(topics, self._node)
-        super().__init__("live", Store(CAPACITY), topics, scene)
+        super().__init__("live", Store(CAPACITY), topics, scene, boom=self._node.get_namespace())
         shown = [topics.inputs[Stream.IMU], *topics.outputs.values(), topics.events]
         self._heard: list[tuple[Subscription[Any], str]] = []
         for topic in shown:

@@ -1,7 +1,7 @@
-"""Drive a twin with the samples of a session: the one loop of the live node, the replay, the live page and the calibration.
+"""Loop that updates a twin with samples and changes, shared by live node, replay, live page and calibration.
 
-What a twin predicts depends on its samples and on the changes between them alone. Every user takes both from here, in the
-order in which they come, and only differs in what it does with the reports: so a replay repeats the live node to the bit.
+Predictions depend only on samples and on the changes between them. All users give both to the twin in their order, and differ
+only in their use of the reports. So a replay repeats the live node bit for bit.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Item = TypeVar("Item", Sample, SampleBlock)
 
 
 class Step(NamedTuple):
-    """A sample, what it caused, and how long that took the twin, s."""
+    """A sample, its report, and the computing time of the twin, s."""
 
     sample: Sample
     report: Report
@@ -34,28 +34,28 @@ def drive(twin: Twin, items: Iterable[Sample | Change | None], judged: bool = Tr
 
 
 def drive(twin: Twin, items: Iterable[Sample | Change | None], judged: bool = True) -> Iterator[Step | None]:
-    """Update `twin` with every sample, as it is asked for.
+    """Update `twin` with one sample for each step that the caller takes.
 
     Parameters
     ----------
     twin : Twin
     items : iterable of Sample, Change or None
-        None is a message without a usable value. A change is asked of the twin, and takes effect with the next full stroke
-        sample, as it did while the session was recorded.
+        None is a message without a usable value. A change is requested from the twin. It takes effect with the next full
+        stroke sample, as in the recording.
     judged : bool
         See `Twin.update`.
 
     Yields
     ------
     Step or None
-        Of every sample; None for a message without a usable value.
+        Step for each sample; None for a message without a usable value.
     """
     for item in _repeating_changes(twin, items):
         yield None if item is None else drive_one(twin, item, judged)
 
 
 def drive_one(twin: Twin, sample: Sample, judged: bool = True) -> Step:
-    """Update `twin` with one sample that no change precedes; see `drive`."""
+    """Update `twin` with one sample without a change; see `drive`."""
     began = perf_counter()
     report = twin.update(sample, judged)
     return Step(sample, report, perf_counter() - began)
@@ -64,13 +64,13 @@ def drive_one(twin: Twin, sample: Sample, judged: bool = True) -> Step:
 def drive_blocks(
     twin: Twin, items: Iterable[SampleBlock | Change | None]
 ) -> Iterator[tuple[SampleBlock, list[ReportBlock | Report]] | None]:
-    """Update `twin` block by block and yield each block with its reports, see `drive` and `Twin.update_block`."""
+    """Update `twin` block by block; yield each block with its reports. See `drive` and `Twin.update_block`."""
     for item in _repeating_changes(twin, items):
         yield None if item is None else (item, twin.update_block(item))
 
 
 def _repeating_changes(twin: Twin, items: Iterable[Item | Change | None]) -> Iterator[Item | None]:
-    """Yield all items but the changes; request each change of the twin in its turn."""
+    """Yield all items except changes; request each change from the twin at its place."""
     for item in items:
         if isinstance(item, Change):
             twin.requests.repeat(item)

@@ -26,5 +26,8 @@ EVENTS = {
     "unmatched": "no prediction at the stamp of this sample; no residual",
 }
 
+CONSEQUENCES = frozenset({"waiting", "model"})
+"""Events that follow from others."""
+
 TOLD_AT_ONCE = frozenset({"restart", "stroke elsewhere", "clock set", "jump back", "reset", "load", "limits", "zero"})
 """Events that `Report.change` goes with."""

@@ -9,32 +9,32 @@ from ..types import NANO, Array
 from .regular import reach_of_strokes
 from .state import CHECKED, OTHERS, TRUSTED, Limits
 
-MOST_DOUBTED = 5  # readings in a row that are not believed though none jumps from the one before; the next one is
-SILENT_AFTER = 100_000_000  # ns after which a missing stroke is told
-BELIEVED_AFTER = 1_000_000_000  # ns after which readings that jumped elsewhere, and stay there, are believed
-USUAL_RATE = 0.1  # of the fastest, which it may have gone at meanwhile, beside twice what it was going at: then it is back
+MOST_DOUBTED = 5  # implausible readings in a row, without a jump, that are left out; the next one is accepted
+SILENT_AFTER = 100_000_000  # ns after which a missing stroke is reported
+BELIEVED_AFTER = 1_000_000_000  # ns after which readings that stay where they jumped are accepted
+USUAL_RATE = 0.1  # share of the maximum rate; with twice the estimated rate it bounds the motion between jump and return
 NEVER = -1
 Flags = NDArray[np.bool_]
 
 
 class StrokeCheck:
-    """Check of what drives the model in one run, sample by sample, against the estimates (n,) at the sample before.
+    """Check of strokes or angles that drive the model in one run, against the estimates (n,) at the sample before.
 
     Parameters
     ----------
     clock : ndarray of int64
-        Where it keeps CHECKED, TRUSTED and OTHERS, see `boom_twin.twin.state.TwinState`.
+        Clock of `boom_twin.twin.state.TwinState`; CHECKED, TRUSTED and OTHERS are updated.
     """
 
     def __init__(self, clock: NDArray[np.int64]) -> None:
         self._clock = clock
         self._before = 0
-        self._jumped = np.zeros(0, np.int64)  # stamp (ns) since when a stroke is where it jumped; NEVER
+        self._jumped = np.zeros(0, np.int64)  # stamp (ns) of a stroke's jump; NEVER without one
 
     def is_of_others(self, stamp: int, values: Array, estimate: Array, limits: Limits) -> bool:
-        """Return True if two or more strokes are out of reach of their cylinders, as of another boom.
+        """Return True if two or more strokes are out of reach of their cylinders, probably of another boom.
 
-        After `MOST_DOUBTED` such samples in a row the strokes are believed, and the result is False.
+        After `MOST_DOUBTED` such samples in a row the result is False.
         """
         limit = self._limit(stamp, limits)
         if np.count_nonzero(_are_far(values, estimate, limit)) < 2:
@@ -50,18 +50,18 @@ class StrokeCheck:
     def of(
         self, stamp: int, values: Array, before: Array, estimate: Array | None, rates: Array, limits: Limits
     ) -> tuple[Array, list[str]]:
-        """Return the strokes for the model to take, and events; `must_restart` tells if the model can take them.
+        """Return the strokes for the model, and events. If `must_restart` is then True, the model cannot follow them.
 
         Parameters
         ----------
         stamp : int
             ns.
         values, before : ndarray, shape (n,)
-            As measured now and by the sample before, m; NaN = missing.
+            Measured now and in the sample before, m; NaN = missing.
         estimate : ndarray, shape (n,), or None
-            m; None for the first sample of a run.
+            Estimated strokes, m; None for the first sample of a run.
         rates : ndarray, shape (n,)
-            Of the strokes, as estimated at the sample before, m/s.
+            Rates of the strokes estimated at the sample before, m/s.
         limits : Limits
 
         Returns
@@ -81,7 +81,7 @@ class StrokeCheck:
         if not far.any() and np.isfinite(values).all():
             self._clock[TRUSTED] = stamp
             return values, []
-        if self._clock[TRUSTED] > self._before:  # all were well since the last doubt
+        if self._clock[TRUSTED] > self._before:  # a regular sample came since the last irregular one
             self._strange[:], self._seen[:], self._jumped[:] = 0, self._clock[TRUSTED], NEVER
         self._before = stamp
         step = values - before
@@ -94,22 +94,22 @@ class StrokeCheck:
 
     @property
     def must_restart(self) -> bool:
-        """Return True if a stroke has stayed where it jumped for so long that it is believed.
+        """Return True if a stroke has stayed where it jumped for `BELIEVED_AFTER`.
 
-        The model must restart: no motion leads there.
+        The model must restart, because no motion leads there.
         """
         jumped = self._jumped != NEVER
         return bool(jumped.any() and (self._before - self._jumped[jumped]).max() >= BELIEVED_AFTER)
 
     def _gone(self, stamp: int, rates: Array) -> Array:
-        """Return how far each reading may have gone at these `rates` since it jumped, shape (n,)."""
+        """Return the distance of each reading at these `rates` since its jump, shape (n,)."""
         elapsed = np.where(self._jumped == NEVER, 0, stamp - self._jumped) * NANO
         return np.asarray(rates * elapsed)
 
     def _note_jumps(self, stamp: int, far: Flags, jumps: Flags, is_onward: Flags, returned: Flags) -> Flags:
         """Update the record of strokes that jumped; return those that jumped back.
 
-        A stroke that jumps on in the same direction belongs to a cylinder that moves and a sensor that reports seldom.
+        A second jump in the same direction is motion of the cylinder, reported by a slow sensor.
         """
         is_away = self._jumped != NEVER
         is_back: Flags = is_away & returned

@@ -1,1 +1,1 @@
-"""Commissioning check: which name, unit, sign, zero and mount every sensor of a rig has, told from its readings."""
+"""Commissioning check: identify name, unit, sign, zero and mount of every sensor of a rig from readings."""

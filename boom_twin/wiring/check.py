@@ -1,8 +1,8 @@
-"""Commissioning check of a window of readings: what is wired as declared, what is not, and the declaration that mends it.
+"""Commissioning check of a window of readings: channels that are not wired as declared, and their corrected declaration.
 
-An explanation says how every stroke is read. It gives the strokes, hence the boom at rest, hence what all other sensors should
-read. The explanation with the least cost wins. A channel is determined if every explanation and hypothesis that reads it in
-another way costs `SURE` nats more.
+An explanation is a way to read every stroke. Its strokes give the boom at rest, and so the expected readings of all other
+sensors. The explanation with the least cost wins. A channel is determined if every explanation and hypothesis that reads it
+in another way costs `SURE` nats more.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from .hypotheses import (
 )
 from .readings import Channel, Table, Window, tables_of
 
-SURE = 7.0  # nats by which a reading of a channel has to be the best
-WRONG = 4.0  # nats a block, 2.8 standard deviations, above which a channel is not read as declared
-DOUBTFUL = 1.0  # nats a block from which on other ways to read it are compared: it may show in some postures only
-KEPT = 8  # explanations of strokes that are compared by all sensors
-MOVED = 0.03  # share of the largest stroke, from which on a change is a move
-STILL_WEIGHT, MOVED_WEIGHT = 1.0, 4.0  # independent postures among the blocks
+SURE = 7.0  # nats, least margin that determines a channel
+WRONG = 4.0  # nats per block (2.8 standard deviations) above which a channel is not as declared
+DOUBTFUL = 1.0  # nats per block above which other ways are compared, as an error may show in few postures
+KEPT = 8  # stroke explanations compared with all sensors
+MOVED = 0.03  # least change of a stroke that is a move, relative to the largest stroke
+STILL_WEIGHT, MOVED_WEIGHT = 1.0, 4.0  # independent postures: at rest, after a move
 Declared = Mapping[Stream, Sequence[Channel]]
 
 
@@ -56,15 +56,15 @@ class Verdict(NamedTuple):
     channel : str
     declared : Channel
     best : Channel or None
-        How it is read; None if no hypothesis explains its readings.
+        Most likely way to read it, None if no name is left for it.
     margin : float
-        Nats by which other ways of reading are less likely.
+        Nats by which every other way is less likely.
     is_wrong : bool
         True if it is not read as declared.
     is_explained : bool
         True if `best` explains the readings.
     has_no_gravity : bool
-        True if the driver of an IMU has taken gravity out.
+        True if the driver of an IMU removes gravity.
     """
 
     stream: Stream
@@ -78,23 +78,28 @@ class Verdict(NamedTuple):
 
     @property
     def is_sure(self) -> bool:
-        """Return True if `best` mends the channel."""
+        """Return True if the correction `best` is certain."""
         return self.is_wrong and self.is_explained and self.best is not None and self.margin >= SURE
 
 
 class Checked(NamedTuple):
-    """Result of a check: `moved` is False if the boom stood still; `expected` is that of the strokes as they are read best."""
+    """Result of a check. `moved` is False if the boom stood still. `expected` belongs to the best explanation."""
 
     verdicts: tuple[Verdict, ...]
     moved: bool
     expected: Expected
     tables: Mapping[Stream, Table]
 
+    @property
+    def has_strokes_alone(self) -> bool:
+        """Return True if no other sensor was read. Strokes swapped or shifted within the travels are then not found."""
+        return set(self.tables) == {Stream.STROKES}
+
 
 class _Part(NamedTuple):
-    """Best readings of one stream under an explanation.
+    """Best ways to read one stream under an explanation.
 
-    `cost` in nats; by channel how it is read, and flags of `Verdict`. `margin` gives that of a channel (0-based).
+    `cost` is in nats. `margin` takes the index of a channel. The other fields are those of `Verdict`, by channel.
     """
 
     cost: float
@@ -121,27 +126,27 @@ def check(
     is_quick: bool = False,
     places: Mapping[str, Place] = NO_PLACES,
 ) -> Checked | None:
-    """Check how the sensors of a rig are read.
+    """Check the declaration of a rig's sensors against readings.
 
     Parameters
     ----------
     scene : Scene
-        With its load.
+        Scene with load.
     reads : StrokeReading
-        What stroke transducers read.
+        Quantity of the stroke readings.
     declared : mapping of Stream to sequence of Channel
-        How every channel is read now, in the order of the channels.
+        Declaration of every channel, in the order of the channels.
     window : mapping of Stream to mapping of str to Series
-        Readings by name; of an IMU by axis. Strokes are needed.
+        Readings by name (IMU: by axis). Strokes are required.
     is_quick : bool
-        Tell only what is not read as declared, and not how it is read.
+        Flag channels not read as declared, without a correction.
     places : mapping of str to Place
         See `boom_twin.Twin`.
 
     Returns
     -------
     Checked or None
-        None if there is no block in which every stroke was read, or no explanation at all.
+        None if no block has readings of every stroke, or there is no explanation.
     """
     tables = {stream: table for stream, table in tables_of(window).items() if len(table.names)}
     strokes = tables.get(Stream.STROKES)
@@ -160,7 +165,7 @@ class _Checker:
         self, model: RestModel, declared: Declared, tables: Mapping[Stream, Table], weight: float, is_quick: bool
     ) -> None:
         self._model, self._scene, self._declared, self._tables, self._weight = model, model.scene, declared, tables, weight
-        self._limit = weight * (MOST - WRONG) + ANY_ZERO  # nats that readings cost at most if a hypothesis explains them
+        self._limit = weight * (MOST - WRONG) + ANY_ZERO  # nats, largest cost of explained readings
         self._is_quick = is_quick
         usual, cost = tuple(declared[Stream.STROKES]), self._declared_cost()
         self.found = [] if cost is None else [self._explained(usual, cost)]
@@ -170,7 +175,7 @@ class _Checker:
             self.found = sorted(found, key=lambda each: each.cost)
 
     def _declared_cost(self) -> float | None:
-        """Return the prior cost of the strokes as declared; None if a name is in no message."""
+        """Return the prior cost of the declared strokes, None if a name has no readings."""
         table, declared = self._tables[Stream.STROKES], self._declared[Stream.STROKES]
         if any(each.name not in table.names for each in declared):
             return None
@@ -180,7 +185,7 @@ class _Checker:
         return sum(float(costs[at]) for at, each in plain.channels.items() if own[at[0]] == at[:2] and each == declared[at[0]])
 
     def _common(self, stream: Stream) -> list[tuple[float, int | None, bool]]:
-        """Return prior cost, unit and reversal that the sensors of a stream may have in common."""
+        """Return every (prior cost, unit, reversal) that the sensors of a stream may share."""
         units, own = list(SENSORS[stream].units), self._declared[stream][0].unit
         ways = product((None, *range(len(units))), (False,) if stream is Stream.STROKES else (False, True))
         return [
@@ -189,7 +194,7 @@ class _Checker:
         ]
 
     def _stroke_explanations(self) -> dict[tuple[Channel, ...], float]:
-        """Return the ways to read the strokes that go best with travels and encoders, with their prior costs."""
+        """Return the stroke explanations that fit travels and encoders best, with their prior costs."""
         table, declared = self._tables[Stream.STROKES], self._declared[Stream.STROKES]
         angles, encoders = self._tables.get(Stream.ANGLES), self._declared[Stream.ANGLES]
         if any(each.absolute for each in encoders):
@@ -218,7 +223,7 @@ class _Checker:
         return {strokes: prior for strokes, (_, prior) in kept}
 
     def _explained(self, strokes: tuple[Channel, ...], prior: float) -> _Explanation:
-        """Return an explanation with the best readings of all other sensors."""
+        """Return an explanation with the best ways to read all other sensors."""
         table, units = self._tables[Stream.STROKES], SENSORS[Stream.STROKES].units
         columns = [si(each, units, table.values[:, table.names.index(each.name)]) for each in strokes]
         expected = self._model.expected(np.column_stack(columns))
@@ -238,7 +243,7 @@ class _Checker:
         return _Explanation(strokes, expected, parts, prior + sum(part.cost for part in parts.values()))
 
     def _part(self, stream: Stream, expected: Expected, cube_of: Callable[[], Cube]) -> _Part:
-        """Return the best readings of a stream, over what all its sensors may have in common."""
+        """Return the best ways to read a stream, over all common units and reversals."""
         declared, names = self._declared[stream], self._tables[stream].names
         costs = declared_costs(stream, self._tables[stream], declared, expected, self._weight)
         is_known = {each.name for each in declared}.issuperset(names)
@@ -255,7 +260,7 @@ class _Checker:
         explained = [not wrong[j] if j not in places else float(cube.costs[places[j]]) < self._limit for j in range(len(best))]
         for j, (read, own) in enumerate(zip(best, declared, strict=True)):
             wrong[j] |= read is not None and is_common and (read.unit, read.sign) != (own.unit, own.sign)
-            wrong[j] &= not (read == own and explained[j])  # its zero is off, or a fault came meanwhile
+            wrong[j] &= not (read == own and explained[j])  # misfit by a zero error or a recent fault
 
         def margin(j: int) -> float:
             if (read := best[j]) is None:
@@ -282,7 +287,7 @@ class _Checker:
         for j, (own, read) in enumerate(zip(self._declared[Stream.STROKES], best.strokes, strict=True)):
             others = [each.cost - best.cost for each in self.found[1:] if each.strokes[j] != read]
             found.append(Verdict(Stream.STROKES, names[Stream.STROKES][j], own, read, min(others, default=np.inf), read != own))
-        unsettled = list[float]()  # margins of angles that are not known: they vouch for the strokes
+        unsettled = list[float]()  # margins of undetermined angles, which confirm the strokes
         for stream, part in best.parts.items():
             for j, own in enumerate(self._declared[stream]):
                 rivals = [

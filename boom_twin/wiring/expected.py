@@ -1,4 +1,4 @@
-"""Expected readings at rest: what angles, forces and gravity at the tip are for measured strokes."""
+"""Expected readings at rest: angles, forces and gravity at the IMUs for measured strokes."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from ..types import NO_PLACES, Array, Mount, Place, Stream, StrokeReading
 
 
 class Expected(NamedTuple):
-    """Expected readings in every block; NaN where the boom cannot have such strokes.
+    """Expected readings in every block, NaN if no posture has its strokes.
 
     Attributes
     ----------
     angles : dict of Mount or None to ndarray, shape (blocks, n)
-        rad: of encoders (None), and of inclinometers at the root and at the head of each section.
+        Encoders (key None), and inclinometers at the root and at the head of each section, rad.
     forces : ndarray, shape (blocks, n)
         N.
     gravity : dict of Stream to ndarray of complex, shape (blocks,)
         Specific force at rest at every IMU, along its section (real) and across it (imaginary), m/s^2.
     compression : ndarray, shape (blocks, n)
-        rad, by which each joint would turn if the strokes were drives instead of lengths.
+        Rotation of each joint if the strokes are drives instead of lengths, rad. 0 without a posture.
     """
 
     angles: dict[Mount | None, Array]
@@ -49,9 +49,9 @@ class RestModel:
     Parameters
     ----------
     scene : Scene
-        With its load.
+        Scene with load.
     reads : StrokeReading
-        What stroke transducers read.
+        Quantity of the stroke readings.
     places : mapping of str to Place
         See `boom_twin.Twin`.
     """
@@ -93,7 +93,7 @@ class RestModel:
         return Expected(angles, forces, gravity, compression)
 
     def _compression(self, strokes: Array, angles: Array, forces: Array) -> Array:
-        """Return the turn (rad) of each joint by the compression of its oil."""
+        """Return the rotation of each joint by the compression of its oil, rad."""
         drives = drives_as_read(self._boom, strokes, forces, StrokeReading.LENGTH)
         step = 1e-4
         slopes = [np.diff(stroke_curve(self.scene, i, each + np.array([-step, step])))[0] for i, each in enumerate(angles)]

@@ -1,7 +1,7 @@
-"""Hypotheses of how each sensor is read, and their costs: minus the logarithm of prior and likelihood, nats.
+"""Hypotheses of how each sensor is read, with costs: negative logarithm of prior times likelihood, nats.
 
-A stream of n channels has a cube of costs (n, names, hypotheses): that the readings by a name are those of a channel, under one
-conversion. Names go to channels by the assignment of the least total cost.
+A stream of n channels has costs (n, names, hypotheses). An entry is the cost of reading a channel by a name under one
+hypothesis. Names are assigned to channels at the least total cost.
 """
 
 from __future__ import annotations
@@ -19,22 +19,20 @@ from ..types import GIVE, SENSORS, Array, Stream
 from .expected import Expected
 from .readings import Channel, Table
 
-ANGLE_ERROR = math.radians(0.7)  # zero of an encoder, and what the scene may be wrong by
+ANGLE_ERROR = math.radians(0.7)  # rad, zero error of an encoder and error of the scene
 GRAVITY_ERROR = 0.6  # m/s^2, bias of an IMU and mean acceleration of the tip
-REST_ERROR = 0.3  # m/s^2, likewise where gravity is taken out
-FORCE_SHARE, FORCE_LEAST = 0.12, 0.04  # error of a force by loads: share of itself, and of the largest
-MOST = 12.0  # nats that a block may count for: a reading may be wrong for a reason that no hypothesis has
-NEAR_ZERO = math.radians(
-    5.0
-)  # a zero below it is for a calibration, and is not told; a turn or half a turn within it is taken as that
+REST_ERROR = 0.3  # m/s^2, the same if the driver removes gravity
+FORCE_SHARE, FORCE_LEAST = 0.12, 0.04  # force error by loads, relative to the force and to the largest
+MOST = 12.0  # nats, largest cost of a block, as a reading may err for a reason without hypothesis
+NEAR_ZERO = math.radians(5.0)  # tolerance of zeros (left to calibration) and of quarter and half turns
 UNIT, OTHER_UNIT, SIGN, NAME, EXTRA_NAME = 4.0, 9.0, 4.0, 3.0, 6.0  # nats, prior costs of changes
 REVERSED, PIN_TO_PIN, HALF_TURN, SMALL_ZERO, ANY_ZERO = 6.0, 5.0, 5.0, 6.0, 9.0
 ABSOLUTE, TURNED, NO_GRAVITY = 4.0, 8.0, 4.0
 IMPOSSIBLE = 1e6  # nats
 OUTSIDE = 60.0  # nats for strokes beyond the travel
-SLACK = 0.02  # share of a travel that a stroke may be outside
+SLACK = 0.02  # allowed stroke beyond the travel, relative to it
 LEAST_SLOPE = 0.02  # m/rad, of a cylinder at a dead centre
-LOOSE = 3.0  # times the error of angles, where encoders choose the explanations of strokes
+LOOSE = 3.0  # factor on the angle error if encoders select stroke explanations
 TAU = 2.0 * math.pi
 
 
@@ -44,13 +42,13 @@ class Cube(NamedTuple):
     Attributes
     ----------
     costs : ndarray, shape (n, names, hypotheses)
-        Without those of units and signs; see `common_costs`.
+        Costs other than unit and sign (see `common_costs`).
     channels : dict of (int, int, int) to Channel
-        How a channel is read under a hypothesis.
+        Way to read a channel under a hypothesis.
     units, declared_units : ndarray of int, shape (n, names, hypotheses)
-        Places of the unit, and of that declared, among the units of the stream.
+        Indices of the unit and of the declared unit among the units of the stream.
     reversals : ndarray of bool, shape (n, names, hypotheses)
-        True if the sign is not that declared.
+        True if the sign is not as declared.
     """
 
     costs: Array
@@ -61,7 +59,7 @@ class Cube(NamedTuple):
 
 
 def common_costs(cube: Cube, unit: int | None, is_reversed: bool) -> Array:
-    """Return all costs if the sensors of a stream have a unit in common (None: as declared), and are reversed or not."""
+    """Return all costs if the sensors of a stream share a unit (None: as declared) and a reversal of sign."""
     free = cube.declared_units if unit is None else unit
     return np.asarray(
         cube.costs + np.where(cube.units == free, 0.0, OTHER_UNIT) + np.where(cube.reversals == is_reversed, 0.0, SIGN)
@@ -69,14 +67,14 @@ def common_costs(cube: Cube, unit: int | None, is_reversed: bool) -> Array:
 
 
 def misfit(off: Array, weight: float) -> Array:
-    """Return the cost of readings that are `off` (.., blocks) standard deviations; NaN is what no boom can have."""
+    """Return the cost of errors `off` (.., blocks) in standard deviations. NaN (no such posture) costs `MOST`."""
     if not off.shape[-1]:
         return np.zeros(off.shape[:-1])
     return np.asarray(weight * np.minimum(np.where(np.isfinite(off), 0.5 * off**2, MOST), MOST).mean(axis=-1))
 
 
 def assigned(costs: Array) -> tuple[float, dict[int, tuple[int, int, int]]]:
-    """Return the least total of costs (n, names, hypotheses), and by channel the place of its name and hypothesis."""
+    """Return the least total cost, and the assigned index into `costs` (n, names, hypotheses) by channel."""
     from scipy.optimize import linear_sum_assignment  # its import takes longer than the check of a sound rig
 
     least = costs.min(axis=2)
@@ -86,9 +84,9 @@ def assigned(costs: Array) -> tuple[float, dict[int, tuple[int, int, int]]]:
 
 
 def read_alike(cube: Cube, j: int, channel: Channel) -> tuple[NDArray[np.int64], ...]:
-    """Return the places of the hypotheses that read channel j in this way.
+    """Return the indices of the hypotheses that read channel j as `channel`.
 
-    The place of an inclinometer on its section makes no difference, nor that the first joint has one: bending is small.
+    Bending is small: inclinometers at root and head are alike, and at joint 0 so are inclinometer and encoder.
     """
     places = [
         place
@@ -116,7 +114,7 @@ def name_cost(declared: Sequence[Channel], j: int, name: str, names: Sequence[st
 
 
 def settings_of(declared: Sequence[Channel], j: int, name: str) -> Channel:
-    """Return how the sensor of a name is read as declared; one that is not declared is read as that of channel j."""
+    """Return the declaration of a name, or that of channel j under this name if it has none."""
     return next((each for each in declared if each.name == name), declared[j])._replace(name=name)
 
 
@@ -155,7 +153,7 @@ class _Builder:
 def declared_costs(
     stream: Stream, table: Table, declared: Sequence[Channel], expected: Expected, weight: float
 ) -> list[float | None]:
-    """Return the costs of angle or force readings as declared; None of a name without readings."""
+    """Return the costs of angle or force readings as declared, None for a name without readings."""
     costs: list[float | None] = []
     for j, own in enumerate(declared):
         if own.name not in table.names:
@@ -200,9 +198,9 @@ def angle_cube(table: Table, declared: Sequence[Channel], expected: Expected, we
 
 
 def _zeros(off: Array, is_encoder: bool, weight: float) -> Iterator[tuple[float, Array, Array]]:
-    """Yield prior cost, zeros (ways,) in rad, and misfits (ways,) of angles that are `off` (ways, blocks), rad.
+    """Yield prior cost, zeros (ways,) in rad and misfits (ways,) for angle errors `off` (ways, blocks), rad.
 
-    The decoder finds one turn by itself.
+    The decoder itself removes one turn.
     """
     turns = np.round(off / TAU)
     wrapped = off - TAU * turns
@@ -236,7 +234,7 @@ def force_cube(table: Table, declared: Sequence[Channel], expected: Expected, we
 
 
 class GravityHypothesis(NamedTuple):
-    """Way in which an IMU is read: its cost, the channels of x and z, and True if it has no gravity in it."""
+    """Way to read an IMU: its cost, the channels of x and z, and True if its driver removes gravity."""
 
     cost: float
     channels: tuple[Channel, Channel]
@@ -244,7 +242,7 @@ class GravityHypothesis(NamedTuple):
 
 
 def gravity_hypotheses(table: Table, declared: Sequence[Channel], gravity: Array, weight: float) -> list[GravityHypothesis]:
-    """Return all ways in which an IMU may be read where `gravity` (blocks,) is expected; as declared first."""
+    """Return all ways to read an IMU if `gravity` (blocks,) is expected, the declared one first."""
     units = SENSORS[Stream.IMU].units
     places = {name: a for a, name in enumerate(table.names)}
     is_read = np.isfinite(table.values[:, [places[each.name] for each in declared]]).all(axis=1)
@@ -264,7 +262,7 @@ def gravity_hypotheses(table: Table, declared: Sequence[Channel], gravity: Array
                     cost = (UNIT if unit != declared[0].unit else 0.0) + (SIGN if min(flip_x, flip_z) < 0 else 0.0)
                     cost += NAME if (x, z) != (declared[0].name, declared[1].name) else 0.0
                     found.append(GravityHypothesis(cost + float(misfit(np.abs(f - right) / sigma, weight)), (one, two)))
-                    if flip_z < 0 or places[x] > places[z]:  # the same as a turn of another pair
+                    if flip_z < 0 or places[x] > places[z]:  # equals a rotation of another pair
                         continue
                     turn = float(np.angle(np.nansum(right * f.conj())))
                     if abs(math.remainder(turn, math.pi / 2.0)) > NEAR_ZERO:
@@ -311,7 +309,7 @@ def stroke_cube(strokes: Table, declared: Sequence[Channel], scene: Scene, encod
 
 
 class Encoders(NamedTuple):
-    """Readings of encoders with their declaration; `is_in_order` if each is of its own joint. Unit and sign may be any."""
+    """Readings and declaration of encoders. `is_in_order` is True if names are as declared. Unit and sign are free."""
 
     table: Table
     declared: Sequence[Channel]
@@ -319,7 +317,7 @@ class Encoders(NamedTuple):
 
 
 class _Curves(NamedTuple):
-    """Strokes (hypotheses, blocks) in m that encoders tell, their standard deviations, and prior costs (hypotheses,)."""
+    """Strokes (hypotheses, blocks) by encoders, m, their standard deviations, and prior costs (hypotheses,)."""
 
     strokes: Array
     sigmas: Array
@@ -327,7 +325,7 @@ class _Curves(NamedTuple):
 
 
 def _curves(scene: Scene, j: int, encoders: Encoders) -> _Curves:
-    """Return the strokes of joint j by what encoders read, for all their hypotheses."""
+    """Return the strokes of joint j from the encoders, for all their hypotheses."""
     tracks, costs = list[Array](), list[float]()
     units, (table, declared, is_in_order) = SENSORS[Stream.ANGLES].units, encoders
     low, high = np.radians(scene.joints[j].range_deg)

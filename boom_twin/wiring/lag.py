@@ -1,4 +1,4 @@
-"""Lag of a stream against the strokes: by how much later its readings match what the strokes make it expect."""
+"""Lag of a stream behind the strokes: delay at which its readings match those expected from the strokes."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from numpy.typing import NDArray
 
 from ..types import NANO, Array
 
-SPAN = 4.0  # s of readings, each less its mean: zeros and slow errors of the model are no lag
-LONGEST, COARSE = 1.0, 0.05  # s, largest lag that is looked for, and spacing of the first guesses
-ROUNDS = 6  # of Gauss-Newton
-FEWEST = 3.0  # spans and channels, in effect, that have to move
-CLEAR = 0.5  # share of the squared residual that may be left beside the lag
-FLOOR = 1e-3  # s, standard deviation of a lag by errors of the model
+SPAN = 4.0  # s, span whose mean is removed, so that zeros and slow model errors are no lag
+LONGEST, COARSE = 1.0, 0.05  # s, largest lag of the search, and spacing of the first guesses
+ROUNDS = 6  # Gauss-Newton steps
+FEWEST = 3.0  # least effective number of moving spans and channels
+CLEAR = 0.5  # largest squared residual with the lag, relative to that without
+FLOOR = 1e-3  # s, standard deviation of a lag by model errors
 
 
 class Lag(NamedTuple):
-    """Lag of a stream, s, with its standard deviation; infinite if too little moved."""
+    """Lag of a stream and standard deviation, s. `sigma` is infinite if no lag is found."""
 
     lag: float
     sigma: float
 
 
 def lag_of(stamps: NDArray[np.int64], read: Array, expected: Array) -> Lag:
-    """Return the lag of readings at some stamps (k,) in ns, against what is expected at them, both (k, channels).
+    """Return the lag of readings behind expected ones, both (k, channels), at `stamps` (k,) in ns.
 
-    Gauss-Newton from the best of several guesses. The scatter among spans gives the deviation.
+    Gauss-Newton starts from the best of several guesses. The scatter among spans gives the deviation.
     """
     times = (stamps - stamps[0]) * NANO
     spans = (times // SPAN).astype(int)
@@ -52,7 +52,7 @@ def lag_of(stamps: NDArray[np.int64], read: Array, expected: Array) -> Lag:
 
 
 def _left(times: Array, spans: NDArray[np.int64], read: Array, expected: Array, lag: float) -> tuple[Array, Array]:
-    """Return readings less what was expected `lag` (s) before, and the rates of that, each less its mean in a span."""
+    """Return residuals to the readings expected `lag` s before, and their rates, each less its mean in a span."""
     then, step = times - lag, 0.005
     columns = [np.interp(then, times, column) for column in expected.T]
     slopes = [(np.interp(then + step, times, c) - np.interp(then - step, times, c)) / (2.0 * step) for c in expected.T]

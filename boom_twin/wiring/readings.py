@@ -1,4 +1,4 @@
-"""Readings of a session by the names of its messages, and the blocks of them that a commissioning check compares."""
+"""Readings of a session by name, and their means in the blocks that a commissioning check compares."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from ..types import SENSORS, Array, Mount, Stream
 
-BLOCK = 100_000_000  # ns; readings are averaged over it
-MEAN = 10  # blocks before and after one, over which forces and accelerations are averaged: vibration has mean 0
-CORRELATED = 5.0  # blocks whose vibration is alike
-EVENLY = 12  # blocks that are compared, evenly in time; beside them the extremes of every stroke
+BLOCK = 100_000_000  # ns, averaging time of readings
+MEAN = 10  # blocks on each side in the mean of forces and accelerations, which removes vibration
+CORRELATED = 5.0  # blocks with correlated vibration
+EVENLY = 12  # compared blocks evenly in time, besides the extremes of every stroke
 
 
 class Channel(NamedTuple):
-    """How a channel is read: quantity (SI) = sign * scale * (reading - zero), in `unit`; `turned` (rad) is an IMU's."""
+    """Way to read a channel: quantity = sign * scale * (reading - zero), in `unit`. `turned` is an IMU's rotation, rad."""
 
     name: str
     unit: str
@@ -29,7 +29,7 @@ class Channel(NamedTuple):
 
 
 def is_checked(stream: Stream) -> bool:
-    """Return True for a stream whose wiring a commissioning check looks at."""
+    """Return True if a commissioning check covers the stream."""
     return stream in (Stream.STROKES, Stream.ANGLES, Stream.FORCES) or SENSORS[stream].is_accelerometer
 
 
@@ -51,7 +51,7 @@ class Table(NamedTuple):
     ----------
     names : tuple of str
     values, spreads : ndarray, shape (blocks, names)
-        Means and their standard errors by vibration; NaN where there is none.
+        Means and their standard errors by vibration, NaN without readings.
     """
 
     names: tuple[str, ...]
@@ -60,7 +60,7 @@ class Table(NamedTuple):
 
 
 def tables_of(window: Window) -> dict[Stream, Table]:
-    """Return the readings in some blocks in which all strokes were read; no blocks if there is none.
+    """Return the readings in selected blocks with all strokes, or empty tables without such a block.
 
     Names without readings there are left out.
     """
@@ -97,7 +97,7 @@ def _chosen(common: NDArray[np.int64], strokes: list[Array]) -> NDArray[np.int64
 
 
 def _at(chosen: NDArray[np.int64], numbers: NDArray[np.int64], means: Array, reach: int) -> Array:
-    """Return mean and its standard error (2, blocks) over `reach` blocks before and after each of those chosen."""
+    """Return mean and standard error (2, blocks) over `reach` blocks before and after each chosen block."""
     first, end = np.searchsorted(numbers, chosen - reach), np.searchsorted(numbers, chosen + reach, "right")
     middle = means.mean() if len(means) else 0.0
     sums = [np.concatenate([[0.0], np.cumsum(each)]) for each in (means - middle, (means - middle) ** 2)]

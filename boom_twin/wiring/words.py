@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 from ..types import SENSORS
-from .check import Verdict
+from .check import Checked, Verdict
 from .readings import Channel
 
 UNEXPLAINED = "no name, unit, sign or zero explains its readings"
+STROKES_ALONE = "strokes are within the travels; swapped or shifted ones show only beside angles, forces or an IMU"
 
 
 def reading(way: Channel) -> str:
@@ -22,15 +23,15 @@ def reading(way: Channel) -> str:
     return ", ".join(parts)
 
 
-def finding(verdict: Verdict, moved: bool) -> str:
-    """Return what was found about a channel."""
+def finding(verdict: Verdict, checked: Checked) -> str:
+    """Return the finding about a channel."""
     if not verdict.is_wrong:
-        return "as declared"
+        return "within the travel" if checked.has_strokes_alone else "as declared"
     if not verdict.is_explained or verdict.best is None:
         return f"not as declared: {UNEXPLAINED}"
     if verdict.is_sure:
         return likely(verdict)
-    why = "several ways explain it" if moved else "the boom stood still"
+    why = "several ways explain it" if checked.moved else "the boom stood still"
     return f"not as declared; not determined: {why}; {likely(verdict)}"
 
 
@@ -41,6 +42,6 @@ def likely(verdict: Verdict) -> str:
 
 
 def channel_name(verdict: Verdict) -> str:
-    """Return the sensor of a verdict as alarms name it."""
+    """Return the name that alarms give the sensor."""
     kind = SENSORS[verdict.stream]
     return kind.stem if kind.is_accelerometer else verdict.channel

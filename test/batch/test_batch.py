@@ -139,7 +139,8 @@ def test_the_page_needs_nothing_from_elsewhere(done: Done) -> None:
     assert found.sources and all(link.startswith("data:image/png;base64,") for link in found.sources)
     written = re.sub('base64,[^"]*', "", text)
     assert "http" not in written and not re.search(r"url\(|@import|fetch\(", written)
-    assert found.tags.count("tr") == COUNT + 2 and "residual_rms_joint_1, rad" in written
+    assert found.tags.count("tr") == COUNT + 4 and "Counted once: 4 sessions" in text, "the sessions are copies of one"
+    assert "Damage is not known: give --fatigue" in text and "residual_rms_joint_1, rad" in written
     assert '<div class="sorted"><table' in text, "the table scrolls by itself where the screen is narrower"
 
 

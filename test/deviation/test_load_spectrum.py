@@ -7,6 +7,7 @@ import pytest
 
 from boom_twin.deviation.load_spectrum import (
     LEAST,
+    TipLoad,
     find_pulses,
     tip_load,
 )
@@ -26,11 +27,16 @@ def pulses(t: np.ndarray, frequency: float, height: float) -> np.ndarray:
     return height * ((t * frequency) % 1.0 < 0.5)[:, None] * UP
 
 
+def known_load(t: np.ndarray, loads: np.ndarray) -> TipLoad | None:
+    """Load in estimates that are 1 N uncertain."""
+    return tip_load(t, loads, np.full(loads.shape, 0.5))
+
+
 @pytest.mark.parametrize("frequency", [0.2, 0.43, 0.6])
 @pytest.mark.parametrize(("seconds", "rate"), [(40.0, 200.0), (60.0, 50.0), (24.0, 1000.0)])
 def test_rectangular_pulses_give_their_frequency_and_height(frequency: float, seconds: float, rate: float) -> None:
     t = times(seconds, rate)
-    found = tip_load(t, pulses(t, frequency, 130.0) + 25.0)
+    found = known_load(t, pulses(t, frequency, 130.0) + 25.0)
     assert found is not None and found.pulses is not None
     assert found.pulses.frequency == pytest.approx(frequency, rel=0.02)
     assert found.pulses.height == pytest.approx(130.0, rel=0.05)
@@ -39,7 +45,7 @@ def test_rectangular_pulses_give_their_frequency_and_height(frequency: float, se
 
 def test_a_sine_in_any_direction_gives_its_fundamental() -> None:
     t = times(60.0)
-    found = tip_load(t, 50.0 * np.sin(2.0 * np.pi * 0.37 * t)[:, None] * np.array([0.6, -0.8]))
+    found = known_load(t, 50.0 * np.sin(2.0 * np.pi * 0.37 * t)[:, None] * np.array([0.6, -0.8]))
     assert found is not None and found.pulses is not None
     assert found.pulses.frequency == pytest.approx(0.37, rel=0.002)
     assert found.pulses.height == pytest.approx(0.5 * np.pi * 50.0, rel=0.01)
@@ -63,15 +69,22 @@ def test_noise_without_a_period_has_no_main_frequency() -> None:
         gusts = np.zeros((800, 2))
         for row in range(1, 800):
             gusts[row] = kept * gusts[row - 1] + scale * np.sqrt(1.0 - kept**2) * chance.standard_normal(2)
-        found = tip_load(np.arange(800) * 0.05, gusts)
+        found = known_load(np.arange(800) * 0.05, gusts)
         assert found is not None and found.pulses is None
-        told = "none above 20 N" if scale == 1.0 else f"{found.rms:.0f} N rms, no main frequency"
+        told = "none above 20 N" if scale == 1.0 else f"{found.rms:.0f} N rms (+- 1), no main frequency"
         assert found.text == told
 
 
 def test_a_small_load_is_none_and_what_was_never_measured_is_not_told() -> None:
     t = times(40.0)
-    small = tip_load(t, pulses(t, 0.43, 0.5 * LEAST))
+    small = known_load(t, pulses(t, 0.43, 0.5 * LEAST))
     assert small is not None and small.text == "none above 20 N"
-    assert tip_load(t, np.zeros((len(t), 2))) is None
-    assert tip_load(t[:0], np.zeros((0, 2))) is None
+    assert known_load(t, np.zeros((len(t), 2))) is None
+    assert known_load(t[:0], np.zeros((0, 2))) is None
+
+
+@pytest.mark.parametrize(("sigma", "told"), [(10.0, "85 N rms (+- 14), no main frequency"), (60.0, "none above 170 N")])
+def test_a_load_within_its_uncertainty_is_not_told_from_none(sigma: float, told: str) -> None:
+    t = times(5.0)
+    found = tip_load(t, np.full((len(t), 2), 60.0), np.full((len(t), 2), sigma**2))
+    assert found is not None and found.text == told and found.is_there == ("rms" in told)

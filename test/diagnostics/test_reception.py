@@ -43,7 +43,7 @@ def test_what_is_left_out_is_told_at_once_and_only_what_is_new() -> None:
     watch, judge = ReceptionWatch(), ComponentJudge("reception")
     found = [watch.status(begun(judge, 10.0 * k), {}, {"shapes": count}) for k, count in enumerate((0, 7, 7, 7))]
     assert [status.level for status in found] == [Level.OK, Level.WARN, Level.OK, Level.OK]
-    assert found[1].message == "too many messages for the time there is: shapes left out, no prediction"
+    assert found[1].message == "too many messages for the time there is: shapes left out, predictions complete"
     assert [status.values["shapes left_out"] for status in found] == [0, 7, 0, 0]
 
 

@@ -86,7 +86,7 @@ def test_a_healthy_rig(rig: Rig) -> None:
     found = after(rig, 5)
     sick = {name: status.message for name, status in found.items() if status.level != Level.OK}
     assert sick == {}
-    names = ["model", *NAMES.values(), "outputs", "tip"]
+    names = ["model", *NAMES.values(), "outputs", "swing"]
     names += [f"sensor {kind}_{i}" for kind in ("cylinder", "joint") for i in (1, 2, 3, 4)]
     names += [
         "sensor tip_imu_x",
@@ -115,10 +115,10 @@ def test_a_residual_that_grows_and_shrinks_again(rig: Rig) -> None:
 
 @pytest.mark.parametrize(("swing", "level"), [(0.1, Level.OK), (0.2, Level.WARN), (0.4, Level.ERROR)])
 def test_how_far_the_tip_swings_is_told_against_its_limits(rig: Rig, swing: float, level: Level) -> None:
-    status = after(rig, 5, swing=swing)["tip"]
+    status = after(rig, 5, swing=swing)["swing"]
     assert status.level == level and status.values["swing_m"] == pytest.approx(swing, rel=0.01)
     assert (status.values["swing_m_warn"], status.values["swing_m_error"]) == (0.15, 0.3)
-    assert after(rig, 12, swing=0.0)["tip"].level == Level.OK
+    assert after(rig, 12, swing=0.0)["swing"].level == Level.OK
 
 
 def test_a_failure_of_the_model_is_urgent_once(rig: Rig) -> None:

@@ -154,11 +154,11 @@ def test_massless_boom_without_stiffness_is_singular():
 
 
 def scratch(work):
-    """All arrays of work, also those of what is condensed, but the weights of the schemes, which `run` prepares once."""
+    """All arrays of work, also those of what is condensed, but for inputs: weights of the schemes, the load at the tip."""
     for name, value in work._asdict().items():
         if isinstance(value, tuple):
             yield from value
-        elif name not in ("weights", "finer"):
+        elif name not in ("weights", "finer", "load"):
             yield value
 
 

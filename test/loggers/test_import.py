@@ -16,7 +16,7 @@ from loggers.logger_files import SESSION, readings, three_german_files
 from recordings import read, scan
 from ruamel.yaml import YAML
 
-from boom_twin import Sample, Stream, replay
+from boom_twin import Sample, Stream, load_scene, replay, statics
 from boom_twin.bag.session_files import write_samples
 from boom_twin.bag.session_sheet import kept
 from boom_twin.loggers.column_file import load_columns
@@ -173,6 +173,30 @@ def test_files_of_many_programs_are_read_without_options(tmp_path: Path, style: 
         assert values == pytest.approx(expected, abs=1e-8)
 
 
+def test_a_table_of_simulate_is_imported_by_its_lengths_and_strokes_alone_are_not_called_right(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The table has drives and lengths; strokes within their travels were told to be as declared, whatever their order."""
+    rest, motion = statics(load_scene(), "arch"), tmp_path / "motion.csv"
+    drive = [f"{0.05 * row:g}," + ",".join(f"{stroke:.6f}" for stroke in rest.strokes) for row in range(60)]
+    (tmp_path / "drive.csv").write_text("\n".join(["t_s," + ",".join(f"stroke_{i}_m" for i in range(1, 5)), *drive, ""]))
+    assert main(["simulate", "--drive", str(tmp_path / "drive.csv"), "--out", str(motion), "--no-error-estimate"]) == 0
+    capsys.readouterr()
+    assert main(["import", str(motion), "--out", str(tmp_path / "session"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [column for column in told["columns"] if "joint" not in column and "force" not in column] == [
+        f"length_{i}_m" for i in range(1, 5)
+    ]
+    lengths = dict(zip(told["columns"], told["first_values"], strict=True))
+    assert [lengths[f"length_{i}_m"] for i in range(1, 5)] == pytest.approx(rest.lengths, abs=1e-5)
+    assert main(["import", str(tmp_path / "drive.csv"), "--out", str(tmp_path / "alone")]) == 0
+    capsys.readouterr()
+    assert main(["mapping", "--check", str(tmp_path / "alone")]) == main(["info", str(tmp_path / "alone")]) == 0
+    told = capsys.readouterr().out
+    assert "cylinder_1  cylinder_1, m  within the travel" in told and "as declared\n" not in told
+    assert told.count("swapped or shifted ones show only beside angles, forces or an IMU") == 2
+
+
 def test_signals_of_a_bus_come_row_by_row_and_are_one_sample_a_cycle(tmp_path: Path) -> None:
     head = [
         "// export of a CAN trace",
@@ -283,7 +307,7 @@ FAULTS = {
     "one is missing": (GOOD.replace("Zylinder 3", "Kran"), "no column for cylinder_3. Not used: 'Kran [mm]'"),
     "two times": (GOOD.replace("Zylinder 4 [mm]", "Zeit [s]"), "several columns 'Zeit [s]'"),
     "no header": (GOOD.partition("\n")[2], "numbers stand in its first line"),
-    "no table": ("nothing\nto see", "no table is found in it, which begins with 'nothing'"),
+    "no table": ("nothing\nto see", "no table found. The file begins with 'nothing'"),
     "no time": (GOOD.replace("Zeit", "Nr"), "no column of times among"),
     "ms or s": (table([TIMELESS], lambda row: f"{0.15 * row:.2f}", numbers(",", 4)), "the times may be in s or ms"),
     "day or month": (table([TIMELESS], lambda row: f"03/04/2026 10:00:{clock(row)}", numbers(",", 4)), "or month/day"),
@@ -308,7 +332,7 @@ def test_files_without_a_common_time_and_parts_of_one_recording(tmp_path: Path, 
     assert main(["import", a, late, *out]) == 1
     assert "late.csv: 100 to 100.59 s: no time in common with the strokes" in capsys.readouterr().err
     assert main(["import", a, a, *out]) == 1
-    assert "which overlap. Leave one out" in capsys.readouterr().err
+    assert " overlap. Leave one out" in capsys.readouterr().err
     (tmp_path / "b.csv").write_text(second + "1.20;62")  # the logger was switched off
     assert main(["import", b, a, *out, "--json"]) == 0
     told = capsys.readouterr()
@@ -358,7 +382,7 @@ def test_a_library_that_is_missing_is_named_with_the_extra(
     (tmp_path / "log.tdms").write_bytes(b"TDSm")
     monkeypatch.setitem(sys.modules, "nptdms", None)
     assert main(["import", str(tmp_path / "log.tdms"), "--out", str(tmp_path / "s")]) == 1
-    assert 'nptdms is not installed, and reads such files. Run `pip install "boom_twin[import]"`.' in capsys.readouterr().err
+    assert 'reading it needs nptdms, which is not installed. Run `pip install "boom_twin[import]"`.' in capsys.readouterr().err
 
 
 def test_the_columns_file_of_the_page_is_one_and_faults_are_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -154,7 +154,7 @@ def test_what_to_do_follows_from_alarms_and_the_swing_of_the_tip(
     kind: str | None, cause: str | None, swing: int, action: str
 ) -> None:
     store = Store(10)
-    store.set_statuses(0.0, table(status("n: model"), status("n: tip", swing, "the tip swings too far", swing_m=0.4)))
+    store.set_statuses(0.0, table(status("n: model"), status("n: swing", swing, "the tip swings too far", swing_m=0.4)))
     if kind is not None:
         judge(store.alarms, 0.0, Alarm("joint_3", kind, 0, None, cause, ""))
     found = state(store, 0.0, 0.0)

@@ -42,9 +42,11 @@ def test_the_estimate_is_nearer_to_the_truth_than_the_prediction(first):
     summary = first[0].summary
     assert summary["tip_estimate_error_rms_m"] < NEARER[summary["strokes"]] * summary["tip_error_rms_m"]
     assert summary["tip_estimate_acceleration_error_rms_m_s2"] < 0.6 * summary["tip_acceleration_error_rms_m_s2"]
-    assert summary["tip_load"] == "none above 20 N" and 0.0 < summary["tip_load_rms_N"] < 20.0
+    assert (
+        summary["tip_load"].startswith("none above ") and 0.0 < summary["tip_load_rms_N"] < summary["tip_load_sigma_N"] < 25.0
+    )
     lines = [line for line in as_text(summary) if line.startswith(("tip error", "acceleration error", "load at the tip"))]
-    assert [line.count("of the estimate") for line in lines] == [1, 1, 0] and lines[2].endswith("none above 20 N")
+    assert [line.count("of the estimate") for line in lines] == [1, 1, 0] and lines[2].endswith(summary["tip_load"])
 
 
 def test_residuals_are_what_is_expected(first):

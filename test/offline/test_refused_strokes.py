@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from default_boom import strokes_of_posture
 
-from boom_twin import Sample, Stream, load_scene
+from boom_twin import BoomTwinError, Sample, Stream, load_scene, replay
 from boom_twin.offline.refused_strokes import RefusedStrokes
 from boom_twin.twin.blocks import block_of
 
@@ -46,3 +48,12 @@ def test_with_the_default_scene_another_boom_is_likelier_than_inches() -> None:
         refused.take(block_of([Sample(Stream.STROKES, 1, np.array([first, 0.6, 0.2, 0.2]))], 4))
     assert "for another boom give --scene" in near.told and "unit" not in near.told
     assert "--scene" not in far.told
+
+
+def test_the_most_frequent_event_is_named_and_not_its_consequence(tmp_path: Path) -> None:
+    """Every stroke was in mm and a tenth was missing; the message said that most were missing."""
+    strokes = 1e3 * strokes_of_posture(load_scene(), "arch")
+    table = {"t_s": 0.01 * np.arange(100)} | {f"cylinder_{i + 1}": np.full(100, stroke) for i, stroke in enumerate(strokes)}
+    table["cylinder_3"][::10] = np.nan
+    with pytest.raises(BoomTwinError, match="Most often out of range: a stroke outside 0 to max_stroke"):
+        replay(table, None, tmp_path / "out")

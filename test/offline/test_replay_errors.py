@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from command import main
 from default_boom import strokes_of_posture
 from recordings import SessionWriter, write_session
 from ros_messages import fill_header, load_topics, new_message
@@ -26,6 +27,12 @@ def session(path, rows=200, hole=None, strokes=None, joints=True):
 def test_missing_folder(tmp_path):
     with pytest.raises(BagError, match="no such file or directory"):
         replay(tmp_path / "nothing", load_scene(), tmp_path / "out")
+
+
+def test_a_missing_folder_is_told_before_the_model_is_compiled(tmp_path, capsys):
+    assert main(["replay", str(tmp_path / "nothing"), "--out", str(tmp_path / "out")]) == 1
+    (told,) = capsys.readouterr().err.splitlines()
+    assert told.startswith(f"boom_twin replay: {tmp_path / 'nothing'}: there is no such file or directory. Give")
 
 
 def test_strokes_that_are_not_the_scenes(tmp_path):

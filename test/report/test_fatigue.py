@@ -73,7 +73,7 @@ def test_without_the_package_it_says_what_to_install(monkeypatch):
 
 def test_the_report_has_the_fatigue_of_all_stations(replays, tmp_path, capsys):
     text = (replays[0] / "report.html").read_text(encoding="utf-8")
-    assert "detail category 80 MPa" in text and "sessions to a damage of 1" in text and "±" in text
+    assert "detail category 80 MPa" in text and "hours of such work to a damage of 1" in text and "±" in text
     assert text.partition("<h3>Fatigue")[2].count("section 1 at") == 6
     assert main(["replay", "bags/pump_session", "--out", str(tmp_path / "b"), "--fatigue"]) == 1
     assert "Give --report too" in capsys.readouterr().err

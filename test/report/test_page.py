@@ -12,7 +12,14 @@ from page_outline import outline
 
 from boom_twin.texts import alarm_text
 
-TITLES = ("Alarms", "Residuals", "Natural frequencies and damping", "Tip", "Bending of the sections", "Gaps and events")
+TITLES = (
+    "Alarms over time",
+    "Residuals",
+    "Natural frequencies and damping",
+    "Tip",
+    "Bending of the sections",
+    "Gaps and events",
+)
 
 
 def test_the_page_has_every_part_and_needs_nothing_but_itself(replays: tuple[Path, Path]) -> None:
@@ -29,6 +36,9 @@ def test_the_page_has_every_part_and_needs_nothing_but_itself(replays: tuple[Pat
 def test_a_fault_is_named_with_its_time(replays: tuple[Path, Path]) -> None:
     healthy, faulty = (outline(folder / "report.html").text for folder in replays)
     assert "No alarm: no sensor gives itself away" in healthy and "Heights are not in the scene: assumed are 2.4" in healthy
+    first_lines = faulty.partition("synthetic session")[0]
+    assert alarm_text("joint_3", "jump", "joint_3.sensor") in first_lines and "Largest bending stresses: section" in first_lines
+    assert first_lines.count(" MPa at ") == 3 and "Hours a year that use it up" in first_lines
     assert "1 alarm." in faulty and "joint_3: joint_3.sensor" in faulty
     assert alarm_text("joint_3", "jump", "joint_3.sensor") in faulty
     began = re.search(r"from ([0-9.]+) s, it lasts to the end", faulty)

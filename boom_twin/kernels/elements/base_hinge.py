@@ -1,10 +1,10 @@
-"""Elastic hinge between ground and base about the pivot of joint 1: a spring and a damper that turn. The base has no mass.
+"""Elastic hinge between ground and massless base about the pivot of joint 1: rotational spring and damper.
 
-With the turn phi of the base, its stiffness k and damping d, energy k phi^2 / 2,
+With rotation phi of the base, stiffness k, damping d and energy k phi^2 / 2,
 
     moment    k phi + d phi',   phi' = C phi + D;      tangent   k + d C.
 
-The barrel pin of cylinder 1 turns with the base. With c from the pivot to this pin and n = c turned by 90 degrees,
+C is `Motion.rate`. The barrel pin of cylinder 1 rotates with the base. With c from pivot to pin, n = c rotated by 90 degrees,
 
     dr_C = n dphi,   d2r_C = -c dphi^2.
 """
@@ -27,21 +27,21 @@ HINGE = np.dtype(
 
 @inner
 def hinge_moment(hinge, turn, motion):
-    """Return the moment (N m) of the hinge at a turn phi (rad)."""
+    """Return the moment (N m) of the hinge at a rotation phi (rad)."""
     return hinge.stiffness * turn + hinge.damping * (motion.rate * turn + motion.offset[hinge.z])
 
 
 @inner
 def turn_barrel_force(g, cx, cy):
-    """Return the derivative by phi of the work whose gradient over (C, R, N) is `g`; (cx, cy) from pivot to barrel pin."""
+    """Return the derivative by phi of a work with gradient `g` over (C, R, N); (cx, cy): from pivot to barrel pin."""
     return cx * g[END_C + 1] - cy * g[END_C]
 
 
 @inner
 def turn_barrel_tangent(hinge, motion, g, h, cx, cy, bx, by, s, m):
-    """Write row and column m of the cut, those of phi, from cylinder 1's (g, h); N has m - 1.
+    """Write row and column m (phi) of the cut from cylinder 1's gradient g and Hessian h. N has m - 1.
 
-    (cx, cy) is the vector from the pivot to the barrel pin, (bx, by) that from the frame to the rod pin, m.
+    Vectors (m): (cx, cy) from the pivot to the barrel pin, (bx, by) from the frame to the rod pin.
     """
     for i in range(m):
         s[m, i] = 0.0

@@ -1,13 +1,13 @@
-"""Plain product of transfer matrices from base to tip, the papers' own form; kept to show where it loses digits.
+"""Plain product of transfer matrices from base to tip, as in the papers. It shows where this form loses digits.
 
-A unit is what lies between two cuts with nothing carried: one element, or a whole six-bar from its pin C on. Sweeping in
-through one unit from a cut whose force f_O = f_0 + df is left open, as three more slots that multiply its displacement, gives
+A unit is the part between two cuts without carried columns: one element, or all from a pin C through its six-bar. At the
+output cut the force is f_O = f_0 + df. The sweep inwards keeps df as three more degrees of freedom and gives
 
-    f_I = S_ee de_I + S_ef df + p_e,      de_O = S_fe de_I + S_ff df + p_f,
+    f_I = S_ee de_I + S_ef df + p_e,      de_O = S_fe de_I + S_ff df + p_f.
 
-and solved for the output the unit's transfer matrix, [de_O, f_O, 1] = U [de_I, f_I, 1]. The elements are those of the Riccati
-sweep; only the way they are combined differs. Their product maps the cut behind substructure A to the free tip, whose force
-is zero; that gives the increments at the base, and multiplying outwards all cuts.
+Solved for the output, this is the transfer matrix of the unit, [de_O, f_O, 1] = U [de_I, f_I, 1]. The elements are those of the
+Riccati sweep. The product of all U maps the cut behind substructure A to the free tip. The force there is zero. This gives
+the increments at the base. Multiplication outwards then gives all cuts.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from ..plane_algebra import solve
 from ..tables import DIGITS_LOST, JOINT_B, OK, ROD_PIN, SINGULAR, STATION, Z_FORCE_A, Tables
 from .riccati_sweep import clear_cut, sweep_in, sweep_out
 
-LOST = 1e-6  # force left at the free tip over the largest in the boom, at which a pass counts as lost
+LOST = 1e-6  # ratio of the force left at the free tip to the largest force, above which digits are lost
 THREE, FIVE, SIX, SEVEN = np.int64(3), np.int64(5), np.int64(6), np.int64(7)
 
 
 class Product(NamedTuple):
-    """Room for the plain product of a boom in k units.
+    """Working arrays of the plain product for a boom of k units.
 
-    bounds : (k + 1,) operations at which the units start, and the end.
-    u : (k, 6, 7) transfer matrices; the first unit, substructure A, has none.
-    force : (k, 3) force and torque at the output of every unit, N and N m, of the pass before.
+    bounds : (k + 1,) first operation of each unit, and the end.
+    u : (k, 6, 7) transfer matrices; that of the first unit, substructure A, is not used.
+    force : (k, 3) force and torque at the output of every unit after the last pass, N and N m.
     total, other : (6, 7), a, right, order : scratch.
-    z : (7,) state vector, its last entry 1.
+    z : (7,) state vector in the first 6 entries.
     """
 
     bounds: np.ndarray
@@ -48,7 +48,7 @@ class Product(NamedTuple):
 
 
 def new_product(t: Tables) -> Product:
-    """Units of a compiled boom: cuts are where neither a pin C nor the force of cylinder 1 is carried."""
+    """Return working arrays, with cuts where neither a pin C nor the force of cylinder 1 is carried."""
     kinds = t.operations.kind
     carried, bounds = 1, [1]
     for k, kind in enumerate(kinds[1:], 1):
@@ -64,7 +64,7 @@ def new_product(t: Tables) -> Product:
 
 @inner
 def open_end(work, force):
-    """The cut behind a unit: force `force` (3,), open by three more slots."""
+    """Begin at the output cut of a unit, with force `force` (3,) and df as three more degrees of freedom."""
     clear_cut(work, SIX)
     for i in range(3):
         work.p[i] = force[i]
@@ -74,7 +74,7 @@ def open_end(work, force):
 
 @inner
 def transfer_matrix(s, p, force, a, right, order, u):
-    """U (6, 7) of a unit from its condensed (s, p), six slots; False if its output force does not show at its input."""
+    """Write U (6, 7) of a unit from its condensed (s, p), 6 degrees of freedom; return False if S_ef is singular."""
     for i in range(3):
         for j in range(3):
             a[i, j] = s[i, 3 + j]
@@ -98,7 +98,7 @@ def transfer_matrix(s, p, force, a, right, order, u):
 
 @inner
 def multiply(left, right, out):
-    """out = left right for affine maps (6, 7)."""
+    """Write out = left right for affine maps (6, 7)."""
     for i in range(6):
         for j in range(7):
             value = left[i, 6] if j == 6 else 0.0
@@ -109,9 +109,9 @@ def multiply(left, right, out):
 
 @inner
 def close_root(work, product):
-    """Increments of joint A, and of the force behind substructure A, so that the tip is free; False if singular.
+    """Solve for the increments of joint A and of the force behind substructure A, by a free tip; return False if singular.
 
-    Slots of the condensed substructure A: x, y (which do not move), theta, the force behind it (3), N.
+    Degrees of freedom of the condensed substructure A: x, y (fixed), theta, the force behind it (3), N.
     """
     s, p, total, a, right = work.s, work.p, product.total, product.a, product.right
     for row in range(2):
@@ -137,7 +137,7 @@ def close_root(work, product):
 
 @inner
 def plain_pass(t, state, work, motion, drive, drive_rate, product):
-    """Increments of all unknowns into `work.dz`; returns OK, SINGULAR or DIGITS_LOST."""
+    """Write the increments of all unknowns into `work.dz`; return OK, SINGULAR or DIGITS_LOST."""
     bounds, u, force, total, other, z = product.bounds, product.u, product.force, product.total, product.other, product.z
     units = force.shape[0]
     for i in range(6):
@@ -176,7 +176,7 @@ def plain_pass(t, state, work, motion, drive, drive_rate, product):
 
 @inner
 def multiply_out(t, state, work, product):
-    """Every cut from the one before it, and the increments inside the units."""
+    """Compute every cut from the one inboard of it, and the increments inside the units."""
     bounds, force, z, cut = product.bounds, product.force, product.z, work.cut
     largest = abs(state.z[t.joints[0].z + Z_FORCE_A])
     for k in range(1, force.shape[0]):

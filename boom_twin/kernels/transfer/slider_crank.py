@@ -1,8 +1,8 @@
 """Substructure A, slider-crank: cylinder 1 between the base and section 1.
 
-Sweeping in, the rod pin adds the cylinder to the cut and opens a column for its force N; at the pivot the section's angle and
-N are what is left to solve. The pivot does not move, or by the offset of its journal only, which is solved with them. A base
-on an elastic hinge turns; its turn has a column behind that of N.
+At the rod pin, the inward sweep adds the cylinder to the cut, with a column for its force N. At the pivot, the section's angle
+and N remain to be solved. The pivot is fixed; with clearance, the offset of its journal is solved too. The rotation of a base
+on an elastic hinge has the column after that of N.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .clearance_pins import condense_ends, torque_of
 
 @inner
 def join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m):
-    """Add cylinder 1 at outlet `row` of a frame (cos c, sin sn); return the slots of the cut, more by N and the base's turn."""
+    """Add cylinder 1 at outlet `row` of a frame (cos c, sin sn). Return the size of the cut, with N and the base's rotation."""
     outlet = t.outlets[row]
     pins, cylinder, s, p = state.pins[0], t.cylinders[0], work.s, work.p
     g, h = work.own_g, work.own_h
@@ -57,7 +57,7 @@ def join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m
         s[m, i] = h[AXIAL, END_R + i]
         s[i, m] = h[AXIAL, END_R + i]
     s[m, m] = h[AXIAL, AXIAL]
-    turn_x = -by * h[END_R, END_R] + bx * h[END_R, END_R + 1]  # row of the turning against x, y of the rod pin
+    turn_x = -by * h[END_R, END_R] + bx * h[END_R, END_R + 1]  # row of the rotation, columns x, y of the rod pin
     turn_y = -by * h[END_R + 1, END_R] + bx * h[END_R + 1, END_R + 1]
     for i in range(2):
         for j in range(2):
@@ -76,14 +76,14 @@ def join_rod(t, state, work, condensed, motion, drive, drive_rate, row, c, sn, m
 
 @inner
 def barrel_pin(t, state):
-    """Return the vector (m) from the pivot of joint 1 to the barrel pin of cylinder 1, which turns with the base."""
+    """Return the vector (m) from the pivot of joint 1 to the barrel pin of cylinder 1."""
     base = state.frames[0]
     return rotated(base[FRAME_COS], base[FRAME_SIN], t.linkages[0].cx, t.linkages[0].cy)
 
 
 @inner
 def slot_of(unknown, offsets):
-    """Return the slot of an unknown of joint A: theta, N, `offsets` x and y of its journal, turn of the base."""
+    """Return the row in the cut of an unknown of joint A: theta, N, `offsets` (journal's x, y), base's rotation."""
     if unknown < 2:
         return 2 + unknown
     return unknown - 2 if unknown < 2 + offsets else 4
@@ -91,9 +91,9 @@ def slot_of(unknown, offsets):
 
 @inner
 def close_base(t, work, condensed, renew, operation):
-    """Solve increments of joint A into the gains of `operation`, in the order of `slot_of`.
+    """Solve the increments of joint A and store them for `operation`, in the order of `slot_of`.
 
-    renew : whether its tangent is made anew. False if singular.
+    renew : True for a new tangent. Return False if it is singular.
     """
     s, p, b, joint = work.s, work.p, work.right, t.joints[0]
     a, order, offsets = condensed.factors[operation], condensed.order[operation], 2 * joint.clearances
@@ -123,7 +123,7 @@ def close_base(t, work, condensed, renew, operation):
         for i in range(2):
             a[0, 2 + i] += hold[TORQUE_X + i]
             a[2 + i, 0] += hold[TORQUE_X + i]
-        if size > 2 + offsets:  # friction turns the base back
+        if size > 2 + offsets:  # pin friction acts back on the base
             turn = size - 1
             b[turn, 0] -= hold[TORQUE]
             a[turn, turn] += hold[TORQUE_TURN]

@@ -26,12 +26,12 @@ from .kept_tangent import (
 from .matrix_product import plain_pass
 from .riccati_sweep import FREE, ROOT, clear_cut, sweep_in, sweep_out
 
-ANEW = np.bool_(False)  # for `advance`: no tangent is kept. Typed, because numba compiles once more for every literal
-TICKS = np.int64(4096)  # of a step, the grid of its sub-steps
-MOST = np.int64(32)  # sub-steps that a step is divided into for their error; for passes that fail, down to SHORTEST
-SHORTEST = 1e-5  # s, of a sub-step
-EASY = 0.1  # of the error allowed: the next sub-step is twice as long
-LONGEST_INCREMENT = 0.5  # rad in one pass of a time step; more means that the step has lost its way
+ANEW = np.bool_(False)  # `keep` of `advance`: no kept tangent. Typed, because numba compiles once more for every literal
+TICKS = np.int64(4096)  # ticks of a step; sub-steps are whole numbers of ticks
+MOST = np.int64(32)  # largest number of sub-steps for accuracy; after failed passes they are divided down to SHORTEST
+SHORTEST = 1e-5  # s, shortest sub-step
+EASY = 0.1  # ratio of error to allowed error, below which the next sub-step is twice as long
+LONGEST_INCREMENT = 0.5  # rad, limit of the increments in one pass of a time step; larger ones mean divergence
 
 
 @kernel
@@ -44,23 +44,23 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
     Parameters
     ----------
     scheme : Scheme
-        See `kernels.integrators`; the scheme of rest gives static equilibrium next to the history's positions.
+        See `kernels.integrators`; `REST` gives static equilibrium near the positions of the history.
     tolerance : float
-        Done once the largest increment (rad) is below it; convergence is quadratic, so the error left is about its square.
+        Largest increment (rad) at convergence. Convergence is quadratic, so the remaining error is about its square.
     passes : int
-        At most so many; a single pass is the papers' linearised step and counts as converged.
+        Largest number of passes. A single pass is the papers' linearised step and counts as converged.
     longest : float
-        Increments are shortened so that none exceeds this (rad).
+        Limit (rad) to which the increments of a pass are scaled down.
     product : Product or None
-        None for the Riccati form; else room for the plain product of transfer matrices (see `kernels.transfer.matrix_product`).
+        None for the Riccati form; else working arrays of `kernels.transfer.matrix_product`.
     keep : bool
-        Whether this step goes on from the last one made in `work`, whose tangent it may use: see
-        `kernels.transfer.kept_tangent`; for ideal pins in the Riccati form.
+        True if this step continues the last one in `work` and may use its tangent, see `kernels.transfer.kept_tangent`. It
+        requires ideal pins and the Riccati form.
 
     Returns
     -------
     status, passes, last increment (rad)
-        On failure the histories stay as they were, or as the last sub-step left them.
+        After a failure the histories are those of the last complete sub-step.
     """
     history, operations, done, total, size = state.history, t.operations.shape[0], 0, 0, 0.0
     condensed = work.condensed
@@ -133,7 +133,7 @@ def advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longes
 
 @inner
 def advance_again(t, state, work, scheme, drive, drive_rate, tolerance, passes, longest, product, keep):
-    """Advance like `advance`; repeat a step that fails with a kept tangent once, with new ones. Return status and passes."""
+    """Advance like `advance`. If a step fails with a kept tangent, repeat it with new ones. Return status and passes."""
     total, may_use = 0, keep
     while True:
         status, count, _ = advance(t, state, work, scheme, drive, drive_rate, tolerance, passes, longest, product, may_use)
@@ -146,7 +146,7 @@ def advance_again(t, state, work, scheme, drive, drive_rate, tolerance, passes, 
 
 @inner
 def first_part(t, state, scheme):
-    """Ticks of the first sub-step: all, unless the last step was divided to its end."""
+    """Return the ticks of the first sub-step: those at the end of the last step, or all at the start."""
     if t.clearances.shape[0] == 0 or least_part(t, scheme) == TICKS or state.pace[0] == 0:
         return TICKS
     return max(state.pace[0], least_part(t, scheme), TICKS // MOST)
@@ -154,7 +154,7 @@ def first_part(t, state, scheme):
 
 @inner
 def least_part(t, scheme):
-    """Ticks of the shortest sub-step: all where nothing touches and parts, and for schemes with a longer memory."""
+    """Return the ticks of the shortest sub-step: all without clearance or outside generalised-alpha and Newmark."""
     part = TICKS
     if t.clearances.shape[0] > 0 and (scheme.family == GENERALISED_ALPHA or scheme.family == NEWMARK):
         while part > 1 and scheme.reach * part > 2.0 * SHORTEST * TICKS:
@@ -164,7 +164,7 @@ def least_part(t, scheme):
 
 @inner
 def interpolate_drive(state, work, drive, drive_rate, span, share):
-    """Drive of a sub-step that ends at `share` of a step of `span` s: on the cubic from the last step's drive to this one's."""
+    """Write the drive at `share` of a step of `span` s, on the cubic from the last step's drive to this one's."""
     u = share
     for i in range(drive.shape[0]):
         work.drive[i], work.drive_rate[i] = drive[i], drive_rate[i]
@@ -178,7 +178,7 @@ def interpolate_drive(state, work, drive, drive_rate, span, share):
 
 @inner
 def predict(t, state, reach):
-    """First guess of the unknowns `reach` s ahead: x + h v + h^2 a/2 for coordinates, forces as they were."""
+    """Write the first guess of the unknowns `reach` s ahead: x + h v + h^2 a/2 for coordinates, unchanged forces."""
     x, v, a = state.history[X], state.history[V], state.history[A]
     for i in range(state.z.shape[0]):
         if t.moving[i] > 0.0:
@@ -187,7 +187,7 @@ def predict(t, state, reach):
 
 @inner
 def newton_status(work, solved, size, tolerance, passes):
-    """Status after a pass that ended with `solved` and an increment of `size` (rad): go on with NOT_CONVERGED."""
+    """Return the status after a pass with result `solved` and increment `size` (rad); NOT_CONVERGED: continue."""
     if solved != OK:
         for i in range(3):
             if not math.isfinite(work.p[i]):
@@ -234,7 +234,7 @@ def observe(t, state, out):
 
 @inner
 def observe_pins(t, state, out):
-    """Write for every pin with clearance, shape (pins, 4): offset of its journal (m), force (N), 1 where it touches."""
+    """Write offset of the journal (m), force (N), and 1 if it touches, for every pin with clearance; shape (pins, 4)."""
     v = state.history[V]
     for k in range(t.clearances.shape[0]):
         row, memory = t.clearances[k], state.contacts[k]
@@ -249,18 +249,18 @@ def observe_pins(t, state, out):
 
 @kernel
 def run(t, state, work, steps, counts, drives, rates, loads, family, parameter, tolerance, passes, product, out):
-    """Follow drive lengths through many rows.
+    """Step the boom along given drives, and write rows of results.
 
     Parameters
     ----------
     steps : ndarray, shape (rows,)
-        Step (s) that leads to each row.
+        Length (s) of the steps that lead to each row.
     counts : ndarray of int, shape (rows,)
-        Number of such steps; `drives`, `rates` hold all of them one after the other.
+        Number of these steps. `drives`, `rates` and `loads` have a row for each step.
     drives, rates : ndarray, shape (sum of counts, n)
-        Drive lengths (m) and rates (m/s) at the end of every step, or where the scheme solves.
+        Drive lengths (m) and rates (m/s) at the instant of every step that the scheme solves for.
     loads : ndarray, shape (sum of counts, 2)
-        Force at the tip (N) at the end of every step; without rows there is none. Before the first step it is ``work.load[1]``.
+        Force at the tip (N) at the end of every step; no rows, no force. Before the first step it is ``work.load[1]``.
     family, parameter : int, float
         See `kernels.integrators.prepare`.
     product : Product or None
@@ -273,9 +273,9 @@ def run(t, state, work, steps, counts, drives, rates, loads, family, parameter, 
     status, row, passes : int
         Status of the last step and the row it belongs to; total of Newton passes.
     jolt : float
-        Sum over all steps of h^2 |a' - a| of the tip, m: what the error of a step is measured by, see `Simulation`.
+        Sum over all steps of h^2 |a' - a| of the tip, m. It measures the step error, see `Simulation`.
     shake : float
-        Sum over all steps of h^2 |a'| of the tip, m: half of `jolt` where the acceleration changes sign from step to step.
+        Sum over all steps of h^2 |a'| of the tip, m. It is half of `jolt` if the acceleration changes sign in every step.
     """
     at, total, jolt, shake, a = 0, 0, 0.0, 0.0, state.history[A]
     keep = product is None and passes > 1 and t.clearances.shape[0] == 0

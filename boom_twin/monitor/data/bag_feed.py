@@ -103,7 +103,7 @@ def bag_feed(
     reads = given.strokes.reading
     if not is_published and topics.inputs[reads.stream].absolute not in counts:
         raise BagError(f"{path}: nothing to show. It needs {reads.named}, or outputs of the twin.")
-    feed = BagFeed(_title(session, is_published), store, topics, given.scene, length * window.share(length))
+    feed = BagFeed(_title(session, is_published), store, topics, given.scene, length * window.share(length), namespace)
     if is_published:
         feed.begin(_take_published(session, feed, topics, counts, window))
     else:

@@ -36,10 +36,20 @@ class Feed:
         By default the package's own, if the node says that it uses that. No file is opened that a message names.
     end : float, optional
         Length of a recorded session, s; None if it is live.
+    boom : str
+        Name of the boom among several: the namespace of its node, empty if it has none.
     """
 
-    def __init__(self, title: str, store: Store, topics: Topics, scene: Scene | None = None, end: float | None = None) -> None:
-        self.title, self.store, self.end = title, store, end
+    def __init__(
+        self,
+        title: str,
+        store: Store,
+        topics: Topics,
+        scene: Scene | None = None,
+        end: float | None = None,
+        boom: str = "",
+    ) -> None:
+        self.title, self.store, self.end, self.boom = title, store, end, boom.strip("/")
         self.topic_rows = TopicRows(store, topics)
         self.trouble = ""  # why there is not more to be had
         self.phase = ""  # what is done before data can be shown, in words

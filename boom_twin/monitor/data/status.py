@@ -23,8 +23,8 @@ HEALTH = "health"
 """The status that stands for all alarms of the rig's health."""
 SENSOR_GROUPS = ("sensor", "residual")
 """Kinds of statuses that speak of one channel, as an alarm of the rig's health does."""
-WITH_FIGURES = ("tip", "tip load")
-"""Statuses whose values the page shows."""
+WITH_FIGURES = ("swing", "tip load", "model")
+"""Statuses whose values are kept, for the page and for ``/metrics``."""
 _LIMITS = ("_error", "_warn", "_stale")
 
 
@@ -124,7 +124,7 @@ def _lamp(name: str, status: Any, clock: float) -> StatusLamp:
 
 
 def _group(name: str) -> str:
-    if name in ("model", "tip", "tip load", "bending"):
+    if name in ("model", "swing", "tip load", "bending"):
         return "model"
     kind = name.split(" ")[0]
     return {"sensor": "sensors", "residual": "residuals", HEALTH: "residuals", "recording": "recorder"}.get(kind, "timing")
@@ -161,8 +161,8 @@ MAX_ALARMS = 500
 class ListedAlarm:
     """Alarm in the list: a lamp that was not well, or an alarm of the health monitor.
 
-    Only the health monitor's have `causes`, the most probable first, each with its probability (NaN where the sensor itself
-    gives it away), `words` by language, and `stops` if the boom is to be stopped.
+    Those of lamps have no `fault`. Only the health monitor's have a `cause` and `causes`, the most probable first, each with
+    its probability (NaN where the sensor itself gives it away), and `stops` if the boom is to be stopped.
     """
 
     number: int  # by which it is acknowledged
@@ -174,8 +174,10 @@ class ListedAlarm:
     is_acknowledged: bool = False
     causes: tuple[tuple[str, float], ...] = ()
     evidence: str = ""
-    words: dict[str, str] = field(default_factory=dict)
+    words: dict[str, str] = field(default_factory=dict)  # the sentence by language
     stops: bool = False
+    fault: str = ""  # kind of fault in one word, see `boom_twin.types.Alarm`
+    cause: str | None = None  # parameter or sensor at fault; None if it is not known
 
 
 class AlarmList:
@@ -252,7 +254,7 @@ class AlarmList:
     def add_gap(self, channel: str, begin: float, end: float) -> None:
         """Add a gap between two stamps of a channel."""
         alarm = self.add(channel, Severity.WARN, alarm_text(channel, "gap", None), begin, end)
-        alarm.words, alarm.evidence = _words(channel, "gap", None), f"for {end - begin:.2f} s"
+        alarm.words, alarm.evidence, alarm.fault = _words(channel, "gap", None), f"for {end - begin:.2f} s", "gap"
 
     def add(self, name: str, level: Severity, reason: str, begin: float, end: float | None = None) -> ListedAlarm:
         """Add an alarm, with its end (s) if it is over, such as a gap."""
@@ -288,5 +290,6 @@ def _renew(alarm: ListedAlarm, found: Alarm, time: Callable[[int], float]) -> No
     alarm.reason, alarm.begin, alarm.causes = text(found.told), time(found.since), causes
     alarm.evidence = text(evidence_with_cause(found.evidence, causes))
     alarm.words = _words(found.channel, found.kind, found.cause)
+    alarm.fault, alarm.cause = text(found.kind), None if found.cause is None else text(found.cause)
     alarm.stops = alarm_sentence(found.channel, found.kind, found.cause).stops
     alarm.end = None if found.until is None else time(found.until)

@@ -18,7 +18,7 @@ export class Now {
   }
 
   show() {
-    const { swing_m: swing, swing_m_warn: warn, swing_m_error: limit } = this.figures("tip"), { frequency_Hz: rate } = this.figures("tip load");
+    const { swing_m: swing, swing_m_warn: warn, swing_m_error: limit } = this.figures("swing"), { frequency_Hz: rate } = this.figures("tip load");
     const isKnown = Number.isFinite(swing) && Number.isFinite(limit), millimetres = metres => (1000 * metres).toFixed(0);
     const level = !isKnown ? "OFF" : swing > limit ? "ERROR" : swing > warn ? "WARN" : "OK";
     fill("tip-now", level, isKnown ? t("tip swings {size} mm", { size: millimetres(swing) }) : t("swing of the tip not known"),

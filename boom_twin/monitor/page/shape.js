@@ -10,7 +10,7 @@ const FULL = 1e5; // N that has the full colour
 const MARGIN = 30; // px
 const ARROW = 0.01; // m of the arrow for a newton of load at the tip
 const HEAD = 9; // px
-const LEAST = 5; // N; no arrow below
+const LEAST = 5; // N; no arrow below, nor below two standard deviations
 
 export class Shape {
   constructor(connection, view) {
@@ -20,7 +20,7 @@ export class Shape {
     for (const button of document.querySelectorAll("#factors button")) button.onclick = () => this.choose(Number(button.dataset.factor));
     this.choose(1);
     connection.addEventListener("reset", () => { this.box = null; });
-    connection.addEventListener("state", event => showLoad(event.detail.groups));
+    connection.addEventListener("state", event => { this.uncertainty = showLoad(event.detail.groups); });
   }
 
   choose(factor) {
@@ -81,7 +81,7 @@ export class Shape {
     const table = this.connection.table("estimate");
     if (!table?.count) return;
     const [x, z] = [8, 9].map(column => table.at(column, table.count - 1)), size = Math.hypot(x, z);
-    if (!(size > LEAST)) return;
+    if (!(size > Math.max(LEAST, 2 * (this.uncertainty || 0)))) return;
     const colour = lineColour(3), tail = [tip[0] - ARROW * x, tip[1] - ARROW * z];
     this.drawLine(frame, [tail, tip], { colour, width: 4, label: `${size.toFixed(0)} N` });
     const { context, at } = frame, [px, py] = at(tip), angle = Math.atan2(-z, x);
@@ -182,8 +182,9 @@ function colourOf(force) {
   return `rgb(${end.map(c => Math.round(150 + share * (c - 150)))})`;
 }
 
-// What /diagnostics says of the load at the tip.
+// Show what /diagnostics says of the load at the tip; return its standard deviation, N.
 function showLoad(groups) {
   const status = groups.flatMap(group => group.lamps).find(({ name, level }) => name === "tip load" && level === "OK");
   document.getElementById("load").textContent = status ? translated(status.reason) : "";
+  return status?.figures.rms_sigma_N;
 }

@@ -11,23 +11,23 @@ from rclpy.node import Node
 
 Result = TypeVar("Result")
 
-LOOK = 0.05  # s of steady time between checks for the end of the work
+LOOK = 0.05  # period of the checks for the end of the work, s
 
 
 class BackgroundTask(Generic[Result]):
-    """Work that takes too long for a callback, done in a thread; a callback of `node` takes its result.
+    """Work too long for a callback, done in a thread. A callback of `node` receives its result.
 
-    The thread is a daemon: a compiler that works in it cannot be interrupted, see `boom_twin.ros.startup.end_with_threads`.
+    The thread is a daemon, because a compiler in it cannot be interrupted, see `boom_twin.ros.startup.end_with_threads`.
 
     Parameters
     ----------
     node : Node
     work : callable
-        Is called in the thread.
+        Function to call in the thread.
     use : callable
-        Takes what `work` returned, in the thread of the executor.
+        Receiver of the result of `work`, in the executor's thread.
     give_up : callable
-        Takes what `work` raised, in the thread of the executor.
+        Receiver of an exception of `work`, in the executor's thread.
     """
 
     def __init__(
@@ -43,14 +43,14 @@ class BackgroundTask(Generic[Result]):
         Thread(target=self._run, name="preparation", daemon=True).start()
 
     def abandon(self) -> None:
-        """Let the thread end by itself; its result is not used."""
+        """Discard the result; the thread ends by itself."""
         self._node.destroy_timer(self._timer)
 
     def _run(self) -> None:
         try:
             result = self._work()
         except Exception as error:
-            reason = error  # the name `error` ends with this block
+            reason = error  # Python deletes `error` after this block
             self._ended = lambda: self._give_up(reason)
         else:
             self._ended = lambda: self._use(result)

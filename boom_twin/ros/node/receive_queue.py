@@ -1,8 +1,8 @@
 """Bounded queue of received messages, so that a flood leaves time for services, timers and diagnostics.
 
-The executor only puts messages here, which takes some microseconds; they are read between two turns of it, for a limited time.
-rclpy's events executor calls back once for every message that ever arrived, in one row with services and timers. So messages
-are taken over before they are read. Where even that is too slow, `boom_twin.ros.runtime.CallbackTurns` drops the row.
+The executor puts messages here within some microseconds. Between two of its turns, messages are read for a limited time.
+rclpy's events executor calls back once for every arrived message, in one queue with services and timers. So messages are
+taken from it before they are read. If even that is too slow, `boom_twin.ros.runtime.CallbackTurns` drops the executor's queue.
 """
 
 from __future__ import annotations
@@ -19,30 +19,30 @@ from ...types import NANO
 from ..runtime import CallbackTurns, with_information
 
 FRESH = 0.005
-"""Age (s) of a message, at its receipt from the executor, above which more are taken to stand in the executor's own row."""
+"""Age (s) of a message from the executor above which more are assumed to wait in the executor's queue."""
 LARGEST = 1 << 18
-"""Bytes of a message that is put: a thousand names, which are as many as are looked at, take a part of that."""
+"""Largest message that is read, bytes. A message of a thousand names (the most that are examined) is smaller."""
 CATCH_UP = 0.5
-"""Most time (s) for reading what arrived before a request, where the answer depends on it."""
+"""Time limit (s) for reading messages before a request whose answer depends on them."""
 BUDGET = 0.01
-"""Time (s) for messages that wait, between two turns of services and timers."""
+"""Time limit (s) for reading messages between two turns of the executor."""
 INTAKE = 0.2
-"""Most time (s) for taking messages over from the executor, before some of them are read."""
+"""Time limit (s) for taking messages from the executor before some are read."""
 
 
 class _Topic:
-    """Waiting messages of one topic, with their arrival (ns), and its counts."""
+    """Waiting messages of one topic with arrival times (ns), and counts."""
 
     def __init__(self, depth: int, read: Callable[[bytes], None]) -> None:
         self.waiting: deque[tuple[int, bytes]] = deque()
         self.depth, self.read = depth, read
         self.received = self.lost = self.dropped = 0
-        self.gone = 0  # turns of messages that gave way, see `ReceiveQueue._turns`
+        self.gone = 0  # dropped messages that are still in `ReceiveQueue._turns`
         self.wait = self.latency = nan
         self.number, self._missed, self._is_numbered = -1, 0, True
 
     def count(self, number: int | None) -> None:
-        """Count a message by its sequence number. A number that is not above the last one is another publisher's."""
+        """Count a message by its sequence number. A number that does not increase is another publisher's."""
         self.received += 1
         if number is None:
             return
@@ -53,7 +53,7 @@ class _Topic:
         self.number = number
 
     def look(self) -> Reception:
-        """Return the reception of this topic and start a new interval."""
+        """Return the reception since the last look and start a new interval."""
         self.lost += self._missed if self._is_numbered else 0
         counts = self.received, self.lost, self.dropped, len(self.waiting)
         found = Reception(*counts, self.wait, self.latency, self._is_numbered)
@@ -64,29 +64,29 @@ class _Topic:
 class ReceiveQueue:
     """Queue of messages of several topics, read in the order of their arrival.
 
-    Of a topic of which too many wait, the oldest gives way; others do not suffer from it.
+    If a topic exceeds its `depth`, its oldest message is dropped. Other topics lose none.
 
     Parameters
     ----------
     clock : callable
-        Time of the system, ns: the one by which the middleware notes arrivals.
+        System time, ns: the middleware's clock of arrivals.
 
     Attributes
     ----------
     received : int
-        Messages of all topics that were put.
+        Queued messages of all topics.
     oddities : Counter
-        How many of all topics were left out at once as ``too large``, see `LARGEST`: reading them would take too long.
+        Discarded messages of all topics: ``too large`` to be read in time, see `LARGEST`.
     share : float
-        Messages that wait behind the one that is being read, or was last, of its topic; as a share of what may.
+        Waiting messages of the topic read last, relative to its `depth`.
     is_behind : bool
-        Whether the newest message had waited for the executor, so that there may be more.
+        True if the newest message had waited in the executor, so that more may wait there.
     """
 
     def __init__(self, clock: Callable[[], int] = time.time_ns) -> None:
         self._clock = clock
         self._topics: dict[str, _Topic] = {}
-        self._turns: deque[_Topic] = deque()  # of the topics, for each message that waits, and for those that gave way
+        self._turns: deque[_Topic] = deque()  # topic of each message, by arrival; also of dropped ones
         self.received, self.is_behind, self.share = 0, False, 0.0
         self.oddities: Counter[str] = Counter()
         self._on_put: Callable[[], None] | None = None
@@ -101,16 +101,16 @@ class ReceiveQueue:
         Parameters
         ----------
         name : str
-            Of the topic.
+            Name of the topic.
         depth : int
-            Most messages that may wait.
+            Largest number of waiting messages.
         read : callable
-            What is to be done with one; it must not raise.
+            Reader of a message; it must not raise.
         """
         self._topics[name] = topic = _Topic(depth, read)
 
         def put(data: bytes, info: Mapping[str, Any]) -> None:
-            if self._topics.get(name) is not topic:  # closed while this message stood in the executor's row
+            if self._topics.get(name) is not topic:  # closed while this message waited in the executor
                 return
             now = self._clock()
             arrival = info["received_timestamp"] or now
@@ -138,11 +138,11 @@ class ReceiveQueue:
         self.is_behind = False
 
     def work(self, budget: float) -> None:
-        """Read messages until none waits or `budget`, s, has passed; the last one may take longer."""
+        """Read messages until none waits or `budget` (s) has passed. The last one may exceed it."""
         end = time.monotonic() + budget
         while self._turns:
             topic = self._turns.popleft()
-            if topic.gone:  # the oldest of its messages gave way, so that this turn is not another's
+            if topic.gone:  # turn of a dropped message
                 topic.gone -= 1
                 continue
             arrival, data = topic.waiting.popleft()
@@ -157,9 +157,9 @@ class ReceiveQueue:
                 return
 
     def serve(self, turns: CallbackTurns) -> None:
-        """Let callbacks run for a turn and read messages as they come, in this one thread and in the order of arrival.
+        """Run callbacks for one turn and read messages as they arrive, in this thread and in order of arrival.
 
-        The turn ends as soon as a message cannot be read at once: then more are to be taken over first.
+        The turn ends if a message cannot be read at once: more must be taken from the executor first.
         """
         if self:
             turns.poll()
@@ -186,7 +186,7 @@ class ReceiveQueue:
         return max(0, self._clock() - arrival) * NANO
 
     def catch_up(self) -> None:
-        """Read what arrived before a request that is about to be answered, as far as there is time for it."""
+        """Read messages that arrived before the present request, for at most `CATCH_UP`."""
         self.work(CATCH_UP)
 
     def look(self) -> Mapping[str, Reception]:

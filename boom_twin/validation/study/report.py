@@ -18,7 +18,7 @@ PACKAGES = ("numpy", "scipy", "numba", "exudyn", "boom_twin")
 
 
 def machine() -> dict[str, str | int | None]:
-    """Return date (UTC), CPU model, usable cores and versions; None for a package that is not installed."""
+    """Return date (UTC), CPU model, usable cores and versions. The version of a missing package is None."""
     versions = {package: _version(package) for package in PACKAGES}
     return {
         "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
@@ -50,19 +50,19 @@ SYNTHETIC = "Scene parameters are surrogates; nothing here was measured on a rig
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a Markdown table with a final newline. Floats have 3 digits or are whole; None and NaN are dashes."""
-    lines = [list(head), ["---"] * len(head), *([_text(value) for value in row] for row in rows)]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    """Return a Markdown table with a final newline. Floats have 3 digits or no decimals. None and NaN are dashes."""
+    lines = [f"| {' | '.join(line)} |\n" for line in (head, *([_text(value) for value in row] for row in rows))]
+    return "".join((lines[0], f"|{'---|' * len(head)}\n", *lines[1:]))
 
 
 def page(parts: Iterable[str]) -> str:
-    """Return a Markdown page of paragraphs, tables and headings; its last line is of date, machine, versions and surrogates."""
+    """Return a Markdown page of the parts. Its last line gives date, machine and versions, and calls the data surrogates."""
     made = ", ".join(f"{name} {value}" for name, value in machine().items() if value is not None)
     return "\n\n".join(part.rstrip("\n") for part in (*parts, f"{made}. {SYNTHETIC}") if part) + "\n"
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write the numbers of a study, and the machine, as JSON into a folder that is made if need be."""
+    """Write the numbers of a study and the machine as JSON; make the folder if it is missing."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write_atomic(path, json_text({"machine": machine(), **content}, indent=1) + "\n")
 

@@ -1,4 +1,4 @@
-"""Six-bar linkage of a B joint: where its links lie, and which of them bears the rod pin."""
+"""Six-bar linkage of a B joint: frames of its links and positions of its pins."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from .system import Frame
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A uniform rod with its frame in its middle: mass (kg), length (m), and its pins in its own axes (m).
+    """A link as a uniform rod, with its frame at its middle.
 
     Attributes
     ----------
+    mass, length : float
+        kg, m.
     apex, outer : Point
-        Pin that it shares with the other link, pin on its section.
+        Pin shared with the other link, and pin on the section, m, in the axes of the link.
     """
 
     mass: float
@@ -31,13 +33,13 @@ class Link:
 
     @property
     def lump(self) -> Lump:
-        """Return the mass of the link about its middle."""
+        """Return mass and moment of inertia of the link."""
         return Lump(self.mass, (0.0, 0.0), self.mass * self.length**2 / 12)
 
 
 @dataclass(frozen=True, slots=True)
 class SixBar:
-    """Both links, and the cylinder's pins.
+    """Both links and the cylinder's pins.
 
     Attributes
     ----------
@@ -66,12 +68,12 @@ class SixBar:
 
     @property
     def two_force(self) -> Link:
-        """Return the other link."""
+        """Return the link without the rod pin."""
         return self.left if self.bears_right else self.right
 
 
 def six_bar(scene: Scene, frames: list[Frame], index: int) -> SixBar:
-    """Return the linkage of joint `index` (0-based) between straight sections at `frames`."""
+    """Return the linkage of joint `index` (0-based) between undeformed sections at `frames`."""
     joint, length = scene.joints[index], scene.sections[index - 1].length
     assert joint.C and joint.D and joint.E and joint.lL and joint.lR
     hinge = (length + joint.D[0], joint.D[1])
@@ -81,19 +83,19 @@ def six_bar(scene: Scene, frames: list[Frame], index: int) -> SixBar:
     left = Link(joint.mL or 0.0, joint.lL, _between(start, apex), half_left, (-joint.lL / 2, 0.0))
     right = Link(joint.mR or 0.0, joint.lR, _between(apex, end), (-joint.lR / 2, 0.0), half_right)
     bears_right = joint.kind == "B3"
-    along, aside = joint.R or (joint.lL, 0.0)  # B1 has no R: its rod pin is the apex
+    along, aside = joint.R or (joint.lL, 0.0)  # B1 has no R; its rod pin is the apex
     rod_pin = (along - (half_right if bears_right else half_left)[0], aside)
     return SixBar(left, right, bears_right, rod_pin, (length + joint.C[0], joint.C[1]), hinge, joint.E)
 
 
 def _between(start: Array, end: Array) -> Frame:
-    """Return the frame in the middle of two places, x from the first to the second."""
+    """Return the frame in the middle of two points, its x axis from start to end."""
     middle = (start + end) / 2
     return Frame(float(middle[0]), float(middle[1]), math.atan2(end[1] - start[1], end[0] - start[0]))
 
 
 def _apex(start: Array, end: Array, from_start: float, from_end: float, is_right: bool) -> Array:
-    """Return the third corner, left or right of start->end, of the triangle with these two sides (law of cosines)."""
+    """Return the third corner of a triangle with these sides, left or right of start->end (law of cosines)."""
     base = end - start
     span = float(np.hypot(*base))
     opening = math.acos((span**2 + from_start**2 - from_end**2) / (2 * span * from_start))
