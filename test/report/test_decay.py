@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from default_boom import strokes_of_posture, with_parameters
 
-from boom_twin import Sample, Stream, Twin, load_scene, simulate, statics
+from boom_twin import Sample, Twin, load_scene, simulate, statics
 from boom_twin.offline.history import HistoryBuilder
 from boom_twin.offline.recording import Recording
 from boom_twin.report.vibration import SHORTEST_REST, RestFinder, course, still, vibrations

@@ -20,7 +20,7 @@ from made_once import MadeOnce
 from recordings import SessionWriter, load_mapping, read_both, scan, write_session
 from ros_messages import load_topics
 
-from boom_twin import Stream, load_scene, statics
+from boom_twin import load_scene, statics
 
 PATIENCE = 240.0  # s; the first node compiles
 SECONDS, RATE = 4.0, 200.0
