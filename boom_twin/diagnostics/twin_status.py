@@ -9,7 +9,7 @@ import numpy as np
 
 from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Thresholds
-from ..types import Health, Report, Sample, Stream
+from ..types import SENSORS, Health, Report, Sample, Stream
 from .levels import ComponentJudge, Evaluation, Level, Status, Value
 from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, stress_status
 from .sensor_status import SensorSpec, sensor_status
@@ -185,7 +185,8 @@ class TwinWatch:
             is_required = self._sensors[stream][0].required
             found.append(topic_status(topic, watch, is_required, publishers[stream], watch.lag - strokes, wrong))
         if reception is not None:
-            followed = {stream: seconds(each.newest) for stream, each in self._streams.items()}
+            streams = {stream: self._streams[Stream(SENSORS[stream].gives or stream)] for stream in publishers}
+            followed = {stream: seconds(each.newest) for stream, each in streams.items()}
             found.insert(0, publishers_status(judge("publishers"), publishers, followed))
             found.append(self._reception.status(judge("reception"), reception, left_out or {}))
         found.append(outputs_status(judge("outputs"), subscribers))
