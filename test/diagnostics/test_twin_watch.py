@@ -194,3 +194,13 @@ def test_stresses_are_told_with_their_deviation_once_sensors_know_of_a_load() ->
     assert status.values["section_1_at_0.60_m_sigma_MPa"] == pytest.approx(0.73, rel=0.02)
     rigid = scene.model_copy(update={"modes": 0})
     assert stress_model(rigid) is None
+
+
+def test_the_sources_of_pressures_are_watched_by_the_forces_that_they_give(rig: Rig) -> None:
+    rig.second((Stream.STROKES, Stream.ANGLES, Stream.FORCES))
+    rig.peers[Stream.PRESSURES] = Peers("/cylinder_pressures", ("/valves", "/bridge"))
+    found = all_pieces(rig.watch.look({}, "", rig.peers, [Peers("/out", ("/screen",))], rig.now + 1e9, {}))
+    (status,) = (each for each in found if each.name == "publishers")
+    values = dict(status.values)
+    assert status.level is Level.ERROR and "several publishers of /cylinder_pressures: /valves, /bridge" in status.message
+    assert values["/cylinder_pressures newest_stamp_s"] == values["/cylinder_forces newest_stamp_s"]
