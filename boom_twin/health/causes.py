@@ -109,7 +109,7 @@ def possible_faults(scene: Scene, reads: StrokeReading = StrokeReading.LENGTH) -
     """
     mass, sections = explain(scene).mass, [name for name in parameter_names(scene) if name.endswith(".EI")]
     base = [name for name in parameter_names(scene) if name == "base.stiffness"]
-    found = [Fault(name, "softer", LOSS, name != sections[-1]) for name in [*_springs(scene), *sections, *base]]
+    found = [Fault(name, "softer", LOSS, name not in sections[-1:]) for name in [*_springs(scene), *sections, *base]]
     found.append(Fault("oil.k", "softer", OIL_LOSS, False))
     for cause, size in (("tip.payload", LOAD * mass), ("line_fill", LOAD * mass / scene.reach)):
         found.append(Fault(cause, "more", size))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import BagError, UsageError
 from ..messages.sample_decoder import LATEST
-from ..types import SECOND
+from ..types import SECOND, Array
 from .headers import TIME_UNITS, is_time
 from .log_table import LogRows, LogTable, Times
 
@@ -118,15 +118,14 @@ def _numbers(table: LogTable, rows: LogRows, cells: Times, header: str, unit: st
         raise BagError(
             f"{table.source}: {header} is in {unit}. Times are in {', '.join(TIME_UNITS)}: give unit in --columns FILE."
         )
-    numbers = _integers(table, rows, cells, header, TIME_UNITS[unit] if unit else SECOND)
-    step = float(np.median(np.diff(numbers))) / SECOND if len(numbers) > 1 else 0.01
     told = unit
     if not unit:
-        seconds = numbers / SECOND
+        values = _values(table, rows, cells, header)
+        step = float(np.median(np.diff(values))) if len(values) > 1 else 0.01
         fitting = [
             u for u, size in TIME_UNITS.items() if u not in ("min", "h") and STEPS[0] <= step * size / SECOND <= STEPS[1]
         ]
-        if "d" in fitting and not EXCEL_DAYS[0] < seconds[0] < EXCEL_DAYS[1]:
+        if "d" in fitting and not EXCEL_DAYS[0] < values[0] < EXCEL_DAYS[1]:
             fitting.remove("d")
         if len(fitting) != 1:
             known = f"may be in {' or '.join(fitting)}" if fitting else "are in no unit that gives 5 to 10 000 rows a second"
@@ -135,8 +134,8 @@ def _numbers(table: LogTable, rows: LogRows, cells: Times, header: str, unit: st
                 "Give time: {column: .., unit: ..} in --columns FILE."
             )
         told = f"{fitting[0]} by their steps"
-        numbers = _integers(table, rows, cells, header, TIME_UNITS[fitting[0]])
         unit = fitting[0]
+    numbers = _integers(table, rows, cells, header, TIME_UNITS[unit])
     first = int(numbers[0])
     if unit == "d" and EXCEL_DAYS[0] * 86_400 < first / SECOND < EXCEL_DAYS[1] * 86_400:
         local = _to_utc(numbers - SINCE_1899, zone)
@@ -148,6 +147,16 @@ def _numbers(table: LogTable, rows: LogRows, cells: Times, header: str, unit: st
             f"{table.source}: {header} goes to {numbers.max() / SECOND:.10g} s: not in {unit}. Give its unit in --columns FILE."
         )
     return TableTimes(numbers, f"{header}: {told}", first > 365 * 86_400 * SECOND)
+
+
+def _values(table: LogTable, rows: LogRows, cells: Times, header: str) -> Array:
+    """Return times as numbers in the unit of the column."""
+    if isinstance(cells, np.ndarray):
+        return cells.astype(np.float64)
+    try:
+        return np.array([float(text.replace(",", ".")) for text in cells])
+    except ValueError:
+        return _integers(table, rows, cells, header, SECOND).astype(np.float64)  # which names the row
 
 
 def _integers(table: LogTable, rows: LogRows, cells: Times, header: str, size: int) -> Stamps:

@@ -179,12 +179,12 @@ def _stable_groups(values: Array) -> tuple[Array, list[Array]]:
 
 
 def _shapes(values: Array, leading: int, frequencies: list[float]) -> list[Array]:
-    """Return, for each frequency, the real shape at all channels of the nearest pole of the highest order."""
+    """Return, for each frequency, the real shape at all channels of the nearest pole."""
     if not frequencies:
         return []
     found, _, _, _, _, shapes = _identified(values, leading, False)
-    at = found[:, -1]
-    picked = [shapes[int(np.nanargmin(np.abs(at - frequency))), -1] for frequency in frequencies]
+    off = [np.where(np.isfinite(found), np.abs(found - frequency), np.inf) for frequency in frequencies]
+    picked = [shapes[np.unravel_index(int(np.argmin(each)), each.shape)] for each in off]
     return [np.real(each / each[np.argmax(np.abs(each))]) for each in picked]
 
 

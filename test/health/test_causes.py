@@ -85,6 +85,12 @@ def test_a_softer_base_is_told_of_scenes_with_an_elastic_one():
     assert "outriggers" in alarm_text(base.channel, base.kind, base.cause)
 
 
+def test_a_boom_of_rigid_sections_has_faults_of_springs_and_loads():
+    rigid = booms.scene_of(booms.document() | {"modes": 0})
+    causes = {fault.cause for fault in possible_faults(rigid)}
+    assert {"cylinder_1.k", "tip.payload"} <= causes and not any(cause.endswith(".EI") for cause in causes)
+
+
 class Follower:
     """A twin whose evidence grows by nats a second that depend on its boom and on the stamp; keeps the changes it is told."""
 

@@ -139,7 +139,14 @@ GROUPED_HEADER = table(
 MATLAB = table(
     ["Time," + ",".join(f"cyl_len_{i}_mm" for i in range(1, 5))], lambda row: f"27-Nov-2026 13:03:{clock(row)}", numbers(), ","
 )
+UNIX = table(
+    ["timestamp," + ",".join(f"cylinder_{i}_mm" for i in range(1, 5))],
+    lambda row: str(AT_14 // 10**6 + 10 * row),
+    numbers(),
+    ",",
+)
 STYLES = {
+    "unix time in ms": (UNIX.encode(), AT_14, []),
     "catman": (CATMAN.encode("utf-16"), 10**9, []),
     "grouped header": (GROUPED_HEADER.encode("cp1252"), 10**9, []),
     "matlab": (MATLAB.encode(), AT_14, ["--timezone", "UTC"]),

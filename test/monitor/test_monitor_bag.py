@@ -70,7 +70,7 @@ def test_rows_are_those_of_the_replay(feed: Feed, replayed: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("reads", list(StrokeReading))
+@pytest.mark.parametrize("reads", [StrokeReading.LENGTH, StrokeReading.DRIVE])
 def test_the_posture_is_that_of_the_drives_whatever_transducers_read(reads: StrokeReading, tmp_path: Path) -> None:
     """Through the twin, and from what a twin published; a result says itself what its strokes are."""
     scene, session, stamps = load_scene(), tmp_path / "session", 10**18 + 5_000_000 * np.arange(100)
