@@ -32,8 +32,11 @@ from .time_window import WHOLE, TimeWindow
 
 def refuse_absent(path: Path) -> None:
     """Raise BagError if there is no file or folder at `path`."""
-    if not (path.is_file() or path.is_dir()):
-        raise BagError(f"{path}: there is no such file or directory. Give a rosbag2 directory or a file of a session.")
+    try:
+        path.stat()
+    except OSError as error:
+        reason = "there is no such file or directory" if isinstance(error, FileNotFoundError) else error.strerror
+        raise BagError(f"{path}: {reason}. Give a rosbag2 directory or a file of a session.") from None
 
 
 def stored_files(path: Path, storage: str = "") -> list[Path]:

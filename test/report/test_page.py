@@ -12,6 +12,7 @@ from page_outline import outline
 
 from boom_twin.texts import alarm_text
 
+SESSION = str(Path(__file__).parents[2] / "bags" / "arch_session")
 TITLES = (
     "Alarms over time",
     "Residuals",
@@ -55,5 +56,5 @@ def test_heights_may_be_given(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("heights", ["0.4,0.3", "a,b,c,d", "0.4,0.3,0.2,0.0", "0.4,0.3,0.2,nan", ""])
 def test_heights_that_are_none(heights: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", "nowhere", "--out", str(tmp_path), "--report", f"--section-height={heights}"]) == 1
+    assert main(["replay", SESSION, "--out", str(tmp_path), "--report", f"--section-height={heights}"]) == 1
     assert "give 4 heights above 0, in m" in capsys.readouterr().err

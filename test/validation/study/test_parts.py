@@ -52,6 +52,6 @@ def test_the_files(found: parts.PartsStudy, two_sections: Scene, tmp_path: Path,
     assert first["edits"].startswith(("sections[", "remove ")) and first["step_time_s"] > 0.0
     text = (out / "parts.md").read_text()
     assert (
-        text.count("\n| ") == len(found.shown) + 2 and "Leave out parts whose error you accept" in text and "surrogate" in text
+        text.count("\n| ") == len(found.shown) + 1 and "Leave out parts whose error you accept" in text and "surrogate" in text
     )
     assert (out / "parts.png").read_bytes()[:4] == b"\x89PNG"
