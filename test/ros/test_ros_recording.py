@@ -112,13 +112,14 @@ def _flat(value: Any) -> Iterator[str]:
 
 
 def test_every_topic_was_recorded(recorded: Path, values: Values) -> None:
-    sent = [topic for stream, topic in TOPICS.inputs.items() if stream is not Stream.FORCES]
+    sent = [topic for stream, topic in TOPICS.inputs.items() if stream not in (Stream.FORCES, Stream.PRESSURES)]
     assert values.keys() == {topic.absolute for topic in [*sent, *TOPICS.outputs.values()]}
     sheet = YAML(typ="safe").load((recorded / "session.yaml").read_text())
     assert {count["topic"]: count["written"] for count in sheet["counts"]} == {
         **{name: len(messages) for name, messages in values.items()},
         TOPICS.events.absolute: 0,
         TOPICS.inputs[Stream.FORCES].absolute: 0,
+        TOPICS.inputs[Stream.PRESSURES].absolute: 0,
     }
     assert len(list(recorded.glob("*.mcap"))) >= 3
     assert sheet["scene"] == default_text() + "# a copy\n"  # as the node told it
@@ -171,7 +172,9 @@ def left_out(recorded: Path) -> set[Output]:
 
 def test_a_replay_gives_what_the_node_published(recorded: Path, bag: Path, tmp_path: Path) -> None:
     """Of all samples as they were sent, and what was asked of the node."""
-    inputs = {topic.absolute: stream for stream, topic in TOPICS.inputs.items() if stream is not Stream.FORCES}  # none is sent
+    inputs = {
+        topic.absolute: stream for stream, topic in TOPICS.inputs.items() if stream not in (Stream.FORCES, Stream.PRESSURES)
+    }  # none is sent
     topic = TOPICS.outputs[Output.CHANGES]
     changes = {stamp_of(msg): data for *_, data, msg in read_both(scan(recorded), {topic.absolute: topic.type})}
     with SessionWriter(tmp_path / "bag", TOPICS.inputs | {Output.CHANGES: topic}) as writer:
