@@ -31,7 +31,7 @@ from demo.isolation import isolated
 SETTLING = 100.0
 """Time (s) before memory is looked at: windows of residuals, loads and alarms fill up to a minute and a half from the start."""
 LARGEST = 6.0
-"""MB. It was 1 MB. Naming a fault makes further twins, which took 2.8 MB here; whether memory leaks beside it is not known yet."""
+"""MB. It was 1 MB. Naming a fault makes further twins, which took 2.8 MB; whether memory leaks beside it is not known yet."""
 PIECE, BACKLOGS = 10.0, 2
 """Time (s) over which a rise is taken, and how many of these are left out."""
 LINES = 100
