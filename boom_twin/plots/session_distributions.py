@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.column_statistics import ColumnStatistics
-from ..analysis.even_times import spacing, unbroken
+from ..analysis.even_times import power_density, spacing, unbroken
 from ..types import Array
 from .history import Density, History, ResidualDistribution, SessionDistributions
 
@@ -98,9 +98,7 @@ def _mean(one: Density, other: Density) -> Density:
 
 
 def density(stamps: Array, values: Array, interval: float = 0.0) -> Density:
-    """Return the one-sided power spectral density of `values` (k,) by Welch's method with a Hann window and half overlap.
-
-    Values are interpolated to even times, also across NaN. ``scipy.signal`` has this too, but takes half a second to import.
+    """Return the one-sided power spectral density of `values` (k,), interpolated to even times, also across NaN.
 
     These are `interval` (s) apart; 0: as far as the `stamps` (k,) usually are.
     """
@@ -110,11 +108,5 @@ def density(stamps: Array, values: Array, interval: float = 0.0) -> Density:
     interval = interval or spacing(stamps[known])
     even = np.arange(stamps[known][0], stamps[known][-1], interval)
     segment = min(len(even), round(SEGMENT / interval))
-    parts = np.lib.stride_tricks.sliding_window_view(np.interp(even, stamps[known], values[known]), segment)
-    parts = parts[:: segment - segment // 2]
-    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(segment) / segment)
-    lines = np.fft.rfft(window * (parts - parts.mean(axis=1, keepdims=True)), axis=1)[:, 1:]
-    power = 2.0 * interval * np.square(np.abs(lines)).mean(axis=0) / np.square(window).sum()
-    if segment % 2 == 0:
-        power[-1] *= 0.5  # the highest line has no twin at a negative frequency
-    return Density(np.asarray(np.fft.rfftfreq(segment, interval)[1:]), power, interval, len(parts))
+    frequencies, power, count = power_density(np.interp(even, stamps[known], values[known]), interval, segment)
+    return Density(frequencies[1:], power[1:], interval, count)

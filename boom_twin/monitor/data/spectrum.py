@@ -7,9 +7,9 @@ from math import isfinite, nan, pi
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks, hilbert, periodogram, welch
+from scipy.signal import find_peaks, hilbert, periodogram
 
-from ...analysis.even_times import spacing
+from ...analysis.even_times import power_density, spacing
 from ...types import Array
 
 SPECTRUM_SPAN = 40.0
@@ -55,7 +55,7 @@ def spectrum(times: Array, values: Array) -> Spectrum | None:
     even = times[0] + np.arange(round((times[-1] - times[0]) * rate) + 1) / rate
     values = np.stack([np.interp(even, times, column) for column in values.T], axis=1)
     length = min(round(SEGMENT * rate), len(even))
-    frequencies, densities = welch(values, rate, "hann", length, detrend="constant", axis=0)
+    frequencies, densities, _ = power_density(values, 1.0 / rate, length)
     peaks = tuple(sorted(_peaks(frequencies, densities.sum(axis=1), values, rate), key=lambda peak: peak.frequency))
     return Spectrum(frequencies, densities, peaks)
 
