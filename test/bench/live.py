@@ -47,7 +47,6 @@ from demo.isolation import isolated
 
 from boom_twin import load_scene, statics
 from boom_twin.messages.cdr_decoder import stamp_in
-from boom_twin.scene.kinematics import strokes_of_posture
 
 OUT = {
     "tip/position": PointStamped,
@@ -119,10 +118,9 @@ def source(rate_text: str, duration_text: str, *more: str) -> None:
             raise SystemExit("nobody listens")
         time.sleep(0.1)
     time.sleep(1.0)
-    random, rest = np.random.default_rng(1), strokes_of_posture(scene, "arch")
-    angles = statics(scene, "arch").joints
+    random, rest = np.random.default_rng(1), statics(scene, "arch")
     templates = []
-    for kind, values, sigma in (("cylinder", rest, 2e-5), ("joint", angles, 1.7e-4)):
+    for kind, values, sigma in (("cylinder", rest.lengths, 2e-5), ("joint", rest.joints, 1.7e-4)):
         msg = JointState(name=[f"{kind}_{i}" for i in range(1, 5)])
         rows = values + random.normal(0.0, sigma, (200, 4))
         for row in rows:
