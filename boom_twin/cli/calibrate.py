@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .. import __version__
-from ..errors import UsageError
+from ..errors import BoomTwinError, UsageError
 from ..offline.progress import progress_of
 from .arguments import add_json, add_mapping, add_params, add_session_scene, add_window, files_of, window_of
 from .output import open_session_scene, open_session_settings, print_result, warn, warn_incomplete
@@ -43,7 +43,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """Run the calibration, write the scene and print the result."""
+    """Run the calibration, write the scene and print the result; exit code 1 if it must not be used."""
     from ..bag.reader import scan
     from ..calibration.output import as_object, as_text, mapping_path, refuse_overwriting, write_mapping, write_scene
     from ..calibration.run import Choice, calibrate
@@ -70,6 +70,8 @@ def run(args: Namespace) -> int:
     print_result(args.json, as_object(found) | {"wall_s": wall, "files": written}, [*as_text(found), f"{wall:.1f} s", *written])
     for bag in args.bags:
         warn_incomplete(scan(Path(bag)))
+    if found.unusable:
+        raise BoomTwinError(f"{args.out}: {found.unusable}")
     return 0
 
 

@@ -198,10 +198,10 @@ def _check_earlier(folder: Path, kind: ResultKind) -> None:
         return
     if not kind.is_replaced:
         raise BagError(f"{folder}: holds {entries[0]} already, and nothing is written over. Choose a new folder.")
-    remedy = f"Choose a new folder, or move it away: only an earlier {kind.command} is replaced, and as it was written"
+    remedy = f"Choose a new folder, or move it away: only an earlier result of this command is replaced, as it was written"
     command, listed = _manifest(folder)
     if command != kind.command or listed is None:
-        raise BagError(f"{folder}: holds {entries[0]}, and no manifest of a {kind.command} (0.1.0 wrote none). {remedy}.")
+        raise BagError(f"{folder}: holds {entries[0]}, and no manifest of `boom_twin {kind.command}`. {remedy}.")
     own = {name for name in listed if kind.has(name)}  # a manifest may come with a recording, and say anything
     folders = set(_folders(*own))
     for name in entries:
@@ -278,12 +278,12 @@ def _check_left(building: Path, kind: ResultKind) -> None:
     entries = _entries(building)
     remedy = "Move it away, or choose another folder: results are built there"
     if entries and entries != [UNFINISHED] and _note(building / UNFINISHED)[0] != kind.command:
-        raise BagError(f"{building}: holds {entries[0]}, and no unfinished {kind.command} left it. {remedy}.")
+        raise BagError(f"{building}: holds {entries[0]}, and no `boom_twin {kind.command}` left it. {remedy}.")
     for name in entries:
         if not (kind.has(name) or name in (*_folders(*kind.files), MANIFEST, UNFINISHED)):
             raise BagError(f"{building}: holds {name}, which {kind.command} does not write. {remedy}.")
     if not kind.is_replaced and MANIFEST in entries:
-        raise BagError(f"{building}: holds a whole result of an earlier {kind.command}. Rename it, or choose another folder.")
+        raise BagError(f"{building}: holds a whole result of `boom_twin {kind.command}`. Rename it, or choose another folder.")
 
 
 def _remove(folder: Path, names: Sequence[str]) -> None:

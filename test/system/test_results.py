@@ -206,7 +206,7 @@ def test_a_session_that_could_not_be_put_in_place_is_not_thrown_away(tmp_path: P
         (building.folder / "session_0.mcap").write_text("saved")
         recording(tmp_path / "out")
     (tmp_path / "out").rename(tmp_path / "moved")
-    with pytest.raises(BagError, match=r"out\.unfinished: holds a whole result of an earlier recover.*Rename it"):
+    with pytest.raises(BagError, match=r"out\.unfinished: holds a whole result of `boom_twin recover`.*Rename it"):
         build(tmp_path / "out", RECOVER, name="session_0.mcap")
     (tmp_path / "out.unfinished").rename(tmp_path / "saved")
     assert (tmp_path / "saved" / "session_0.mcap").read_text() == "saved" and not incompleteness(tmp_path / "saved")

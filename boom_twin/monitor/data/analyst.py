@@ -100,7 +100,7 @@ def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
 
 
 UNKNOWN_SCENE = TipResponses(trouble="the model is not known: give --scene")
-UNKNOWN_POSTURE = TipResponses(trouble="the strokes are not known yet")
+UNKNOWN_POSTURE = TipResponses(trouble="the posture is not known yet")
 KNOWN_SHARE = 0.9
 """Share of the rows of a signal that must have a value."""
 MODE_DISTANCE = 0.2

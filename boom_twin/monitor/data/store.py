@@ -9,7 +9,7 @@ from operator import itemgetter
 import numpy as np
 from numpy.typing import NDArray
 
-from ...types import NANO
+from ...types import NANO, Stream
 from .received_messages import MalformedError
 from .status import AlarmList, StatusTable
 
@@ -73,6 +73,7 @@ class Store:
 
     def __init__(self, capacity: int, keeps_statuses: bool = False) -> None:
         self._capacity, self._keeps_statuses = capacity, keeps_statuses
+        self.driven_by = Stream.STROKES  # stream whose samples the model follows
         self.generation = 0  # incremented when a clock set back deletes all rows
         self.epoch = self._before = 0  # first stamp (ns), origin of times; the one before all rows were deleted
         self.newest = 0.0  # newest time of all tables, s
@@ -133,7 +134,7 @@ class Store:
             self.tables[name] = Table(name, columns, self._capacity)
         table, time = self.tables[name], self.time(stamp)
         if name == EVERY_STROKE and table.count and time - table.newest > GAP:
-            self.alarms.add_gap("cylinder_strokes", table.newest, time)
+            self.alarms.add_gap(self.driven_by.value, table.newest, time)
         table.append(time, values)
         self.newest = max(self.newest, time)
 

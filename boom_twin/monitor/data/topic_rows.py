@@ -117,6 +117,7 @@ class TopicRows:
 
     def __init__(self, store: Store, topics: Topics) -> None:
         self._store, self._decoder = store, SampleDecoder(1, topics)
+        store.driven_by = topics.stroke_reading.stream
         self.dropped = DroppedMessages()
         self._forces_felt, self._estimates = PartsOfRows((COMPARED, Output.RESIDUALS)), PartsOfRows(JOINED)
         self._forces: list[float] = []
