@@ -216,10 +216,7 @@ def _calibrated(task: SessionTask, scene: Scene, settings: Settings, window: Tim
         found = calibrate([task.session], scene, None, settings, task.mapping, window=window)
     except BoomTwinError as error:
         return {"calibration_reason": str(error).replace("\n", " ")}
-    row: Row = {
-        "calibration_misfit": found.misfit,
-        "calibration_remarks": "; ".join([*found.remarks, *([found.unusable] if found.unusable else [])]),
-    }
+    row: Row = {"calibration_misfit": found.misfit, "calibration_remarks": "; ".join(found.remarks)}
     for estimate in found.estimates:
         if estimate.told:
             name = f"calibrated_{estimate.unknown.name}"

@@ -150,7 +150,6 @@ def as_text(found: Calibration) -> list[str]:
         *lines,
         f"fit: innovations at most {found.misfit:.2f} times as large as noise explains, {found.passes} passes",
         *found.remarks,
-        *([found.unusable] if found.unusable else []),
     ]
 
 
@@ -184,7 +183,7 @@ def as_object(found: Calibration) -> dict[str, Any]:
         "held_out": found.held_out,
         "misfit": found.misfit,
         "passes": found.passes,
-        "remarks": [*found.remarks, *([found.unusable] if found.unusable else [])],
+        "remarks": list(found.remarks),
     }
 
 

@@ -87,7 +87,7 @@ class Calibration:
     remarks : tuple of str
         What a reader should know.
     unusable : str
-        Reason why the result must not be used; empty if it may be.
+        The remark that the result must not be used; empty if it may be.
     """
 
     scene: Scene
@@ -173,7 +173,8 @@ def calibrate(
     after = judged(better, rigging, sessions[-1], zeros, kept_from)
     progress(1.0, "done")
     held_out = sessions[-1].name if len(sessions) > 1 else f"the last third of {sessions[-1].name}"
-    remarks, unusable = tuple(_remarks(fit, problem.names, estimates, sessions)), _worse(before, after)
+    unusable = _worse(before, after)
+    remarks = (*_remarks(fit, problem.names, estimates, sessions), *([unusable] if unusable else []))
     misfit, judgements = float(fit.misfits.max()), (held_out, before, after, mapped, remarks, unusable)
     return Calibration(better, zeros, estimates, tuple(groups), misfit, fit.passes, tuple(sessions), *judgements)
 

@@ -198,7 +198,7 @@ def _check_earlier(folder: Path, kind: ResultKind) -> None:
         return
     if not kind.is_replaced:
         raise BagError(f"{folder}: holds {entries[0]} already, and nothing is written over. Choose a new folder.")
-    remedy = f"Choose a new folder, or move it away: only an earlier result of this command is replaced, as it was written"
+    remedy = "Choose a new folder, or move it away: only an earlier result of this command is replaced, as it was written"
     command, listed = _manifest(folder)
     if command != kind.command or listed is None:
         raise BagError(f"{folder}: holds {entries[0]}, and no manifest of `boom_twin {kind.command}`. {remedy}.")
