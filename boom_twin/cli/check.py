@@ -25,8 +25,7 @@ from .output import columns, open_scene, print_result, tell
 if TYPE_CHECKING:
     from ..deviation.accuracy import TipAccuracy
 
-PNG = b"\x89PNG"
-"""First bytes of a picture; only such a file is replaced."""
+PNG = b"\x89PNG"  # first bytes of a picture; only such a file is replaced
 SIZE_A = "angle of the section, cylinder force"
 SIZE_B = "angles of section and two links, pin force (2), cylinder force"
 

@@ -29,8 +29,7 @@ QUESTIONS: tuple[tuple[Place, str | None], ...] = (
     (("damping_ratio",), "0.01"),
 )
 """Keys of the table that are no section's or joint's, with their defaults."""
-KEPT = ".table.yaml"
-"""How the name of the file ends that keeps the answers, beside the scene."""
+KEPT = ".table.yaml"  # how the name of the file ends that keeps the answers, beside the scene
 
 
 def add_arguments(parser: ArgumentParser) -> None:

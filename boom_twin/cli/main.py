@@ -102,8 +102,7 @@ COLLECT_AFTER = 100_000
 
 DESCRIPTION = "Digital twin of a concrete placing boom."
 EXIT_CODES = "exit codes: 0 done, 1 the input or the run failed (the reason is on stderr), 2 usage"
-COMPLETING = "_ARGCOMPLETE"
-"""Set in the environment by a shell that asks for completions."""
+COMPLETING = "_ARGCOMPLETE"  # set in the environment by a shell that asks for completions
 
 
 class CommandParser(ArgumentParser):

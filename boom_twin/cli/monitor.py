@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 
 ACTS = ("mark", "acknowledge", "acknowledge-at-node", "record")
-NICE = 5
-"""Nice value of the monitor, by which it gives way to the node on the same machine."""
+NICE = 5  # nice value of the monitor, by which it gives way to the node on the same machine
 
 
 def add_arguments(parser: ArgumentParser) -> None:

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from ..bag.recovery.recover import Recovery
 
 
-SHOWN = 20
-"""Faults that are printed one by one."""
+SHOWN = 20  # faults that are printed one by one
 
 
 def add_arguments(parser: ArgumentParser) -> None:

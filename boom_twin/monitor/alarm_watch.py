@@ -10,8 +10,7 @@ from ..types import SECOND
 from .data.feed import Feed
 from .data.status import ListedAlarm
 
-BEGIN, CAUSE, END = "begin", "cause", "end"
-"""Kinds of changes."""
+BEGIN, CAUSE, END = "begin", "cause", "end"  # kinds of changes
 MICRO = 1000  # ns
 
 

@@ -21,12 +21,9 @@ from ..system.terminal_text import printable
 from .access_control import POLICY
 
 LOG = logging.getLogger("boom_twin.monitor.connections")
-REQUEST_TIME = 5.0
-"""Timeout (s) of a connection's first complete request, and of each further one."""
-LOGGED_LENGTH = 200
-"""Largest length of a logged error message."""
-MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64
-"""Largest number of silent or accepted connections: in total, and of one address."""
+REQUEST_TIME = 5.0  # timeout (s) of a connection's first complete request, and of each further one
+LOGGED_LENGTH = 200  # largest length of a logged error message
+MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64  # largest number of silent or accepted connections: in total, and of one address
 
 
 class Connections:
@@ -140,10 +137,8 @@ class Connection(web.RequestHandler):
             self._deadline = None
 
 
-LOG_PERIOD = 10.0
-"""Period (s) of the log's rate limit."""
-MAX_LOG_LINES = 3
-"""Largest number of records of one logger in a `LOG_PERIOD`."""
+LOG_PERIOD = 10.0  # period (s) of the log's rate limit
+MAX_LOG_LINES = 3  # largest number of records of one logger in a `LOG_PERIOD`
 
 
 class LogRateLimit(logging.Filter):

@@ -28,12 +28,9 @@ from .data.store import Store
 from .server import Server
 from .serving import serving
 
-CAPACITY = 150_000
-"""Rows kept of every table: twelve minutes at 200 Hz."""
-MOST_WAITING = 20_000
-"""Largest number of waiting samples; beyond it the oldest are dropped."""
-MOST_AT_ONCE = 200
-"""Largest number of samples in one poll, so that pages are served."""
+CAPACITY = 150_000  # rows kept of every table: twelve minutes at 200 Hz
+MOST_WAITING = 20_000  # largest number of waiting samples; beyond it the oldest are dropped
+MOST_AT_ONCE = 200  # largest number of samples in one poll, so that pages are served
 
 
 class SourceFeed(Feed):

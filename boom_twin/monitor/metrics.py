@@ -18,8 +18,7 @@ from .data.status import LEVELS, SILENCE, StatusLamp
 from .data.store import EVERY_STROKE, Table
 from .data.topic_rows import COMPARED, ESTIMATE, ESTIMATE_COLUMNS, RESIDUALS
 
-WINDOW = 10.0
-"""Window (s) of the root mean square of residuals."""
+WINDOW = 10.0  # window (s) of the root mean square of residuals
 AXES = ("x", "z")
 REMEDY = 'prometheus_client is not installed, and /metrics needs it. Run `pip install "boom_twin[monitor]"`.'
 

@@ -23,16 +23,11 @@ from .webhook import Webhook
 
 PAGE = Path(__file__).parent / "page"
 MAX_VIEWERS = 16
-MAX_REQUEST_BYTES = 4096
-"""Largest request of a page, bytes."""
-POLL_PERIOD = 1.0 / 60.0
-"""Seconds between two polls of the feed."""
-PEAK_PERIOD = 10.0
-"""Seconds between two spectra of a live session while no page is open."""
-ALARM_PERIOD = 1.0
-"""Seconds between two looks for changes of alarms."""
-HEARTBEAT = 60.0
-"""Seconds without an answer after which the connection of a viewer is closed."""
+MAX_REQUEST_BYTES = 4096  # largest request of a page, bytes
+POLL_PERIOD = 1.0 / 60.0  # seconds between two polls of the feed
+PEAK_PERIOD = 10.0  # seconds between two spectra of a live session while no page is open
+ALARM_PERIOD = 1.0  # seconds between two looks for changes of alarms
+HEARTBEAT = 60.0  # seconds without an answer after which the connection of a viewer is closed
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 

@@ -15,8 +15,7 @@ from .access_control import AccessControl, in_address
 from .connections import Connections
 from .server import Server
 
-BACKLOG = 128
-"""Connections that may wait to be accepted; the kernel refuses more."""
+BACKLOG = 128  # connections that may wait to be accepted; the kernel refuses more
 
 
 @asynccontextmanager

@@ -21,20 +21,14 @@ from .data.feed import Feed, Playback, SessionList
 from .data.store import Table
 from .protocol import ROWS, alarms, dump, layout, pack, state
 
-PERIOD = 1.0 / 30.0
-"""Seconds between two messages of rows."""
+PERIOD = 1.0 / 30.0  # seconds between two messages of rows
 STATE_PERIOD = 0.5
 SPECTRUM_PERIOD = 1.0
-CHUNK = 8000
-"""Largest number of rows in a block."""
-BEHIND = 5.0
-"""Largest delay (s) of a page; beyond it, older rows are skipped."""
-HISTORY = 600.0
-"""Seconds of data that a page gets when it opens or seeks."""
-NEWEST_ROW_ONLY = "shape"
-"""Table of which only the newest row is sent."""
-MAX_REQUESTS = 40
-"""Largest number of requests of a page in a second."""
+CHUNK = 8000  # largest number of rows in a block
+BEHIND = 5.0  # largest delay (s) of a page; beyond it, older rows are skipped
+HISTORY = 600.0  # seconds of data that a page gets when it opens or seeks
+NEWEST_ROW_ONLY = "shape"  # table of which only the newest row is sent
+MAX_REQUESTS = 40  # largest number of requests of a page in a second
 
 
 class Viewer:

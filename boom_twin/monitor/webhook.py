@@ -16,14 +16,10 @@ from aiohttp import ClientError, ClientSession, ClientTimeout
 from ..errors import UsageError
 
 LOG = logging.getLogger("boom_twin.monitor.webhook")
-MAX_WAITING = 100
-"""Largest number of waiting messages; one more replaces the oldest."""
-PAUSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-"""Pauses (s) before further attempts."""
-POST_TIME = 10.0
-"""Timeout (s) of one attempt."""
-CLOSING_TIME = 2.0
-"""Time (s) for waiting messages when the monitor ends."""
+MAX_WAITING = 100  # largest number of waiting messages; one more replaces the oldest
+PAUSES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # pauses (s) before further attempts
+POST_TIME = 10.0  # timeout (s) of one attempt
+CLOSING_TIME = 2.0  # time (s) for waiting messages when the monitor ends
 TRY_AGAIN = (HTTPStatus.REQUEST_TIMEOUT, HTTPStatus.TOO_EARLY, HTTPStatus.TOO_MANY_REQUESTS)
 """Status codes below 500 after which another attempt may succeed."""
 

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
 ENLARGED_SPAN = 6.0  # s shown enlarged
 TRUTH: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (3, 4))}
-COLOURS = (BLUE, ORANGE)
-"""Of x and y. A prediction is a broad pale line, an estimate a thin dark one over it."""
+COLOURS = (BLUE, ORANGE)  # of x and y; a prediction is a broad pale line, an estimate a thin dark one over it
 BROAD: dict[str, Any] = {"linewidth": 3.2, "alpha": 0.4}
 BAND = 2.0  # standard deviations that are shaded, as their label says
 

@@ -39,8 +39,7 @@ SIGNALS = (
     PREDICTION,
 )
 """The best first: the prediction knows nothing of what shakes the boom."""
-RESPONSE_FREQUENCIES = np.geomspace(0.25, 30.0, 400)
-"""Frequencies of the responses, Hz."""
+RESPONSE_FREQUENCIES = np.geomspace(0.25, 30.0, 400)  # frequencies of the responses, Hz
 MILLIMETRE = 1e-3
 
 
@@ -74,10 +73,8 @@ class ResponseList(PresentPosture[TipResponses]):
         return TipResponses(names, RESPONSE_FREQUENCIES, np.column_stack(columns), rates_to_avoid(columns[0]))
 
 
-PUMP_RATES = np.linspace(0.2, 1.2, 201)
-"""Rates of a pump, Hz."""
-HARMONICS = np.arange(1, 16, 2)
-"""Harmonics of pump pulses that are on for half a period; there are no even ones."""
+PUMP_RATES = np.linspace(0.2, 1.2, 201)  # rates of a pump, Hz
+HARMONICS = np.arange(1, 16, 2)  # harmonics of pump pulses that are on for half a period; there are no even ones
 
 
 def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
@@ -101,10 +98,8 @@ def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
 
 UNKNOWN_SCENE = TipResponses(trouble="the model is not known: give --scene")
 UNKNOWN_POSTURE = TipResponses(trouble="the posture is not known yet")
-KNOWN_SHARE = 0.9
-"""Share of the rows of a signal that must have a value."""
-MODE_DISTANCE = 0.2
-"""Relative distance up to which a peak is taken for a mode of the model."""
+KNOWN_SHARE = 0.9  # share of the rows of a signal that must have a value
+MODE_DISTANCE = 0.2  # relative distance up to which a peak is taken for a mode of the model
 
 
 class Analyst:

@@ -31,13 +31,10 @@ from ...types import NANO
 from .feed import Feed
 from .store import Store
 
-DIAGNOSIS_PERIOD = 1.0
-"""Seconds between two diagnoses of the twin, as of the node."""
-PUBLISHED_OUTPUT = Output.TIP_ACCELERATION
-"""A session with this output is shown as its node published it."""
+DIAGNOSIS_PERIOD = 1.0  # seconds between two diagnoses of the twin, as of the node
+PUBLISHED_OUTPUT = Output.TIP_ACCELERATION  # A session with this output is shown as its node published it
 COMPILING = "compiling the model (up to a minute the first time)"
-READING_TIME = 0.04
-"""Seconds of reading at a time, after which the pages have their turn."""
+READING_TIME = 0.04  # seconds of reading at a time, after which the pages have their turn
 
 
 class BagFeed(Feed):

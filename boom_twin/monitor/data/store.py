@@ -13,8 +13,7 @@ from ...types import NANO, Stream
 from .received_messages import MalformedError
 from .status import AlarmList, StatusTable
 
-FIRST_ROOM = 1024
-"""Initial capacity of a table, rows."""
+FIRST_ROOM = 1024  # initial capacity of a table, rows
 Rows = tuple[NDArray[np.float64], NDArray[np.float32]]
 
 
@@ -58,12 +57,10 @@ class Table:
         return self._times[places], self._values[places]
 
 
-MAX_STATUSES = 100_000
-"""Largest number of kept states of the lamps, about a day."""
+MAX_STATUSES = 100_000  # largest number of kept states of the lamps, about a day
 SET_BACK = 1_000_000_000
 """Threshold (ns) of a backward jump: beyond it the clock may have been set back, else the stamp is out of order."""
-LEAP_AHEAD = 60_000_000_000
-"""Threshold (ns) of a forward jump that may be an outlier. Rows of a table are closer together."""
+LEAP_AHEAD = 60_000_000_000  # threshold (ns) of a forward jump that may be an outlier; rows of a table are closer together
 EVERY_STROKE, GAP = "displacement", 0.1
 """Table with a row for every stroke sample; pause (s) between its rows that raises an alarm."""
 

@@ -31,20 +31,15 @@ from .received_messages import (
 from .status import MAX_NODES, Severity
 from .store import Store
 
-MAX_BYTES = 1_000_000
-"""Bytes of an encoded message; a longer one is not decoded."""
+MAX_BYTES = 1_000_000  # bytes of an encoded message; a longer one is not decoded
 MAX_STATUSES, MAX_CAUSES, MAX_MARKERS = 500, 100, 500
 """Statuses or alarms of one message, causes of one alarm, markers of one shape."""
-MAX_COLUMNS = 1000
-"""Numbers of one row; a boom of nine sections has some two hundred."""
-MAX_WAITING = 1000
-"""Stamps of which parts may wait for the others."""
-COMPARED = Stream.IMU
-"""The stream whose readings are shown beside the predicted ones; of all others the residuals are."""
+MAX_COLUMNS = 1000  # numbers of one row; a boom of nine sections has some two hundred
+MAX_WAITING = 1000  # stamps of which parts may wait for the others
+COMPARED = Stream.IMU  # the stream whose readings are shown beside the predicted ones; of all others the residuals are
 RESIDUALS = {stream: "joints" if stream is Stream.ANGLES else stream.value for stream in Stream if stream is not COMPARED}
 """Names of the tables of residuals."""
-NO_MEASUREMENT = "no measurement"
-"""Oddity of `SampleDecoder` that is no fault here: an Imu states that it has no measurement."""
+NO_MEASUREMENT = "no measurement"  # oddity of `SampleDecoder` that is no fault here: an Imu states that it has no measurement
 PLANE, ACCELERATION = ("x_m", "z_m"), ("x_m_s2", "z_m_s2")
 ESTIMATE = "estimate"
 ESTIMATE_COLUMNS = (

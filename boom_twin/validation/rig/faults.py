@@ -197,8 +197,7 @@ def check(faults: Sequence[RigFault], scene: Scene, duration: float) -> None:
             )
 
 
-_MOST = {"late": 10.0, "noisy": 1000.0, "scale": 1.0}
-"""Largest sizes that are the same for all booms; a delay in s."""
+_MOST = {"late": 10.0, "noisy": 1000.0, "scale": 1.0}  # largest sizes that are the same for all booms; a delay in s
 MOST_ANGLE, MOST_FORCE = 1.0, 1e6  # rad, N; bias, spikes, and drift in a second
 
 

@@ -81,8 +81,7 @@ class Programme:
         return sorted((move for move in self.moves if move.cylinder == cylinder), key=lambda move: move.start)
 
 
-BUNDLED_DURATION = 60.0
-"""Seconds of the bundled session."""
+BUNDLED_DURATION = 60.0  # seconds of the bundled session
 
 BUNDLED_MOVES = (
     Move(0, 3.0, 1.5, 0.665),

@@ -15,8 +15,7 @@ from ...errors import UsageError
 from ...types import SECOND, Array
 
 RATE = 200.0  # Hz
-RATES = 50.0, 1000.0
-"""Hz: jitter reaches half the time between two samples at 2500 Hz, and a motion is recorded at 1000 Hz."""
+RATES = 50.0, 1000.0  # Hz: jitter reaches half the time between two samples at 2500 Hz, and a motion is recorded at 1000 Hz
 
 
 @dataclass(frozen=True, slots=True)

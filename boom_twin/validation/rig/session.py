@@ -23,8 +23,7 @@ from .exudyn.solve import SITE, Change, Drive, TipLoad, simulate
 from .exudyn.system import Site
 from .sensors import Sensors, read, sampling_stamps, specific_force
 
-EPOCH = 1_700_000_000 * SECOND
-"""Stamp (ns) of the start of every session."""
+EPOCH = 1_700_000_000 * SECOND  # stamp (ns) of the start of every session
 POINT_PERIOD = 1.0  # s, of a total station
 BACK_PRESSURE = 1e6  # Pa
 

@@ -84,11 +84,9 @@ def _tangent(residual: Any, state: Array, moving: int) -> Array:
     return columns
 
 
-Drive = Callable[[Array], tuple[Array, Array]]
-"""Times (m,) in s -> absolute strokes (m, n) in m and their rates (m, n) in m/s."""
+Drive = Callable[[Array], tuple[Array, Array]]  # times (m,) in s -> absolute strokes (m, n) in m and their rates (m, n) in m/s
 
-TipLoad = Callable[[Array], Array]
-"""Times (m,) in s -> external force at the tip (m, 2) in N, in the base's axes; 0 at t = 0."""
+TipLoad = Callable[[Array], Array]  # times (m,) in s -> external force at the tip (m, 2) in N, in the base's axes; 0 at t = 0
 
 Change = tuple[Scene, Callable[[Array], Array]]
 """A scene that differs in stiffnesses or masses only; times (m,) in s -> share (m,) of the difference, 0 at t = 0."""

@@ -44,39 +44,21 @@ class Scheme:
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """Computing time and Newton passes of a motion.
+    """Computing time and Newton passes of a motion."""
 
-    Attributes
-    ----------
-    seconds : float
-        CPU time of Exudyn's stepping alone.
-    passes, tangents : int
-        Newton passes, and tangents made.
-    """
-
-    seconds: float
-    passes: int
-    tangents: int
+    seconds: float  # CPU time of Exudyn's stepping alone
+    passes: int  # of Newton's method
+    tangents: int  # made
 
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """Inputs to a boom in count + 1 rows, one for the start and one for every step.
+    """Inputs to a boom in count + 1 rows, one for the start and one for every step."""
 
-    Attributes
-    ----------
-    strokes, rates : ndarray, shape (count + 1, n)
-        m, m/s.
-    load : ndarray, shape (count + 1, 2), or None
-        External force at the tip, N, in the base's axes; at the start it is 0.
-    changes : ParameterChanges
-        Of stiffnesses and masses.
-    """
-
-    strokes: Array
-    rates: Array
-    load: Array | None
-    changes: ParameterChanges
+    strokes: Array  # (count + 1, n), m
+    rates: Array  # (count + 1, n), m/s
+    load: Array | None  # (count + 1, 2), external force at the tip, N, in the base's axes; at the start it is 0
+    changes: ParameterChanges  # of stiffnesses and masses
 
 
 def step_through(boom: Boom, course: Course, step: float, output_step: float, scheme: Scheme) -> Effort:
