@@ -23,23 +23,11 @@ FEW = 3  # passes with a kept tangent, below which tangents are many
 
 @dataclass(frozen=True, slots=True)
 class Scheme:
-    """Generalised-alpha with Newton's method.
+    """Generalised-alpha with Newton's method."""
 
-    Attributes
-    ----------
-    rho : float
-        Spectral radius at infinite frequency.
-    kept : int
-        Passes that a step may take with the tangent of earlier steps (Exudyn's modified Newton) before it is made anew;
-        0 makes it in every pass, 9 is Exudyn's own choice.
-    tolerance : float
-        Of a step, relative to its residual without accelerations and constraint forces; Exudyn's rounding allows no less
-        than 1e-6.
-    """
-
-    rho: float = 0.8
-    kept: int = 9
-    tolerance: float = 1e-6
+    rho: float = 0.8  # spectral radius at infinite frequency
+    kept: int = 9  # passes with the tangent of earlier steps before it is made anew; 0: anew in each, 9: Exudyn's choice
+    tolerance: float = 1e-6  # of a step, relative to its residual without accelerations and constraint forces; 1e-6 at least
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,11 +94,7 @@ def _settings(count: int, step: float, output_step: float, scheme: Scheme) -> An
 
 
 def _feed(boom: Boom, course: Course, step: float) -> None:
-    """Hand the moving drives, before every step, their lengths without force at its end.
-
-    All drives get those of the start at once. Pins with play note then whether they touch. Load and changed parameters are
-    those of the step's end, too.
-    """
+    """Hand the moving drives, before every step, their lengths without force at its end, and load and parameters there."""
     rests = [_rests(boom, i, course) for i in range(len(boom.drives))]
     moving = [(*drive, rest) for drive, rest in zip(boom.drives, rests, strict=True) if min(rest) < max(rest)]
     oils = [(drive[0], _stiffness(boom, i, course).tolist()) for i, drive in enumerate(boom.drives) if _cylinder(boom, i).oil]

@@ -130,15 +130,7 @@ TURNS, QUICK_TURNS = 5, 2  # runs of each program at the same step
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None) -> list[Path]:
-    """Run all cases on a motion of `scene`; write ``error.json``, ``error.md`` and pictures into `out`; return the paths.
-
-    Parameters
-    ----------
-    quick : bool
-        Run few cases on a short motion.
-    posture : str, optional
-        Start of the motion, see `motion_of`.
-    """
+    """Run all cases on a motion of `scene` from `posture`; write error.json, error.md and pictures; return the paths."""
     problem = pose(scene, motion_of(scene, posture, QUICK_DURATION if quick else DURATION), quick)
     cases: list[Case] = [*own_cases(scene, quick), *(peer_cases(quick) if problem.exudyn else ())]
     runner, rounds = Runner(problem), 1 if quick else ROUNDS

@@ -29,16 +29,9 @@ MEANINGS = {
 
 
 def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = None, soak: bool = False) -> list[Path]:
-    """Run the study; write stability.json, stability.md and stability.png into `out`; returns their paths.
+    """Run the study on motions from `posture`; write stability.json, stability.md and stability.png; return their paths.
 
-    Parameters
-    ----------
-    quick : bool
-        A subset of the cases.
-    posture : str, optional
-        Where motions of the scene start.
-    soak : bool
-        The holds of 24 simulated hours as well, by the default method.
+    `quick`: a subset of the cases. `soak`: the holds of 24 simulated hours as well, by the default method.
     """
     if posture is not None:
         scene = scene.model_copy(update={"postures": {posture: section_angles(scene, posture)}})

@@ -75,13 +75,7 @@ def one(case: Case, methods: dict[str, Method]) -> CaseResult:
 
 
 def _judge(case: Case, setup: Setup) -> tuple[Callable[[MethodRun], Facts], str]:
-    """Return the function that judges a motion of the case, and its reference in words.
-
-    Raises
-    ------
-    SolverError
-        No equilibrium to start from.
-    """
+    """Return the function that judges a motion of the case, and its reference in words; SolverError without equilibrium."""
 
     def unsolvable(found: MethodRun) -> Facts:
         return Facts(found.status, solvable=False, doubt=found.doubt, passes=found.passes)
