@@ -145,13 +145,7 @@ class Command(Protocol):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command and return the exit code.
-
-    Parameters
-    ----------
-    argv : sequence of str, optional
-        Arguments without the program's name; by default those of the process, which then has nothing else to do.
-    """
+    """Run one command and return the exit code; without `argv` that of the process, which has nothing else to do."""
     if argv is not None:
         return _main(argv)
     open_closed_streams()

@@ -120,10 +120,7 @@ def _check_listeners(unmatched: list[str], unheard: list[str], topics: int, args
 
 
 class Keys:
-    """Keys of the terminal within a context; none if stdin is no terminal, or that of another program.
-
-    Leaving the context restores the terminal's settings.
-    """
+    """Keys of the terminal within a context; none if stdin is no terminal, or that of another program."""
 
     def __init__(self) -> None:
         self._before: list[Any] | None = None

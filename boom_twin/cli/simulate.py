@@ -252,14 +252,9 @@ def _is_earlier(start: bytes) -> bool:
 
 
 def read_history(path: Path, n: int, stems: Sequence[str]) -> tuple[Array, Array, str]:
-    """Return times (m,) in s, strokes or lengths (m, n) in m, and their column stem (``stroke``) from a CSV file.
+    """Return times (m,) in s, strokes or lengths (m, n) in m, and their column stem from a CSV file.
 
-    The stem is the first of `stems` in the header.
-
-    Raises
-    ------
-    UsageError
-        The file cannot be read, has another header, no rows, or a value that is no number.
+    UsageError for another file. The stem is the first of `stems` in the header.
     """
     table = read_csv(path, UsageError)
     stem = next((stem for stem in stems if f"{stem}_1_m" in table.names), stems[0])

@@ -22,8 +22,7 @@ RECORDER_TIMEOUT = 2 * PATIENCE
 class RecorderProcess:
     """Recorder in a child process, at most one at a time.
 
-    Every recording gets a directory in `folder`, named by its time (UTC). `options` are more arguments of
-    ``boom_twin record``.
+    ``boom_twin record`` with `options` into a new directory of `folder`.
     """
 
     def __init__(self, folder: Path, options: Sequence[str] = ()) -> None:

@@ -15,18 +15,12 @@ MICRO = 1000  # ns
 
 
 class AlarmWatch:
-    """Watch of one feed's alarms with channel and kind: alarms of the rig's health, and gaps.
-
-    Attributes
-    ----------
-    begun : Counter
-        Alarms so far, by channel and kind.
-    """
+    """Watch of one feed's alarms with channel and kind: alarms of the rig's health, and gaps."""
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
         self._known: dict[int, tuple[str | None, bool]] = {}  # (cause, has ended) by number of the alarm
-        self.begun: Counter[tuple[str, str]] = Counter()
+        self.begun: Counter[tuple[str, str]] = Counter()  # alarms so far, by channel and kind
 
     def active(self) -> list[ListedAlarm]:
         """Return the active alarms."""

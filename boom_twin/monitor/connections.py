@@ -27,10 +27,7 @@ MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64  # largest number of silent or accepte
 
 
 class Connections:
-    """All connections to one server: silent ones (no complete request yet), and accepted ones.
-
-    Each kind is in order of last use. If it is full, a new one replaces the oldest. `server` answers the requests.
-    """
+    """Connections to one server, silent and accepted ones, each in order of last use."""
 
     def __init__(self, server: web.Server) -> None:
         self._server = server

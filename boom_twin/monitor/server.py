@@ -33,10 +33,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """Server of the live page for one feed. With several `sessions`, it is the open one.
-
-    `webhook` posts changes of alarms.
-    """
+    """Server of the live page for one feed: of several `sessions`, the open one. `webhook` posts changes of alarms."""
 
     def __init__(
         self,

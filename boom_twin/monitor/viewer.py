@@ -32,7 +32,7 @@ MAX_REQUESTS = 40  # largest number of requests of a page in a second
 
 
 class Viewer:
-    """Viewer of one prepared WebSocket. Feed, actions and analyst are common to all viewers.
+    """Viewer of one prepared WebSocket.
 
     `choose` opens one of the `sessions` by its index and returns a sentence for the viewer.
     """
@@ -119,10 +119,7 @@ class Viewer:
             await self._socket.send_str(told)
 
     async def _send_rows(self, position: float) -> None:
-        """Send all unsent rows, in messages of bounded size.
-
-        Rows that arrive meanwhile wait for the next turn.
-        """
+        """Send all unsent rows, in messages of bounded size; rows that arrive meanwhile wait for the next turn."""
         tables = list(self._feed.store.tables.values())[: self._tables]
         unsent = {number: self._unsent(table, position) for number, table in enumerate(tables)}
         while unsent:

@@ -25,14 +25,9 @@ TRY_AGAIN = (HTTPStatus.REQUEST_TIMEOUT, HTTPStatus.TOO_EARLY, HTTPStatus.TOO_MA
 
 
 class Webhook:
-    """Poster of JSON objects to `url`, one after the other, each with the name of this machine as ``host``.
+    """Poster of JSON objects to `url` (http or https, else UsageError), each with the name of this machine as ``host``.
 
     The log names the server only, because a path may hold a secret. Redirections are not followed.
-
-    Raises
-    ------
-    UsageError
-        `url` is not an address of http or https.
     """
 
     def __init__(self, url: str) -> None:

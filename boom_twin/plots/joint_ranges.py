@@ -27,10 +27,7 @@ ENDS = ((BLUE, "lowest"), (ORANGE, "highest"))
 
 
 def joint_ranges_picture(path: Path, scene: Scene, name: str) -> Path:
-    """Draw one pair of panels for each joint, and one panel of the boom with every joint at the ends of its range.
-
-    `name` is that of the scene in the title. Returns `path`.
-    """
+    """Draw a pair of panels for each joint, and one of the boom with every joint at the ends of its range; return `path`."""
     count = len(scene.joints)
     columns = min(COLUMNS, count + 1)
     rows = -(-(count + 1) // columns)
@@ -119,10 +116,7 @@ def _joint(axes: Axes, scene: Scene, i: int) -> None:
 
 
 def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | None) -> None:
-    """Draw one position of a joint's mechanism; name its pins if `colour` is given.
-
-    The names have a bright outline, because links and cylinders lie below them.
-    """
+    """Draw one position of a joint's mechanism; name its pins, with a bright outline, if `colour` is given."""
     from matplotlib.patheffects import withStroke
 
     joint, alpha = bones.joints[i], 0.12 if colour is None else 0.4

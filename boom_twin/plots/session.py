@@ -24,8 +24,7 @@ def replay_pictures(
     """Draw what was replayed into a directory, which is made if it is not there; return the written files.
 
     These are ``tip.png``, ``residuals.png`` (if there are channels), ``posture.png`` (if there are shapes), ``spectrum.png``
-    (from 4 s on); none at all if nothing was predicted. The same arrays give the same bytes. `session` is its name for the
-    titles, and `note` small print such as "synthetic session of a virtual rig".
+    (from 4 s on). `session` is its name for the titles, and `note` small print.
     """
     if len(history.stamps_s) == 0:
         return []

@@ -11,16 +11,9 @@ from .style import BLUE, GREY, ORANGE, legend_above, picture
 
 
 def stabilisation_picture(path: Path, title: str, poles: Array, modes: Array, model: Array) -> None:
-    """Draw poles by frequency and model order, identified modes, and natural frequencies of the model.
+    """Draw poles, identified modes, and natural frequencies of the model (k,), Hz.
 
-    Parameters
-    ----------
-    poles : ndarray, shape (poles, 3)
-        Frequency (Hz), model order, and 1 if the pole is stable, else 0.
-    modes : ndarray, shape (m, 2)
-        Frequencies of the modes and their standard deviations, Hz.
-    model : ndarray, shape (k,)
-        Natural frequencies of the model, Hz.
+    `poles` (p, 3): frequency (Hz), model order, and 1 if stable, else 0. `modes` (m, 2): frequencies and deviations, Hz.
     """
     with picture(path, title, "a pole is stable if it stays the same at the next model order") as figure:
         axes = figure.subplots()

@@ -60,15 +60,7 @@ class MeasuredRest:
 
 
 def measured_rests(session: MeasuredSession, scene: Scene, rigging: Rigging) -> list[MeasuredRest]:
-    """Return the modes of every rest period of at least `SHORTEST_REST` seconds.
-
-    Raises
-    ------
-    BagError
-        The session has no such rest period, or neither IMU, angles nor forces.
-    UsageError
-        pyOMA-2 is not installed.
-    """
+    """Return the modes of every rest period of at least `SHORTEST_REST` seconds; BagError without one, or without sensors."""
     periods = rest_periods(session, scene, rigging)
     long_enough = [each for each in periods if each.times[-1] >= SHORTEST_REST]
     if not long_enough:

@@ -86,12 +86,8 @@ def read_csv_pieces(
 ) -> Iterator[CsvTable]:
     """Yield the table in a file, up to `together` rows at a time, so that a file of any size takes little memory.
 
-    Without a `layout` the names are in the first line, and columns are separated by commas.
-
-    Raises
-    ------
-    BoomTwinError
-        The type `error`: the file cannot be read, a line is longer than `LONGEST_LINE`, or there is no row below the header.
+    Without a `layout` the names are in the first line, and columns are separated by commas. Raise `error` if the file cannot
+    be read, a line is longer than `LONGEST_LINE`, or there is no row below the header.
     """
     try:
         encoding = layout.encoding if layout else marked_encoding(path) or "utf-8"

@@ -91,20 +91,9 @@ class UnfinishedResult:
 def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Iterator[UnfinishedResult]:
     """Build a folder of results, which is renamed to `out` if the block ends without an exception.
 
-    After an exception the new folder is removed, and `out` is unchanged.
-
-    Parameters
-    ----------
-    out : Path
-        Folder that is missing, empty, or an earlier result of the same command.
-    kind : ResultKind
-    sources : sequence of Path
-        Files and folders that the command reads. None may lie in `out`, nor `out` in a session.
-
-    Raises
-    ------
-    BagError
-        `out` holds anything else, another command is at work on it, or it cannot be written.
+    After an exception the new folder is removed, and `out` is unchanged. `out` is missing, empty, or an earlier result of the
+    same command. None of the `sources` that the command reads may lie in it, nor it in a session. BagError if `out` holds
+    anything else, another command is at work on it, or it cannot be written.
     """
     place = real_path(out)
     check_lasting(out)
@@ -147,13 +136,7 @@ def is_unfinished(folder: Path) -> bool:
 
 
 def check_lasting(out: Path) -> None:
-    """Refuse a place inside an unfinished result, because the next run of its command would remove files there.
-
-    Raises
-    ------
-    BagError
-        The place lies in an unfinished result.
-    """
+    """Raise BagError for a place inside an unfinished result: the next run of its command would remove files there."""
     place = real_path(out)
     if (found := next(filter(is_unfinished, (place, *place.parents)), None)) is not None:
         told = f"lies in an unfinished result, which its command removes when it runs again ({found / UNFINISHED})"

@@ -80,12 +80,8 @@ HARMONICS = np.arange(1, 16, 2)  # harmonics of pump pulses that are on for half
 def rates_to_avoid(accelerations: Array) -> tuple[tuple[float, float], ...]:
     """Return the ranges of pump rates (Hz) at which the tip swings `TOO_MUCH` times as far as at the median rate.
 
-    It is the rule of `boom_twin.analysis.resonance_map`, on a response that is known: root mean square for peak to peak.
-
-    Parameters
-    ----------
-    accelerations : ndarray, shape (k,)
-        Amplitude of the tip's acceleration (m/s^2) by 1 N at `RESPONSE_FREQUENCIES`.
+    `accelerations` (k,) of the tip (m/s^2) by 1 N are at `RESPONSE_FREQUENCIES`. The rule is that of
+    `boom_twin.analysis.resonance_map`: root mean square for peak to peak.
     """
     swings = accelerations / (2.0 * np.pi * RESPONSE_FREQUENCIES) ** 2
     at = HARMONICS * PUMP_RATES[:, None]

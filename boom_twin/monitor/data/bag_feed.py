@@ -78,17 +78,10 @@ def bag_feed(
     window: TimeWindow = WHOLE,
     namespace: str = "",
 ) -> BagFeed:
-    """Open a recording, or the result bag of a replay.
+    """Open a recording, or the result bag of a replay; for the parameters see `boom_twin.offline.replay.replay`.
 
-    The parameters are those of `boom_twin.offline.replay.replay`. A session without outputs is run through a twin with these
-    `settings`, at rest where the `window` begins.
-
-    Raises
-    ------
-    BagError
-        It cannot be read, is of another boom, or has nothing that can be shown.
-    UsageError
-        The mapping cannot be used.
+    A session without outputs is run through a twin with these `settings`, at rest where the `window` begins. BagError if it
+    cannot be read, is of another boom, or has nothing that can be shown.
     """
     options = ReplayOptions(mapping=mapping, window=window, namespace=namespace)
     given = replay_inputs(path, scene, settings, options)

@@ -95,15 +95,10 @@ class Store:
         return (stamp - self.epoch) * NANO
 
     def receive(self, name: str, columns: Sequence[str], stamp: int, values: Sequence[float]) -> None:
-        """Add a row to a table after a check of its stamp.
+        """Add a row to a table; MalformedError if its stamp is not after the last one or the columns differ.
 
-        A row with a jump in its stamp is held until the next row of its table. If that row follows it closely, both are
-        added. Otherwise the held row was an outlier. A clock set back deletes all earlier rows.
-
-        Raises
-        ------
-        MalformedError
-            The stamp is not after the last one, the columns differ, or the held row was an outlier.
+        A row with a jump in its stamp is held until the next row of its table. If that follows closely, both are added.
+        Otherwise the held row was an outlier, which is an error. A clock set back deletes all earlier rows.
         """
         if name in self.tables and self.tables[name].columns != tuple(columns):
             raise MalformedError(_difference(self.tables[name].columns, columns))
