@@ -144,7 +144,7 @@ def _serve(args: Namespace, feed: Feed, actions: Any, sessions: SessionList | No
 async def _run(args: Namespace, server: Any, access: Any) -> None:
     import asyncio
 
-    from ..monitor.serving import serving
+    from ..monitor.server import serving
     from ..ros.startup import stop_signals
 
     stopped = asyncio.Event()

@@ -25,8 +25,7 @@ from .data.feed import Feed
 from .data.received_messages import text
 from .data.status import Severity
 from .data.store import Store
-from .server import Server
-from .serving import serving
+from .server import Server, serving
 
 CAPACITY = 150_000  # rows kept of every table: twelve minutes at 200 Hz
 MOST_WAITING = 20_000  # largest number of waiting samples; beyond it the oldest are dropped
