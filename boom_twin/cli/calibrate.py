@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from .. import __version__
 from ..errors import BoomTwinError, UsageError
 from ..offline.progress import progress_of
-from .arguments import add_json, add_mapping, add_params, add_session_scene, add_window, files_of, window_of
+from .arguments import add_json, add_session, files_of, window_of
 from .output import open_session_scene, open_session_settings, print_result, warn, warn_incomplete
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("bags", nargs="+", metavar="BAG", help="healthy sessions, begun at rest; the last one is held out")
-    add_session_scene(parser)
     parser.add_argument("--out", type=Path, metavar="SCENE", required=True, help="the new scene; zeros: a mapping beside it")
     parser.add_argument("--parameters", metavar="A,B,..", help="just these, as cylinder_1.k,joint_2.zero; else those below")
     parser.add_argument("--load", choices=("payload", "line_fill"), help="besides k of cylinders and zeros of sensors: a load")
@@ -33,9 +32,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     whose = "zeros of all sensors (default), of all but the stroke transducers, or none"
     parser.add_argument("--zeros", choices=("all", "angles", "none"), default="all", help=whose)
-    add_params(parser)
-    add_mapping(parser)
-    add_window(parser)
+    add_session(parser)
     parser.add_argument("--date", metavar="DATE", help="for the provenance; today if not given")
     parser.add_argument("--force", action="store_true", help="replace files of the result that are there already")
     parser.add_argument("--no-pictures", action="store_true", help="leave the pictures out")

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from .arguments import add_json, add_params, add_session_scene, add_window, files_of, window_of
+from .arguments import add_json, add_session, files_of, window_of
 from .output import open_session_scene, open_session_settings, print_result, tell, warn
 
 if TYPE_CHECKING:
@@ -20,9 +20,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     for name in ("A", "B"):
         parser.add_argument(name, help="a recorded session, which is replayed, or the folder of a replay")
-    add_session_scene(parser)
-    add_params(parser)
-    add_window(parser)
+    add_session(parser, mapping=False)
     kept = "folder for compare.png and the replays: new, empty, or of an earlier compare; without it nothing is kept"
     parser.add_argument("--out", metavar="DIR", help=kept)
     add_json(parser)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import BoomTwinError, UsageError
 from ..monitor import PORT
-from .arguments import add_mapping, add_params, add_ros_args, add_session_scene, add_window, ros_arguments, window_of
+from .arguments import add_ros_args, add_session, ros_arguments, window_of
 from .output import open_scene, open_session_scene, open_session_settings, tell, warn_incomplete
 
 if TYPE_CHECKING:
@@ -32,10 +32,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         type=Path,
         help="a recorded session, the bag of a replay, or a folder of several sessions to choose from (the live topics)",
     )
-    add_session_scene(parser)
-    add_params(parser)
-    add_mapping(parser)
-    add_window(parser)
+    add_session(parser)
     parser.add_argument("--port", type=int, help=f"({PORT}, or any that is free if that is taken; 0: any)")
     parser.add_argument("--host", default="127.0.0.1", help="listen here (127.0.0.1); elsewhere a token is needed, and printed")
     token = "the token is the one in FILE, on this machine, too; without it, a new one at each start"

@@ -10,18 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..offline.progress import progress_of
 from ..types import StrokeReading
-from .arguments import (
-    SESSION,
-    add_json,
-    add_mapping,
-    add_namespace,
-    add_params,
-    add_session_scene,
-    add_window,
-    files_of,
-    refuse_given,
-    window_of,
-)
+from .arguments import SESSION, add_json, add_namespace, add_session, files_of, refuse_given, window_of
 from .output import open_session_scene, open_session_settings, print_result, tell, warn_incomplete
 
 if TYPE_CHECKING:
@@ -32,12 +21,9 @@ if TYPE_CHECKING:
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help=SESSION)
-    add_session_scene(parser)
-    add_window(parser)
+    add_session(parser)
     place = "folder for summary.json, bag/, tables and pictures: new, empty, or of an earlier replay, which is replaced"
     parser.add_argument("--out", required=True, metavar="DIR", help=place)
-    add_params(parser)
-    add_mapping(parser)
     add_namespace(parser, "ROS namespace of the node in the session, for topics and --params")
     parser.add_argument(
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
