@@ -94,9 +94,8 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
     from ..batch.sources import fingerprint, key_of
     from ..system.received_files import sha256_of
 
-    paths = {
-        name: path and str(Path(path).resolve()) for name in ("scene", "params", "mapping") for path in [getattr(args, name)]
-    }
+    given = {name: getattr(args, name) for name in ("scene", "params", "mapping")}
+    paths = {name: None if path is None else str(Path(path).resolve()) for name, path in given.items()}
     contents = [f"{name} {sha256_of(Path(path))}" for name, path in paths.items() if path is not None]
     window = window_of(args)
     kinds = [str(args.report), str(args.keep_bags), str(args.calibrate), str(args.fatigue)]
