@@ -22,7 +22,6 @@ MEGABYTE = 1_000_000
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     sources = "sessions, globs (quote them), or files *.txt that list these, one a line"
     parser.add_argument("bags", nargs="+", metavar="BAG", help=sources)
     place = "folder for sessions.parquet, batch.html and the replays: new, empty, or of an earlier batch, which goes on"

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("bags", nargs="+", metavar="BAG", help="healthy sessions, begun at rest; the last one is held out")
     parser.add_argument("--out", type=Path, metavar="SCENE", required=True, help="the new scene; zeros: a mapping beside it")
     parser.add_argument("--parameters", metavar="A,B,..", help="just these, as cylinder_1.k,joint_2.zero; else those below")
@@ -96,7 +95,6 @@ def _moving(bar: ProgressBar) -> Progress:
 
 
 def _draw(found: Calibration, out: Path) -> list[Path]:
-    """Draw pictures beside the scene."""
     from ..calibration.output import picture_paths, shown
     from ..plots.session import Interval, held_out_picture, parameters_picture
 

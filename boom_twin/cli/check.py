@@ -31,7 +31,6 @@ SIZE_B = "angles of section and two links, pin force (2), cylinder force"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the scene, ``--json``, and the options of a search for the smallest model."""
     add_scene(parser)
     add_json(parser)
     parser.add_argument("--strict", action="store_true", help="warnings are errors: the exit code is 1 if there are any")

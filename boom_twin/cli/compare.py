@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     for name in ("A", "B"):
         parser.add_argument(name, help="a recorded session, which is replayed, or the folder of a replay")
     add_session(parser, mapping=False)

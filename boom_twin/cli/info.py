@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help=SESSION)
     add_session(parser, params=False)
     add_json(parser)
@@ -131,7 +130,6 @@ def _part(info: BagInfo, values: dict[str, Any]) -> str:
 
 
 def _table(info: BagInfo) -> list[str]:
-    """Return a table with one line for each topic."""
     late = ["log - stamp, ms: least", "mean", "most"]
     rows = [["topic", "type", "count", "Hz", "gap, ms", "at s", "not rising", "no stamp", *late]]
     for tally in info.tallies:

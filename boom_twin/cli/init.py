@@ -16,7 +16,6 @@ from .output import tell_oddities
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("--table", metavar="FILE", type=Path, help="dimensions in YAML or CSV")
     parser.add_argument("--force", action="store_true", help="replace a scene that is there, after the table was mended")
     what = parser.add_mutually_exclusive_group(required=True)
@@ -46,7 +45,6 @@ def run(args: Namespace) -> int:
 
 
 def _next(scene: Path, source: str, warnings: int) -> str:
-    """Return in words what to do after the scene is written."""
     if not warnings:
         picture = str(scene.with_suffix(".png"))
         check = shlex.join(["boom_twin", "check", str(scene), "--strict", "--picture", picture])

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("--check", metavar="BAG", help=f"check how the sensors of a session are wired: {SESSION}")
     add_session(parser, params=False)
     parser.add_argument("--out", type=Path, metavar="FILE", help="with --check: write the proposed mapping")

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help="a recorded session with a rest period of 20 s or more, better two minutes")
     parser.add_argument(
         "--out", required=True, metavar="DIR", help="folder for modes.json and stabilisation diagrams, new or empty"

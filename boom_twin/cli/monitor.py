@@ -25,7 +25,6 @@ NICE = 5  # nice value of the monitor, by which it gives way to the node on the 
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare which feed is shown, who may open the page, and what viewers may do."""
     parser.add_argument(
         "--bag",
         metavar="BAG",
@@ -92,7 +91,6 @@ def _lower_priority() -> None:
 
 
 def _sessions(args: Namespace) -> SessionList:
-    """Return the sessions of ``--bag``, the first one open."""
     from ..bag.reader import scan
     from ..monitor.data.bag_feed import bag_feed
     from ..monitor.data.feed import SessionList, sessions_in
@@ -109,7 +107,6 @@ def _sessions(args: Namespace) -> SessionList:
 
 @contextmanager
 def _live_feed(args: Namespace) -> Iterator[Feed]:
-    """Provide the feed of the live topics within a context."""
     from ..ros.startup import require_rclpy
 
     require_rclpy()

@@ -29,7 +29,6 @@ BAR = "{l_bar}{bar}| {n:.1f}/{total:.1f} s"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the session, and how it is played."""
     parser.add_argument("bag", metavar="BAG", type=Path, help="rosbag2 directory, or a file: .mcap, .db3, .bag of ROS 1, .csv")
     parser.add_argument("--rate", type=positive, default=1.0, metavar="R", help="session time over real time (1)")
     parser.add_argument("--start", type=not_negative, default=0.0, metavar="S", help="begin so many seconds in (0)")

@@ -18,7 +18,6 @@ SHOWN = 20  # faults that are printed one by one
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, a directory of .mcap files, or one .mcap; only read")
     parser.add_argument("--out", required=True, metavar="DIR", help="directory of the new session, new or empty")
     parser.add_argument(

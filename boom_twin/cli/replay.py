@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help=SESSION)
     add_session(parser)
     place = "folder for summary.json, bag/, tables and pictures: new, empty, or of an earlier replay, which is replaced"
@@ -109,7 +108,6 @@ def flat(summary: dict[str, Any]) -> dict[str, Any]:
 
 
 def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
-    """Write pictures and report, as they are wanted; return these files and the file of the figures."""
     from ..offline.history import draw
     from ..report.page import write_report
 
@@ -164,7 +162,6 @@ def count_as_text(name: str, count: int) -> str:
 
 
 def _errors(summary: dict[str, Any]) -> list[str]:
-    """Return lines on the errors against the truth, of the prediction and of the estimate."""
     lines = [
         f"tip error          {1e3 * summary['tip_error_rms_m']:.2f} mm rms against the truth",
         f"acceleration error {summary['tip_acceleration_error_rms_m_s2']:.3f} m/s^2 rms against the truth",

@@ -16,7 +16,6 @@ from .output import tell, tell_oddities
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     add_scene(parser)
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the bag and its truth, new or empty")
     moves = parser.add_mutually_exclusive_group()
@@ -70,7 +69,6 @@ class ListFaults(Action):
 
 
 def _refuse_unrecorded(causes: list[str], recorded: set[str]) -> None:
-    """Raise UsageError if a fault is of a sensor that is not recorded."""
     for cause in causes:
         for stem, sensors in (("joint_", "angles"), ("cylinder_force_", "forces")):
             if cause.startswith(stem) and sensors not in recorded:

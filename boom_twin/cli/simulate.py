@@ -32,7 +32,6 @@ SPARSE_ROWS = 1.0  # s between rows, above which a warning comes
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     add_scene(parser)
     purpose = "the posture that the first row must be in: a name, or section angles, deg; else it may be any"
     parser.add_argument("--posture", metavar="NAME", help=purpose)
@@ -64,7 +63,6 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def _share(text: str) -> float:
-    """Parse a number from 0 to 1."""
     if (value := not_negative(text)) > 1.0:
         raise ArgumentTypeError(f"{text}: must be at most 1")
     return value
@@ -117,7 +115,6 @@ def run(args: Namespace) -> int:
 
 
 def _check_targets(targets: dict[str, str | None]) -> None:
-    """Raise UsageError if two options would write the same file."""
     seen: dict[Path, str] = {}
     for option, target in targets.items():
         if target and seen.setdefault(Path(target).resolve(), option) != option:
@@ -125,7 +122,6 @@ def _check_targets(targets: dict[str, str | None]) -> None:
 
 
 def _check_sampling(args: Namespace) -> None:
-    """Raise UsageError for options that do not go with ``--samples``, or only with it."""
     if args.samples is None:
         refuse_given(args, "goes with --samples N. Add it, or leave --vary out.", "vary")
         return
@@ -135,7 +131,6 @@ def _check_sampling(args: Namespace) -> None:
 
 
 def _sample(args: Namespace, scene: Scene, times: Array, strokes: Array, angles: Array | None, force: Array | None) -> int:
-    """Simulate many booms; write their statistics and the samples."""
     from ..analysis.monte_carlo import simulate_samples
     from ..offline.progress import progress_of
 
@@ -263,7 +258,6 @@ def read_history(path: Path, n: int, stems: Sequence[str]) -> tuple[Array, Array
 
 
 def _columns(table: CsvTable, names: Sequence[str]) -> Array:
-    """Return columns of a table, shape (rows, len(names)); UsageError if one is missing or holds no number."""
     table.require(names)
     return np.column_stack([table.column(name) for name in names])
 

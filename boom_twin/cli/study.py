@@ -19,7 +19,6 @@ KINDS: dict[str, tuple[str, str]] = {
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare a parser for every kind."""
     kinds = parser.add_subparsers(dest="kind", metavar="KIND", required=True)
     for name, (_, purpose) in KINDS.items():
         own = kinds.add_parser(name, help=purpose, description=purpose[0].upper() + purpose[1:] + ".")

@@ -64,7 +64,6 @@ class AlarmWatch:
         }
 
     def _date(self, time: float) -> str:
-        """Return a session time (s) as the date of its stamp, UTC, to the microsecond."""
         stamp = self._feed.store.epoch + round(time * SECOND)
         date = datetime.fromtimestamp(stamp // SECOND, UTC) + timedelta(microseconds=stamp % SECOND // MICRO)
         return date.isoformat(timespec="microseconds").replace("+00:00", "Z")

@@ -58,7 +58,6 @@ class Connections:
         self._cut_off(connection, f"it sent no request within {REQUEST_TIME:g} s")
 
     def _count(self, kind: list[Connection], connection: Connection) -> None:
-        """Add a connection of a kind, and close the oldest one if a limit is reached."""
         same = [each for each in kind if each.address == connection.address]
         if len(same) >= MAX_OF_ADDRESS or len(kind) >= MAX_CONNECTIONS:
             self._cut_off(same[0] if len(same) >= MAX_OF_ADDRESS else kind[0], "a newer one")

@@ -134,7 +134,6 @@ class Metrics:
     # -- rows and families --------------------------------------------------------------------------------------------
 
     def _fresh(self, name: str) -> Table | None:
-        """Return a table if its newest row is at most `SILENCE` old, else None."""
         store = self._feed.store
         table = store.tables.get(name)
         return table if table is not None and table.count and store.newest - table.newest <= SILENCE else None
@@ -160,7 +159,6 @@ class Metrics:
 
 
 def _rms(channel: str, values: Array) -> Iterator[tuple[str, float]]:
-    """Yield the channel and its root mean square, unless nothing was measured."""
     known = values[np.isfinite(values)]
     if len(known):
         yield channel, float(np.sqrt(np.mean(known**2)))

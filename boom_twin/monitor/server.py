@@ -101,7 +101,6 @@ class Server:
         return socket
 
     async def _run(self, application: web.Application) -> AsyncIterator[None]:
-        """Poll the feed as long as the server runs."""
         self._analyst = Analyst(self._feed)
         async with AsyncExitStack() as stack:
             if self._webhook is not None:
@@ -120,7 +119,6 @@ class Server:
             await asyncio.sleep(POLL_PERIOD)
 
     async def _follow_alarms(self) -> None:
-        """Update counts and post changes of alarms of the feed shown."""
         while True:
             self._metrics.follow()
             for change in self._watch.changes():
@@ -129,7 +127,6 @@ class Server:
             await asyncio.sleep(ALARM_PERIOD)
 
     def _show(self, feed: Feed) -> None:
-        """Show `feed`, with its own alarms and counts."""
         self._feed, self._watch = feed, AlarmWatch(feed)
         self._metrics = Metrics(feed, self._watch)
 

@@ -136,7 +136,6 @@ class Viewer:
                 await self._socket.send_bytes(b"".join(blocks))
 
     def _unsent(self, table: Table, position: float) -> tuple[int, int]:
-        """Return the numbers of the first unsent row and of the one after the last."""
         end = table.count if self._playback is None else table.until(position)
         first = self._sent.get(table.name)
         if first is None:
@@ -159,7 +158,6 @@ class Viewer:
             await asyncio.sleep(SPECTRUM_PERIOD)
 
     async def _send_spectrogram(self, position: float) -> None:
-        """Send the unsent columns of the spectrogram."""
         generation = self._generation
         found = await self._analyst.spectrogram_between(max(self._spectrogram_until, position - HISTORY), position)
         if found is not None and generation == self._generation == self._feed.store.generation:
@@ -188,7 +186,6 @@ class Viewer:
     # -- in -----------------------------------------------------------------------------------------------------------
 
     async def _receive(self) -> None:
-        """Carry out requests; close the socket of a page that sends anything else."""
         second, count = 0.0, 0
         async for message in self._socket:
             now = time.monotonic()

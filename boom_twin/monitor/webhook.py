@@ -77,7 +77,6 @@ class Webhook:
                     self._waiting.task_done()
 
     async def _attempts(self, session: ClientSession, message: Mapping[str, Any]) -> str:
-        """Post a message; return the reason of failure, empty if it was accepted."""
         for pause in (*PAUSES, None):
             reason, may_succeed = await self._post(session, message)
             if not reason or not may_succeed:

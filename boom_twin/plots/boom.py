@@ -62,7 +62,6 @@ def draw_section(axes: Axes, corners: list[tuple[Array, Array, bool]], depth: fl
 
 
 def _box(axes: Axes, start: Array, stop: Array, width: float, colour: str, order: float, alpha: float = 1.0) -> None:
-    """Draw a rectangle about the line from start to stop."""
     along = (stop - start) / np.hypot(*(stop - start))
     across = 0.5 * width * np.array([-along[1], along[0]])
     x, y = np.array([start + across, stop + across, stop - across, start - across]).T

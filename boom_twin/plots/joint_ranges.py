@@ -87,7 +87,6 @@ def folded_section(pivot: Array, before: float, angle: float, length: float, asi
 
 
 def _fan(axes: Axes, pivot: Array, ends: Array, radius: float) -> None:
-    """Draw the sector that a section sweeps about its pivot."""
     turn = np.linspace(ends[0], ends[1], 60)
     rim = pivot + radius * np.column_stack([np.cos(turn), np.sin(turn)])
     axes.fill(*np.vstack([pivot, rim]).T, facecolor=PURPLE, alpha=0.18, linewidth=0, zorder=3)
@@ -139,7 +138,6 @@ def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | 
 
 
 def _stroke(axes: Axes, scene: Scene, i: int) -> None:
-    """Draw stroke by angle in the band that the cylinder has."""
     joint = scene.joints[i]
     degrees = np.linspace(*joint.range_deg, CURVE)
     axes.axhspan(0.0, joint.cylinder.max_stroke, color=PALE, alpha=0.5, linewidth=0, label="0 to max_stroke")

@@ -125,7 +125,6 @@ def _rms(gap: Array) -> float:
 
 
 def _mark(axes: Axes, window: tuple[float, float]) -> None:
-    """Shade the part of the session that is shown enlarged."""
     axes.axvspan(*window, color=PALE, alpha=0.6, linewidth=0, zorder=0.4)
     late = sum(window) > sum(axes.get_xlim())
     place, shift, side = (window[0], -4, "right") if late else (window[1], 4, "left")

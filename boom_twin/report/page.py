@@ -100,7 +100,6 @@ def _uncertainty(recording: Recording) -> list[tuple[str, object]]:
 
 
 def _verdict(result: Replay) -> list[str]:
-    """Return the verdict and all alarms: first those that stop the boom, then those with a cause."""
     if not result.recording.is_judged:
         return [paragraph(NO_JUDGE, "note")]
     alarms = sorted(result.summary["alarms"], key=lambda alarm: (not _stops(alarm), alarm["cause"] is None, alarm["from_s"]))
@@ -118,7 +117,6 @@ WORST = 3  # stations named in the first lines
 
 
 def _worst_stations(found: Evaluation) -> list[str]:
-    """Return the stations with the largest stresses, and the life in hours if a detail category is given."""
     worst = [f"{load.station.name}: {_stress(load)} MPa at {load.time:.1f} s" for load in found.loads[:WORST]]
     parts = [paragraph(f"Largest bending stresses: {'; '.join(worst)}.")] if worst else []
     if found.category is not None and found.fatigue:
@@ -156,7 +154,6 @@ def _alarm_times(found: Evaluation, folder: Path) -> list[str]:
 
 
 def _alarm(alarm: dict[str, Any]) -> str:
-    """Return an alarm of ``summary.json`` as HTML: the sentence, its evidence, times, causes."""
     end = "it lasts to the end" if alarm["to_s"] is None else f"to {alarm['to_s']:.2f} s"
     evidence = f"{alarm['evidence']}; " if alarm["evidence"] else ""
     rows = [(rank["cause"], f"{100.0 * rank['probability']:.0f} %") for rank in alarm["ranked"]]
@@ -201,7 +198,6 @@ def _vibration(found: Evaluation, folder: Path) -> list[str]:
 
 
 def _measured(each: Vibration, model: float) -> tuple[str, str, str]:
-    """Return frequency, deviation from the model, and damping, each with standard deviation."""
     apart, sigma = 100.0 * (each.frequency / model - 1.0), 100.0 * each.frequency_sigma / model
     return (
         f"{each.frequency:.4f} ± {each.frequency_sigma:.1g}",
@@ -252,7 +248,6 @@ def _load(load: Load) -> tuple[object, ...]:
 
 
 def _stress(load: Load) -> str:
-    """Return the stress in MPa, with the standard deviation of the unknown load's part if it is known."""
     deviation = "" if np.isnan(load.sigma) else f" ± {1e-6 * load.sigma / load.modulus:.2g}"
     return f"{1e-6 * load.stress:.3g}{deviation}"
 

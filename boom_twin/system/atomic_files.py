@@ -111,5 +111,4 @@ def _replace(path: Path, data: bytes, sync: Callable[[int], None]) -> None:
 
 
 def _mode(path: Path) -> int:
-    """Return the permissions of the file that is replaced, or those of a new one."""
     return stat.S_IMODE(path.stat().st_mode) if path.exists() else 0o666 & ~_umask

@@ -171,7 +171,6 @@ def _identity(path: Path) -> tuple[int, int]:
 
 
 def _check_earlier(folder: Path, kind: ResultKind) -> None:
-    """Refuse a folder unless it is empty or an unchanged result of the same command."""
     if folder.exists() and not folder.is_dir():
         raise BagError(f"{folder}: is no folder. Choose another name.")
     entries = _entries(folder)
@@ -223,7 +222,6 @@ def _note(path: Path) -> tuple[str, dict[str, str] | None]:
 
 @contextmanager
 def _locked(building: Path, kind: ResultKind) -> Iterator[int]:
-    """Make the folder to build in, and lock its marker."""
     marker = building / UNFINISHED
     try:
         building.parent.mkdir(parents=True, exist_ok=True)
@@ -268,7 +266,6 @@ def _check_left(building: Path, kind: ResultKind) -> None:
 
 
 def _remove(folder: Path, names: Sequence[str]) -> None:
-    """Remove files by name, then the folders inside that are empty."""
     for name in names:
         (folder / name).unlink(missing_ok=True)
     for inner in reversed([name for name in _entries(folder) if name.endswith("/")]):
@@ -276,7 +273,6 @@ def _remove(folder: Path, names: Sequence[str]) -> None:
 
 
 def _remove_empty(folder: Path) -> None:
-    """Remove a folder that holds only files of the system."""
     with suppress(OSError):
         if not _entries(folder):
             for name in OF_THE_SYSTEM:
@@ -285,7 +281,6 @@ def _remove_empty(folder: Path) -> None:
 
 
 def _complete(building: Path, kind: ResultKind) -> None:
-    """Sync all files to the disk, then list them in the manifest."""
     files = [name for name in _entries(building) if not name.endswith("/") and name != UNFINISHED]
     for name in files:
         if not kind.has(name):
@@ -312,7 +307,6 @@ def _discard(folder: Path) -> None:
 
 
 def _put_in_place(out: Path, place: Path, building: Path, replaced: Path, kind: ResultKind) -> None:
-    """Rename a whole result to its place."""
     try:
         _check_earlier(place, kind)  # again: somebody may have put something there meanwhile
         if place.exists():

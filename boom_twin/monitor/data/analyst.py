@@ -173,7 +173,6 @@ class Analyst:
         return PREDICTION
 
     def _moved(self, time: float) -> float:
-        """Return the largest motion (m) of a cylinder within the window before `time` (s)."""
         strokes = self._feed.strokes_between(time - SPECTRUM_SPAN, time)
         return float(np.ptp(strokes, axis=0).max()) if len(strokes) else 0.0
 

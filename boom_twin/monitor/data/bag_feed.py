@@ -102,7 +102,6 @@ def bag_feed(
 
 
 def _names(topics: Topics) -> dict[str, Topic]:
-    """Return every topic that may be shown, by its absolute name."""
     shown = [*topics.inputs.values(), *topics.outputs.values(), topics.events]
     return {topic.absolute: topic for topic in shown}
 
@@ -192,6 +191,5 @@ class TwinView:
 
 
 def _as_message(status: Status) -> Any:
-    """Return a status as a message on ``/diagnostics`` holds it."""
     values = [SimpleNamespace(key=key, value=str(value)) for key, value in status.values.items()]
     return SimpleNamespace(name=f"{NODE}: {status.name}", level=status.level, message=status.message, values=values)

@@ -270,12 +270,10 @@ class AlarmList:
 
 
 def _words(channel: str, kind: str, cause: str | None) -> dict[str, str]:
-    """Return the sentence about an alarm by language."""
     return {language: text(alarm_text(channel, kind, cause, language)) for language in LANGUAGES}
 
 
 def _renew(alarm: ListedAlarm, found: Alarm, time: Callable[[int], float]) -> None:
-    """Update `alarm` to the present state of `found`, an alarm of the health monitor."""
     causes = tuple((text(each.cause), each.probability) for each in found.ranked) or ((text(found.cause or "not known"), nan),)
     is_same = [each[0] for each in causes[:1]] == [each[0] for each in alarm.causes[:1]]
     alarm.is_acknowledged &= is_same and found.until is None

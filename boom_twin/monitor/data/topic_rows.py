@@ -178,7 +178,6 @@ class TopicRows:
             self._join_estimate(role, stamp, values)
 
     def _join_estimate(self, role: Output, stamp: int, values: list[float]) -> None:
-        """Add the row of an estimate as soon as all its parts are there."""
         if (parts := self._estimates.put(role, stamp, values)) is None:
             return
         displacement, position, pose, acceleration, load = parts
@@ -207,7 +206,6 @@ class TopicRows:
             self._append(RESIDUALS[stream], [f"{name}_{end}" for end in ends for name in msg.name], stamp, values + ratios)
 
     def _join_force(self, part: Hashable, stamp: int, values: list[float]) -> None:
-        """Add the row of a measurement and its residual as soon as both are there."""
         if (parts := self._forces_felt.put(part, stamp, values)) is not None:
             (x, z), (left_x, left_z, *sigmas) = parts
             self._append("force", FORCE_COLUMNS, stamp, [x, z, x - left_x, z - left_z, *sigmas])

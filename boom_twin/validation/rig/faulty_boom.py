@@ -51,7 +51,6 @@ def with_faults(scene: Scene, faults: Sequence[RigFault]) -> Scene:
 
 
 def _worn(scene: Scene, at: str, more: float) -> Scene:
-    """Return `scene` with `more` radial clearance (m) of the pin `at`."""
     clearance = scene.clearance or Clearance()
     pins = {pin.at: pin for pin in clearance.pins}
     pin = pins.get(at) or Pin(at=at, pin_radius=JOURNAL, radial_clearance=0.0)

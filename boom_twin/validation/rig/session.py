@@ -52,7 +52,6 @@ class RigSession:
         write_atomic(path, content.getvalue())
 
     def _columns(self) -> list[tuple[str, int, Array]]:
-        """Return name with unit, decimals and values of every column of the truth."""
         truth, number = self.truth, range(self.strokes.shape[1])
         load = [] if "load" not in truth else [(f"tip_load_{axis}_N", 3, truth["load"][:, i]) for i, axis in enumerate("xy")]
         return [

@@ -55,7 +55,6 @@ def add_section(boom: Boom, frame: Frame, index: int, elements: int) -> BuiltSec
 
 
 def _station(boom: Boom, frame: Frame, x: float, own: list[Lump], borne: list[Lumps]) -> Station:
-    """Add a rigid frame with its `own` masses and with what it bears for its neighbours."""
     mass = masses.gather([*own, *(lump for lumps in borne for lump in lumps.inertia)], x)
     weight = masses.gather([*own, *(lump for lumps in borne for lump in lumps.weight)], x) if borne else None
     node = boom.node(frame.point((x, 0.0)), frame.angle)
@@ -192,7 +191,6 @@ def _six_bar(boom: Boom, frames: list[Frame], index: int) -> tuple[int, int, tup
 
 
 def _link(boom: Boom, link: Link, borne: Lumps | None = None) -> int:
-    """Add the body of a link, with what it bears for its neighbours."""
     node = boom.node(np.array([link.frame.x, link.frame.y]), link.frame.angle)
     if borne is None:
         return boom.body(node, link.mass, link.lump.com, link.lump.inertia)

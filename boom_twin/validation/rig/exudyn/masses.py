@@ -78,7 +78,6 @@ def _part(part: RigidPart | None) -> list[Lump]:
 
 
 def _tip(scene: Scene, index: int) -> list[Lump]:
-    """Return the payload if section `index` is the last one."""
     if scene.tip is None or not scene.tip.payload or index != len(scene.sections) - 1:
         return []
     return [Lump(scene.tip.payload, (scene.sections[index].length, 0.0), 0.0)]

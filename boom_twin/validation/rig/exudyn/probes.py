@@ -162,5 +162,4 @@ def _on_drive(boom: Boom, drive: int, kind: Any) -> int:
 
 
 def _sensor(boom: Boom, kind: Any, item: Any, **where: Any) -> int:
-    """Add a sensor that stores its values in memory only."""
     return int(boom.system.AddSensor(item(outputVariableType=kind, storeInternal=True, writeToFile=False, **where)))

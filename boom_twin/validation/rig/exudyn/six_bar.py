@@ -69,7 +69,6 @@ def six_bar(scene: Scene, frames: list[Frame], index: int) -> SixBar:
 
 
 def _between(start: Array, end: Array) -> Frame:
-    """Return the frame in the middle of two points, its x axis from start to end."""
     middle = (start + end) / 2
     return Frame(float(middle[0]), float(middle[1]), math.atan2(end[1] - start[1], end[0] - start[0]))
 

@@ -179,7 +179,6 @@ def move(
 
 
 def _built_alike(boom: Boom, scene: Scene, strokes: Array) -> Boom:
-    """Build the boom of another scene as `boom` was built."""
     return build(scene, strokes, boom.elements, boom.nodally_exact, boom.lumps is not None, boom.shear_over_axial, boom.sites)
 
 

@@ -113,7 +113,6 @@ def _varies_rest(case: Own) -> bool:
 
 
 def _by_label(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Return own rows that went through, by method."""
     groups: dict[str, list[Row]] = {}
     for row in of(rows, Own):
         if row.good:
@@ -171,7 +170,6 @@ def report(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None) -
 
 
 def _setting(problem: Problem) -> str:
-    """Return the paragraphs on motion, error measures and run time."""
     own, other = problem.own, problem.exudyn
     second = f"There is no independent reference: {problem.missing}"
     if other is not None and problem.apart is not None:
@@ -204,7 +202,6 @@ def _by_step(rows: Sequence[Row]) -> str:
 
 
 def _equal(problem: Problem, rows: Sequence[Row]) -> str:
-    """Return a table of the fastest case of each program within each error bound of `EQUAL`."""
     if problem.exudyn is None:
         return problem.missing
     lines = []
@@ -243,7 +240,6 @@ def _methods(rows: Sequence[Row]) -> str:
 
 
 def _failed(rows: Sequence[Row]) -> str:
-    """Return a Markdown list of failure reasons with their cases."""
     cases: dict[str, list[str]] = {}
     for row in rows:
         if not row.good:
@@ -253,7 +249,6 @@ def _failed(rows: Sequence[Row]) -> str:
 
 
 def _ms(row: Row) -> float:
-    """Return CPU milliseconds per simulated second."""
     return 1e3 * row.seconds
 
 
@@ -278,7 +273,6 @@ def _content(problem: Problem, rows: Sequence[Row], duel: dict[str, Any] | None)
 
 
 def _flat(row: Row) -> dict[str, Any]:
-    """Return a row as a flat dict, settings first."""
     settings = asdict(row.case)
     settings |= settings.pop("method", {})
     numbers = {key: value for key, value in vars(row).items() if key not in ("case", "status")}

@@ -116,7 +116,6 @@ def _default(rows: Sequence[CaseResult]) -> str:
 
 
 def _others(rows: Sequence[CaseResult]) -> str:
-    """Return one entry for all methods that are worse than the default in the same cases."""
     ranks = {mark: rank for rank, mark in enumerate(("holds", "refuses", "degrades", "fails", "silent"))}
     methods: dict[str, list[str]] = {}
     for method in rows[0].cells:
@@ -151,7 +150,6 @@ def _long(rows: Sequence[CaseResult]) -> str:
 
 
 def _content(rows: list[CaseResult], limits: dict[str, Limit]) -> dict[str, Any]:
-    """Return everything that was found."""
     silent = [(row.case, method) for row in rows for method, cell in row.cells.items() if cell.verdict.silent]
     return {
         "methods": METHODS,

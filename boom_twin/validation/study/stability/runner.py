@@ -103,7 +103,6 @@ def _march(setup: Setup, step: float, every: int, method: Method) -> MethodRun:
 
 
 def _thinned(motion: MethodRun, stride: int) -> MethodRun:
-    """Return the motion with every `stride`-th row."""
     names = ("times", "tip", "tip_acceleration", "joints", "cylinder_forces")
     return replace(motion, **{name: getattr(motion, name)[::stride] for name in names})
 
@@ -115,7 +114,6 @@ def _strokes(setup: Setup, time: float) -> tuple[Array, Array]:
 
 
 def _equilibrium(setup: Setup) -> Array:
-    """Return the tip (m), shape (2,), at rest at the last strokes."""
     return rest_at(setup.scene, *_strokes(setup, setup.duration))[1].frames[-1, :2].copy()
 
 
