@@ -161,21 +161,16 @@ def placed_sensors_of(text: str, scene: Scene) -> list[tuple[str, Stream, dict[s
     """
     names = [name.strip() for name in text.split(",") if name.strip()]
     sensors_of(",".join(name for name in names if name.partition("@")[0] not in PLACED or "@" not in name))
-    places, stems = dict[str, Place](), dict[tuple[str, str], str]()
+    placed: dict[tuple[str, str], tuple[str, Place]] = {}  # name and place by kind and text
     for kind in ("imu", "moment", "point"):
         texts = list(dict.fromkeys(at for name in names if _placed(name)[0] == kind and (at := _placed(name)[1])))
-        found = named_places(kind, texts, scene)
-        stems |= {(kind, at): stem for at, stem in zip(texts, found, strict=True)}
-        places |= found
+        placed |= {(kind, at): found for at, found in zip(texts, named_places(kind, texts, scene).items(), strict=True)}
     chosen = []
     for name in names:
-        kind, at = _placed(name)
-        stem = stems.get((kind, at), "")
-        if name.startswith("gyro@"):
-            stem += "_rate"
-        stream = Stream.MOMENTS if kind == "moment" else Stream(stem) if stem else SENSORS[name]
-        own = stems.get((kind, at))
-        chosen.append((name, stream, {own: places[own]} if own else {}))
+        stem, place = placed.get(_placed(name), ("", None))
+        end = "_rate" if name.startswith("gyro") else ""
+        stream = Stream.MOMENTS if name.startswith("moment") else Stream(stem + end) if stem else SENSORS[name]
+        chosen.append((name, stream, {stem: place} if place else {}))
     return chosen
 
 

@@ -44,7 +44,7 @@ def run(args: Namespace) -> int:
         values, lines = _examined(scene, None)
     else:
         with result_folder(args.out, ENVELOPE, files_of(args, "scene")) as building:
-            values, lines = _examined(scene, building.folder)
+            values, lines = _examined(scene, building)
         lines += ["", *(f"Written: {args.out / name}" for name in ("envelope.csv", "envelope.json", "envelope.png"))]
     print_result(args.json, values, lines)
     return 0

@@ -58,7 +58,7 @@ def run(args: Namespace) -> int:
         return 0
     sheet = SessionSheet(__version__, None if scene is None else scene.text, note=args.note)
     with result_folder(args.out, IMPORT, [*args.files, *files_of(args, "scene", "columns", "mapping")]) as building:
-        done = import_session(tables, building.folder, given, sheet, joints, args.mapping)
+        done = import_session(tables, building, given, sheet, joints, args.mapping)
     _warn(done, scene is None, given.timezone)
     if scene is not None:
         tell(f"next: boom_twin info {args.out}; its line `wiring` says if units, signs and names fit the boom")

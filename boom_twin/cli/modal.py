@@ -51,8 +51,8 @@ def run(args: Namespace) -> int:
             files.append(f"rest_{number}.png")
             title = f"{session.name}, rest period {rest.start:.1f} to {rest.stop:.1f} s"
             found = np.array([(each.frequency, each.frequency_sigma) for each in rest.modes]).reshape(-1, 2)
-            stabilisation_picture(building.folder / files[-1], title, rest.poles, found, rest.model)
-        write_atomic(building.folder / "modes.json", json.dumps([_as_object(rest) for rest in rests], indent=2) + "\n")
+            stabilisation_picture(building / files[-1], title, rest.poles, found, rest.model)
+        write_atomic(building / "modes.json", json.dumps([_as_object(rest) for rest in rests], indent=2) + "\n")
     print_result(args.json, _flat(rests), [*_as_text(rests), *(str(out / name) for name in files)])
     return 0
 

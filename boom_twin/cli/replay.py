@@ -72,7 +72,7 @@ def run(args: Namespace) -> int:
         def add(stretch: Stretch) -> None:
             nonlocal table
             if table is None:  # the sensors of a session are known with its first stretch
-                table = SampleTable(partial(table_file, building.folder / name), joints, stretch.streams)
+                table = SampleTable(partial(table_file, building / name), joints, stretch.streams)
             table.add(stretch)
 
         options = ReplayOptions(
@@ -88,7 +88,7 @@ def run(args: Namespace) -> int:
         found = evaluated_replay(
             building, args.bag, scene, settings, options, heights, args.fatigue, add if args.table else None
         )
-        files = [path.name for path in _write(args, found, building.folder)]
+        files = [path.name for path in _write(args, found, building)]
         if table is not None:
             table.finish()
             files.append(name)

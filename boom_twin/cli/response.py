@@ -103,8 +103,8 @@ def run(args: Namespace) -> int:
         warn(f"{doubt}.")
     if args.out:
         with result_folder(Path(args.out), RESPONSE, files_of(args, "scene", "load")) as building:
-            write_atomic(building.folder / f"{answer.name}.csv", columns_text(answer.columns))
-            answer.draw(building.folder / f"{answer.name}.png")
+            write_atomic(building / f"{answer.name}.csv", columns_text(answer.columns))
+            answer.draw(building / f"{answer.name}.png")
         answer.lines.append(f"Written: {args.out}")
     print_result(args.json, answer.values | {"warnings": answer.doubts}, answer.lines)
     return 0

@@ -39,7 +39,7 @@ def run(args: Namespace) -> int:
     options = {"soak": True} if getattr(args, "soak", False) else {}
     scene, out = open_scene(args.scene), Path(args.out)
     with result_folder(out, study(args.kind), files_of(args, "scene")) as building:
-        written = write(scene, building.folder, quick=args.quick, posture=args.posture, **options)
+        written = write(scene, building, quick=args.quick, posture=args.posture, **options)
     for path in written:
         print(out / path.name)
     return 0

@@ -75,20 +75,8 @@ def study(kind: str) -> ResultKind:
     return ResultKind(f"study {kind}", (f"{kind}.json", f"{kind}.md", f"{kind}*.png"), is_replaced=True)
 
 
-@dataclass(frozen=True, slots=True)
-class UnfinishedResult:
-    """A result that is being built: its folder."""
-
-    folder: Path
-
-    def inner(self, name: str) -> UnfinishedResult:
-        """Return a new folder in it, for a part of the result."""
-        (self.folder / name).mkdir()
-        return UnfinishedResult(self.folder / name)
-
-
 @contextmanager
-def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Iterator[UnfinishedResult]:
+def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Iterator[Path]:
     """Build a folder of results, which is renamed to `out` if the block ends without an exception.
 
     After an exception the new folder is removed, and `out` is unchanged. `out` is missing, empty, or an earlier result of the
@@ -116,7 +104,7 @@ def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Itera
             _check_earlier(place, kind)
             _discard(replaced)
             _remove(building, [MANIFEST, *filter(kind.has, _entries(building))])
-            yield UnfinishedResult(building)
+            yield building
             _complete(building, kind)
         except BaseException as error:
             with suppress(OSError):
