@@ -205,19 +205,14 @@ def _parser(arguments: Sequence[str]) -> ArgumentParser:
     is_completing = COMPLETING in os.environ
     for name, purpose in COMMANDS.items():
         about = purpose[0].upper() + purpose[1:] + "."
-        own = commands.add_parser(name, description=about, epilog=_epilog(name))
+        examples = [f"  boom_twin {example}" for example in EXAMPLES.get(name, ())]
+        own = commands.add_parser(name, description=about, epilog="\n".join(["examples:", *examples] if examples else []))
         own.add_argument("--quiet", action="store_true", help="leave out what is told on the way, but for warnings")
         if is_completing or name in arguments:
             _command(name).add_arguments(own)
     if is_completing:
         _complete(parser)
     return parser
-
-
-def _epilog(command: str) -> str:
-    """Return the lines below the options; a command that `EXAMPLES` lacks has none."""
-    lines = [f"  boom_twin {example}" for example in EXAMPLES.get(command, ())]
-    return "\n".join(["examples:", *lines]) if lines else ""
 
 
 def _complete(parser: ArgumentParser) -> None:

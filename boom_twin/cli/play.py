@@ -10,7 +10,7 @@ import tty
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 from tqdm import tqdm
 
@@ -122,26 +122,21 @@ class Keys:
     """Keys of the terminal within a context; none if stdin is no terminal, or that of another program."""
 
     def __init__(self) -> None:
-        self._before: list[Any] | None = None
+        self.are_read = False
 
     def __enter__(self) -> Self:
         if _is_ours():
-            self._before = termios.tcgetattr(sys.stdin)
+            self.are_read, self._before = True, termios.tcgetattr(sys.stdin)
             tty.setcbreak(sys.stdin, termios.TCSADRAIN)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if self._before is not None and _is_ours():
+        if self.are_read and _is_ours():
             termios.tcsetattr(sys.stdin, termios.TCSADRAIN, self._before)
-
-    @property
-    def are_read(self) -> bool:
-        """Return True if keys of a terminal are read."""
-        return self._before is not None
 
     def pressed(self) -> str:
         """Return the keys pressed since the last call."""
-        if self._before is None or not _is_ours() or not select.select([sys.stdin], [], [], 0.0)[0]:
+        if not self.are_read or not _is_ours() or not select.select([sys.stdin], [], [], 0.0)[0]:
             return ""
         return os.read(sys.stdin.fileno(), 100).decode(errors="replace")
 

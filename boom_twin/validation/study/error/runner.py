@@ -64,14 +64,10 @@ class Runner:
             for case in cases:
                 if turn == 0:
                     found[case] = self.row(case)
-                elif self._again(found[case]):
-                    found[case] = replace(found[case], seconds=min(found[case].seconds, self.row(case).seconds))
+                elif (row := found[case]).good and (isinstance(case, Own) or row.seconds * self.problem.motion.duration < LONG):
+                    found[case] = replace(row, seconds=min(row.seconds, self.row(case).seconds))
                 tick()
         return list(found.values())
-
-    def _again(self, row: Row) -> bool:
-        brief = isinstance(row.case, Own) or row.seconds * self.problem.motion.duration < LONG
-        return row.good and brief
 
     def row(self, case: Case) -> Row:
         """Run one case once. Whatever it raises becomes its status."""

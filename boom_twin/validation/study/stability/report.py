@@ -38,16 +38,12 @@ def write(scene: Scene, out: Path, quick: bool = False, posture: str | None = No
     chosen = [case for case in cases(scene) if case.quick or not quick]
     rows = run(chosen, METHODS, _progress)
     long_rows = run(long_holds(scene) if soak else (), {"default": METHODS["default"]}, _progress)
-    limits = {_title(row.case): limit_of(row.case.make()) for row in rows if _has_no_equilibrium(row)}
+    limits = {_title(row.case): limit_of(row.case.make()) for row in rows if NO_EQUILIBRIUM in row.cells["default"].status}
     return write_files(out, rows, long_rows, limits, move_in_words(scene))
 
 
 def _progress(line: str) -> None:
     print(line, file=sys.stderr)
-
-
-def _has_no_equilibrium(row: CaseResult) -> bool:
-    return NO_EQUILIBRIUM in row.cells["default"].status
 
 
 def _title(case: Case) -> str:
@@ -78,7 +74,7 @@ def text(rows: Sequence[CaseResult], long_rows: Sequence[CaseResult], limits: di
         f"1e-10 rad), or the equilibrium. The move: {move}. Cases make all or part of it, in 1 s unless stated otherwise. "
         "Accelerations and forces within 50 ms after a speed jump are impulses and are ignored.",
         "![Where each method holds](stability.png)",
-        "## Verdicts by method", _meanings(), _counts(rows),
+        "## Verdicts by method", "".join(f"- {mark}: {meaning}.\n" for mark, meaning in MEANINGS.items()), _counts(rows),
         "## The default",
         "All cases hold except:", _default(rows),
         "## Other methods",
@@ -92,10 +88,6 @@ def text(rows: Sequence[CaseResult], long_rows: Sequence[CaseResult], limits: di
         parts += ["## Holds of 24 simulated hours", _long(long_rows)]
     parts += ["Limits: one move. Cases with another geometry use invented booms."]
     return page(parts)
-
-
-def _meanings() -> str:
-    return "".join(f"- {mark}: {meaning}.\n" for mark, meaning in MEANINGS.items())
 
 
 def _counts(rows: Sequence[CaseResult]) -> str:

@@ -93,7 +93,9 @@ def _judge(case: Case, setup: Setup) -> tuple[Callable[[MethodRun], Facts], str]
             return unsolvable, f"{NOTHING}: the reference ended, {right.status}"
         told = f"default method at {step:.3g} s"
         return lambda found: ended(found) or against_motion(_thinned(found, stride), right, setup.still, setup.jump), told
-    rest = _equilibrium(setup) if case.truth == "equilibrium" else None
+    rest = None  # the tip (m) at rest at the last strokes
+    if case.truth == "equilibrium":
+        rest = rest_at(setup.scene, *_strokes(setup, setup.duration))[1].frames[-1, :2].copy()
     told = "equilibrium of the last strokes" if rest is not None else "a vibration that does not grow about a mean that stays"
     return lambda found: ended(found) or against_rest(found, rest, setup.still, setup.every), told
 
@@ -111,10 +113,6 @@ def _strokes(setup: Setup, time: float) -> tuple[Array, Array]:
     """Return strokes (m) at a time (s), and joint angles (rad) of the undeformed boom there."""
     strokes = setup.drive(np.array([time]))[0][0]
     return strokes, joint_angles_of_strokes(setup.scene, strokes, near=setup.angles)
-
-
-def _equilibrium(setup: Setup) -> Array:
-    return rest_at(setup.scene, *_strokes(setup, setup.duration))[1].frames[-1, :2].copy()
 
 
 @dataclass(frozen=True)
