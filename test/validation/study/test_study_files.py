@@ -29,6 +29,9 @@ def test_of_two_kinds_each_has_its_own_folder(tmp_path: Path) -> None:
     with result_folder(tmp_path / "out", study("error"), []) as building:
         (building / "error_methods.png").write_text("two")
     assert (tmp_path / "out" / "error_methods.png").read_text() == "two"
-    with pytest.raises(BagError, match="only an earlier study parts is"), result_folder(tmp_path / "out", study("parts"), []):
+    with (
+        pytest.raises(BagError, match="only an earlier result of this command is"),
+        result_folder(tmp_path / "out", study("parts"), []),
+    ):
         raise AssertionError("it is another study's")
     assert (tmp_path / "out" / "error_methods.png").read_text() == "two"
