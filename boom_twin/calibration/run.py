@@ -86,6 +86,8 @@ class Calibration:
         How the sensors of the sessions were read.
     remarks : tuple of str
         What a reader should know.
+    unusable : str
+        The remark that the result must not be used; empty if it may be.
     """
 
     scene: Scene
@@ -100,6 +102,7 @@ class Calibration:
     after: HeldOutResult
     mapped: Mapped
     remarks: tuple[str, ...]
+    unusable: str
 
 
 def calibrate(
@@ -170,8 +173,9 @@ def calibrate(
     after = judged(better, rigging, sessions[-1], zeros, kept_from)
     progress(1.0, "done")
     held_out = sessions[-1].name if len(sessions) > 1 else f"the last third of {sessions[-1].name}"
-    remarks = tuple(_remarks(fit, problem.names, estimates, sessions) + _worse(before, after))
-    misfit, judgements = float(fit.misfits.max()), (held_out, before, after, mapped, remarks)
+    unusable = _worse(before, after)
+    remarks = (*_remarks(fit, problem.names, estimates, sessions), *([unusable] if unusable else []))
+    misfit, judgements = float(fit.misfits.max()), (held_out, before, after, mapped, remarks, unusable)
     return Calibration(better, zeros, estimates, tuple(groups), misfit, fit.passes, tuple(sessions), *judgements)
 
 
@@ -243,16 +247,17 @@ def _estimates(problem: CalibrationProblem, fit: Fit, groups: Sequence[Inseparab
     return tuple(found)
 
 
-def _worse(before: HeldOutResult, after: HeldOutResult) -> list[str]:
+def _worse(before: HeldOutResult, after: HeldOutResult) -> str:
+    """Return which residuals have grown on what was held out, and the remedy; empty if none has."""
     worse = [
         name for name, old, new in zip(before.names, before.spread, after.spread, strict=True) if new > GROWN * max(old, 1.0)
     ]
     if not worse:
-        return []
-    return [
+        return ""
+    return (
         f"On what was held out the residuals of {', '.join(worse)} have grown: do not use this result. Record a session that "
         "tells what was left as before, or estimate fewer parameters."
-    ]
+    )
 
 
 def _remarks(fit: Fit, names: Sequence[str], estimates: Sequence[Estimate], sessions: Sequence[MeasuredSession]) -> list[str]:

@@ -25,14 +25,12 @@ from .output import columns, open_scene, print_result, tell
 if TYPE_CHECKING:
     from ..deviation.accuracy import TipAccuracy
 
-PNG = b"\x89PNG"
-"""First bytes of a picture; only such a file is replaced."""
+PNG = b"\x89PNG"  # first bytes of a picture; only such a file is replaced
 SIZE_A = "angle of the section, cylinder force"
 SIZE_B = "angles of section and two links, pin force (2), cylinder force"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the scene, ``--json``, and the options of a search for the smallest model."""
     add_scene(parser)
     add_json(parser)
     parser.add_argument("--strict", action="store_true", help="warnings are errors: the exit code is 1 if there are any")

@@ -14,12 +14,10 @@ if TYPE_CHECKING:
     from ..bag.recovery.recover import Recovery
 
 
-SHOWN = 20
-"""Faults that are printed one by one."""
+SHOWN = 20  # faults that are printed one by one
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, a directory of .mcap files, or one .mcap; only read")
     parser.add_argument("--out", required=True, metavar="DIR", help="directory of the new session, new or empty")
     parser.add_argument(

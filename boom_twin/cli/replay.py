@@ -10,18 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..offline.progress import progress_of
 from ..types import StrokeReading
-from .arguments import (
-    SESSION,
-    add_json,
-    add_mapping,
-    add_namespace,
-    add_params,
-    add_session_scene,
-    add_window,
-    files_of,
-    refuse_given,
-    window_of,
-)
+from .arguments import SESSION, add_json, add_namespace, add_session, files_of, refuse_given, window_of
 from .output import open_session_scene, open_session_settings, print_result, tell, warn_incomplete
 
 if TYPE_CHECKING:
@@ -30,14 +19,10 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: ArgumentParser) -> None:
-    """Declare the arguments."""
     parser.add_argument("bag", metavar="BAG", help=SESSION)
-    add_session_scene(parser)
-    add_window(parser)
+    add_session(parser)
     place = "folder for summary.json, bag/, tables and pictures: new, empty, or of an earlier replay, which is replaced"
     parser.add_argument("--out", required=True, metavar="DIR", help=place)
-    add_params(parser)
-    add_mapping(parser)
     add_namespace(parser, "ROS namespace of the node in the session, for topics and --params")
     parser.add_argument(
         "--no-changes", action="store_true", help="do not repeat what was changed while recording: load, limits, zeros, starts"
@@ -87,7 +72,7 @@ def run(args: Namespace) -> int:
         def add(stretch: Stretch) -> None:
             nonlocal table
             if table is None:  # the sensors of a session are known with its first stretch
-                table = SampleTable(partial(table_file, building.folder / name), joints, stretch.streams)
+                table = SampleTable(partial(table_file, building / name), joints, stretch.streams)
             table.add(stretch)
 
         options = ReplayOptions(
@@ -103,7 +88,7 @@ def run(args: Namespace) -> int:
         found = evaluated_replay(
             building, args.bag, scene, settings, options, heights, args.fatigue, add if args.table else None
         )
-        files = [path.name for path in _write(args, found, building.folder)]
+        files = [path.name for path in _write(args, found, building)]
         if table is not None:
             table.finish()
             files.append(name)
@@ -123,7 +108,6 @@ def flat(summary: dict[str, Any]) -> dict[str, Any]:
 
 
 def _write(args: Namespace, found: Evaluation, out: Path) -> list[Path]:
-    """Write pictures and report, as they are wanted; return these files and the file of the figures."""
     from ..offline.history import draw
     from ..report.page import write_report
 
@@ -178,7 +162,6 @@ def count_as_text(name: str, count: int) -> str:
 
 
 def _errors(summary: dict[str, Any]) -> list[str]:
-    """Return lines on the errors against the truth, of the prediction and of the estimate."""
     lines = [
         f"tip error          {1e3 * summary['tip_error_rms_m']:.2f} mm rms against the truth",
         f"acceleration error {summary['tip_acceleration_error_rms_m_s2']:.3f} m/s^2 rms against the truth",

@@ -31,7 +31,7 @@ KERNEL_SOURCES = (
     "kernels", "analysis/cylinder_drives.py", "analysis/equilibrium.py", "deviation", "twin/update.py",
     "twin/state.py", "twin/regular.py", "twin/blocks.py",
     "calibration/rest_filter.py",
-    "health/sensor_survey.py", "health/sensor_findings.py", "types.py",
+    "health/sensor_survey.py", "health/sensor_findings.py", "types.py", "sensor_kinds.py",
 )  # fmt: skip
 """Folders and modules of the package that kernels, or the constants in them, come from."""
 SUFFIX, USER = ".kernel", ".user"

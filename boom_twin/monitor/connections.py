@@ -21,19 +21,13 @@ from ..system.terminal_text import printable
 from .access_control import POLICY
 
 LOG = logging.getLogger("boom_twin.monitor.connections")
-REQUEST_TIME = 5.0
-"""Timeout (s) of a connection's first complete request, and of each further one."""
-LOGGED_LENGTH = 200
-"""Largest length of a logged error message."""
-MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64
-"""Largest number of silent or accepted connections: in total, and of one address."""
+REQUEST_TIME = 5.0  # timeout (s) of a connection's first complete request, and of each further one
+LOGGED_LENGTH = 200  # largest length of a logged error message
+MAX_CONNECTIONS, MAX_OF_ADDRESS = 256, 64  # largest number of silent or accepted connections: in total, and of one address
 
 
 class Connections:
-    """All connections to one server: silent ones (no complete request yet), and accepted ones.
-
-    Each kind is in order of last use. If it is full, a new one replaces the oldest. `server` answers the requests.
-    """
+    """Connections to one server, silent and accepted ones, each in order of last use."""
 
     def __init__(self, server: web.Server) -> None:
         self._server = server
@@ -64,7 +58,6 @@ class Connections:
         self._cut_off(connection, f"it sent no request within {REQUEST_TIME:g} s")
 
     def _count(self, kind: list[Connection], connection: Connection) -> None:
-        """Add a connection of a kind, and close the oldest one if a limit is reached."""
         same = [each for each in kind if each.address == connection.address]
         if len(same) >= MAX_OF_ADDRESS or len(kind) >= MAX_CONNECTIONS:
             self._cut_off(same[0] if len(same) >= MAX_OF_ADDRESS else kind[0], "a newer one")
@@ -140,10 +133,8 @@ class Connection(web.RequestHandler):
             self._deadline = None
 
 
-LOG_PERIOD = 10.0
-"""Period (s) of the log's rate limit."""
-MAX_LOG_LINES = 3
-"""Largest number of records of one logger in a `LOG_PERIOD`."""
+LOG_PERIOD = 10.0  # period (s) of the log's rate limit
+MAX_LOG_LINES = 3  # largest number of records of one logger in a `LOG_PERIOD`
 
 
 class LogRateLimit(logging.Filter):

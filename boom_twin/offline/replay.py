@@ -28,7 +28,7 @@ from ..loggers.log_table import table_of_frame
 from ..messages.sample_decoder import ODDITIES
 from ..scene.load import SceneSource
 from ..system.atomic_files import write_atomic
-from ..system.result_folder import REPLAY, UnfinishedResult, result_folder
+from ..system.result_folder import REPLAY, result_folder
 from ..system.summary_display import SummaryDisplay, data_frame
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
@@ -173,7 +173,8 @@ def replay(
         options = ReplayOptions(progress, mapping, changes, health, window, namespace, with_bag, causes)
         if is_path:
             return replay_into(building, bag, scene, settings, options)
-        kept, place = given_scene(scene), building.inner(SESSION).folder
+        kept, place = given_scene(scene), building / SESSION
+        place.mkdir()
         sheet, own = SessionSheet(__version__, kept.text), None if mapping is None else Path(mapping)
         import_session([table_of_frame(bag)], place, ColumnFile(), sheet, len(kept.scene.joints), own)
         found = replay_into(building, place, kept, settings, options)
@@ -181,18 +182,18 @@ def replay(
 
 
 def replay_into(
-    building: UnfinishedResult,
+    out: Path,
     bag: str | Path,
     scene: SceneSource | SessionScene,
     settings: Settings | None = None,
     options: ReplayOptions = USUAL,
     take: Callable[[Stretch], None] | None = None,
 ) -> Replay:
-    """Replay as `replay` does, into a folder under construction to which more will be added.
+    """Replay as `replay` does, into the folder `out` under construction, to which more will be added.
 
     With `take`, memory stays the same however long the session is: it is given one `Stretch` after the other, and none is kept.
     """
-    given, out = replay_inputs(Path(bag), scene, settings, options), building.folder
+    given = replay_inputs(Path(bag), scene, settings, options)
     session, joints = given.session, len(given.scene.joints)
     truth = truth_in(options.window, session, given.topics, given.wanted)
     errors = None if truth is None else TipErrors(truth)

@@ -104,7 +104,6 @@ def spectrum_picture(path: Path, session: str, history: History, note: str) -> N
 
 
 def _modes(axes: Axes, natural: Array) -> None:
-    """Mark the natural frequencies (Hz), shape (modes, 2), each from its least to its largest; with their numbers."""
     for number, (low, high) in enumerate(natural, 1):
         axes.axvspan(low, max(high, 1.01 * low), color=PURPLE, alpha=0.25, linewidth=0, zorder=0.5)
         place = np.sqrt(low * high), 0.99

@@ -115,9 +115,9 @@ def _part_titles_and_legends(figure: Figure) -> None:
 
 
 def shade_gaps(axes: Axes, gaps: list[tuple[float, float]]) -> None:
-    """Draw grey bands where strokes were missing. The first band has a legend label."""
+    """Draw grey bands where samples were missing. The first band has a legend label."""
     for number, (start, stop) in enumerate(gaps):
-        axes.axvspan(start, stop, color=PALE, linewidth=0, zorder=0.5, label="" if number else "strokes missing")
+        axes.axvspan(start, stop, color=PALE, linewidth=0, zorder=0.5, label="" if number else "no samples")
 
 
 def shade_alarms(axes: Axes, alarms: list[AlarmSpan]) -> None:

@@ -104,7 +104,7 @@ def moving(folder: Path) -> Path:
 
 def table_of(session: Path, out: Path) -> bytes:
     with result_folder(out, REPLAY, [session]) as building:
-        table = SampleTable(partial(table_file, building.folder / "samples.csv"), 4)
+        table = SampleTable(partial(table_file, building / "samples.csv"), 4)
         replay_into(building, session, load_scene(), options=ReplayOptions(health=False), take=table.add)
         table.finish()
     return (out / "samples.csv").read_bytes()

@@ -191,7 +191,7 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Recovery:
         There is no session, nothing of it can be saved, or `out` cannot be written or lies in the source.
     """
     with result_folder(out, RECOVER, [path]) as building:
-        return _recover(path, building.folder, unverified)
+        return _recover(path, building, unverified)
 
 
 def _recover(path: Path, out: Path, unverified: bool) -> Recovery:

@@ -26,7 +26,8 @@ from boom_twin import load_scene, simulate
 from boom_twin.bag.reader import read, scan
 from boom_twin.bag.session_model import scene_of
 from boom_twin.scene.schema import Scene
-from boom_twin.types import SENSORS, G, Stream, StrokeReading
+from boom_twin.sensor_kinds import G
+from boom_twin.types import SENSORS, Stream, StrokeReading
 from boom_twin.validation.rig.faulty_boom import wrong_by
 from boom_twin.validation.rig.motion import random_programme
 from boom_twin.wiring.check import Verdict, check
