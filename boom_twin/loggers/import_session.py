@@ -153,7 +153,7 @@ def _mapping(path: Path | None, assignment: Assignment, joints: int) -> tuple[st
         return text, topics
     document: dict[str, Any] = plain(text) or {}
     document = {**document, "sensors": {**(document.get("sensors") or {}), **dict.fromkeys(lacking, "none")}}
-    return dump(document), mapping_from(document, str(path), joints)
+    return dump(document), mapping_from(document, str(path or "mapping of channels without a column"), joints)
 
 
 def _read(assignment: Assignment, given: ColumnFile, zone: tzinfo | None) -> dict[int, ReadTable]:

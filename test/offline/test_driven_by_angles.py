@@ -98,14 +98,14 @@ def test_without_the_mapping_the_remedy_is_told(without_strokes, mapping, tmp_pa
     assert "replay     nothing is missing" in told and "are not read: angles drive the model" in told
 
 
-@pytest.mark.parametrize(("factor", "told"), [(180.0 / np.pi, "In degrees it would fit"), (-1.0, "its sensor can read")])
-def test_angles_that_do_not_fit_are_told(factor, told, mapping, tmp_path):
+@pytest.mark.parametrize("factor", [180.0 / np.pi, -1.0])
+def test_angles_that_do_not_fit_are_told(factor, mapping, tmp_path):
     """A CSV file without strokes."""
     angles = np.array([each.values for each in samples_of(BAGS / "arch_session", [Stream.ANGLES])[:400]])
     rows = np.column_stack([0.005 * np.arange(len(angles)), factor * angles])
     csv = tmp_path / "session.csv"
     np.savetxt(csv, rows, delimiter=",", header="t_s," + ",".join(f"joint_{i}_rad" for i in range(1, 5)), comments="")
-    with pytest.raises(BagError, match=f"no angle sample could be used .* names joint_1..4.*{told}"):
+    with pytest.raises(BagError, match=r"no angle sample could be used .* names joint_1..4.* can read .*units .* by --mapping"):
         replay(csv, None, tmp_path / "out", mapping=mapping)
 
 
