@@ -137,8 +137,8 @@ def commission(
         names = [sensor.name for sensor in mapped.topics.sensors_of(Stream.STROKES, joints).values()]
         heard = series[Stream.STROKES]
         silent = [name for name in names if name not in heard or not np.isfinite(heard[name].values).any()]
-        told = f": {', '.join(silent)} never had a value" if silent else ""
-        lacking = f"{session.path}: no time in which all {joints} cylinders of the scene ({own.source}) have strokes{told}"
+        without = f": {', '.join(silent)} never had a value" if silent else ""
+        lacking = f"{session.path}: no time in which all {joints} cylinders of the scene ({own.source}) have strokes{without}"
         raise BagError(f"{lacking}. Give the boom's scene by --scene.")
     told = told_reading(found, reads)
     _mend(document, found, None if told is reads else told)
