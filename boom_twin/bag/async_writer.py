@@ -115,7 +115,6 @@ class Storage:
     ----------
     bag : BagWriter
         Used by this object only from now on.
-    split : FileSplit
     tell : callable
         Receives a sentence when the disk does not answer, when it answers again, and when no further file begins.
     """

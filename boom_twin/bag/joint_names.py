@@ -23,7 +23,6 @@ def refuse_other_names(session: Session, topics: Topics, joints: int, scene: str
 
     Parameters
     ----------
-    session : Session
     topics : Topics
         Names of its topics and sensors.
     joints : int

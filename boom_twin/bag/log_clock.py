@@ -26,17 +26,10 @@ class LogClock:
     A recorder writes a topic's messages as they come. If the log times of a topic step back and continue from there, the
     clock was set back. If they step back often, or for one message, the file was not written in order, and its log times
     are sound.
-
-    Attributes
-    ----------
-    places : ndarray of int64, shape (k,)
-        Place of the first message after every step.
-    shifts : ndarray of int64, shape (k,)
-        Total shift of the clock after every step, ns.
     """
 
-    places: Integers
-    shifts: Integers
+    places: Integers  # place of the first message after every step; shape (k,)
+    shifts: Integers  # total shift of the clock after every step, ns; shape (k,)
 
     @property
     def is_set_back(self) -> bool:

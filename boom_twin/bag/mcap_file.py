@@ -59,14 +59,9 @@ _PIECE = 2**31
 
 @dataclass(frozen=True, slots=True)
 class McapFile(SessionFile):
-    """Content of one .mcap file.
+    """Content of one .mcap file."""
 
-    Attributes
-    ----------
-    pieces : list of ChunkIndex
-        Chunks, and runs of messages outside chunks, in the order of the file.
-    """
-
+    # chunks, and runs of messages outside chunks, in the order of the file
     pieces: list[ChunkIndex] = field(default_factory=list)
 
     def heads(self) -> Iterator[tuple[int, int, bytes]]:

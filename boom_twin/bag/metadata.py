@@ -224,27 +224,13 @@ def _profile(entry: dict[Any, Any]) -> Qos | None:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """One topic in a bag.
+    """One topic in a bag."""
 
-    Attributes
-    ----------
-    topic, type : str
-        Absolute name, and type as ``package/msg/Name``.
-    definition : bytes
-        Definition of the type and all types in it, in the language `definition_encoding`.
-    details : dict of str to str
-        Metadata of the channel.
-    qos : object
-        Offered profiles, for ``metadata.yaml``.
-    type_hash : str
-    encoding, definition_encoding : str
-    """
-
-    topic: str
+    topic: str  # topic, type: absolute name, and type as ``package/msg/Name``
     type: str
-    definition: bytes
+    definition: bytes  # definition of the type and all types in it, in the language `definition_encoding`
     details: Mapping[str, str] = field(default_factory=dict)
-    qos: Any = ()
+    qos: Any = ()  # offered profiles, for ``metadata.yaml``
     type_hash: str = ""
     encoding: str = "cdr"
     definition_encoding: str = "ros2msg"

@@ -145,37 +145,19 @@ class TopicInfo:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """Content of a session.
-
-    Attributes
-    ----------
-    path : Path
-        Path as given.
-    files : tuple of SessionFile
-    topics : tuple of TopicInfo
-        Topics, sorted by name.
-    start, end : int
-        First and last log time in nanoseconds; 0 without messages.
-    checked : bool
-        True if all its messages are under a checksum. Without (the default of ``ros2 bag record``), a flipped bit in
-        a value cannot be detected.
-    notes : dict of str to str
-        Notes of the writer, for instance that the session is synthetic.
-    metadata : BagMetadata or None
-        Content of ``metadata.yaml``; None without one.
-    incomplete : str
-        Reason why the session is not whole, if its folder says so; else empty.
-    """
+    """Content of a session."""
 
     path: Path
     files: tuple[SessionFile, ...]
-    topics: tuple[TopicInfo, ...]
-    start: int
+    topics: tuple[TopicInfo, ...]  # topics, sorted by name
+    start: int  # start, end: first and last log time in nanoseconds; 0 without messages
     end: int
+    # True if all its messages are under a checksum. Without (the default of ``ros2 bag record``), a flipped bit in a value
+    # cannot be detected
     checked: bool
-    notes: dict[str, str]
-    metadata: BagMetadata | None
-    incomplete: str
+    notes: dict[str, str]  # notes of the writer, for instance that the session is synthetic
+    metadata: BagMetadata | None  # content of ``metadata.yaml``; None without one
+    incomplete: str  # reason why the session is not whole, if its folder says so; else empty
 
     def find(self, name: str) -> TopicInfo | None:
         """Return a topic by its name, with or without its leading slash; None if it is missing."""

@@ -61,36 +61,20 @@ def by_topic(counts: Mapping[int, int], channels: Mapping[int, Channel]) -> Coun
 
 @dataclass(frozen=True, slots=True)
 class SessionFile(ABC):
-    """Content of one file of a session.
-
-    Attributes
-    ----------
-    path : Path
-    storage : str
-        Storage of the file: ``mcap``, ``sqlite3``, ``ros1`` or ``csv``.
-    library, compression : str
-        Program that wrote the file, by its own name; compression of its first chunk, or a note that it has no chunks.
-    channels : dict of int to Channel
-    schemas : dict of int to Schema
-    counts : dict of int to int
-        Number of messages by channel.
-    start, end : int
-        First and last log time in nanoseconds; 0 without messages.
-    checked : bool
-        True if its messages are under a checksum and counted. If not, a flipped bit can pass undetected.
-    notes : dict of str to str
-    """
+    """Content of one file of a session."""
 
     path: Path
-    storage: str
+    storage: str  # storage of the file: ``mcap``, ``sqlite3``, ``ros1`` or ``csv``
+    # library, compression: program that wrote the file, by its own name; compression of its first chunk, or a note that it has
+    # no chunks
     library: str
     compression: str
     channels: dict[int, Channel]
     schemas: dict[int, Schema]
-    counts: dict[int, int]
-    start: int
+    counts: dict[int, int]  # number of messages by channel
+    start: int  # start, end: first and last log time in nanoseconds; 0 without messages
     end: int
-    checked: bool = False
+    checked: bool = False  # True if its messages are under a checksum and counted. If not, a flipped bit can pass undetected
     notes: dict[str, str] = field(default_factory=dict)
 
     def check_counts(self, source: str, counts: Mapping[int, int], other: str, others: Mapping[int, int]) -> None:

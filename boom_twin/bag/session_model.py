@@ -30,22 +30,12 @@ LENGTHS_SINCE = 0, 2  # first version of the virtual rig whose transducers read 
 
 @dataclass(frozen=True)
 class SessionScene:
-    """A scene, its text, and the source of the text.
-
-    Attributes
-    ----------
-    scene : Scene
-    text : str
-    source : str
-        Path, place in a ``session.yaml``, or `DEFAULT_NAME`.
-    oddities : tuple of Fault
-        Values that can be computed but are implausible.
-    """
+    """A scene, its text, and the source of the text."""
 
     scene: Scene
     text: str
-    source: str
-    oddities: tuple[Fault, ...] = ()
+    source: str  # path, place in a ``session.yaml``, or `DEFAULT_NAME`
+    oddities: tuple[Fault, ...] = ()  # values that can be computed but are implausible
 
     @property
     def sha256(self) -> str:
@@ -142,8 +132,6 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
 
     Parameters
     ----------
-    session : Path
-    given : Path, optional
     joints : int, optional
         Number of joints, see `boom_twin.messages.mapping.load_mapping`.
     namespace : str

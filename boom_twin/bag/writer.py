@@ -261,7 +261,6 @@ class SessionWriter:
 
     Parameters
     ----------
-    directory : Path
     topics : dict of str to Topic
         Topics by any key, which `write` takes. Names are made absolute.
     notes : dict of str to str, optional

@@ -58,20 +58,11 @@ class ReadTable(NamedTuple):
 
 @dataclass(frozen=True)
 class ImportedSession:
-    """Result of an import.
-
-    Attributes
-    ----------
-    assignment : Assignment
-    read : dict of int to ReadTable
-        Rows and times by table index, for tables with channels.
-    counts : dict of str to int
-        Messages by topic.
-    """
+    """Result of an import."""
 
     assignment: Assignment
-    read: dict[int, ReadTable]
-    counts: dict[str, int]
+    read: dict[int, ReadTable]  # rows and times by table index, for tables with channels
+    counts: dict[str, int]  # messages by topic
 
 
 class _Readings(NamedTuple):
@@ -100,8 +91,6 @@ def import_session(
 
     Parameters
     ----------
-    tables : sequence of LogTable
-    out : Path
     given : ColumnFile
         Columns, times and time zone that headers do not give.
     sheet : SessionSheet

@@ -132,7 +132,6 @@ class ReportEncoder:
 
         Parameters
         ----------
-        report : Report
         is_wanted : callable
             Returns True for an output that is wanted; by default for all.
 

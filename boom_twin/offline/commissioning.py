@@ -41,22 +41,13 @@ AXES = "x", "y", "z"
 
 @dataclass(frozen=True)
 class Commissioning:
-    """Result of the check of a session.
-
-    Attributes
-    ----------
-    checked : Checked
-    document : dict
-        Keys of the mapping that mends what the check is sure of.
-    lags : dict of Stream to Lag
-        Lag of each stream against the strokes; empty if it was not asked for, or the strokes are not known.
-    declared_reads, reads : StrokeReading
-        What stroke transducers read as declared, and as told by the encoders; None if it cannot be told.
-    """
+    """Result of the check of a session."""
 
     checked: Checked
-    document: dict[str, Any]
+    document: dict[str, Any]  # keys of the mapping that mends what the check is sure of
+    # lag of each stream against the strokes; empty if it was not asked for, or the strokes are not known
     lags: Mapping[Stream, Lag]
+    # declared_reads, reads: what stroke transducers read as declared, and as told by the encoders; None if it cannot be told
     declared_reads: StrokeReading
     reads: StrokeReading | None
 
@@ -109,7 +100,6 @@ def commission(
 
     Parameters
     ----------
-    bag : path
     scene, mapping : path, optional
         By default those of the session, else those of the package.
     window : TimeWindow

@@ -69,12 +69,7 @@ EXTREME = ("tip_displacement", "tip_position", "tip_acceleration", "moments", "s
 
 
 class HistoryBuilder:
-    """Builder of a session's history from its stretches; its memory does not grow with their number.
-
-    Parameters
-    ----------
-    scene : Scene
-    """
+    """Builder of a session's history from its stretches; its memory does not grow with their number."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene, self._plan = scene, compile_scene(scene)

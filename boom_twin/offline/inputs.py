@@ -52,36 +52,17 @@ USUAL = ReplayOptions()
 
 @dataclass(frozen=True)
 class ReplayInputs:
-    """Session and all that it is read with.
-
-    Attributes
-    ----------
-    session : Session
-    kept : SessionScene
-        Scene with its text and source.
-    settings : Settings
-    mapping : str
-        Source of the mapping.
-    topics : Topics
-    wanted : list of str
-        Input topics to read: that which drives the model, and those of other inputs with messages.
-    strokes : SessionStrokes
-    streams : tuple of Stream
-        Of the sensors that the mapping has; gyros only if the session's messages hold their readings.
-    health : bool
-        True if the rig's health is judged.
-    window : TimeWindow
-    """
+    """Session and all that it is read with."""
 
     session: Session
-    kept: SessionScene
+    kept: SessionScene  # scene with its text and source
     settings: Settings
-    mapping: str
+    mapping: str  # source of the mapping
     topics: Topics
-    wanted: list[str]
+    wanted: list[str]  # input topics to read: that which drives the model, and those of other inputs with messages
     strokes: SessionStrokes
-    streams: tuple[Stream, ...]
-    health: bool
+    streams: tuple[Stream, ...]  # of the sensors that the mapping has; gyros only if the session's messages hold their readings
+    health: bool  # True if the rig's health is judged
     window: TimeWindow
 
     @property

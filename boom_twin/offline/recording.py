@@ -21,20 +21,12 @@ STRETCH = 2**14
 
 
 class ResidualRows(NamedTuple):
-    """Residuals of one stream.
+    """Residuals of one stream."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of its channels.
-    stamps : ndarray of int64, shape (k,)
-        Nanoseconds.
-    values, sigmas : ndarray, shape (k, channels)
-        Measured minus predicted in the unit of the sensor, NaN where not measured; standard deviation expected of it.
-    """
-
-    names: tuple[str, ...]
-    stamps: NDArray[np.int64]
+    names: tuple[str, ...]  # of its channels
+    stamps: NDArray[np.int64]  # ns; shape (k,)
+    # values, sigmas: measured minus predicted in the unit of the sensor, NaN where not measured; standard deviation expected of
+    # it; shape (k, channels)
     values: Array
     sigmas: Array
 
@@ -46,31 +38,15 @@ class ResidualRows(NamedTuple):
 
 @dataclass(frozen=True)
 class Stretch:
-    """Part of a session: everything that was predicted in it.
+    """Part of a session: everything that was predicted in it."""
 
-    Attributes
-    ----------
-    joints : int
-        Of the boom.
-    block : ReportBlock
-    health : list of Health
-    first : int
-        Stamp of the first prediction of the session, ns.
-    samples : list of SampleBlock
-        That were read meanwhile.
-    reads : StrokeReading
-        Of the strokes of the predictions.
-    streams : collection of Stream
-        Of the session's sensors.
-    """
-
-    joints: int
+    joints: int  # of the boom
     block: ReportBlock
     health: list[Health]
-    first: int
-    samples: list[SampleBlock]
-    reads: StrokeReading
-    streams: Collection[Stream]
+    first: int  # stamp of the first prediction of the session, ns
+    samples: list[SampleBlock]  # read meanwhile
+    reads: StrokeReading  # of the strokes of the predictions
+    streams: Collection[Stream]  # of the session's sensors
 
     @property
     def predictions(self) -> PredictionBlock:

@@ -91,12 +91,7 @@ class CsvFile:
 
 
 class RowsInMemory:
-    """Table in memory.
-
-    Attributes
-    ----------
-    parts : list of ndarray, shape (k, columns)
-    """
+    """Table in memory."""
 
     def __init__(self) -> None:
         self.parts: list[Array] = []

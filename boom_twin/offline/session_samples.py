@@ -81,7 +81,6 @@ class SessionSamples:
 
     Parameters
     ----------
-    session : Session
     topics : Topics
         How its topics and sensors are named, and read.
     wanted : list of str

@@ -18,7 +18,6 @@ def summary_of(recording: Recording, counts: Counter[str], wall: float, file: Pa
 
     Parameters
     ----------
-    recording : Recording
     counts : Counter
         Events of the twin.
     wall : float

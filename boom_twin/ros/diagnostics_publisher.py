@@ -24,7 +24,6 @@ class DiagnosticsPublisher:
 
     Parameters
     ----------
-    node : Node
     topic : Topic
         Where they are published.
     hardware_id : str

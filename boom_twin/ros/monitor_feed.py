@@ -42,7 +42,6 @@ class TopicFeed(Feed):
 
     Parameters
     ----------
-    topics : Topics
     scene : Scene, optional
         As of a `Feed`.
     """

@@ -33,7 +33,6 @@ def write_atomic(path: Path, content: str | bytes, sync: Callable[[int], None] =
 
     Parameters
     ----------
-    path : Path
     content : str or bytes
         Text is encoded as UTF-8; surrogates in it (bytes of a path) become escapes.
     sync : callable, optional

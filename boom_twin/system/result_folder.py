@@ -99,7 +99,6 @@ def result_folder(out: Path, kind: ResultKind, sources: Sequence[Path]) -> Itera
     ----------
     out : Path
         Folder that is missing, empty, or an earlier result of the same command.
-    kind : ResultKind
     sources : sequence of Path
         Files and folders that the command reads. None may lie in `out`, nor `out` in a session.
 

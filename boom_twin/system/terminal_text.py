@@ -34,7 +34,6 @@ class PrintableStream:
 
     Parameters
     ----------
-    stream : TextIO
     name : str
         Name in the OSError of a failed write. If it is empty, failed writes are dropped without an error.
     """

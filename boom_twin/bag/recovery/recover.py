@@ -33,26 +33,15 @@ _INDEXES = {Opcode.STATISTICS, Opcode.CHUNK_INDEX}
 
 @dataclass(slots=True)
 class FileDefinitions:
-    """Definitions, notes and counts of one damaged file.
+    """Definitions, notes and counts of one damaged file."""
 
-    Attributes
-    ----------
-    channels, schemas : dict
-        Channels and schemas by number; a definition under a checksum replaces one without.
-    notes : dict of str to str
-    told : Counter or None
-        Number of messages by topic from a sound summary.
-    is_summed : bool
-        True if the checksum of all bytes up to the end of the data fits.
-    listed : Counter of (int, int, int)
-        Chunks in a sound summary's index, by first and last log time (ns) and content size.
-    """
-
+    # channels, schemas: channels and schemas by number; a definition under a checksum replaces one without
     channels: dict[int, Channel] = field(default_factory=dict)
     schemas: dict[int, Schema] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
-    told: Counter[str] | None = None
-    is_summed: bool = False
+    told: Counter[str] | None = None  # number of messages by topic from a sound summary
+    is_summed: bool = False  # True if the checksum of all bytes up to the end of the data fits
+    # chunks in a sound summary's index, by first and last log time (ns) and content size
     listed: Counter[tuple[int, int, int]] = field(default_factory=Counter)
 
     def topic(self, channel: int, metadata: BagMetadata | None) -> Recorded | None:
@@ -136,33 +125,16 @@ MOST_FAULTS = 1000
 
 @dataclass(slots=True)
 class Recovery:
-    """Result of a recovery: counts of saved and lost messages, and faults.
+    """Result of a recovery: counts of saved and lost messages, and faults."""
 
-    Attributes
-    ----------
-    saved : Counter
-        Number of messages by topic, counted in the new session after it was written.
-    unvouched : Counter
-        Number of saved messages by topic that were under no checksum.
-    lost : dict of str to int, or None
-        Number of lost messages by topic; None if the source has no sound count.
-    nameless : int
-        Number of sound messages left out because the definition of their topic is lost.
-    copies : int
-        Number of messages left out because their chunk is a copy of an earlier one.
-    faults : list of (Path, Fault)
-        The first `MOST_FAULTS` faults.
-    fault_count : int
-        Number of all faults.
-    """
-
+    # number of messages by topic, counted in the new session after it was written
     saved: Counter[str] = field(default_factory=Counter)
-    unvouched: Counter[str] = field(default_factory=Counter)
-    lost: dict[str, int] | None = None
-    nameless: int = 0
-    copies: int = 0
-    faults: list[tuple[Path, DamagedBytes]] = field(default_factory=list)
-    fault_count: int = 0
+    unvouched: Counter[str] = field(default_factory=Counter)  # number of saved messages by topic that were under no checksum
+    lost: dict[str, int] | None = None  # number of lost messages by topic; None if the source has no sound count
+    nameless: int = 0  # number of sound messages left out because the definition of their topic is lost
+    copies: int = 0  # number of messages left out because their chunk is a copy of an earlier one
+    faults: list[tuple[Path, DamagedBytes]] = field(default_factory=list)  # the first `MOST_FAULTS` faults
+    fault_count: int = 0  # number of all faults
 
     def note(self, path: Path, fault: DamagedBytes) -> None:
         """Count a fault, and keep it if it is among the first `MOST_FAULTS`."""
@@ -176,7 +148,6 @@ def recover(path: Path, out: Path, unverified: bool = False) -> Recovery:
 
     Parameters
     ----------
-    path, out : Path
     unverified : bool
         Also save the whole messages at the start of chunks that are cut off or whose checksum does not fit.
 

@@ -39,22 +39,12 @@ _SIZE = struct.Struct("<Q")
 
 @dataclass(frozen=True, slots=True)
 class SoundRecords:
-    """Whole records that follow each other.
-
-    Attributes
-    ----------
-    offset : int
-    vouched : bool
-        True if the checksum of their chunk fits.
-    content : bytes
-    chunk : Chunk or None
-        Their chunk, if the records are its whole content.
-    """
+    """Whole records that follow each other."""
 
     offset: int
-    vouched: bool
+    vouched: bool  # True if the checksum of their chunk fits
     content: bytes
-    chunk: Chunk | None = None
+    chunk: Chunk | None = None  # their chunk, if the records are its whole content
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +63,6 @@ def scan_damaged(
 
     Parameters
     ----------
-    path : Path
     unverified : bool
         Also yield the whole records at the start of a chunk whose checksum does not fit or cannot be verified.
     channels : container of int, optional

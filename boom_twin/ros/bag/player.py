@@ -40,7 +40,6 @@ class Player:
 
     Parameters
     ----------
-    session : Session
     names : sequence of str, optional
         Topics, with the session's quality of service; by default the inputs of the twin.
     clock_rate : float, optional

@@ -147,7 +147,6 @@ class Recorder:
         See `recorder_node`.
     storage : Storage
         Completed at the end.
-    wanted : sequence of RequestedTopic
     thresholds : Thresholds
         Of the state on ``/diagnostics``.
     tell : callable

@@ -104,21 +104,11 @@ DEPTH = 4000
 
 @dataclass(frozen=True, slots=True)
 class RequestedTopic:
-    """Topic to record.
+    """Topic to record."""
 
-    Attributes
-    ----------
-    name : str
-        Absolute name.
-    type : str or None
-        None for the type of its first publisher.
-    topic : Topic or None
-        Entry of ``topics.yaml``, if any.
-    """
-
-    name: str
-    type: str | None = None
-    topic: Topic | None = None
+    name: str  # absolute name
+    type: str | None = None  # None for the type of its first publisher
+    topic: Topic | None = None  # entry of ``topics.yaml``, if any
 
     @property
     def required(self) -> bool:
@@ -131,7 +121,6 @@ def requested_topics(names: Sequence[str], known: Mapping[str, Topic]) -> list[R
 
     Parameters
     ----------
-    names : sequence of str
     known : dict of str to Topic
         Topics by absolute name.
 

@@ -23,7 +23,6 @@ class BackgroundTask(Generic[Result]):
 
     Parameters
     ----------
-    node : Node
     work : callable
         Function to call in the thread.
     use : callable

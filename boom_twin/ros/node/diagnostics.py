@@ -122,8 +122,6 @@ class Diagnostics:
 
     Parameters
     ----------
-    node : Node
-    topics : Topics
     queue : ReceiveQueue
         Queue of the inputs.
 

@@ -28,7 +28,6 @@ class MonitorProcess:
     ----------
     node : Node
         Its names, namespace and remappings are those that the page listens to.
-    topics : Topics
     mapping, scene : str
         Their paths; empty: the package's own.
     """

@@ -33,7 +33,6 @@ class Services:
 
     Parameters
     ----------
-    node : Node
     twin : Twin
         Takes what is asked for with its next full stroke sample.
     acknowledge : callable
@@ -115,12 +114,7 @@ LOG_PERIOD = 1.0
 
 
 class StartLog:
-    """Log of the changes from which on the model runs with other settings or zeros, or restarts from static equilibrium.
-
-    Parameters
-    ----------
-    log : Log
-    """
+    """Log of the changes from which on the model runs with other settings or zeros, or restarts from static equilibrium."""
 
     def __init__(self, log: Log) -> None:
         self._log = log
