@@ -77,15 +77,11 @@ class Syncer:
 
 FLUSH = 0.25
 """Time between two flushes, s. A killed process loses at most the messages of that time."""
-STALL = 5.0
-"""Time without an answer of the disk before it is reported, s."""
-PATIENCE = 30.0
-"""Time for the disk to complete the bag at the end, s."""
-MOST_WAITING = 256 * 2**20
-"""Bytes of messages that may wait in memory."""
+STALL = 5.0  # time without an answer of the disk before it is reported, s
+PATIENCE = 30.0  # time for the disk to complete the bag at the end, s
+MOST_WAITING = 256 * 2**20  # bytes of messages that may wait in memory
 
-MOST_FILES = 2000
-"""Limit for the number of files of one recording: readers refuse a ``metadata.yaml`` of about 3000 files."""
+MOST_FILES = 2000  # limit for the number of files of one recording: readers refuse a ``metadata.yaml`` of about 3000 files
 
 _Message = tuple[int, int, bytes, int, int]
 

@@ -30,8 +30,7 @@ TIME = "t_s"
 _NUMBERED = re.compile(r"(?:stroke_(\d{1,3})_m|joint_(\d{1,3})_rad|cylinder_force_(\d{1,3})_N)")
 ROWS_TO_JUDGE, SLOWEST_STEP, FASTEST_STEP = 20, 1.0, 1e-4  # rows; s from row to row, by which the unit of the times is known
 UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # of which a second has so many
-NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}
-"""Channel number of every stream."""
+NUMBERS = {stream: number for number, stream in enumerate(Stream, 1)}  # channel number of every stream
 
 
 @dataclass(frozen=True, slots=True)

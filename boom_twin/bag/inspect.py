@@ -17,8 +17,7 @@ from .reader import Session, scan
 from .session_file import CDR, SessionFile, as_bag_error, schema_of
 from .time_window import WHOLE, TimeWindow
 
-VARIANTS = 100
-"""Largest number of different name lists counted in one topic."""
+VARIANTS = 100  # largest number of different name lists counted in one topic
 
 
 class Skew(NamedTuple):

@@ -15,8 +15,7 @@ Piece = tuple[Integers, Integers, NDArray[np.uint64]]
 """Places, channels and log times (ns) of many messages in the order of the file."""
 OUT_OF_ORDER = 0.25
 """Share of steps back among a file's messages at which its order is not that of recording; a random order has half."""
-MAJORITY = 0.5
-"""Share of messages in topics that step back at which the clock is the cause, because all topics share the clock."""
+MAJORITY = 0.5  # share of messages in topics that step back at which the clock is the cause, because all topics share the clock
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -40,8 +40,7 @@ Pack = Callable[[bytearray], bytes]
 
 _INDEX_HEAD = struct.Struct("<HI")  # index of one channel in one chunk: channel, bytes of entries
 _INDEX_ENTRY = struct.Struct("<QQ")  # log time (ns), place in the chunk
-_HEADS = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")
-"""Array type of `PREFIX` and `MESSAGE_HEAD`."""
+_HEADS = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")  # array type of `PREFIX` and `MESSAGE_HEAD`
 
 
 class McapWriter:

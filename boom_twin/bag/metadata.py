@@ -20,11 +20,9 @@ from ..messages.topic_table import Qos
 from ..system.atomic_files import write_atomic
 
 FILE_NAME = "metadata.yaml"
-VERSION = 9
-"""Version of the format that Jazzy writes."""
+VERSION = 9  # version of the format that Jazzy writes
 
-STORAGES = {".mcap": "mcap", ".db3": "sqlite3"}
-"""Storages of rosbag2 that are read, by the suffix of their files."""
+STORAGES = {".mcap": "mcap", ".db3": "sqlite3"}  # storages of rosbag2 that are read, by the suffix of their files
 _ROOT = "rosbag2_bagfile_information"
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
@@ -184,8 +182,7 @@ def offered_qos(qos: Qos) -> list[dict[str, Any]]:
     ]
 
 
-DEEPEST = 10_000
-"""Limit for the depth of a QoS profile that is read."""
+DEEPEST = 10_000  # limit for the depth of a QoS profile that is read
 
 _RELIABILITY = {1: "reliable", 2: "best_effort", "reliable": "reliable", "best_effort": "best_effort"}
 _DURABILITY = {1: "transient_local", 2: "volatile", "transient_local": "transient_local", "volatile": "volatile"}

@@ -112,8 +112,7 @@ _PARSERS: dict[str, Callable[[str, str], Typesdict]] = {
     "ros2msg": get_types_from_msg,
     "ros2idl": lambda text, _: get_types_from_idl(text),
 }
-_SEPARATOR = re.compile(r"^={3,}[ \t]*$", re.MULTILINE)
-"""Line between definitions, for which rosbags requires 80 characters."""
+_SEPARATOR = re.compile(r"^={3,}[ \t]*$", re.MULTILINE)  # line between definitions, for which rosbags requires 80 characters
 
 
 def _parsed(place: str, schema: Schema, kind: str) -> Typesdict:
@@ -130,8 +129,7 @@ def _parsed(place: str, schema: Schema, kind: str) -> Typesdict:
         raise BagError(f"{place}: its definition cannot be parsed ({error}). Record the session again.") from error
 
 
-RECOVERED = "recovered from"
-"""Key of the note on a session that was recovered from a damaged one."""
+RECOVERED = "recovered from"  # key of the note on a session that was recovered from a damaged one
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,8 +275,7 @@ def read_blocks(session: Session, wanted: Mapping[str, str], window: TimeWindow 
     return SessionBlocks([(file, readable(file, types)) for file in session.files], asked, window)
 
 
-_AND = " and "
-"""Separator between the types of a topic that has several."""
+_AND = " and "  # separator between the types of a topic that has several
 
 
 def _topics(files: tuple[SessionFile, ...]) -> tuple[TopicInfo, ...]:

@@ -21,8 +21,7 @@ from ..system.received_files import open_received
 from .mcap_records import MOST_HELD
 from .session_file import CDR, PARSE_ERRORS, SessionFile, channel_of, schema_of
 
-ENCODING = "ros1"
-"""Encoding of a message that is not converted, because its type differs in Jazzy."""
+ENCODING = "ros1"  # encoding of a message that is not converted, because its type differs in Jazzy
 _OWN = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 """Types that differ in ROS 2, and that `Typestore.ros1_to_cdr` converts."""
 _ERRORS = (ReaderError, AssertionError, EOFError, RecursionError, *PARSE_ERRORS)

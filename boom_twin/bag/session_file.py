@@ -22,15 +22,13 @@ from ..messages.message_block import MessageBlock
 from ..messages.type_store import jazzy
 from .log_clock import NEVER_SET_BACK, LogClock
 
-TOGETHER = 2000
-"""Messages in one block of a file that is read message by message."""
+TOGETHER = 2000  # messages in one block of a file that is read message by message
 CDR = "cdr"
 REMEDY = "The file is damaged or was cut off: `boom_twin recover BAG --out DIR` saves what is whole."
 
 _LZ4 = (RuntimeError,)
 _PARSING = (struct.error, ValueError, KeyError, IndexError, OverflowError, MemoryError)
-PARSE_ERRORS = (McapError, SerdeError, ZstdError, *_LZ4, *_PARSING)
-"""Errors that the parsers raise on invalid bytes."""
+PARSE_ERRORS = (McapError, SerdeError, ZstdError, *_LZ4, *_PARSING)  # errors that the parsers raise on invalid bytes
 
 
 @contextmanager

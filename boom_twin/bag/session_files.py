@@ -15,8 +15,7 @@ from ..messages.type_store import fill_header, new_message
 from ..types import SENSORS, Array, Sample, Stream
 from .writer import SessionWriter
 
-_UNKNOWN = -1.0
-"""First element of a covariance: the quantity is not measured (REP-145)."""
+_UNKNOWN = -1.0  # first element of a covariance: the quantity is not measured (REP-145)
 
 
 def write_session(

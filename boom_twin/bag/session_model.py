@@ -23,8 +23,7 @@ from .session_sheet import KeptText, kept, kept_parameters, rig_version, sha256
 
 DEFAULT_MAPPING = "default mapping"
 DEFAULT_PARAMETERS = "default parameters"
-GIVEN = "given as a Scene"
-"""Source of a scene that came by no file."""
+GIVEN = "given as a Scene"  # source of a scene that came by no file
 LENGTHS_SINCE = 0, 2  # first version of the virtual rig whose transducers read lengths
 
 

@@ -26,11 +26,9 @@ from .session_model import given_scene
 from .session_sheet import SessionSheet
 from .writer import BagWriter, recorded
 
-CLOCK_SET = SECOND
-"""Step back of a stamp (ns) above which a clock was set; a smaller one is a late row."""
+CLOCK_SET = SECOND  # step back of a stamp (ns) above which a clock was set; a smaller one is a late row
 BY_NAME = "sensor_msgs/msg/JointState"
-CHECK_PERIOD = 0.5
-"""Time (s) between two checks of the disk."""
+CHECK_PERIOD = 0.5  # time (s) between two checks of the disk
 
 
 class LogTimes:

@@ -45,8 +45,7 @@ def claim_directory(directory: Path) -> None:
         raise BagError(f"{directory}: holds {taken[0]} already, and nothing is overwritten. Choose a new directory.")
 
 
-CHUNK_SIZE = 64 * 1024
-"""Bytes of messages that wait in memory: about one second of a 200 Hz session."""
+CHUNK_SIZE = 64 * 1024  # bytes of messages that wait in memory: about one second of a 200 Hz session
 RESULT_CHUNK_SIZE = 512 * 1024
 """Bytes of messages in a chunk of a result bag: about a second of all outputs at 200 Hz. Fewer chunks need less index."""
 LIBRARY = "boom_twin"

@@ -10,12 +10,9 @@ import numpy as np
 from ..health.wiring_monitor import KIND as WIRING
 from ..types import Array, Health, Report, Sample, Stream
 
-JUDGED_TIME = 5_000_000_000
-"""Window (ns) of the test."""
-FEWEST_RESIDUALS = 10
-"""Least number of a joint's residuals in the window."""
-LARGEST_RESIDUAL = radians(10.0)
-"""Largest residual by sag, load, wrong stiffness, and most encoders' zeros."""
+JUDGED_TIME = 5_000_000_000  # window (ns) of the test
+FEWEST_RESIDUALS = 10  # least number of a joint's residuals in the window
+LARGEST_RESIDUAL = radians(10.0)  # largest residual by sag, load, wrong stiffness, and most encoders' zeros
 
 
 class OtherBoom:

@@ -19,10 +19,8 @@ from ..scene.schema import Scene
 from ..types import SECOND, Alarm, Array, Health, Report, StrokeReading
 from .levels import Bounds, ComponentJudge, Level, Status, Value
 
-FAILURE_SHOWN = 1.0
-"""Time (s) for which a failure is shown."""
-LOAD_WINDOW, LOAD_INTERVAL = 40 * SECOND, SECOND // 50
-"""Window and interval of the estimates of the load at the tip, ns."""
+FAILURE_SHOWN = 1.0  # time (s) for which a failure is shown
+LOAD_WINDOW, LOAD_INTERVAL = 40 * SECOND, SECOND // 50  # window and interval of the estimates of the load at the tip, ns
 MEGA = 1e6
 
 

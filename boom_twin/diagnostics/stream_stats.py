@@ -13,30 +13,21 @@ from numpy.typing import NDArray
 
 from ..types import NANO, Array, Sample
 
-LONGEST_PAUSE = 10.0
-"""Longest step of stamps (s) that is a pause of the sensor; a longer one is a jump of its clock."""
+LONGEST_PAUSE = 10.0  # longest step of stamps (s) that is a pause of the sensor; a longer one is a jump of its clock
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelStats:
     """Statistics of one sensor since the last look."""
 
-    value: float
-    """Newest reading, in the sensor's unit; NaN before the first one."""
-    stamp: int
-    """Stamp of `value`, ns; 0 before the first one."""
-    rate: float
-    """Readings a second, by their stamps; NaN if fewer than two."""
-    gap: float
-    """Longest step between their stamps, s."""
-    gaps: int
-    """Steps longer than permitted, since listening began."""
-    missing: float
-    """Share of the messages without a finite value; NaN without messages."""
-    outside: float
-    """Share of the messages with a value out of range; NaN without messages."""
-    unchanged: int
-    """Consecutive readings, up to the newest, that repeat the one before."""
+    value: float  # newest reading, in the sensor's unit; NaN before the first one
+    stamp: int  # stamp of `value`, ns; 0 before the first one
+    rate: float  # readings a second, by their stamps; NaN if fewer than two
+    gap: float  # longest step between their stamps, s
+    gaps: int  # steps longer than permitted, since listening began
+    missing: float  # share of the messages without a finite value; NaN without messages
+    outside: float  # share of the messages with a value out of range; NaN without messages
+    unchanged: int  # consecutive readings, up to the newest, that repeat the one before
 
 
 class Channel:

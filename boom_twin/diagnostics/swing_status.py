@@ -9,8 +9,7 @@ import numpy as np
 from ..types import SECOND, Array, Report
 from .levels import Bounds, ComponentJudge, Status
 
-WINDOW, INTERVAL = 4 * SECOND, SECOND // 50
-"""Window (four periods of a slow boom) and interval of displacements, ns."""
+WINDOW, INTERVAL = 4 * SECOND, SECOND // 50  # window (four periods of a slow boom) and interval of displacements, ns
 
 
 class SwingWatch:

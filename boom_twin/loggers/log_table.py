@@ -17,8 +17,7 @@ from ..types import Array
 from .csv_layout import layout_of, number_in
 from .headers import split_header, unit_of
 
-Times = list[str] | NDArray[Any]
-"""Cells of a column of times: texts, numbers in a unit, or `datetime64`."""
+Times = list[str] | NDArray[Any]  # cells of a column of times: texts, numbers in a unit, or `datetime64`
 
 
 @dataclass

@@ -13,10 +13,8 @@ from .encoded_block import Bytes
 from .topic_table import FRAME
 from .type_store import fill_header, jazzy
 
-ORIGIN = 4
-"""Bytes of encapsulation, from after which CDR aligns."""
-STAMP = 1_365_991_213
-"""Seconds that stand for the stamp, in every header of a message."""
+ORIGIN = 4  # bytes of encapsulation, from after which CDR aligns
+STAMP = 1_365_991_213  # seconds that stand for the stamp, in every header of a message
 
 _DOUBLE, _SINGLE = 0x7E37_E43C_8800_0000, 0x7E96_7600
 """Bits of the first placeholder of either width, about 1e300 and 1e38; the next ones count up. No constant comes near them."""

@@ -17,20 +17,15 @@ from .cdr_decoder import Axes
 from .sample_assembler import Reading, SampleAssembler
 from .topic_table import Topics, factor, load_topics
 
-LATEST = 2**31 * SECOND
-"""First stamp beyond the range of a message, ns."""
+LATEST = 2**31 * SECOND  # first stamp beyond the range of a message, ns
 
-MOST_NAMES = 1000
-"""Limit for the number of names in a message; a machine has some tens of them."""
+MOST_NAMES = 1000  # limit for the number of names in a message; a machine has some tens of them
 
-KEPT = 16
-"""Number of lists of names that are remembered for one stream: a bus may send every joint in a message of its own."""
+KEPT = 16  # number of lists of names that are remembered for one stream: a bus may send every joint in a message of its own
 
-NO_MEASUREMENT = -1.0
-"""First element of a covariance where the quantity is not measured (REP-145)."""
+NO_MEASUREMENT = -1.0  # first element of a covariance where the quantity is not measured (REP-145)
 
-_ABSENT = float("nan")
-"""Value of a channel that a message does not have, distinguished by identity from a reading of NaN."""
+_ABSENT = float("nan")  # value of a channel that a message does not have, distinguished by identity from a reading of NaN
 
 
 def stamp_of(msg: Any) -> int:

@@ -34,8 +34,7 @@ def jazzy() -> Typestore:
     return get_typestore(Stores.ROS2_JAZZY)
 
 
-MOST_TEXTS = 100
-"""Texts of a message that may be in another encoding than UTF-8."""
+MOST_TEXTS = 100  # texts of a message that may be in another encoding than UTF-8
 
 
 def text_in(data: bytes) -> str:

@@ -20,8 +20,7 @@ from ..twin.blocks import EstimateBlock, PredictionBlock
 from ..types import NANO, Array
 
 FILE_NAME = "truth.csv.gz"
-LARGEST_TRUTH = 64 * 2**20
-"""Bytes of an unpacked file that are read: about an hour at 200 Hz."""
+LARGEST_TRUTH = 64 * 2**20  # bytes of an unpacked file that are read: about an hour at 200 Hz
 COLUMNS = ("t_s", "tip_x_m", "tip_y_m", "tip_ax_m_s2", "tip_ay_m_s2")
 LOAD_COLUMNS = ("tip_load_x_N", "tip_load_y_N")
 

@@ -16,8 +16,7 @@ from ..twin.blocks import CODES, EstimateBlock, PredictionBlock, ReportBlock, Sa
 from ..types import HELD, NANO, USUAL_STREAMS, Alarm, Array, Health, Report, Stream, StrokeReading, channels_of
 from .ground_truth import TipErrors
 
-STRETCH = 2**14
-"""Predictions in a stretch, at least: 82 s at 200 Hz, some 30 MB."""
+STRETCH = 2**14  # predictions in a stretch, at least: 82 s at 200 Hz, some 30 MB
 
 
 class ResidualRows(NamedTuple):

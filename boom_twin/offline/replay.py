@@ -45,8 +45,7 @@ from .session_samples import SessionSamples
 from .summary import alarm_as_text, summary_of
 from .threads import quick_switches, read_ahead, result_bag
 
-SESSION = "session"
-"""Folder in a replay of a table, with the session that was made of it."""
+SESSION = "session"  # folder in a replay of a table, with the session that was made of it
 
 
 @dataclass(frozen=True, repr=False)

@@ -19,8 +19,7 @@ from ..twin.blocks import CODES, Integers, SampleBlock
 from ..types import NANO, SENSORS, USUAL_STREAMS, Array, Stream, channels_of
 from .recording import Stretch
 
-DELAY = 2.0
-"""Time (s) that a row waits for late residuals."""
+DELAY = 2.0  # time (s) that a row waits for late residuals
 ESTIMATED = (
     "tip_x_m", "tip_y_m", "tip_angle_rad", "tip_vx_m_s", "tip_vy_m_s", "tip_angular_velocity_rad_s",
     "tip_ax_m_s2", "tip_ay_m_s2", "tip_angular_acceleration_rad_s2", "load_x_N", "load_y_N",

@@ -72,8 +72,7 @@ def recorded_changes(session: Session, topics: Topics) -> Changes:
     return Changes((log, decode_changes(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))
 
 
-BATCH = 400
-"""Messages in one block, at least."""
+BATCH = 400  # messages in one block, at least
 
 
 class SessionSamples:

@@ -22,8 +22,7 @@ from ..scene.schema import Scene
 from ..twin.blocks import ReportBlock
 from ..types import Report
 
-ITEMS_AHEAD = 8
-"""Blocks of samples, or of reports, that wait between two threads."""
+ITEMS_AHEAD = 8  # blocks of samples, or of reports, that wait between two threads
 SWITCH_INTERVAL = 2e-5
 """Time (s) that a thread keeps the interpreter's lock while another waits; a call of the twin's kernel takes 1 ms."""
 Item = TypeVar("Item")

@@ -66,8 +66,7 @@ class StopSignal:
         True after a signal.
     """
 
-    LONGEST = 0.5
-    """Time (s) allowed to a callback before it is interrupted."""
+    LONGEST = 0.5  # time (s) allowed to a callback before it is interrupted
 
     def __init__(self) -> None:
         self.asked = False

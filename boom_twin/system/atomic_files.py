@@ -15,8 +15,7 @@ from ..errors import BagError, UsageError
 DRAFT = ".draft"
 """Suffix of a file that is being written; its name begins with a dot. A killed process may leave one."""
 
-HEAD = 4096
-"""Number of first bytes of a file that identify an earlier result."""
+HEAD = 4096  # number of first bytes of a file that identify an earlier result
 
 _RECORDINGS = frozenset({".mcap", ".db3", ".bag"})
 _BESIDE_THEM = frozenset({"metadata.yaml", "session.yaml", "truth.csv.gz"})

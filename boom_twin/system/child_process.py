@@ -14,8 +14,7 @@ from typing import Any
 
 from .cores import usable_cores
 
-ROOT = Path(__file__).absolute().parents[2]
-"""Folder or zip archive from which this process imported ``boom_twin``."""
+ROOT = Path(__file__).absolute().parents[2]  # folder or zip archive from which this process imported ``boom_twin``
 
 _START = (
     "import runpy, sys; from importlib import machinery, util; "

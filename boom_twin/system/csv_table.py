@@ -16,8 +16,7 @@ import numpy as np
 from ..errors import BoomTwinError
 from ..types import Array
 
-LONGEST_LINE = 2**16
-"""Limit for the number of characters in a line."""
+LONGEST_LINE = 2**16  # limit for the number of characters in a line
 
 NOTHING = {"", "-", "nan", "null", "none", "na", "n/a", "#n/a"}
 """Texts of cells without a value, in lower case."""
@@ -31,16 +30,11 @@ class CsvTable:
     """Cells of a CSV file below its header, or of some of its rows."""
 
     path: Path
-    names: list[str]
-    """Names of the columns, from the header."""
-    rows: list[list[str]]
-    """The cells; empty lines are left out."""
-    lines: list[int]
-    """Line number of each row in the file, from 1."""
-    error: type[BoomTwinError]
-    """Type of the errors that are raised."""
-    is_ended: bool = True
-    """False if the last row is the last of the file, and has no line end."""
+    names: list[str]  # names of the columns, from the header
+    rows: list[list[str]]  # the cells; empty lines are left out
+    lines: list[int]  # line number of each row in the file, from 1
+    error: type[BoomTwinError]  # type of the errors that are raised
+    is_ended: bool = True  # False if the last row is the last of the file, and has no line end
 
     def column(self, name: str, blank: float | None = None) -> list[float]:
         """Return the numbers of a column, with `blank` for an empty cell. Without `blank`, an empty cell raises `error`."""

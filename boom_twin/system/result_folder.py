@@ -25,8 +25,7 @@ from .atomic_files import DRAFT, sync_folder, write_atomic
 from .received_files import real_path, sha256_of
 
 MANIFEST, UNFINISHED = "manifest.json", "unfinished.json"
-BUILDING, REPLACED = ".unfinished", ".replaced"
-"""Suffixes of the folders beside the result."""
+BUILDING, REPLACED = ".unfinished", ".replaced"  # suffixes of the folders beside the result
 OF_THE_SYSTEM = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})  # a file manager leaves them in a folder
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Errors of a full disk, a full quota, or a file at its size limit. Errors of writing name no file."""
@@ -38,8 +37,7 @@ class ResultKind:
     """Kind of result: the command and the files that it writes."""
 
     command: str
-    files: tuple[str, ...]
-    """Patterns for the paths of its files in the folder."""
+    files: tuple[str, ...]  # patterns for the paths of its files in the folder
     is_replaced: bool
     """True if a later run replaces the result. If not, it is a recording, which has no manifest and is never replaced."""
 

@@ -119,8 +119,7 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
     return definitions
 
 
-MOST_FAULTS = 1000
-"""Limit for the number of faults that are reported one by one."""
+MOST_FAULTS = 1000  # limit for the number of faults that are reported one by one
 
 
 @dataclass(slots=True)

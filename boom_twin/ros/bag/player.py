@@ -22,12 +22,9 @@ from .subscriptions import installed_class
 
 CLOCK = "/clock"
 NAME = "boom_twin_player"
-LOOK = 0.05
-"""Polling period (s) of listeners and pause."""
-DELIVERY = 10.0
-"""Timeout (s) for acknowledgements of reliable listeners at the end."""
-SETTLE = 0.5
-"""Time (s) from the match with the last listener to the first message."""
+LOOK = 0.05  # polling period (s) of listeners and pause
+DELIVERY = 10.0  # timeout (s) for acknowledgements of reliable listeners at the end
+SETTLE = 0.5  # time (s) from the match with the last listener to the first message
 CATCH_UP = 4.0
 """Factor on the rate at which overdue messages are sent after a delay.
 

@@ -31,10 +31,8 @@ NAMES = ("scene", "mapping", "frame_prefix", *Settings.model_fields)
 
 
 NAME = "boom_twin_recorder"
-LOOK = 0.5
-"""Seconds between looks for new topics, publishers and the disk."""
-LOOKS = 2
-"""Looks from one state on ``/diagnostics`` to the next."""
+LOOK = 0.5  # seconds between looks for new topics, publishers and the disk
+LOOKS = 2  # looks from one state on ``/diagnostics`` to the next
 COMPLETE = "every required topic has a publisher"
 
 

@@ -98,8 +98,7 @@ def _short(name: str) -> str:
     return name.replace("/msg/", "/")
 
 
-DEPTH = 4000
-"""Queue of every topic, messages: some seconds of a session."""
+DEPTH = 4000  # queue of every topic, messages: some seconds of a session
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,16 +18,12 @@ from ...diagnostics.topic_status import Reception
 from ...types import NANO
 from ..runtime import CallbackTurns, with_information
 
-FRESH = 0.005
-"""Age (s) of a message from the executor above which more are assumed to wait in the executor's queue."""
+FRESH = 0.005  # age (s) of a message from the executor above which more are assumed to wait in the executor's queue
 LARGEST = 1 << 18
 """Largest message that is read, bytes. A message of a thousand names (the most that are examined) is smaller."""
-CATCH_UP = 0.5
-"""Time limit (s) for reading messages before a request whose answer depends on them."""
-BUDGET = 0.01
-"""Time limit (s) for reading messages between two turns of the executor."""
-INTAKE = 0.2
-"""Time limit (s) for taking messages from the executor before some are read."""
+CATCH_UP = 0.5  # time limit (s) for reading messages before a request whose answer depends on them
+BUDGET = 0.01  # time limit (s) for reading messages between two turns of the executor
+INTAKE = 0.2  # time limit (s) for taking messages from the executor before some are read
 
 
 class _Topic:

@@ -18,8 +18,7 @@ from ...twin.twin import Twin
 from ...types import SENSORS, Change, Report, Stream, StrokeReading, streams_of
 from ..runtime import Log
 
-PAUSE = 1.0
-"""Time (s) between two calls of a service that starts the model from rest, which takes as long as hundreds of steps."""
+PAUSE = 1.0  # time (s) between two calls of a service that starts the model from rest, which takes as long as hundreds of steps
 FROM_REST = re.compile(r"reset|rezero/cylinder_\d+")
 INACTIVE = "the node is not active, so nothing is measured. Activate it first."
 
