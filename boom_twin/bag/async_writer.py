@@ -26,13 +26,11 @@ class Syncer:
         The mark of the newest request that is on the disk.
     time : float
         Time of that request, s of `time.monotonic`.
-    error : OSError or None
-        Error of the disk, if it failed.
     """
 
     def __init__(self) -> None:
         self.done, self.time = 0, time.monotonic()
-        self.error: OSError | None = None
+        self.error: OSError | None = None  # error of the disk, if it failed
         self._sent = self._answered = 0  # requests; each is changed by one thread only
         self._began = self.time
         self._requests: SimpleQueue[tuple[int, int, float]] = SimpleQueue()

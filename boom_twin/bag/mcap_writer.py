@@ -214,18 +214,14 @@ class _OpenChunk:
 
     Attributes
     ----------
-    content : bytearray
-        The records.
     entries : dict of int to list of bytes
         Index entries (log time and place of every message) by channel, in the order of their first messages.
-    start, end : int
-        First and last log time, ns.
     """
 
     def __init__(self) -> None:
-        self.content = bytearray()
+        self.content = bytearray()  # the records
         self.entries: dict[int, list[bytes]] = {}
-        self.start = self.end = 0
+        self.start = self.end = 0  # first and last log time, ns
 
     def add(self, channel: int, log_time: int, record: bytes) -> None:
         """Append one message."""

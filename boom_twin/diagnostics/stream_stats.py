@@ -92,8 +92,6 @@ class StreamWatch:
 
     Attributes
     ----------
-    count : int
-        Messages, since the beginning.
     newest : int or None
         Stamp of the newest message.
     lag : float
@@ -103,7 +101,7 @@ class StreamWatch:
 
     def __init__(self, ranges: Array, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._ranges, self._monotonic = ranges.tolist(), monotonic
-        self.count = 0
+        self.count = 0  # messages, since the beginning
         self.begin()
 
     def begin(self) -> None:

@@ -126,16 +126,10 @@ class SampleDecoder:
 
     Attributes
     ----------
-    oddities : Counter
-        Count of each of the irregularities `ODDITIES`.
-    other_boom_names : dict of Stream to list of str
-        Names in the newest message that has names of another boom.
     strange_names : dict of Stream to tuple of list of str
         Names missing in the first message that also had names unknown to the scene, and those unknown names.
     delays : dict of Stream to int
         Time from the stamp of a sample to that of its message, ns.
-    refused : int
-        Number of messages without a usable value; one without any names and values is not counted.
     assembler : SampleAssembler
         Assembler of samples from messages.
     """
@@ -148,12 +142,12 @@ class SampleDecoder:
         self._sharing = pair if topics.is_shared else {}
         self.delays = {stream: topics.delay(stream) for stream in self._channels}
         self._areas = topics.areas
-        self.refused = 0
+        self.refused = 0  # number of messages without a usable value; one without any names and values is not counted
         self._by_axis = {stream for stream, kind in SENSORS.items() if not kind.is_named}
-        self.oddities: Counter[str] = Counter()
+        self.oddities: Counter[str] = Counter()  # count of each of the irregularities `ODDITIES`
         wanted = {stream: each.wanted for stream, each in self._channels.items()}
         self.assembler = SampleAssembler(wanted, self.oddities, topics.stroke_reading.stream)
-        self.other_boom_names: dict[Stream, list[str]] = {}
+        self.other_boom_names: dict[Stream, list[str]] = {}  # names in the newest message that has names of another boom
         self.strange_names: dict[Stream, tuple[list[str], list[str]]] = {}
 
     def samples(self, streams: Iterable[Stream], stamp_ns: int, msg: Any) -> list[Sample]:

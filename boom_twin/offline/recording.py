@@ -77,18 +77,14 @@ class SessionTotals:
         Of the joints: rad, and over the expected deviations.
     tip_sigmas : ndarray, shape (2,)
         Largest standard deviation of the predicted tip's x and y, m; NaN if nothing is known of it.
-    tip_sigma : float or None
-        The largest of both together, m.
-    load : TipLoadFinder
-        Of the load at the tip that the model does not know.
     """
 
     def __init__(self, joints: int) -> None:
         self.samples, self.acceleration = 0, 0.0
         self.residuals, self.normalised = ColumnStatistics(joints), ColumnStatistics(joints)
         self.tip_sigmas: Array = np.full(2, np.nan)
-        self.tip_sigma: float | None = None
-        self.load = TipLoadFinder()
+        self.tip_sigma: float | None = None  # the largest of both together, m
+        self.load = TipLoadFinder()  # of the load at the tip that the model does not know
 
     def add(self, stretch: Stretch) -> None:
         """Add a stretch."""
@@ -129,14 +125,6 @@ class Recording:
     ----------
     gaps, clock_sets : list of (int, int)
         Stamps (ns) between which strokes paused; stamps before and after a clock was set.
-    refused : int
-        Samples that were not used.
-    is_judged : bool
-        Whether the rig's health was.
-    noise : dict
-        See `Health.noise`; the newest.
-    totals : SessionTotals
-        Of all stretches that are complete.
     """
 
     def __init__(
@@ -160,10 +148,10 @@ class Recording:
         self._whole: Stretch | None = None
         self.gaps: list[tuple[int, int]] = []
         self.clock_sets: list[tuple[int, int]] = []
-        self.refused = 0
-        self.is_judged = False
-        self.noise: Mapping[str, float] = {}
-        self.totals = SessionTotals(joints)
+        self.refused = 0  # samples that were not used
+        self.is_judged = False  # whether the rig's health was
+        self.noise: Mapping[str, float] = {}  # see `Health.noise`; the newest
+        self.totals = SessionTotals(joints)  # of all stretches that are complete
 
     def add(self, found: ReportBlock | Report) -> None:
         """Add reports of samples."""

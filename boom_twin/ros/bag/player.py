@@ -44,8 +44,6 @@ class Player:
 
     Attributes
     ----------
-    sent : Counter of str
-        Messages sent by topic, in all calls of `play` so far.
     wall, latest : float
         Wall time (s); largest delay of a message (s).
 
@@ -69,7 +67,7 @@ class Player:
         self._clock: Publisher[Any] | None = None
         if clock_rate is not None:
             self._clock = self._node.create_publisher(Clock, CLOCK, 10)
-        self.sent: Counter[str] = Counter()
+        self.sent: Counter[str] = Counter()  # messages sent by topic, in all calls of `play` so far
         self.latest = self.wall = self._ask = 0.0
 
     @property
