@@ -21,10 +21,6 @@ def refuse_other_names(session: Session, topics: Topics, joints: int, scene: str
 
     Parameters
     ----------
-    topics : Topics
-        Names of its topics and sensors.
-    joints : int
-        Number of joints of the scene.
     scene : str
         Source of the scene; empty if unknown.
     """

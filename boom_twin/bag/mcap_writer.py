@@ -50,12 +50,8 @@ class McapWriter:
     ----------
     stream : BinaryIO
         Empty stream. Nothing else may write to it. It is not closed.
-    profile, library : str
-        Fields of the file's header.
     chunk_size : int
         Size above which a chunk is complete, bytes of records.
-    compression : CompressionType
-        Compression of the chunks.
 
     Raises
     ------

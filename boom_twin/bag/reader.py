@@ -231,8 +231,6 @@ def read(session: Session, wanted: Mapping[str, str], window: TimeWindow = WHOLE
 
     Parameters
     ----------
-    session : Session
-        Result of `scan`.
     wanted : dict of str to str
         Message type by topic, with or without the leading slash.
     window : TimeWindow, optional

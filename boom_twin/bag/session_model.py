@@ -131,8 +131,6 @@ def mapping_of(session: Path, given: Path | None = None, joints: int | None = No
 
     Parameters
     ----------
-    joints : int, optional
-        Number of joints, see `boom_twin.messages.mapping.load_mapping`.
     namespace : str
         Namespace of the node, to which names without a leading slash are relative.
 

@@ -64,14 +64,8 @@ class BagWriter:
 
     Parameters
     ----------
-    directory : Path
-        Made if it is not there.
     notes : dict of str to str, optional
         Kept in every file and in ``custom_data``.
-    compression : CompressionType, optional
-        Compression of the chunks.
-    distro : str, optional
-        ROS distribution named in the metadata.
     chunk_size : int, optional
         Bytes of a chunk, before it is compressed.
 
@@ -264,8 +258,6 @@ class SessionWriter:
         Topics by any key, which `write` takes. Names are made absolute.
     notes : dict of str to str, optional
         For instance that the session is synthetic, and its origin.
-    **options
-        As of `BagWriter`.
     """
 
     def __init__(

@@ -83,17 +83,8 @@ class Rows:
 class StreamWatch:
     """Statistics of one stream, computed when `look` is called. Times are in s, stamps in ns.
 
-    Parameters
-    ----------
-    ranges : ndarray, shape (n, 2)
-        Least and greatest reading of each channel, in the sensor's unit.
-    monotonic : callable
-        Monotonic clock, s.
-
     Attributes
     ----------
-    newest : int or None
-        Stamp of the newest message.
     lag : float
         Least time from stamp to arrival between the last two looks, s; NaN without messages. It contains an unknown clock
         offset. The difference of two streams' lags is the offset between their clocks.

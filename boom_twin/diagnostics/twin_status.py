@@ -36,12 +36,6 @@ class TwinWatch:
         Sensors in the order of a sample's values. The first stream drives the model. Empty before the node is configured.
     names : dict of Stream to str
         Names of the input topics. Streams in the messages of another one have none.
-    thresholds : Thresholds
-        Replaceable at run time.
-    monotonic : callable
-        Monotonic clock, s.
-    stress : BendingStressModel, optional
-        Model of the stress, if sections bend.
     """
 
     def __init__(
@@ -151,8 +145,6 @@ class TwinWatch:
             Reason why the twin does not listen, or empty.
         publishers, subscribers : dict of Stream to Peers, iterable of Peers
             Peers of every input, and of all outputs.
-        clock : float
-            Time of the stamps' clock, s.
         reception : dict of str to Reception, optional
             Reception by name of the topic; None if nothing is received live.
         wrong_names : dict of Stream to tuple of Level and str, optional

@@ -107,8 +107,6 @@ def guess(name: str, unit: str, joints: int | None) -> Guess:
 
     Parameters
     ----------
-    name, unit : str
-        From `split_header`.
     joints : int or None
         Number of joints of the boom, if it is known.
     """

@@ -93,8 +93,6 @@ def import_session(
     ----------
     given : ColumnFile
         Columns, times and time zone that headers do not give.
-    sheet : SessionSheet
-        Session metadata: version, scene and note.
     joints : int, optional
         Number of joints of the scene, if there is one.
     mapping : Path, optional

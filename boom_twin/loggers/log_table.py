@@ -39,14 +39,8 @@ class LogTable(ABC):
 
     Parameters
     ----------
-    source : str
-        File or other origin, for messages.
-    headers : sequence of str
-        Column names as written in the file.
     units : sequence of str
         Units given outside the headers, empty strings if none.
-    layout : str
-        Description of the file format.
     """
 
     def __init__(self, source: str, headers: Sequence[str], units: Sequence[str], layout: str) -> None:

@@ -48,8 +48,6 @@ class Template:
     ----------
     messages : sequence of (str, message of rosbags)
         Type and message. Its numbers are constants or from `fields`, and its stamps are `STAMP` s.
-    fields : NumberFields
-        Placeholders in the messages.
 
     Attributes
     ----------
@@ -80,8 +78,6 @@ class Template:
 
         Parameters
         ----------
-        stamps : ndarray of int64, shape (k,)
-            Nanoseconds, for all headers.
         doubles : ndarray, shape (k, d)
             Numbers in the order of the placeholders.
         singles : sequence of float

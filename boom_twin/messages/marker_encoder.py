@@ -44,12 +44,8 @@ class ShapeMarkers:
 
     Parameters
     ----------
-    exaggeration : float
-        Factor of the displacements.
     force_scale : float
         Force that has the full colour, N.
-    frame : str
-        Frame of all markers.
     """
 
     def __init__(self, exaggeration: float, force_scale: float, frame: str = FRAME) -> None:

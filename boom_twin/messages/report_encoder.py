@@ -98,10 +98,6 @@ class ReportEncoder:
 
     Parameters
     ----------
-    scene : Scene
-        Scene of the reports.
-    settings : Settings
-        Settings of the drawing ``shape``.
     frame : str
         Frame in all headers, that of the base.
     """

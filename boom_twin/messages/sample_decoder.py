@@ -119,8 +119,6 @@ class SampleDecoder:
 
     Parameters
     ----------
-    joints : int
-        Number of joints of the scene, n.
     topics : Topics, optional
         Topics and sensors of the rig; those of the package by default.
 
@@ -130,8 +128,6 @@ class SampleDecoder:
         Names missing in the first message that also had names unknown to the scene, and those unknown names.
     delays : dict of Stream to int
         Time from the stamp of a sample to that of its message, ns.
-    assembler : SampleAssembler
-        Assembler of samples from messages.
     """
 
     def __init__(self, joints: int, topics: Topics | None = None) -> None:

@@ -50,13 +50,6 @@ def decode(data: bytes, type_name: str) -> Any:
 
     The `Typestore`'s own decoder takes 3 bytes.
 
-    Parameters
-    ----------
-    data : bytes
-        CDR (``PLAIN_CDR``), of either byte order.
-    type_name : str
-        Type that Jazzy has.
-
     Raises
     ------
     SerdeError

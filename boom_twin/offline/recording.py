@@ -69,8 +69,6 @@ class SessionTotals:
 
     Attributes
     ----------
-    samples : int
-        Predictions.
     acceleration : float
         The largest of the tip, m/s^2.
     residuals, normalised : ColumnStatistics
@@ -110,16 +108,10 @@ class Recording:
 
     Parameters
     ----------
-    joints : int
-        Of the boom.
     take : callable, optional
         Is given every `Stretch` of the session, which is then let go; without it, the whole session is one, and kept.
     errors : TipErrors, optional
         Told of all predictions for which the truth is known.
-    reads : StrokeReading
-        Of the twin's strokes.
-    streams : collection of Stream
-        Of the session's sensors.
 
     Attributes
     ----------

@@ -155,10 +155,6 @@ class SampleTable:
     ----------
     open_file : callable
         Is given the names of the columns, and returns the file that the rows go to.
-    joints : int
-        Of the boom.
-    streams : collection of Stream
-        Of its sensors.
     """
 
     def __init__(

@@ -80,19 +80,8 @@ class SessionSamples:
 
     Parameters
     ----------
-    topics : Topics
-        How its topics and sensors are named, and read.
-    wanted : list of str
-        The input topics to be read.
-    joints : int
-        Of the scene.
     window : TimeWindow, optional
         The part of the session that is read.
-
-    Attributes
-    ----------
-    oddities : Counter
-        Of the decoder, up to now.
     """
 
     def __init__(self, session: Session, topics: Topics, wanted: list[str], joints: int, window: TimeWindow = WHOLE) -> None:

@@ -60,19 +60,6 @@ def result_bag(
 
     The bag is complete if the block ends without an exception.
 
-    Parameters
-    ----------
-    directory : Path
-        New or empty.
-    notes : mapping of str to str
-        Kept in the bag.
-    topics : Topics
-        Names of the output topics and of their frame.
-    scene : Scene
-        Scene of the twin.
-    settings : Settings
-        Settings of the drawing.
-
     Raises
     ------
     BagError

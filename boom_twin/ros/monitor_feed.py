@@ -34,11 +34,6 @@ class TopicFeed(Feed):
 
     Messages are taken by `poll`, not by an executor, which would wake up for each of a thousand in a second.
     Rows are heard as best effort, so the node never keeps or repeats one for it; states and events are heard reliably.
-
-    Parameters
-    ----------
-    scene : Scene, optional
-        As of a `Feed`.
     """
 
     def __init__(self, topics: Topics, scene: Scene | None = None) -> None:

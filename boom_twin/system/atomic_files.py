@@ -64,8 +64,6 @@ def check_target(path: Path, sources: Sequence[Path], own: bytes | Callable[[byt
     ----------
     path : Path
         File to be written. The target of a symbolic link is checked, because `write_atomic` replaces it.
-    sources : sequence of Path
-        Files that are read.
     own : bytes or callable, optional
         First bytes of an earlier result of the same command, which may be replaced; or a function that returns True for
         the first `HEAD` bytes of one. None: any file may be replaced.

@@ -30,13 +30,6 @@ def python_command(module: str, *arguments: str) -> list[str]:
     ``python -m`` puts the working directory first on ``sys.path``, so that a ``numpy.py`` beside a received session would
     run; ``-P`` keeps it away. Environment and working directory are the parent's, so relative paths mean the same. The
     package is taken from where the parent has it, also where the parent alone knows that place (a changed ``sys.path``).
-
-    Parameters
-    ----------
-    module : str
-        Full name, such as ``boom_twin.cli.main``.
-    *arguments : str
-        Arguments of the module.
     """
     return [sys.executable, "-P", "-c", _START, str(ROOT), module, *arguments]
 

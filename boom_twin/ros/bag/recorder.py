@@ -141,12 +141,6 @@ class Recorder:
 
     Parameters
     ----------
-    node : Node
-        See `recorder_node`.
-    storage : Storage
-        Completed at the end.
-    thresholds : Thresholds
-        Of the state on ``/diagnostics``.
     tell : callable
         Told in words when recording begins, once every required topic has a publisher (`COMPLETE`), and what is left out.
     """

@@ -118,11 +118,6 @@ class RequestedTopic:
 def requested_topics(names: Sequence[str], known: Mapping[str, Topic]) -> list[RequestedTopic]:
     """Return the topics named on a command line: ``NAME`` or ``NAME:package/msg/Name``.
 
-    Parameters
-    ----------
-    known : dict of str to Topic
-        Topics by absolute name.
-
     Raises
     ------
     UsageError

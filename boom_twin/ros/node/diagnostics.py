@@ -111,13 +111,7 @@ SLOWEST = 0.02  # s between pieces on average, at most; in a flood of messages t
 
 
 class Diagnostics:
-    """Diagnostics of one node, computed and logged periodically and never per message.
-
-    Parameters
-    ----------
-    queue : ReceiveQueue
-        Queue of the inputs.
-    """
+    """Diagnostics of one node, computed and logged periodically and never per message."""
 
     def __init__(self, node: Node, topics: Topics, queue: ReceiveQueue) -> None:
         self._node, self._logger, self._queue = node, Log(node), queue

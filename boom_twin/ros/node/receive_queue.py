@@ -92,17 +92,7 @@ class ReceiveQueue:
         return bool(self._turns) and any(topic.waiting for topic in self._topics.values())
 
     def open(self, name: str, depth: int, read: Callable[[bytes], None]) -> Callable[..., None]:
-        """Return the callback of a raw subscription.
-
-        Parameters
-        ----------
-        name : str
-            Name of the topic.
-        depth : int
-            Largest number of waiting messages.
-        read : callable
-            Reader of a message; it must not raise.
-        """
+        """Return the callback of a raw subscription."""
         self._topics[name] = topic = _Topic(depth, read)
 
         def put(data: bytes, info: Mapping[str, Any]) -> None:

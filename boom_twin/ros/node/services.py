@@ -36,8 +36,6 @@ class Services:
         Takes what is asked for with its next full stroke sample.
     acknowledge : callable
         Lets go of alarms that ended; says which.
-    is_active : callable
-        Whether the node is.
     catch_up : callable
         Lets the twin take what arrived before a request.
     scene : str
