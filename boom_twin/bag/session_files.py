@@ -13,7 +13,7 @@ from ..errors import UsageError
 from ..messages.topic_table import FRAME, every_input
 from ..messages.type_store import fill_header, new_message
 from ..types import SENSORS, Array, Sample, Stream
-from .writer import SessionWriter
+from .writer import MessageWriter
 
 _UNKNOWN = -1.0  # first element of a covariance: the quantity is not measured (REP-145)
 
@@ -78,7 +78,7 @@ def write_samples(
         (SENSORS[sample.stream].beside, sample.stamp): sample.values for sample in samples if SENSORS[sample.stream].beside
     }
     topics = {stream.value: inputs[stream] for stream in streams if not SENSORS[stream].beside}
-    with SessionWriter(directory, topics, description) as bag:
+    with MessageWriter(directory, topics, description) as bag:
         for sample in samples:
             if sample.stream.value in topics:
                 bag.write(

@@ -246,7 +246,7 @@ def recorded(topic: Topic) -> Recorded:
     return Recorded.offered(topic.absolute, topic.type, definition, topic.qos, jazzy().hash_rihs01(topic.type))
 
 
-class SessionWriter:
+class MessageWriter:
     """Context manager that writes a session of one file.
 
     Leaving the context completes the bag. After an exception the file keeps no end, so that it is not taken for whole;

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..bag.metadata import dump
 from ..bag.session_sheet import SessionSheet
 from ..bag.session_writer import BY_NAME, LogTimes, named_message
-from ..bag.writer import SessionWriter
+from ..bag.writer import MessageWriter
 from ..config.yaml_text import plain
 from ..errors import BagError
 from ..messages.cdr_encoder import STAMP, NumberFields, Template
@@ -213,7 +213,7 @@ def _write(out: Path, readings: list[_Readings], topics: Topics, joints: int, or
     order = np.lexsort((np.concatenate([kind.places for kind in kinds]), ranks, logs))
     counts: Counter[str] = Counter()
     inputs = {topics.inputs[each.stream].absolute: topics.inputs[each.stream] for each in readings}
-    with SessionWriter(out, inputs, {"origin": origin}) as bag:
+    with MessageWriter(out, inputs, {"origin": origin}) as bag:
         for first in range(0, len(order), TOGETHER):
             part = order[first : first + TOGETHER]
             encoded = []

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
-from ..bag.writer import RESULT_CHUNK_SIZE, SessionWriter
+from ..bag.writer import RESULT_CHUNK_SIZE, MessageWriter
 from ..config.settings import Settings
 from ..messages.report_encoder import ReportEncoder
 from ..messages.topic_table import Output, Topic, Topics
@@ -67,7 +67,7 @@ def result_bag(
     """
     encoder = ReportEncoder(scene, settings, topics.frame)
     outputs: dict[str, Topic] = {key: topic for key, topic in topics.outputs.items() if key is not Output.DIAGNOSTICS}
-    with SessionWriter(directory, outputs, notes, chunk_size=RESULT_CHUNK_SIZE) as bag:
+    with MessageWriter(directory, outputs, notes, chunk_size=RESULT_CHUNK_SIZE) as bag:
         thread, waiting = ThreadPoolExecutor(1, "write"), deque[Future[None]]()
 
         def write(found: list[ReportBlock | Report]) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from default_boom import joint_angles_of_strokes, strokes_of_posture
-from recordings import SessionWriter, read, scan, sensor_message
+from recordings import MessageWriter, read, scan, sensor_message
 from ros_messages import TYPES, Output, decode_changes, encode_changes, jazzy, load_topics, new_message
 
 from boom_twin import BagError, Sample, Settings, Stream, load_scene, replay
@@ -74,7 +74,7 @@ def test_a_replay_repeats_the_changes_of_its_session(tmp_path: Path) -> None:
     joints = joint_angles_of_strokes(scene, strokes)
     keys = {"s": topics.inputs[Stream.STROKES], "a": topics.inputs[Stream.ANGLES], "c": topics.outputs[Output.CHANGES]}
     told = Change(5 * SECOND, True, Settings(payload=50.0).live, {"joint_1": 0.02})
-    with SessionWriter(tmp_path / "bag", keys) as bag:
+    with MessageWriter(tmp_path / "bag", keys) as bag:
         for k in range(100):
             stamp = 4 * SECOND + 20_000_000 * k
             bag.write("s", stamp, sensor_message(Sample(Stream.STROKES, stamp, strokes)))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import main
-from recordings import SessionSheet, SessionWriter, read, scan, write_session
+from recordings import MessageWriter, SessionSheet, read, scan, write_session
 from ros_messages import fill_header, load_topics, new_message
 
 from boom_twin import Stream, UsageError, load_scene, replay
@@ -53,7 +53,7 @@ def rig(arrays, tmp_path_factory):
     """The bag of the rig, with its mapping; every fourth message has the angles too."""
     path = tmp_path_factory.mktemp("rig") / "bag"
     topic = load_topics().inputs[Stream.STROKES].model_copy(update={"name": "/rig/joint_states"})
-    with SessionWriter(path, {"all": topic}, {"origin": "synthetic, a test"}) as bag:
+    with MessageWriter(path, {"all": topic}, {"origin": "synthetic, a test"}) as bag:
         for row, (stamp, strokes, angles) in enumerate(zip(*arrays, strict=True)):
             msg = new_message(JOINT_STATE)
             fill_header(msg.header, int(stamp))

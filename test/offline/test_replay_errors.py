@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from command import main
 from default_boom import strokes_of_posture
-from recordings import SessionWriter, write_session
+from recordings import MessageWriter, write_session
 from ros_messages import fill_header, load_topics, new_message
 
 from boom_twin import BagError, Stream, load_scene, replay
@@ -76,7 +76,7 @@ def test_stray_stamps_are_dropped_and_told(tmp_path):
     still = strokes_of_posture(scene, "arch")
     topic = load_topics().inputs[Stream.STROKES]
     stray = {50: (2**31 - 1) * 10**9, 70: 10**9, 90: 0}
-    with SessionWriter(tmp_path / "bag", {"strokes": topic}) as bag:
+    with MessageWriter(tmp_path / "bag", {"strokes": topic}) as bag:
         for row in range(200):
             msg = new_message(topic.type)
             fill_header(msg.header, stray.get(row, START + row * STEP))
