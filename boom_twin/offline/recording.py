@@ -246,25 +246,6 @@ class Recording:
         return found
 
     @property
-    def predictions(self) -> PredictionBlock:
-        """All predictions, see `whole`."""
-        return self.whole.predictions
-
-    @property
-    def estimates(self) -> EstimateBlock:
-        """Estimates beside the predictions, see `whole`."""
-        return self.whole.estimates
-
-    @property
-    def health(self) -> list[Health]:
-        """Reports of the rig's health, see `whole`."""
-        return self.whole.health
-
-    def of(self, stream: Stream) -> ResidualRows:
-        """Return the residuals of one stream, see `whole`."""
-        return self.whole.of(stream)
-
-    @property
     def duration(self) -> float:
         """Time from the first prediction to the last, s, in the model's own time.
 

@@ -40,7 +40,7 @@ from .ground_truth import TipErrors, TipTruth, truth_in
 from .inputs import USUAL, ReplayInputs, ReplayOptions, replay_inputs
 from .progress import Progress
 from .recording import Recording, Stretch
-from .sample_table import RowsInMemory, SampleTable, columns_of
+from .sample_table import SampleTable, columns_of
 from .session_samples import SessionSamples
 from .summary import alarm_as_text, summary_of
 from .threads import quick_switches, read_ahead, result_bag
@@ -82,11 +82,11 @@ class Replay(SummaryDisplay):
         ValueError
             The stretches were given away, see `replay_into`.
         """
-        stretch, rows = self.recording.whole, RowsInMemory()
-        table = SampleTable(lambda _: rows, stretch.joints, stretch.streams)
+        stretch, rows = self.recording.whole, list[Array]()
+        table = SampleTable(rows.append, stretch.joints, stretch.streams)
         table.add(stretch)
         table.finish()
-        return dict(zip(columns_of(stretch.joints, stretch.streams), np.concatenate(rows.parts).T, strict=True))
+        return dict(zip(columns_of(stretch.joints, stretch.streams), np.concatenate(rows).T, strict=True))
 
     def to_frame(self) -> Any:
         """Return `columns` as a ``pandas.DataFrame``; UsageError if pandas is not installed."""

@@ -85,7 +85,7 @@ def test_stray_stamps_are_dropped_and_told(tmp_path):
     result = replay(tmp_path / "bag", scene, tmp_path / "out")
     assert (result.summary["samples"], result.summary["dropped"]) == (197, 3)
     assert result.summary["events"] == {"leap": 2, "no stamp": 1} and result.summary["alarms"] == []
-    stamps = result.recording.predictions.stamps.tolist()
+    stamps = result.recording.whole.predictions.stamps.tolist()
     assert stamps == [START + row * STEP for row in range(200) if row not in stray]
 
 
