@@ -117,6 +117,6 @@ def schema_of(number: int, type_name: str, definition: str = "") -> Schema:
     return Schema(id=number, name=type_name, encoding="ros2msg", data=definition.encode())
 
 
-def channel_of(number: int, topic: str, encoding: str = CDR, metadata: Mapping[str, str] | None = None) -> Channel:
+def channel_of(number: int, topic: str, encoding: str = CDR) -> Channel:
     """Return a channel whose schema has the number of the channel."""
-    return Channel(id=number, topic=topic, message_encoding=encoding, schema_id=number, metadata=dict(metadata or {}))
+    return Channel(id=number, topic=topic, message_encoding=encoding, schema_id=number, metadata={})

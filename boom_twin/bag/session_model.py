@@ -50,26 +50,21 @@ class Mapped:
     source: str
 
 
-def scene_from(source: str | Path | None) -> SessionScene:
-    """Return the scene of a file, or that of the package if no file is given; see `boom_twin.load_scene`."""
+def scene_from(source: SceneSource | SessionScene) -> SessionScene:
+    """Return a scene with its text, from a file or a program, or that of the package for None; see `boom_twin.load_scene`."""
+    if isinstance(source, SessionScene):
+        return source
+    if source is not None and not isinstance(source, str | Path):
+        scene = as_scene(source)
+        return SessionScene(scene, anew(scene), GIVEN)
     name = DEFAULT_NAME if source is None else str(source)
     text = default_text() if source is None else read_text(Path(source))
     scene, oddities = examine_text(text, name)
     return SessionScene(scene, text, name, tuple(oddities))
 
 
-def given_scene(source: SceneSource | SessionScene) -> SessionScene:
-    """Return a scene that is given by a program or a file, or that of the package for None, with its text."""
-    if isinstance(source, SessionScene):
-        return source
-    if source is None or isinstance(source, str | Path):
-        return scene_from(source)
-    scene = as_scene(source)
-    return SessionScene(scene, anew(scene), GIVEN)
-
-
-def scene_of(session: Path, given: str | Path | None = None) -> SessionScene:
-    """Return the scene of a session: from the file `given`, else from its ``session.yaml``, else from the package."""
+def scene_of(session: Path, given: SceneSource | SessionScene = None) -> SessionScene:
+    """Return the scene of a session: what is `given`, else from its ``session.yaml``, else from the package."""
     own = kept(session, "scene", "--scene") if given is None else None
     if own is None:
         return scene_from(given)

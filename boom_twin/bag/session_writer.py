@@ -22,7 +22,7 @@ from ..twin.readings import samples_of
 from ..types import SECOND, SENSORS, Sample, Stream
 from .async_writer import FileSplit, Storage
 from .session_files import sensor_message
-from .session_model import given_scene
+from .session_model import scene_from
 from .session_sheet import SessionSheet
 from .writer import BagWriter, recorded
 
@@ -100,7 +100,7 @@ class SessionWriter:
         note: str | None = None,
         origin: str | None = None,
     ) -> None:
-        self._out, kept = Path(out), given_scene(scene)
+        self._out, kept = Path(out), scene_from(scene)
         self._joints = len(kept.scene.joints)
         path = None if mapping is None else Path(mapping)
         self._topics = load_mapping(path, self._joints)

@@ -11,10 +11,9 @@ from ..analysis.bending_stress import BendingStressModel
 from ..config.settings import Thresholds
 from ..types import SENSORS, Health, Report, Sample, Stream
 from .levels import ComponentJudge, Evaluation, Level, Status, Value
-from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, stress_status
+from .model_status import HealthWatch, LoadWatch, ModelWatch, ResidualWindow, SwingWatch, stress_status
 from .sensor_status import SensorSpec, sensor_status
 from .stream_stats import Rows, StreamWatch
-from .swing_status import SwingWatch
 from .topic_status import Peers, Reception, ReceptionWatch, outputs_status, publishers_status, seconds, topic_status
 
 
@@ -83,9 +82,8 @@ class TwinWatch:
                 rows.append(residuals.normalised)
             if each.prediction is not None:
                 self._newest = each
-                self._swing.took(each)
-            if self._load.is_due(each.stamp) and each.estimate is not None:
-                self._load.took(each.estimate)
+            self._swing.took(each)
+            self._load.took(each)
             self.judged(each.health, 0.0)
 
     def judged(self, health: Health | None, duration: float) -> None:

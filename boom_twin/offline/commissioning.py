@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..bag.reader import Session, read, scan
-from ..bag.session_model import SessionScene, mapping_of, settings_of, strokes_of
+from ..bag.session_model import SessionScene, mapping_of, scene_of, settings_of, strokes_of
 from ..bag.session_sheet import kept
 from ..bag.time_window import WHOLE, TimeWindow
 from ..config.yaml_text import plain, read_plain
@@ -29,7 +29,6 @@ from ..wiring.check import Checked, Verdict, check
 from ..wiring.lag import Lag, lag_of
 from ..wiring.readings import Channel, Series, Window, is_checked
 from ..wiring.words import STROKES_ALONE, finding
-from .inputs import scene_for
 from .session_samples import SessionSamples
 
 LOOK = 60.0  # s of a session that `wiring_of` reads
@@ -115,7 +114,7 @@ def commission(
         Scene or mapping have faults.
     """
     session = scan(Path(bag))
-    own, given = scene_for(session.path, scene), None if mapping is None else Path(mapping)
+    own, given = scene_of(session.path, scene), None if mapping is None else Path(mapping)
     joints = len(own.scene.joints)
     mapped, document = mapping_of(session.path, given, joints), _document(session.path, given)
     reads = strokes_of(session.path, mapped).reading

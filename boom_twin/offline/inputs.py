@@ -11,7 +11,6 @@ from ..bag.reader import Session, read, scan
 from ..bag.session_model import (
     SessionScene,
     SessionStrokes,
-    given_scene,
     mapping_of,
     scene_of,
     settings_of,
@@ -112,7 +111,7 @@ def replay_inputs(
 ) -> ReplayInputs:
     """Return the inputs of a replay; for the parameters and errors see `boom_twin.offline.replay.replay`."""
     session, settings = scan(bag), settings or settings_of(bag).settings
-    kept = scene_for(session.path, scene)
+    kept = scene_of(session.path, scene)
     joints = kept.scene.joints
     mapped = mapping_of(session.path, Path(options.mapping) if options.mapping else None, len(joints), options.namespace)
     topics = mapped.topics.of_scene(joints)
@@ -142,8 +141,3 @@ def _has_rates(session: Session, topic: InputTopic, wanted: list[str]) -> bool:
         return False
     first = next(iter(read(session, {topic.absolute: topic.type})), None)
     return first is not None and first[2].angular_velocity_covariance[0] != NO_MEASUREMENT
-
-
-def scene_for(session: Path, scene: SceneSource | SessionScene) -> SessionScene:
-    """Return the scene to read a session with: `scene`, or if None that of `boom_twin.bag.session_model.scene_of`."""
-    return scene_of(session) if scene is None else given_scene(scene)

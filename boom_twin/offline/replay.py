@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import __version__
 from ..bag.reader import Session
-from ..bag.session_model import SessionScene, given_scene
+from ..bag.session_model import SessionScene, scene_from
 from ..bag.session_sheet import SessionSheet
 from ..bag.time_window import WHOLE, TimeWindow
 from ..bag.writer import FILE_NAME
@@ -172,7 +172,7 @@ def replay(
         options = ReplayOptions(progress, mapping, changes, health, window, namespace, with_bag, causes)
         if is_path:
             return replay_into(building, bag, scene, settings, options)
-        kept, place = given_scene(scene), building.inner(SESSION).folder
+        kept, place = scene_from(scene), building.inner(SESSION).folder
         sheet, own = SessionSheet(__version__, kept.text), None if mapping is None else Path(mapping)
         import_session([table_of_frame(bag)], place, ColumnFile(), sheet, len(kept.scene.joints), own)
         found = replay_into(building, place, kept, settings, options)

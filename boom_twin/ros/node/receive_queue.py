@@ -62,11 +62,6 @@ class ReceiveQueue:
 
     If a topic exceeds its `depth`, its oldest message is dropped. Other topics lose none.
 
-    Parameters
-    ----------
-    clock : callable
-        System time, ns: the middleware's clock of arrivals.
-
     Attributes
     ----------
     received : int
@@ -79,8 +74,7 @@ class ReceiveQueue:
         True if the newest message had waited in the executor, so that more may wait there.
     """
 
-    def __init__(self, clock: Callable[[], int] = time.time_ns) -> None:
-        self._clock = clock
+    def __init__(self) -> None:
         self._topics: dict[str, _Topic] = {}
         self._turns: deque[_Topic] = deque()  # topic of each message, by arrival; also of dropped ones
         self.received, self.is_behind, self.share = 0, False, 0.0
@@ -98,7 +92,7 @@ class ReceiveQueue:
         def put(data: bytes, info: Mapping[str, Any]) -> None:
             if self._topics.get(name) is not topic:  # closed while this message waited in the executor
                 return
-            now = self._clock()
+            now = time.time_ns()  # the middleware's clock of arrivals
             arrival = info["received_timestamp"] or now
             topic.count(info["publication_sequence_number"])
             if len(data) > LARGEST:
@@ -169,7 +163,7 @@ class ReceiveQueue:
             turns.end()
 
     def _since(self, arrival: int) -> float:
-        return max(0, self._clock() - arrival) * NANO
+        return max(0, time.time_ns() - arrival) * NANO
 
     def catch_up(self) -> None:
         """Read messages that arrived before the present request, for at most `CATCH_UP`."""
