@@ -86,9 +86,7 @@ def _samples(path: Path) -> Iterator[Sample]:
             for stream, names in columns.items()
             if any(name in piece.names for name in names)
         }
-        strokes, angles, imu, forces = (values.get(stream) for stream in columns)
-        shifted = np.array(stamps, np.int64) + shift
-        yield from samples_of(shifted, strokes, angles, imu, forces=forces)
+        yield from samples_of(np.array(stamps, np.int64) + shift, values)
 
 
 def _columns_of(table: CsvTable) -> dict[Stream, list[str]]:

@@ -19,7 +19,7 @@ from rosbags.interfaces.typing import Typesdict
 from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
 
 from ..errors import BagError
-from ..messages.type_store import jazzy
+from ..messages.type_store import other_than_jazzy
 from ..system.received_files import holds_file, sha256_of
 from ..types import NANO
 from .metadata import FILE_NAME, STORAGES, BagMetadata, read_metadata, refuse_packed
@@ -100,10 +100,8 @@ def readable(file: SessionFile, asked: Mapping[str, str]) -> set[int]:
         if typed and not fitting:
             raise BagError(f"{place}: message encoding {typed[0].message_encoding!r}: only cdr is read. Use ROS 2.")
         for channel in fitting:
-            for name, (_, fields) in _parsed(place, file.schemas[channel.schema_id], kind).items():
-                known = jazzy().fielddefs.get(name)
-                if known is not None and list(known[1]) != list(fields):
-                    raise BagError(f"{place}: {name} is defined otherwise than in Jazzy. Convert the bag's messages.")
+            for name in other_than_jazzy(_parsed(place, file.schemas[channel.schema_id], kind)):
+                raise BagError(f"{place}: {name} is defined otherwise than in Jazzy. Convert the bag's messages.")
         found.update(each.id for each in fitting)
     return found
 

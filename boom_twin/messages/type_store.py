@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
+from rosbags.interfaces.typing import Typesdict
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
@@ -32,6 +33,12 @@ _ORDERS = (b"\x00\x00", b"\x00\x01")
 def jazzy() -> Typestore:
     """Return the type store that encodes, decodes and describes every message. No type is ever registered in it."""
     return get_typestore(Stores.ROS2_JAZZY)
+
+
+def other_than_jazzy(types: Typesdict) -> list[str]:
+    """Return the names of the types that Jazzy has, and defines otherwise."""
+    known = jazzy().fielddefs
+    return [name for name, (_, fields) in types.items() if name in known and list(known[name][1]) != list(fields)]
 
 
 MOST_TEXTS = 100  # texts of a message that may be in another encoding than UTF-8
