@@ -107,8 +107,7 @@ def _wait_for_end() -> None:
         os.killpg(0, signal.SIGKILL)
 
 
-OK, FAILED = "ok", "failed"
-"""Status of a row."""
+OK, FAILED = "ok", "failed"  # status of a row
 ALARM = ("channel", "kind", "from_s", "to_s", "cause", "told")  # keys of an alarm in a row
 Row = dict[str, Any]
 

@@ -54,7 +54,6 @@ def as_json(outcome: Recovery, out: str) -> dict[str, Any]:
         "saved_without_checksum": [outcome.unvouched[topic] for topic in topics],
         "lost": [None if outcome.lost is None else outcome.lost.get(topic, 0) for topic in topics],
         "lost_of_unknown_topics": outcome.nameless,
-        "left_out_as_copies": outcome.copies,
         "faults": outcome.fault_count,
     }
 
@@ -68,8 +67,6 @@ def as_text(outcome: Recovery, values: dict[str, Any]) -> list[str]:
         lines.append(f"{topic:{wide}}  {values['saved'][row]:9d}  {values['saved_without_checksum'][row]:11d}  {lost:>9}")
     if outcome.nameless:
         lines.append(f"{outcome.nameless} sound messages were left out: the definitions of their topics are lost")
-    if outcome.copies:
-        lines.append(f"{outcome.copies} messages were left out: they stand in copies of chunks that were saved")
     if any(values["saved_without_checksum"]):
         lines.append("'no checksum': saved as they stood; nothing vouches for their values")
     if outcome.lost is None:

@@ -15,6 +15,7 @@ from .output import open_session_scene, open_session_settings, print_result, tel
 
 if TYPE_CHECKING:
     from ..offline.recording import Stretch
+    from ..offline.sample_table import CsvFile, ParquetFile
     from ..report.evaluation import Evaluation
 
 
@@ -49,7 +50,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Replay, draw, and print the result."""
     from ..offline.inputs import ReplayOptions
-    from ..offline.sample_table import SampleTable, check_kind, table_file
+    from ..offline.sample_table import SampleTable, check_kind, columns_of, table_file
     from ..report.evaluation import evaluated_replay
     from ..report.quantities import section_heights
     from ..system.result_folder import REPLAY, result_folder
@@ -67,13 +68,13 @@ def run(args: Namespace) -> int:
     out, sources = Path(args.out), files_of(args, "bag", "scene", "params", "mapping")
     with result_folder(out, REPLAY, sources) as building:
         joints, name = len(scene.scene.joints), f"samples.{args.table}"
-        table: SampleTable | None = None
+        tables: list[tuple[CsvFile | ParquetFile, SampleTable]] = []
 
         def add(stretch: Stretch) -> None:
-            nonlocal table
-            if table is None:  # the sensors of a session are known with its first stretch
-                table = SampleTable(partial(table_file, building / name), joints, stretch.streams)
-            table.add(stretch)
+            if not tables:  # the sensors of a session are known with its first stretch
+                file = table_file(building / name, columns_of(joints, stretch.streams))
+                tables.append((file, SampleTable(file.write, joints, stretch.streams)))
+            tables[0][1].add(stretch)
 
         options = ReplayOptions(
             progress=partial(progress_of, unit="messages", name="replay"),
@@ -89,8 +90,9 @@ def run(args: Namespace) -> int:
             building, args.bag, scene, settings, options, heights, args.fatigue, add if args.table else None
         )
         files = [path.name for path in _write(args, found, building)]
-        if table is not None:
+        for file, table in tables:
             table.finish()
+            file.close()
             files.append(name)
     warn_incomplete(found.result.session)
     written = ["summary.json", *([] if args.no_bag else ["bag"]), *files]

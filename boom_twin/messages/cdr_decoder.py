@@ -101,8 +101,7 @@ class Axes(NamedTuple):
     linear_acceleration_covariance: tuple[float]
 
 
-MOST_HEADS = 8
-"""Number of heads kept for one topic: a bus may send every joint in a message of its own."""
+MOST_HEADS = 8  # number of heads kept for one topic: a bus may send every joint in a message of its own
 
 
 class CdrDecoder:

@@ -55,7 +55,6 @@ def load_mapping(path: Path | None = None, joints: int | None = None) -> Topics:
 
     Parameters
     ----------
-    path : Path, optional
     joints : int, optional
         Number of joints of the scene, if known. Channels beyond it are then faults, too.
 

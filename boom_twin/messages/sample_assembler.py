@@ -44,8 +44,6 @@ class SampleAssembler:
 
     Parameters
     ----------
-    wanted : dict of Stream to ndarray of bool, shape (channels,)
-        True for channels with a sensor.
     oddities : Counter
         Counter of ``names apart``, ``missing names`` and ``two sources``.
     drive : Stream

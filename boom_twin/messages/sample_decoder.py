@@ -17,20 +17,15 @@ from .cdr_decoder import Axes
 from .sample_assembler import Reading, SampleAssembler
 from .topic_table import Topics, factor, load_topics
 
-LATEST = 2**31 * SECOND
-"""First stamp beyond the range of a message, ns."""
+LATEST = 2**31 * SECOND  # first stamp beyond the range of a message, ns
 
-MOST_NAMES = 1000
-"""Limit for the number of names in a message; a machine has some tens of them."""
+MOST_NAMES = 1000  # limit for the number of names in a message; a machine has some tens of them
 
-KEPT = 16
-"""Number of lists of names that are remembered for one stream: a bus may send every joint in a message of its own."""
+KEPT = 16  # number of lists of names that are remembered for one stream: a bus may send every joint in a message of its own
 
-NO_MEASUREMENT = -1.0
-"""First element of a covariance where the quantity is not measured (REP-145)."""
+NO_MEASUREMENT = -1.0  # first element of a covariance where the quantity is not measured (REP-145)
 
-_ABSENT = float("nan")
-"""Value of a channel that a message does not have, distinguished by identity from a reading of NaN."""
+_ABSENT = float("nan")  # value of a channel that a message does not have, distinguished by identity from a reading of NaN
 
 
 def stamp_of(msg: Any) -> int:
@@ -124,25 +119,15 @@ class SampleDecoder:
 
     Parameters
     ----------
-    joints : int
-        Number of joints of the scene, n.
     topics : Topics, optional
         Topics and sensors of the rig; those of the package by default.
 
     Attributes
     ----------
-    oddities : Counter
-        Count of each of the irregularities `ODDITIES`.
-    other_boom_names : dict of Stream to list of str
-        Names in the newest message that has names of another boom.
     strange_names : dict of Stream to tuple of list of str
         Names missing in the first message that also had names unknown to the scene, and those unknown names.
     delays : dict of Stream to int
         Time from the stamp of a sample to that of its message, ns.
-    refused : int
-        Number of messages without a usable value; one without any names and values is not counted.
-    assembler : SampleAssembler
-        Assembler of samples from messages.
     """
 
     def __init__(self, joints: int, topics: Topics | None = None) -> None:
@@ -153,12 +138,12 @@ class SampleDecoder:
         self._sharing = pair if topics.is_shared else {}
         self.delays = {stream: topics.delay(stream) for stream in self._channels}
         self._areas = topics.areas
-        self.refused = 0
+        self.refused = 0  # number of messages without a usable value; one without any names and values is not counted
         self._by_axis = {stream for stream, kind in SENSORS.items() if not kind.is_named}
-        self.oddities: Counter[str] = Counter()
+        self.oddities: Counter[str] = Counter()  # count of each of the irregularities `ODDITIES`
         wanted = {stream: each.wanted for stream, each in self._channels.items()}
         self.assembler = SampleAssembler(wanted, self.oddities, topics.stroke_reading.stream)
-        self.other_boom_names: dict[Stream, list[str]] = {}
+        self.other_boom_names: dict[Stream, list[str]] = {}  # names in the newest message that has names of another boom
         self.strange_names: dict[Stream, tuple[list[str], list[str]]] = {}
 
     def samples(self, streams: Iterable[Stream], stamp_ns: int, msg: Any) -> list[Sample]:

@@ -74,8 +74,7 @@ NO_AREAS = (
     "cylinder of the scene, or bore and rod (lists, m) to inputs.cylinder_pressures in the mapping."
 )
 NODE = "boom_twin"
-FRAME = "base_link"
-"""Frame of the base, in which outputs are given unless a mapping or a parameter names another."""
+FRAME = "base_link"  # frame of the base, in which outputs are given unless a mapping or a parameter names another
 TIP_JOINTS = ("tip_dx", "tip_dz", "tip_pitch")
 """Displacement of the tip from that of rigid sections: along and across the last section, m, and its rotation, rad."""
 DEFAULT_FILE = Path(__file__).parent.parent / "msg_config" / "topics.yaml"
@@ -185,8 +184,7 @@ class Topics(_Entry):
     outputs: dict[Output, Topic]
     events: EventTopic
     sensors: dict[str, Sensor] = {}
-    absent: frozenset[str] = frozenset()
-    """Channels without a sensor, marked by ``none`` in the mapping."""
+    absent: frozenset[str] = frozenset()  # channels without a sensor, marked by ``none`` in the mapping
     ranges: tuple[tuple[float, float], ...] = ()
     """Lowest and highest angle of every joint, rad; empty where the scene is not known."""
     areas: tuple[tuple[float, float], ...] = ()

@@ -14,10 +14,8 @@ from .topic_table import FRAME, TIP_JOINTS
 
 NAME = "boom"
 TIP, TIP_RIGID, TIP_ALONG, TIP_ACROSS, IMU = "tip", "tip_rigid", "tip_along", "tip_across", "imu_link"
-UP_IS_POSITIVE = "0 -1 0"
-"""Axis of every revolute joint (REP-103: x forward, z up): a positive angle raises what it turns."""
-EYE = 0.1
-"""Length of the rod's eye outside the barrel over the length of the closed cylinder."""
+UP_IS_POSITIVE = "0 -1 0"  # axis of every revolute joint (REP-103: x forward, z up): a positive angle raises what it turns
+EYE = 0.1  # length of the rod's eye outside the barrel over the length of the closed cylinder
 BARREL_RADIUS, ROD_RADIUS, BAR = 0.045, 0.025, 0.06
 """Dimensions for drawing: radii over the length of the closed cylinder, side of a link's bar over the link's length."""
 COLOURS = {"section": "0.55 0.62 0.70 1", "link": "0.35 0.40 0.46 1", "barrel": "0.90 0.45 0.10 1", "rod": "0.80 0.82 0.85 1"}

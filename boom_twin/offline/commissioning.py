@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..bag.reader import Session, read, scan
-from ..bag.session_model import mapping_of, scene_of, settings_of, strokes_of
+from ..bag.session_model import SessionScene, mapping_of, scene_of, settings_of, strokes_of
 from ..bag.session_sheet import kept
 from ..bag.time_window import WHOLE, TimeWindow
 from ..config.yaml_text import plain, read_plain
@@ -20,6 +20,7 @@ from ..errors import BagError, UsageError
 from ..messages.mapping import mapping_from
 from ..messages.topic_table import Sensor, Topics, usual
 from ..scene.edit import loaded
+from ..scene.load import SceneSource
 from ..twin.blocks import CODES, ReportBlock, SampleBlock
 from ..twin.driver import drive_blocks
 from ..twin.twin import Twin
@@ -39,22 +40,13 @@ AXES = "x", "y", "z"
 
 @dataclass(frozen=True)
 class Commissioning:
-    """Result of the check of a session.
-
-    Attributes
-    ----------
-    checked : Checked
-    document : dict
-        Keys of the mapping that mends what the check is sure of.
-    lags : dict of Stream to Lag
-        Lag of each stream against the strokes; empty if it was not asked for, or the strokes are not known.
-    declared_reads, reads : StrokeReading
-        What stroke transducers read as declared, and as told by the encoders; None if it cannot be told.
-    """
+    """Result of the check of a session."""
 
     checked: Checked
-    document: dict[str, Any]
+    document: dict[str, Any]  # keys of the mapping that mends what the check is sure of
+    # lag of each stream against the strokes; empty if it was not asked for, or the strokes are not known
     lags: Mapping[Stream, Lag]
+    # declared_reads, reads: what stroke transducers read as declared, and as told by the encoders; None if it cannot be told
     declared_reads: StrokeReading
     reads: StrokeReading | None
 
@@ -75,7 +67,7 @@ class Commissioning:
         return bool(self.late) or is_other or any(verdict.is_sure for verdict in self.wrong)
 
 
-def wiring_of(bag: Path, scene: str | Path | None, mapping: Path | None, window: TimeWindow) -> str:
+def wiring_of(bag: Path, scene: SceneSource | SessionScene, mapping: str | Path | None, window: TimeWindow) -> str:
     """Return one line on how the sensors of a session are wired, by its first `LOOK` seconds."""
     duration = LOOK if window.duration is None else min(LOOK, window.duration)
     try:
@@ -98,8 +90,8 @@ def is_late(lag: Lag) -> bool:
 
 def commission(
     bag: str | Path,
-    scene: str | Path | None = None,
-    mapping: Path | None = None,
+    scene: SceneSource | SessionScene = None,
+    mapping: str | Path | None = None,
     window: TimeWindow = WHOLE,
     with_lags: bool = True,
 ) -> Commissioning:
@@ -107,7 +99,6 @@ def commission(
 
     Parameters
     ----------
-    bag : path
     scene, mapping : path, optional
         By default those of the session, else those of the package.
     window : TimeWindow
@@ -123,16 +114,20 @@ def commission(
         Scene or mapping have faults.
     """
     session = scan(Path(bag))
-    own = scene_of(session.path, scene)
+    own, given = scene_of(session.path, scene), None if mapping is None else Path(mapping)
     joints = len(own.scene.joints)
-    mapped, document = mapping_of(session.path, mapping, joints), _document(session.path, mapping)
+    mapped, document = mapping_of(session.path, given, joints), _document(session.path, given)
     reads = strokes_of(session.path, mapped).reading
     settings = settings_of(session.path).settings
     series = readings_of(session, mapped.topics, joints, window)
     places = mapped.topics.places
     found = check(loaded(own.scene, *settings.load), reads, declared(mapped.topics, joints), series, places=places)
     if found is None:
-        lacking = f"{session.path}: no time in which all {joints} cylinders of the scene ({own.source}) have strokes"
+        names = [sensor.name for sensor in mapped.topics.sensors_of(Stream.STROKES, joints).values()]
+        heard = series[Stream.STROKES]
+        silent = [name for name in names if name not in heard or not np.isfinite(heard[name].values).any()]
+        without = f": {', '.join(silent)} never had a value" if silent else ""
+        lacking = f"{session.path}: no time in which all {joints} cylinders of the scene ({own.source}) have strokes{without}"
         raise BagError(f"{lacking}. Give the boom's scene by --scene.")
     told = told_reading(found, reads)
     _mend(document, found, None if told is reads else told)

@@ -72,8 +72,7 @@ def recorded_changes(session: Session, topics: Topics) -> Changes:
     return Changes((log, decode_changes(msg)) for _, log, msg in read(session, {topic.absolute: topic.type}))
 
 
-BATCH = 400
-"""Messages in one block, at least."""
+BATCH = 400  # messages in one block, at least
 
 
 class SessionSamples:
@@ -81,20 +80,8 @@ class SessionSamples:
 
     Parameters
     ----------
-    session : Session
-    topics : Topics
-        How its topics and sensors are named, and read.
-    wanted : list of str
-        The input topics to be read.
-    joints : int
-        Of the scene.
     window : TimeWindow, optional
         The part of the session that is read.
-
-    Attributes
-    ----------
-    oddities : Counter
-        Of the decoder, up to now.
     """
 
     def __init__(self, session: Session, topics: Topics, wanted: list[str], joints: int, window: TimeWindow = WHOLE) -> None:

@@ -14,18 +14,7 @@ from .recording import Recording
 
 
 def summary_of(recording: Recording, counts: Counter[str], wall: float, file: Path | None) -> dict[str, Any]:
-    """Return the numbers of a replay for ``summary.json``.
-
-    Parameters
-    ----------
-    recording : Recording
-    counts : Counter
-        Events of the twin.
-    wall : float
-        Time of reading, stepping and writing, s.
-    file : Path or None
-        Result bag, if there is one.
-    """
+    """Return the numbers of a replay for ``summary.json``."""
     totals, duration = recording.totals, recording.duration
     return {
         "samples": totals.samples,

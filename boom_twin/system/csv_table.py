@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import BoomTwinError
 from ..types import Array
 
+TOGETHER = 4096  # rows in memory
 LONGEST_LINE = 2**16  # limit for the number of characters in a line
 
 NOTHING = {"", "-", "nan", "null", "none", "na", "n/a", "#n/a"}
@@ -81,10 +82,8 @@ def read_csv(path: Path, error: type[BoomTwinError]) -> CsvTable:
     return CsvTable(path, pieces[0].names, rows, lines, error)
 
 
-def read_csv_pieces(
-    path: Path, error: type[BoomTwinError], together: int = 4096, layout: CsvLayout | None = None
-) -> Iterator[CsvTable]:
-    """Yield the table in a file, up to `together` rows at a time, so that a file of any size takes little memory.
+def read_csv_pieces(path: Path, error: type[BoomTwinError], layout: CsvLayout | None = None) -> Iterator[CsvTable]:
+    """Yield the table in a file, up to `TOGETHER` rows at a time, so that a file of any size takes little memory.
 
     Without a `layout` the names are in the first line, and columns are separated by commas. Raise `error` if the file cannot
     be read, a line is longer than `LONGEST_LINE`, or there is no row below the header.
@@ -101,11 +100,11 @@ def read_csv_pieces(
             else:
                 names, first = layout.names, layout.first_line
                 found = ((line, row) for line, row in found if line >= first)
-            some = list(islice(found, together))
+            some = list(islice(found, TOGETHER))
             if names and not some:
                 raise error(f"{path}: no rows below the header. Give at least one.")
             yield CsvTable(path, names, [row for _, row in some], [line for line, _ in some], error, lines.is_ended)
-            while some := list(islice(found, together)):
+            while some := list(islice(found, TOGETHER)):
                 yield CsvTable(path, names, [row for _, row in some], [line for line, _ in some], error, lines.is_ended)
     except UnicodeError as reason:
         raise error(f"{path}: its encoding cannot be read ({reason}). Save it as UTF-8.") from None

@@ -18,7 +18,7 @@ def followed(session, **options):
     block = SampleBlock(np.zeros(len(session.stamps), np.int64), session.stamps, session.strokes)
     for part in twin.update_block(block):
         recording.add(part)
-    return twin, recording.predictions
+    return twin, recording.whole.predictions
 
 
 def error(name, rate=200.0):

@@ -35,19 +35,12 @@ class GraphPeers:
     """Peers (publishers or subscribers) of every topic of `node`, looked up one topic per call.
 
     Discovery is used because the events of incompatible QoS do not name the peer and do not report when it leaves.
-
-    Attributes
-    ----------
-    publishers : dict of Stream to Peers
-        Peers of the inputs.
-    subscribers : dict of Output to Peers
-        Peers of the outputs.
     """
 
     def __init__(self, node: Node, topics: Topics) -> None:
         self._node = node
-        self.publishers = dict.fromkeys(topics.inputs, Peers())
-        self.subscribers = dict.fromkeys(topics.outputs, Peers())
+        self.publishers = dict.fromkeys(topics.inputs, Peers())  # peers of the inputs
+        self.subscribers = dict.fromkeys(topics.outputs, Peers())  # peers of the outputs
         entries: list[tuple[Stream | Output, Topic]] = [*topics.inputs.items(), *topics.outputs.items()]
         self._entries = cycle([(key, topic, _as_discovered(qos_profile(topic.qos))) for key, topic in entries])
 
@@ -118,20 +111,7 @@ SLOWEST = 0.02  # s between pieces on average, at most; in a flood of messages t
 
 
 class Diagnostics:
-    """Diagnostics of one node, computed and logged periodically and never per message.
-
-    Parameters
-    ----------
-    node : Node
-    topics : Topics
-    queue : ReceiveQueue
-        Queue of the inputs.
-
-    Attributes
-    ----------
-    watch : TwinWatch
-        Receives the twin's events. Every `configure` replaces it.
-    """
+    """Diagnostics of one node, computed and logged periodically and never per message."""
 
     def __init__(self, node: Node, topics: Topics, queue: ReceiveQueue) -> None:
         self._node, self._logger, self._queue = node, Log(node), queue
@@ -147,7 +127,7 @@ class Diagnostics:
         self._newest_piece, self._is_peers_turn = 0.0, False
         self._due, self._active = time.monotonic() + PERIOD, False
         self._preparing_since: float | None = None
-        self.watch = TwinWatch({}, {}, Thresholds())
+        self.watch = TwinWatch({}, {}, Thresholds())  # receives the twin's events. Every `configure` replaces it
         self._counts: dict[str, Mapping[str, int]] = {}
         self._shedding: LoadShedding | None = None
         self._decoder: SampleDecoder | None = None
