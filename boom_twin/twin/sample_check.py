@@ -20,15 +20,7 @@ LARGEST_STAMP = 2**63  # ns
 
 
 class SampleCheck:
-    """Check of samples before the twin takes them.
-
-    Parameters
-    ----------
-    channels : dict of Stream to tuple of str
-        See `boom_twin.types.channels_of`.
-    drive : Stream
-        The one that drives the model.
-    """
+    """Check of samples before the twin takes them; `drive` is the stream that drives the model."""
 
     def __init__(self, channels: Mapping[Stream, tuple[str, ...]], drive: Stream) -> None:
         self._drive = drive
@@ -38,15 +30,7 @@ class SampleCheck:
         self.is_sure = False
 
     def checked(self, sample: Sample) -> Sample:
-        """Return the sample with an int stamp and contiguous float64 values, shape (channels,).
-
-        The sample is not copied if it has these types already.
-
-        Raises
-        ------
-        UsageError
-            See `boom_twin.twin.twin.Twin.update`.
-        """
+        """Return the sample with an int stamp and contiguous float64 values (channels,); UsageError as of `Twin.update`."""
         stream, stamp, values = sample.stream, sample.stamp, sample.values
         if (
             type(stamp) is int

@@ -137,12 +137,8 @@ def beam_shape(row, part, sizes, z, turn, rho):
 def point_on_axis(row, part_psi, z, psi, weights):
     """Return place (m) and rotation (rad) of a point of a part in the frame of its input end.
 
-    Parameters
-    ----------
-    part_psi : ndarray, shape (P+1, n)
-        That of the part.
-    psi, weights : ndarray, shape (n,), (P,)
-        Rotation at the point by the coordinates; integral from the input end to it by the values at the Gauss points, m.
+    `part_psi` (P+1, n) is that of the part, `psi` (n,) the rotation at the point by the coordinates, `weights` (P,) the
+    integral from the input end to it by the values at the Gauss points, m.
     """
     x, y, turn = 0.0, 0.0, 0.0
     for j in range(row.points):
@@ -177,12 +173,10 @@ def shape_derivatives(part, sizes, stretch):
 
 @inner
 def place_beam(row, part, sizes, z, x, y, theta, c, s, position, turn, rho):
-    """Shape and place a part whose input end is at (x, y), turned by theta (cosine c, sine s).
+    """Shape and place a part whose input end is at (x, y), turned by theta (cosine c, sine s); return the end's turn (rad).
 
     Writes the part's `turn` and `rho`, and into `position` the points, and the angles there if there is rotary inertia. The
     arguments `turn` and `rho` are room for them while they are worked out: the part's own, or on the stack.
-
-    Returns the end's turn (rad).
     """
     end, points = beam_shape(row, part, sizes, z, turn, rho), position[row.history : row.history + 2 * row.points + row.rotary]
     for i in range(sizes.points):
@@ -203,9 +197,7 @@ def place_beam(row, part, sizes, z, x, y, theta, c, s, position, turn, rho):
 def transfer_beam(row, part, sizes, own, z, c, sn, motion, gravity, position, s, p, m):
     """Carry a cut (s, p) with m slots from the output to the input end, condensing q in `own`, a `BeamEquations`.
 
-    c, sn : cos and sin of the input end's orientation.
-
-    Returns the number of negative pivots, or -1.
+    The input end has the orientation of cosine `c` and sine `sn`. Return the number of negative pivots, or -1.
     """
     q = z[row.z : row.z + row.bending + row.axial]
     size, stretch = sizes.bending + sizes.axial, stretch_of(sizes, q)

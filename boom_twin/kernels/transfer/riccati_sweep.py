@@ -78,13 +78,8 @@ def clear_cut(work, m):
 def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m, condensed):
     """Transfer the cut in `work` (m degrees of freedom) inwards, from the end of operation `last - 1` through `first`.
 
-    condensed : Condensed
-        Output for `sweep_out`, `clearance_pins.coarseness` and the count of natural frequencies.
-
-    Returns
-    -------
-    status, negative, m : int
-        OK or SINGULAR; negative pivots of the beams (joints: see `Condensed.blocks`); the cut's new degrees of freedom.
+    `condensed` is written for `sweep_out`, `clearance_pins.coarseness` and the count of natural frequencies. Return status
+    (OK or SINGULAR), negative pivots of the beams (joints: see `Condensed.blocks`), and the cut's new degrees of freedom.
     """
     s, p, negative = work.s, work.p, 0
     for k in range(last - 1, first - 1, -1):
