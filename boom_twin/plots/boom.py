@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..scene.kinematics import JointPins, Skeleton
-from ..scene.schema import Scene, section_depth
+from ..scene.schema import Scene
 from ..types import Array
 from .style import BLUE, GREEN, GREY, INK, PURPLE
 
@@ -73,7 +73,7 @@ def draw_boom(axes: Axes, scene: Scene, bones: Skeleton, alpha: float = 0.55) ->
     """Draw base, sections, cylinders, links and pins of an undeformed boom."""
     size = 0.035 * float(sum(section.length for section in scene.sections))
     for i in range(len(scene.sections)):
-        draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i), alpha)
+        draw_section(axes, section_parts(scene, bones, i), scene.sections[i].depth, alpha)
     for joint, part in zip(bones.joints, scene.joints, strict=True):
         draw_cylinder(axes, joint.barrel_pin, joint.rod_pin, part.cylinder.closed_length, 0.22 * size)
         for corners, colour in zip(joint.links, (GREEN, PURPLE), strict=False):

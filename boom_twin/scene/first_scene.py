@@ -36,10 +36,7 @@ RANGE = re.compile(r"joints\[\d+\]\.range_deg")
 def first_scene(table: BoomTable, document: Document, source: str) -> tuple[str, Scene, list[Fault]]:
     """Return the scene's text, the scene, and its warnings at the table's keys and lines.
 
-    Raises
-    ------
-    SceneError
-        The boom of the table cannot be: joints that do not reach all of their ranges, postures out of reach.
+    SceneError if the boom of the table cannot be: joints that do not reach all of their ranges, postures out of reach.
     """
     text, scene, faults, odd = _examined(table, source)
     narrower = [each for each in odd if RANGE.fullmatch(each.path) and not each.bound.startswith((NEXT_TO, TURNS))]

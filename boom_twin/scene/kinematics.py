@@ -77,18 +77,9 @@ def stroke_range(scene: Scene, index: int, samples: int) -> tuple[float, float]:
 
 
 def section_angles(scene: Scene, posture: str) -> tuple[float, ...]:
-    """Return the section angles to the base (deg) of a posture.
+    """Return the section angles to the base (deg) of a posture: a name of the scene, or the angles themselves: ``90,-23,-23``.
 
-    Parameters
-    ----------
-    scene : Scene
-    posture : str
-        A name of the scene, or the angles themselves, as `envelope` and `init` print them: ``90,-23,-23``.
-
-    Raises
-    ------
-    UsageError
-        There is no such name, or a joint cannot take its angle.
+    UsageError if there is no such name, or a joint cannot take its angle.
     """
     if posture in scene.postures:
         return scene.postures[posture]
@@ -128,12 +119,8 @@ def joint_angles_of_strokes(
 ) -> Array:
     """Return relative angles (rad), shape (n,), of the undeformed boom at absolute `strokes` (m), called by `name` in errors.
 
-    Where a stroke belongs to two angles, the one next to `near` (rad), shape (n,), if given.
-
-    Raises
-    ------
-    UsageError
-        If a stroke is not reached anywhere in its joint's ``range_deg``, widened by one degree.
+    Where a stroke belongs to two angles, the one next to `near` (rad), shape (n,), if given. UsageError if a stroke is not
+    reached anywhere in its joint's ``range_deg``, widened by one degree.
     """
     rows = np.zeros(len(scene.joints), LINKAGE).view(np.recarray)
     for i in range(len(rows)):
@@ -164,10 +151,8 @@ CYLINDER, LEFT, RIGHT = "cylinder_{}_swivel", "link_l_{}_swivel", "link_r_{}_swi
 class PassiveJoints:
     """Positions of the passive joints of one scene.
 
-    Attributes
-    ----------
-    names : tuple of str
-        ``cylinder_1_swivel``, then of every six-bar i ``cylinder_i_swivel``, ``link_l_i_swivel``, ``link_r_i_swivel``.
+    `names` are ``cylinder_1_swivel``, then of every six-bar i ``cylinder_i_swivel``, ``link_l_i_swivel``,
+    ``link_r_i_swivel``.
     """
 
     def __init__(self, scene: Scene) -> None:

@@ -21,7 +21,7 @@ from ...errors import Fault
 from ...kernels.elements.linkage import cylinder_length
 from ...types import Array
 from ..kinematics import RANGE_SAMPLES, joint_pins, linkage, rod_pin_of, transmission_angles
-from ..schema import Cylinder, Oil, Scene, section_depth
+from ..schema import Cylinder, Oil, Scene
 from . import Draft, Findings
 from .geometry import Mask, grid_of, usable
 
@@ -70,7 +70,7 @@ def linkage_account(scene: Scene, i: int) -> LinkageAccount:
 def pin_diameter(scene: Scene, i: int) -> float:
     """Return the assumed diameter (m) of the pins of joint `i` (0-based): half the bore, which is guessed without `oil`."""
     oil = scene.joints[i].cylinder.oil
-    return PIN * (BORE * section_depth(scene, i) if oil is None else oil.bore)
+    return PIN * (BORE * scene.sections[i].depth if oil is None else oil.bore)
 
 
 def nearest_pins(pins: dict[str, Array], degrees: Array) -> Nearest | None:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from ...config.yaml_text import Place
-from ..schema import Cylinder, Joint, Point, RigidPart, Scene, Section, section_depth
+from ..schema import Cylinder, Joint, Point, RigidPart, Scene, Section
 from . import Draft, Findings
 
 LENGTHS = ("length", "beam", "height", "rod_pin", "com", "pivot", "cylinder_pin", "C", "D", "E", "R", "lL", "lR",
@@ -246,7 +246,7 @@ def rigid_parts(draft: Draft, scene: Scene) -> Findings:
 
 def _part(draft: Draft, scene: Scene, place: tuple[str, int, str], part: RigidPart, span: tuple[float, float]) -> Findings:
     """Check centre, inertia and mass: at least that of a share of as much beam, at most that of a solid block of its depth."""
-    section, depth, length = scene.sections[place[1]], section_depth(scene, place[1]), span[1] - span[0]
+    section, depth, length = scene.sections[place[1]], scene.sections[place[1]].depth, span[1] - span[0]
     more = OVERHANG * section.length
     low, high = span[0] - more, span[1] + more
     if not low <= part.com[0] <= high or abs(part.com[1]) > BESIDE * depth:
