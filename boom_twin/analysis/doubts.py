@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 
 from ..config.settings import STROKE_RATE
 from ..errors import UsageError
-from ..kernels.elements.linkage import cylinder_length
 from ..kernels.result_row import Results
 from ..kernels.tables import OK
 from ..scene.checks.geometry import LEVER, TRANSMISSION_DEG
-from ..scene.kinematics import RANGE_SAMPLES, joint_angles_of_strokes, linkage, skeleton, transmission_angles
+from ..scene.kinematics import RANGE_SAMPLES, joint_angles_of_strokes, joint_curve, linkage, skeleton
 from ..scene.schema import Scene
 from ..types import Array
 from .drive import DriveCourse, Run
@@ -170,11 +169,9 @@ def joint_doubts(scene: Scene, times: Array, joints: Array) -> Iterator[str]:
                 f"joint_{i + 1} is at {math.degrees(angles[row]):.4g} deg at t = {times[row]:g} s, outside its range_deg "
                 f"{joint.range_deg[0]:g} to {joint.range_deg[1]:g}; give strokes that keep it inside"
             )
-        row_of, degrees = linkage(scene, i), np.linspace(*joint.range_deg, RANGE_SAMPLES)
-        with np.errstate(invalid="ignore"):
-            largest = float(np.nanmax(np.abs(cylinder_length(row_of, np.radians(degrees))[1])))
-            levers = np.abs(cylinder_length(row_of, angles)[1])
-        between = np.full(len(angles), 90.0) if i == 0 else np.degrees(transmission_angles(row_of, angles))
+        own = linkage(scene, i)
+        largest = float(np.nanmax(joint_curve(own, np.radians(np.linspace(*joint.range_deg, RANGE_SAMPLES))).levers))
+        _, levers, between = joint_curve(own, angles)
         if np.nanmin(between) < TRANSMISSION_DEG:
             row = int(np.nanargmin(between))
             yield (

@@ -66,7 +66,7 @@ def write_mapping(found: Calibration, bag: Path, mapping: Path | None, out: Path
     """
     if not found.zeros:
         return None
-    text, zeros = _mapping_text(found, bag, mapping), _in_readings(found, joints)
+    text, zeros = _mapping_text(bag, mapping), _in_readings(found, joints)
     if "sensors" in (plain(text) or {}):
         for name, zero in zeros.items():
             text = with_value(text, ("sensors", name, "zero"), zero)
@@ -86,7 +86,7 @@ def _in_readings(found: Calibration, joints: int) -> dict[str, float]:
     return {name: sensors[name].zero + shift / factor(name, sensors[name]) for name, shift in found.zeros.items()}
 
 
-def _mapping_text(found: Calibration, bag: Path, mapping: Path | None) -> str:
+def _mapping_text(bag: Path, mapping: Path | None) -> str:
     """Return the text of the sessions' mapping; empty for the package's own."""
     if mapping is not None:
         return mapping.read_text(encoding="utf-8-sig")

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..kernels.elements import pin_contact as contact
-from ..kernels.elements.beam import LOCAL_ROWS, TURN_ROWS
+from ..kernels.elements.beam import TURN_ROWS
+from ..kernels.elements.beam_equations import LOCAL_ROWS
 from ..kernels.elements.cylinder import compliance_and_lag
 from ..kernels.integrators import DEPTH, new_weights
 from ..kernels.result_row import Results, results_of, row_width

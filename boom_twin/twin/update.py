@@ -37,7 +37,6 @@ from .state import (
 )  # fmt: skip
 
 SPAN = 2_000_000_000  # ns for which expected readings are kept
-ALONE = np.int64(0)  # row of a sample that comes alone; typed, because numba compiles once more for every literal
 
 DONE, ODD, LOOK, FAILED = range(4)
 """Reason why `update` returned: all samples taken; the sample is irregular; the sample is complete and begins a slot, or is

@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..elements.beam import USUAL, USUAL_LOCAL, BeamEquations, Sizes, is_usual, transfer_beam
+from ..elements.beam import USUAL, Sizes, is_usual
+from ..elements.beam_equations import USUAL_LOCAL, BeamEquations, transfer_beam
 from ..elements.pin_contact import BARREL_END_PIN
-from ..elements.rigid_body import (
-    add_body_force,
-    add_body_tangent,
-    merge_outlet,
-    merge_outlet_force,
-    pull_back,
-    pull_back_force,
-)
+from ..elements.rigid_body import add_body_force, add_body_tangent, merge_outlet, pull_back
 from ..jit import inner, kernel
 from ..tables import (
     BEAM,
@@ -94,17 +88,11 @@ def sweep_in(t, state, work, motion, drive, drive_rate, first, last, m, condense
         elif kind == OFFSET:
             bx, by = t.offsets[row].x, t.offsets[row].y
             ex, ey = c * bx - sn * by, sn * bx + c * by
-            if motion.renew:
-                pull_back(s, p, m, 0, 1, ex, ey)
-            else:
-                pull_back_force(p, 0, 1, ex, ey)
+            pull_back(s, p, m, 0, 1, ex, ey, motion.renew)
         elif kind == STATION:
             bx, by = t.outlets[row].x, t.outlets[row].y
             ex, ey = c * bx - sn * by, sn * bx + c * by
-            if motion.renew:
-                merge_outlet(s, p, m, ex, ey)
-            else:
-                merge_outlet_force(p, m, ex, ey)
+            merge_outlet(s, p, m, ex, ey, motion.renew)
             m -= 2
             p[2] -= torque_of(t, work, t.cylinders[t.outlets[row].cylinder], BARREL_END_PIN)
         elif kind == ROD_PIN:

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from ..elements.pin_contact import CLOSED, Journal, pin_force
+from ..elements.pin_contact import CLOSED
 from ..integrators import GENERALISED_ALPHA, NEWMARK, A, V, X, finish_step, prepare, start_step
 from ..jit import inner, kernel
 from ..result_row import results_in
 from ..tables import FRAME_ANGLE, JOINT_A, JOINT_B, NOT_CONVERGED, NOT_FINITE, OK, Z_SECTION, Motion
-from .clearance_pins import axis_of, coarseness, load_pins, note_contacts, shorten
+from .clearance_pins import coarseness, force_of_pin, load_pins, note_contacts, shorten
 from .forward_kinematics import place
 from .kept_tangent import (
     correct_guess,
@@ -217,22 +217,10 @@ def observe(t, state, out):
     for j in range(3):
         found.tip[0, j], found.tip[1, j] = state.history[X, t.tip + j], state.history[V, t.tip + j]
         found.tip[2, j] = state.history[A, t.tip + j]
-    observe_pins(t, state, found.pins)
-
-
-@inner
-def observe_pins(t, state, out):
-    """Write offset of the journal (m), force (N), and 1 if it touches, for every pin with clearance; shape (pins, 4)."""
-    v = state.history[V]
     for k in range(t.clearances.shape[0]):
-        row, memory = t.clearances[k], state.contacts[k]
-        x, y, vx, vy, turning = state.z[row.z], state.z[row.z + 1], v[row.z], v[row.z + 1], 0.0
-        if row.friction > 0.0:
-            turning = v[row.turn]
-        ax, ay = axis_of(t, state, row)
-        journal = Journal(x=x, y=y, vx=vx, vy=vy, before_x=vx, before_y=vy, turning=turning, axis_x=ax, axis_y=ay)
-        hold = pin_force(row, memory, journal, 0.0)
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = x, y, math.hypot(hold.x, hold.y), memory[CLOSED]
+        at, hold = t.clearances[k].z, force_of_pin(t, state, k, state.history[X], 0.0, state.history[V])
+        found.pins[k, 0], found.pins[k, 1] = state.z[at], state.z[at + 1]
+        found.pins[k, 2], found.pins[k, 3] = math.hypot(hold.x, hold.y), state.contacts[k, CLOSED]
 
 
 @kernel
