@@ -8,7 +8,6 @@ from reprlib import repr as repr_of
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..types import Array, Sample, Stream
@@ -48,13 +47,6 @@ class SampleCheck:
         if not self.is_sure and stream is self._drive:
             self._look(found.stamp)
         return found
-
-    def look_at(self, stamps: NDArray[np.int64]) -> None:
-        """Accept the stamps (ns) of strokes as nanoseconds before their block is taken, if they suffice to decide."""
-        deciding = stamps[: DECIDING - self._count]
-        if not self.is_sure and 0 < len(deciding) == DECIDING - self._count:
-            span = max(self._high, int(deciding.max())) - min(self._low, int(deciding.min()))
-            self.is_sure = span >= DECIDING * SHORTEST_STEP
 
     def _look(self, stamp: int) -> None:
         """Raise UsageError if the stamps are too close together to be nanoseconds.

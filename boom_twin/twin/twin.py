@@ -13,7 +13,7 @@ from ..health.monitor import warm_up
 from ..scene.kinematics import strokes_of_angles
 from ..types import SECOND, Array, Health, Report, Sample, Stream, StrokeReading
 from .block_update import CAPACITY
-from .blocks import CODES, STREAMS, ReportBlock, SampleBlock, block_of
+from .blocks import STREAMS, ReportBlock, SampleBlock, block_of
 from .loaded_model import LoadedModel
 from .readings import check_units, merged, samples_of
 from .sample_taker import SampleTaker
@@ -213,8 +213,6 @@ class Twin(SampleTaker):
         """
         found: list[ReportBlock | Report] = []
         block = SampleBlock(*map(np.ascontiguousarray, block, (np.int64, np.int64, float)))
-        if not self._edge.is_sure:
-            self._edge.look_at(block.stamps[block.streams == CODES[self._drive]])
         row, size, channels, self._judged = 0, len(block.stamps), self._widths, True
         while row < size:
             if self._run is not None and self._edge.is_sure and not self.requests.due:

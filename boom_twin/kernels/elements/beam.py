@@ -49,22 +49,16 @@ class Sizes(NamedTuple):
 
 
 class BeamPart(NamedTuple):
-    """Tables of a beam part, and its shape, which `beam_shape` fills.
+    """Tables of a beam part, and its shape, which `beam_shape` fills; the last of P+1 rows is the output end's."""
 
-    psi : (P+1, n); the last row, as those of all that follows with P+1 rows, belongs to the output end.
-    weights : (P+1, P), m. stiffness : (n, n), N m. mass, rotary : (P,), kg and kg m^2.
-    rho : (P+1, 2), m. drho : (P+1, n + axial, 2), its derivatives by q.
-    turn : (TURN_ROWS, P+1) cosine, sine, their derivatives by the angle (not of the output end), angle.
-    """
-
-    psi: Array
-    weights: Array
-    stiffness: Array
-    mass: Array
-    rotary: Array
-    rho: Array
-    drho: Array
-    turn: Array
+    psi: Array  # (P+1, n)
+    weights: Array  # (P+1, P), m
+    stiffness: Array  # (n, n), N m
+    mass: Array  # (P,), kg
+    rotary: Array  # (P,), kg m^2
+    rho: Array  # (P+1, 2), m
+    drho: Array  # (P+1, n + axial, 2), its derivatives by q
+    turn: Array  # (TURN_ROWS, P+1), cosine, sine, their derivatives by the angle (not of the output end), angle
 
 
 USUAL = Sizes(np.int64(3), np.int64(1), np.int64(4))  # as constants, which the compiler unrolls

@@ -18,14 +18,13 @@ FX, FY, TORQUE, CARRIED_X, CARRIED_Y, STRAIN, ALONG_Q, LOCAL_ROWS = range(8)  # 
 class BeamEquations(NamedTuple):
     """Equations of a part's q while it is condensed, and its gains afterwards (see `condense`).
 
-    coupling : (>= n + axial, m) H_qe. block : (>= n + axial, ..) H_qq, lower triangle. force : (>= n + axial,) g_q.
-    local : (LOCAL_ROWS, >= P, >= n + axial) of the Gauss points, forces in the axes of the input end: force of their masses
-        (N), torque (N m), force that they carry (N); and of the coordinates, the strains that give elastic forces, and g_q.
+    Rows of `local` (LOCAL_ROWS, >= P, >= n + axial), in the axes of the input end: of the Gauss points, force of their masses
+    (N), torque (N m), force that they carry (N); of the coordinates, the strains that give elastic forces, and g_q.
     """
 
-    coupling: Array
-    block: Array
-    force: Array
+    coupling: Array  # (>= n + axial, m), H_qe
+    block: Array  # (>= n + axial, ..), H_qq, lower triangle
+    force: Array  # (>= n + axial,), g_q
     local: Array
 
 
