@@ -63,7 +63,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Result of a calibration.
+    """Result of a calibration."""
 
     Attributes
     ----------
@@ -93,12 +93,12 @@ class Calibration:
     scene: Scene
     zeros: dict[str, float]
     estimates: tuple[Estimate, ...]
-    groups: tuple[InseparableUnknowns, ...]
-    misfit: float
+    groups: tuple[InseparableUnknowns, ...]  # what the sessions do not tell
+    misfit: float  # rms of the normalised innovations of the worst channel; 1 where noise alone is left
     passes: int
     sessions: tuple[MeasuredSession, ...]
-    held_out: str
-    before: HeldOutResult
+    held_out: str  # what was not used for the fit
+    before: HeldOutResult  # the twin's residuals there
     after: HeldOutResult
     mapped: Mapped
     remarks: tuple[str, ...]
@@ -114,35 +114,18 @@ def calibrate(
     progress: Progress = lambda share, what: None,
     window: TimeWindow = WHOLE,
 ) -> Calibration:
-    """Estimate parameters of `scene` from healthy sessions of its boom.
+    """Estimate parameters of `scene` from healthy sessions of its boom, each begun at rest.
 
-    Parameters
-    ----------
-    bags : sequence of path
-        Recorded sessions, each begun at rest. The last one is held out; of a single one, its last third.
-    choice : Choice, optional
-    settings : Settings, optional
-        Noise of the sensors; the package's own by default.
-    mapping : path, optional
-        Of topics and sensors; by default as the sessions were recorded, see `boom_twin.messages.mapping`.
-    progress : callable, optional
-        Told the share done and what comes next.
-    window : TimeWindow, optional
-        The part of each session that is used.
-
-    Returns
-    -------
-    Calibration
-        Estimates with their intervals, what the sessions do not tell, and the residuals on what was held out.
+    The last session is held out; of a single one, its last third. `settings` give the noise of the sensors. `mapping` is by
+    default that of the sessions. `progress` is told the share done and what comes next. `window` is the part of each session
+    that is used.
 
     Raises
     ------
     UsageError
         A parameter that the scene lacks; sessions with different mappings; nothing that the sessions could tell.
-    BagError
-        A session that cannot be used.
-    SolverError
-        The model fails on a session.
+    BagError, SolverError
+        A session that cannot be used; the model fails on it.
     """
     settings, choice = settings or Settings(), choice or Choice()
     progress(0.0, "reading")

@@ -132,7 +132,7 @@ def write(source: str | None, scene: Scene, proposal: Proposal, most: float, out
         f"# ({proposal.course.motion.label}).",
         f"# {ANOTHER}",
     ]
-    body = "\n".join(head) + "\n\n" + rewritten(text, scene, proposal.edits)
+    body = "\n".join(head) + "\n\n" + rewritten(text, scene, proposal.scene)
     write_atomic(out, with_end_mark(body))
 
 

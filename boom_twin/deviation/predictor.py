@@ -138,11 +138,6 @@ class BoomPredictor:
         """Fields of `compiled` as compiled code takes them with every call, see `boom_twin.kernels.jit.hold`."""
         return tuple(map(hold, self.compiled))
 
-    @cached_property
-    def filters_held(self) -> tuple[Any, ...]:
-        """Posture and filters as compiled code takes them, see `held`."""
-        return hold(self.posture), hold(self.filters)
-
     @property
     def stations(self) -> int:
         """Number of stations that have a bending moment."""

@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..kernels.elements.linkage import LINK_L
 from ..scene.kinematics import CYLINDER, LEFT, RIGHT, linkage
-from ..scene.schema import Cylinder, Scene, section_depth
+from ..scene.schema import Cylinder, Scene
 from .topic_table import FRAME, TIP_JOINTS
 
 NAME = "boom"
@@ -80,7 +80,7 @@ def urdf(scene: Scene) -> str:
 
 def _section(robot: Element, scene: Scene, i: int) -> None:
     """Add section `i` (0-based) and the joint that turns it."""
-    name, depth = f"section_{i + 1}", section_depth(scene, i)
+    name, depth = f"section_{i + 1}", scene.sections[i].depth
     link = SubElement(robot, "link", name=name)
     _bar(link, (0.0, 0.0), (scene.sections[i].length, 0.0), depth, "section")
     low, high = (math.radians(angle) for angle in scene.joints[i].range_deg)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..scene.kinematics import Skeleton, skeleton, stroke_curve
-from ..scene.schema import Scene, section_depth
+from ..scene.schema import Scene
 from ..types import Array
 from .boom import draw_cylinder, draw_link, draw_pin, draw_section, named_pins, section_parts
 from .style import BLUE, GREEN, GREY, INK, ORANGE, PALE, PURPLE, picture, side_view
@@ -55,7 +55,7 @@ def _boom(axes: Axes, scene: Scene) -> None:
     with np.errstate(invalid="ignore"):
         bones = skeleton(scene, angles)
     for i in range(len(scene.sections)):
-        draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i))
+        draw_section(axes, section_parts(scene, bones, i), scene.sections[i].depth)
     for i, joint in enumerate(scene.joints):
         before = float(bones.headings[i] - angles[i])
         _fan(axes, bones.pivots[i], before + np.radians(joint.range_deg), FAN * scene.sections[i].length)
@@ -119,9 +119,9 @@ def _mechanism(axes: Axes, scene: Scene, bones: Skeleton, i: int, colour: str | 
     from matplotlib.patheffects import withStroke
 
     joint, alpha = bones.joints[i], 0.12 if colour is None else 0.4
-    draw_section(axes, section_parts(scene, bones, i), section_depth(scene, i), alpha)
+    draw_section(axes, section_parts(scene, bones, i), scene.sections[i].depth, alpha)
     if i > 0:
-        draw_section(axes, section_parts(scene, bones, i - 1), section_depth(scene, i - 1), 0.12)
+        draw_section(axes, section_parts(scene, bones, i - 1), scene.sections[i - 1].depth, 0.12)
     for corners, own in zip(joint.links, (GREEN, PURPLE), strict=False):
         draw_link(axes, corners, PALE if colour is None else own, 2.0 if colour is None else 3.5)
     if colour is None:

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..analysis.bending_stress import BOX
 from ..analysis.free_vibration import Vibration
 from ..health.sensor_monitor import noise_as_text
 from ..offline.recording import Recording
 from ..offline.replay import Replay
 from ..plots import AlarmSpan
 from ..plots.health import frequency_picture, moment_picture, timeline_picture
+from ..scene.schema import DEPTH_BY_GYRATION
 from ..system.atomic_files import write_atomic
 from ..texts import alarm_sentence
 from ..twin.events import EVENTS
@@ -29,7 +29,10 @@ from .vibration import MODE_DISTANCE, SHORTEST_REST, course
 FILE_NAME = "report.html"
 HOUR = 3600.0  # s
 NO_JUDGE = "The rig's health was not judged."
-ASSUMED = f"Heights are not in the scene: assumed are {BOX:g} radii of gyration, as of thin-walled boxes; see --section-height."
+ASSUMED = (
+    f"Heights are not in the scene: assumed are {DEPTH_BY_GYRATION:g} radii of gyration, as of thin-walled boxes; "
+    "see --section-height."
+)
 
 
 def write_report(found: Evaluation, folder: Path) -> Path:

@@ -39,87 +39,60 @@ class Ring(NamedTuple):
 
 @by_reference
 class TwinState(NamedTuple):
-    """State of the twin between samples, beside the boom; s streams of up to w channels, c measured channels in all.
+    """State of the twin between samples, beside the boom; s streams of up to w channels, c measured channels in all."""
 
-    clock : (10,) whole numbers by the names above; stamps in ns, CHECKED and TRUSTED since EPOCH.
-    interval : (1,) running mean of the time between strokes, s; 0 while unknown.
-    newest : (s,) stamp of the newest sample of every stream, ns; NONE before the first.
-    usual : (s,) time from one sample to the next, ns; 0 while unknown.
-    held : (s,) samples that are held, see `boom_twin.twin.stamp_check`.
-    strokes, taken : (n,) newest strokes, or angles that drive the model, less their zeros, and as the model is to take them, m
-    or rad; NaN where missing.
-    past : expected readings (c,), their deviations and the strokes, of the last `SPAN`.
-    waiting : measured samples that wait for a stroke, by stamp and stream.
-    recent : measured less expected, without any zero.
-    zeros_since, zeros : (ZEROS,), (ZEROS, s, w) what sensors read too much from a stamp on. zero_sets : (1,) how many.
-    """
-
-    clock: Integers
-    interval: Array
-    newest: Integers
-    usual: Array
-    held: Integers
-    strokes: Array
-    taken: Array
-    past: Ring
-    waiting: Ring
-    recent: Ring
-    zeros_since: Integers
-    zeros: Array
-    zero_sets: Integers
+    clock: Integers  # (10,), whole numbers by the names above; stamps in ns, CHECKED and TRUSTED since EPOCH
+    interval: Array  # (1,), running mean of the time between strokes, s; 0 while unknown
+    newest: Integers  # (s,), stamp of the newest sample of every stream, ns; NONE before the first
+    usual: Array  # (s,), time from one sample to the next, ns; 0 while unknown
+    held: Integers  # (s,), samples that are held, see `boom_twin.twin.stamp_check`
+    strokes: Array  # (n,), newest strokes or angles that drive the model, less their zeros, m or rad; NaN where missing
+    taken: Array  # (n,), the same as the model is to take them
+    past: Ring  # expected readings (c,), their deviations and the strokes, of the last `SPAN`
+    waiting: Ring  # measured samples that wait for a stroke, by stamp and stream
+    recent: Ring  # measured less expected, without any zero
+    zeros_since: Integers  # (ZEROS,)
+    zeros: Array  # (ZEROS, s, w), what sensors read too much from a stamp on
+    zero_sets: Integers  # (1,), how many
 
 
 @by_reference
 class Limits(NamedTuple):
-    """Limits that `update` checks samples against.
+    """Limits that `update` checks samples against."""
 
-    gap, leap : ns. drive : code of the stream that drives the model, of strokes (m) or angles (rad). far : by which its
-    readings may be off their estimate at once. rate : of the fastest, per s. shortest, longest : (n,) readings that there can
-    be. turns : (n,) whether they may be whole turns off.
-    valid : m, how far the tip may be from the undeformed boom's.
-    gravity : (2,) m/s^2.
-    absolute : (n,) whether the angle sensor of a joint is an inclinometer.
-    absent : (c,) measured channels without a sensor.
-    first, channels : (s,) first column of every stream among the measured channels, and how many it has; 0 if it is not used.
-    """
-
-    gap: int
-    leap: float
-    drive: int
-    far: float
-    rate: float
-    shortest: Array
-    longest: Array
-    turns: Flags
-    valid: float
-    gravity: Array
-    absolute: Flags
-    absent: Flags
-    first: Integers
-    channels: Integers
+    gap: int  # ns
+    leap: float  # ns
+    drive: int  # code of the stream that drives the model, of strokes (m) or angles (rad)
+    far: float  # by which its readings may be off their estimate at once
+    rate: float  # of the fastest, per s
+    shortest: Array  # (n,), least reading that there can be
+    longest: Array  # (n,), greatest
+    turns: Flags  # (n,), whether they may be whole turns off
+    valid: float  # m, how far the tip may be from the undeformed boom's
+    gravity: Array  # (2,), m/s^2
+    absolute: Flags  # (n,), whether the angle sensor of a joint is an inclinometer
+    absent: Flags  # (c,), measured channels without a sensor
+    first: Integers  # (s,), first column of every stream among the measured channels
+    channels: Integers  # (s,), how many it has; 0 if it is not used
 
 
 @by_reference
 class UpdateOutput(NamedTuple):
-    """Buffers for the results of a call, see `boom_twin.twin.blocks`; `counts` has the rows of predictions, and of residuals.
+    """Buffers for the results of a call, see `boom_twin.twin.blocks`."""
 
-    rows : results and estimates, see `boom_twin.kernels.result_row`. estimates : see `boom_twin.deviation.estimate_row`.
-    measured : strokes less their zeros, m. raw : as measured.
-    """
-
-    counts: Integers
+    counts: Integers  # rows of predictions, and of residuals
     at: Integers
     stamps: Integers
-    rows: Array
+    rows: Array  # results and estimates, see `boom_twin.kernels.result_row`
     moments: Array
-    estimates: Array
-    measured: Array
+    estimates: Array  # see `boom_twin.deviation.estimate_row`
+    measured: Array  # strokes less their zeros, m
     residual_at: Integers
     residual_streams: Integers
     residual_stamps: Integers
     values: Array
     sigmas: Array
-    raw: Array
+    raw: Array  # as measured
 
 
 def drop_waiting(state: TwinState, first: int, last: int, stream: int | None = None) -> int:

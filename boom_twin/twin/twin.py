@@ -13,7 +13,7 @@ from ..health.monitor import warm_up
 from ..scene.kinematics import strokes_of_angles
 from ..types import SECOND, Array, Health, Report, Sample, Stream, StrokeReading
 from .block_update import CAPACITY
-from .blocks import CODES, STREAMS, ReportBlock, SampleBlock, block_of
+from .blocks import STREAMS, ReportBlock, SampleBlock, block_of
 from .loaded_model import LoadedModel
 from .readings import check_units, merged, samples_of
 from .sample_taker import SampleTaker
@@ -122,36 +122,13 @@ class Twin(SampleTaker):
         return found
 
     def model(self, settings: Settings) -> LoadedModel:
-        """Return the model under the load of `settings`; another thread may call this, since the twin keeps its own model.
-
-        Parameters
-        ----------
-        settings : Settings
-
-        Returns
-        -------
-        LoadedModel
-            What `ModelPreparation` gives to `requests.tune`.
-
-        Raises
-        ------
-        UsageError
-            The load cannot be.
-        """
+        """Return the model under the load of `settings`, for `requests.tune`; another thread may call this."""
         return self._model(settings)
 
     def zeros(self, channels: Collection[str]) -> tuple[Array, Array]:
-        """Return what sensors of angles, IMU and forces are estimated to read too much, and the variances of that.
+        """Return the estimated zeros of sensors of angles, IMU and forces (m/s^2, rad, N), and their variances.
 
-        Parameters
-        ----------
-        channels : collection of str
-            Names such as ``joint_2``; the results are in the order IMU, angles, forces.
-
-        Returns
-        -------
-        values, variances : ndarray, shape (channels,)
-            m/s^2, rad, N, and their squares.
+        Both are in the order IMU, angles, forces of those `channels`, such as ``joint_2``.
         """
         return self._boom.zeros(channels)
 
@@ -206,25 +183,7 @@ class Twin(SampleTaker):
         return self._told(sample, self._fail(sample, []) if reason == FAILED else self._look_at(sample))
 
     def samples(self, readings: Mapping[str, Any], stamp_ns: int | None) -> list[Sample]:
-        """Return the samples of readings by name in SI units.
-
-        Parameters
-        ----------
-        readings : mapping of str to float or sequence
-            As for `boom_twin.twin.readings.samples_of`.
-        stamp_ns : int
-            Time of the readings, ns.
-
-        Returns
-        -------
-        list of Sample
-            One for each stream, strokes first.
-
-        Raises
-        ------
-        UsageError
-            A name, a value or the stamp cannot be used; or the first readings are in other units.
-        """
+        """Return a sample of each stream of readings by name, as `update` takes them, strokes first."""
         found = samples_of(readings, stamp_ns, self.plan.joints)
         if self._run is None:
             check_units(found)
@@ -248,27 +207,12 @@ class Twin(SampleTaker):
         return self._compiled.judge()
 
     def update_block(self, block: SampleBlock) -> list[ReportBlock | Report]:
-        """Take the samples of a block in turn, as `update` does each of them.
+        """Take the samples of a block in turn, as `update` does each of them, and raise as it does.
 
-        Parameters
-        ----------
-        block : SampleBlock
-
-        Returns
-        -------
-        list of ReportBlock or Report
-            In the order of the samples: blocks of those of which nothing out of the ordinary is to be told, and a report of
-            every other sample.
-
-        Raises
-        ------
-        UsageError
-            As `update` does; the samples before have been taken.
+        Return, in the order of the samples, blocks of reports of regular samples, and a report of every other sample.
         """
         found: list[ReportBlock | Report] = []
         block = SampleBlock(*map(np.ascontiguousarray, block, (np.int64, np.int64, float)))
-        if not self._edge.is_sure:
-            self._edge.look_at(block.stamps[block.streams == CODES[self._drive]])
         row, size, channels, self._judged = 0, len(block.stamps), self._widths, True
         while row < size:
             if self._run is not None and self._edge.is_sure and not self.requests.due:

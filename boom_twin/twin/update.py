@@ -37,7 +37,6 @@ from .state import (
 )  # fmt: skip
 
 SPAN = 2_000_000_000  # ns for which expected readings are kept
-ALONE = np.int64(0)  # row of a sample that comes alone; typed, because numba compiles once more for every literal
 
 DONE, ODD, LOOK, FAILED = range(4)
 """Reason why `update` returned: all samples taken; the sample is irregular; the sample is complete and begins a slot, or is
@@ -46,26 +45,12 @@ outside the model's validity; the model failed (see `STATUS`)."""
 
 @kernel
 def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stamps, values, first, trusted, found):
-    """Take the samples of a block from row `first` on, as long as they are regular.
+    """Take the samples of a block from row `first` on, as long as they are regular; return the reason for the end, and its row.
 
-    Parameters
-    ----------
-    t, boom, live, work, p, f, bending, out : fields of CompiledBoom
-        See `boom_twin.deviation.predictor`; as they are, because tuples of tuples take long to compile.
-    limits : Limits
-    state : TwinState
-        Of a run that has begun.
-    streams, stamps, values : ndarray
-        See `boom_twin.twin.blocks.SampleBlock`.
-    trusted : bool
-        Whether row `first`, the only one, was looked at before; of strokes, ``state.strokes`` and ``state.taken`` hold them.
-    found : Found
-        What it gives is added here.
-
-    Returns
-    -------
-    reason, row : int
-        See `DONE`; the row that it is about.
+    `t` to `out` are the fields of `boom_twin.deviation.predictor.CompiledBoom`, as they are: tuples of tuples take long to
+    compile. `streams`, `stamps`, `values` are those of a `boom_twin.twin.blocks.SampleBlock`. A `trusted` row, the only one,
+    was looked at before; of strokes, ``state.strokes`` and ``state.taken`` hold them. What it gives is added to `found`, an
+    `UpdateOutput`.
     """
     row = first
     while row < stamps.shape[0]:
@@ -100,19 +85,6 @@ def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stam
         if state.clock[BEGINS_SLOT] or state.clock[IS_DEFLECTED]:
             return LOOK, row - 1
     return DONE, row
-
-
-@kernel
-def measure(p, f, limits, state, stream, stamp, values, trusted, found):
-    """Take one measured sample as `update` does, but without the boom; return False, with nothing done, if irregular.
-
-    A `trusted` sample is refused only if no readings were expected at its stamp.
-    """
-    before = found.counts[1]
-    if not compare(limits, state, stream, stamp, values, ALONE, trusted, found):
-        return False
-    take_residuals(limits, state, p, f, before, found)
-    return True
 
 
 @inner

@@ -48,33 +48,16 @@ Declared = Mapping[Stream, Sequence[Channel]]
 
 
 class Verdict(NamedTuple):
-    """Result about one channel.
-
-    Attributes
-    ----------
-    stream : Stream
-    channel : str
-    declared : Channel
-    best : Channel or None
-        Most likely way to read it, None if no name is left for it.
-    margin : float
-        Nats by which every other way is less likely.
-    is_wrong : bool
-        True if it is not read as declared.
-    is_explained : bool
-        True if `best` explains the readings.
-    has_no_gravity : bool
-        True if the driver of an IMU removes gravity.
-    """
+    """Result about one channel."""
 
     stream: Stream
     channel: str
     declared: Channel
-    best: Channel | None
-    margin: float
-    is_wrong: bool
-    is_explained: bool = True
-    has_no_gravity: bool = False
+    best: Channel | None  # most likely way to read it, None if no name is left for it
+    margin: float  # nats by which every other way is less likely
+    is_wrong: bool  # it is not read as declared
+    is_explained: bool = True  # `best` explains the readings
+    has_no_gravity: bool = False  # the driver of an IMU removes gravity
 
     @property
     def is_sure(self) -> bool:
@@ -97,10 +80,7 @@ class Checked(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """Best ways to read one stream under an explanation.
-
-    `cost` is in nats. `margin` takes the index of a channel. The other fields are those of `Verdict`, by channel.
-    """
+    """Best ways to read one stream under an explanation, by channel as in `Verdict`; `cost` is in nats."""
 
     cost: float
     best: tuple[Channel | None, ...]
@@ -126,27 +106,10 @@ def check(
     is_quick: bool = False,
     places: Mapping[str, Place] = NO_PLACES,
 ) -> Checked | None:
-    """Check the declaration of a rig's sensors against readings.
+    """Check the declaration of a rig's sensors against readings; None if no block has all strokes, or nothing explains them.
 
-    Parameters
-    ----------
-    scene : Scene
-        Scene with load.
-    reads : StrokeReading
-        Quantity of the stroke readings.
-    declared : mapping of Stream to sequence of Channel
-        Declaration of every channel, in the order of the channels.
-    window : mapping of Stream to mapping of str to Series
-        Readings by name (IMU: by axis). Strokes are required.
-    is_quick : bool
-        Flag channels not read as declared, without a correction.
-    places : mapping of str to Place
-        See `boom_twin.Twin`.
-
-    Returns
-    -------
-    Checked or None
-        None if no block has readings of every stroke, or there is no explanation.
+    `declared` has every channel in their order. `window` has readings by name (IMU: by axis); strokes are required.
+    `is_quick` only flags channels that are not read as declared. For `places` see `boom_twin.Twin`.
     """
     tables = {stream: table for stream, table in tables_of(window).items() if len(table.names)}
     strokes = tables.get(Stream.STROKES)

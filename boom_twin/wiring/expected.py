@@ -23,38 +23,16 @@ from ..types import NO_PLACES, Array, Mount, Place, Stream, StrokeReading
 
 
 class Expected(NamedTuple):
-    """Expected readings in every block, NaN if no posture has its strokes.
+    """Expected readings in every block, NaN if no posture has its strokes."""
 
-    Attributes
-    ----------
-    angles : dict of Mount or None to ndarray, shape (blocks, n)
-        Encoders (key None), and inclinometers at the root and at the head of each section, rad.
-    forces : ndarray, shape (blocks, n)
-        N.
-    gravity : dict of Stream to ndarray of complex, shape (blocks,)
-        Specific force at rest at every IMU, along its section (real) and across it (imaginary), m/s^2.
-    compression : ndarray, shape (blocks, n)
-        Rotation of each joint if the strokes are drives instead of lengths, rad. 0 without a posture.
-    """
-
-    angles: dict[Mount | None, Array]
-    forces: Array
-    gravity: dict[Stream, Array]
-    compression: Array
+    angles: dict[Mount | None, Array]  # (blocks, n), encoders (None), inclinometers at root and head of each section, rad
+    forces: Array  # (blocks, n), N
+    gravity: dict[Stream, Array]  # (blocks,), at rest at every IMU, along its section and (imaginary) across, m/s^2
+    compression: Array  # (blocks, n), turn of each joint if the strokes are drives instead of lengths, rad; 0 without a posture
 
 
 class RestModel:
-    """Model of a scene at rest.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with load.
-    reads : StrokeReading
-        Quantity of the stroke readings.
-    places : mapping of str to Place
-        See `boom_twin.Twin`.
-    """
+    """Model of a scene, with its load, at rest; `reads` is what the strokes are. For `places` see `boom_twin.Twin`."""
 
     def __init__(self, scene: Scene, reads: StrokeReading, places: Mapping[str, Place] = NO_PLACES) -> None:
         self.scene = scene

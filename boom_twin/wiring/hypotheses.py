@@ -37,25 +37,13 @@ TAU = 2.0 * math.pi
 
 
 class Cube(NamedTuple):
-    """Costs of the readings of one stream.
-
-    Attributes
-    ----------
-    costs : ndarray, shape (n, names, hypotheses)
-        Costs other than unit and sign (see `common_costs`).
-    channels : dict of (int, int, int) to Channel
-        Way to read a channel under a hypothesis.
-    units, declared_units : ndarray of int, shape (n, names, hypotheses)
-        Indices of the unit and of the declared unit among the units of the stream.
-    reversals : ndarray of bool, shape (n, names, hypotheses)
-        True if the sign is not as declared.
-    """
+    """Costs of the readings of one stream, other than unit and sign (see `common_costs`); arrays (n, names, hypotheses)."""
 
     costs: Array
-    channels: Mapping[tuple[int, int, int], Channel]
-    units: NDArray[np.int64]
+    channels: Mapping[tuple[int, int, int], Channel]  # way to read a channel under a hypothesis
+    units: NDArray[np.int64]  # indices among the units of the stream
     declared_units: NDArray[np.int64]
-    reversals: NDArray[np.bool_]
+    reversals: NDArray[np.bool_]  # the sign is not as declared
 
 
 def common_costs(cube: Cube, unit: int | None, is_reversed: bool) -> Array:
@@ -198,10 +186,7 @@ def angle_cube(table: Table, declared: Sequence[Channel], expected: Expected, we
 
 
 def _zeros(off: Array, is_encoder: bool, weight: float) -> Iterator[tuple[float, Array, Array]]:
-    """Yield prior cost, zeros (ways,) in rad and misfits (ways,) for angle errors `off` (ways, blocks), rad.
-
-    The decoder itself removes one turn.
-    """
+    """Yield prior cost, zeros (ways,) in rad and misfits (ways,) of angle errors (ways, blocks); decoders remove a turn."""
     turns = np.round(off / TAU)
     wrapped = off - TAU * turns
     known = np.isfinite(wrapped)

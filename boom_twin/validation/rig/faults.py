@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import UsageError
-from ...scene.edit import parameter, section_mass
+from ...scene.edit import parameter
 from ...scene.schema import Scene
 from ...types import SECOND, Array
 from .exudyn.solve import Drive
@@ -197,7 +197,7 @@ def largest_size(fault: RigFault, scene: Scene, duration: float) -> float:
     if fault.is_of_drive:
         return scene.joints[fault.number - 1].cylinder.max_stroke / (min(fault.end, duration) - fault.onset)
     if fault.kind == "more":
-        mass = sum(map(section_mass, scene.sections))
+        mass = sum(section.mass for section in scene.sections)
         return mass if fault.cause == "tip.payload" else mass / scene.reach
     if fault.kind == "less":
         return parameter(scene, fault.cause)
