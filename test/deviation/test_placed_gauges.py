@@ -6,15 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import strokes_of_posture
+from recordings import load_mapping
+from ros_messages import SampleDecoder, new_message
 
-from boom_twin import Sample, Settings, Stream, Twin, load_scene, statics
+from boom_twin import Sample, Settings, Stream, Twin, UsageError, load_scene, statics
 from boom_twin.analysis.bending_moments import stations
-from boom_twin.cli.main import main
-from boom_twin.errors import UsageError
-from boom_twin.messages.mapping import load_mapping
-from boom_twin.messages.sample_decoder import SampleDecoder
-from boom_twin.messages.type_store import new_message
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.types import Place
 
 SCENE = load_scene()
@@ -76,6 +74,9 @@ def test_messages_are_read_by_the_mapping(tmp_path: Path) -> None:
         ("sensors: {joint_1: {place: {at: 1.0}}}", "only a moment_i has a place"),
         ("sensors: {moment_1: {place: {att: 1.0}}}", "nearest known key here is `at`"),
         ("inputs: {points: {name: other}}", "inputs.points.place"),
+        ("inputs: {imu_2: {place: {section: 0}}}", "inputs.imu_2.place.section"),
+        ("inputs: {joint_angles: {place: {section: 1}}}", "only IMUs and points have a place"),
+        ("inputs: {imu_5: {name: other}}", "nearest is `imu_"),
     ],
 )
 def test_a_wrong_place_is_told(tmp_path: Path, text: str, told: str) -> None:

@@ -7,18 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from default_boom import default_text, strokes_of_angles, strokes_of_posture
+from recordings import load_mapping
+from ros_messages import SampleDecoder, new_message
 from ruamel.yaml import YAML
 
-from boom_twin import Sample, Scene, Settings, Stream, Twin, load_scene, statics
+from boom_twin import Sample, Scene, Settings, Stream, Twin, UsageError, load_scene, statics
 from boom_twin.deviation.predictor import BoomPredictor
 from boom_twin.deviation.states import PREDICTION, drive_place
 from boom_twin.deviation.step import move_sites, place_live
-from boom_twin.errors import UsageError
-from boom_twin.messages.mapping import load_mapping
-from boom_twin.messages.sample_decoder import SampleDecoder
-from boom_twin.messages.type_store import new_message
-from boom_twin.scene.kinematics import gravity_in_base, strokes_of_angles, strokes_of_posture
-from boom_twin.scene.load import default_text
+from boom_twin.scene.kinematics import gravity_in_base
 from boom_twin.twin.blocks import CODES
 from boom_twin.types import Array, Place, Residuals
 
@@ -81,16 +79,6 @@ def test_the_tip_is_one_place_among_others() -> None:
             assert (one.values == other.values).all() and (one.sigmas == other.sigmas).all()
 
 
-def test_a_quarter_turn_is_the_other_axis() -> None:
-    readings = np.random.default_rng(0).normal([5.0, 8.0], 0.1, (60, 2))
-    straight = residuals_of(Twin(SCENE, places={"imu_2": Place(2, 3.1)}), Stream.IMU_2, readings)
-    swapped = np.column_stack([readings[:, 1], -readings[:, 0]])
-    turned = residuals_of(Twin(SCENE, places={"imu_2": Place(2, 3.1, math.pi / 2)}), Stream.IMU_2, swapped)
-    for one, other in zip(straight, turned, strict=True):
-        assert other.values == pytest.approx([one.values[1], -one.values[0]], abs=1e-9)
-        assert other.sigmas == pytest.approx(one.sigmas[::-1], rel=1e-9)
-
-
 @pytest.mark.parametrize("at", [0.2, 2.0, 3.1])
 def test_a_place_on_a_beam_is_where_statics_have_it(at: float) -> None:
     """Its angle at rest, by gravity, is continuous where parts meet, and lies between those of root and head."""
@@ -119,23 +107,6 @@ def test_a_mapping_places_them_and_their_messages_are_read(tmp_path: Path) -> No
     msg.angular_velocity_covariance[0] = -1.0
     assert [each.stream for each in decoder.samples(topics.heard["/mid/imu"], 6 * 10**9, msg)] == [Stream.IMU_2]
     assert not decoder.oddities
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("inputs: {imu_2: {place: {section: 0}}}", "inputs.imu_2.place.section"),
-        ("inputs: {imu_2: {place: {sektion: 1}}}", "nearest known key here is `section`"),
-        ("inputs: {joint_angles: {place: {section: 1}}}", "only IMUs and points have a place"),
-        ("inputs: {imu_5: {name: other}}", "nearest is `imu_"),
-        ("inputs: {imu_2: {name: other}}", "inputs.imu_2.place"),
-    ],
-)
-def test_a_wrong_place_is_told(tmp_path: Path, text: str, told: str) -> None:
-    path = tmp_path / "mapping.yaml"
-    path.write_text(text)
-    with pytest.raises(UsageError, match=told):
-        load_mapping(path, 4)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from health.recorded import NANO, PUMP, Outcome, run, session, spoilt
 
-from boom_twin import Settings, Stream, Twin, load_scene
+from boom_twin import Settings, Stream
 
 DEGREE, ONSET = math.radians(1.0), 6.0
 JOINTS = range(4)
@@ -91,15 +91,6 @@ def test_healthy_sessions_give_no_alarm():
     assert np.all(healthy().health[-1].tip_sigmas > 1e-5) and np.all(healthy().health[-1].tip_sigmas < 0.05)
 
 
-def told(outcome: Outcome):
-    return [(health.stamp, health.alarms, health.tip_sigmas.tobytes()) for health in outcome.health]
-
-
-def test_twice_is_the_same():
-    again = faulty.__wrapped__(Stream.ANGLES, "stuck", 0)
-    assert told(again) == told(faulty(Stream.ANGLES, "stuck", 0)) and again.told()
-
-
 def test_the_order_of_arrival_does_not_matter():
     """Angles that come 60 ms late, each in its own order: the same is told, at most a block later."""
     samples = spoilt(session(), Stream.ANGLES, 0, lambda v, t: 1.0)
@@ -116,12 +107,6 @@ def test_pump_and_wind_are_no_fault():
     assert len(outcome.health) >= 28 and outcome.states() == []
 
 
-def test_twice_the_stated_noise_gives_no_spikes():
-    rng, sigma = np.random.default_rng(5), math.sqrt(3.0) * Settings().angle_sigma
-    noisy = [replace(s, values=s.values + rng.normal(0.0, sigma, 4)) if s.stream is Stream.ANGLES else s for s in session(18.0)]
-    assert run(noisy).states() == []
-
-
 def test_noise_of_all_sensors_at_once_is_told_as_noise():
     """Three times what is stated: angles that are as noisy as strokes are no sign that the boom is shaken."""
     rng, settings = np.random.default_rng(6), Settings()
@@ -131,13 +116,6 @@ def test_noise_of_all_sensors_at_once_is_told_as_noise():
     ]
     assert run(noisy).health[-1].noise["noise_over_stroke_sigma"] > 1.8
     assert healthy().health[-1].noise["noise_over_stroke_sigma"] < 1.1
-
-
-def test_a_twin_without_health_tells_nothing():
-    twin = Twin(load_scene())
-    outcome = run(session(3.0), twin=twin)
-    assert outcome.health == [] and twin.judge is None
-    assert outcome.tips().tobytes() == healthy().tips()[: len(outcome.tips())].tobytes()
 
 
 def test_after_a_gap_it_begins_anew():

@@ -7,13 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recordings import load_mapping
+from ros_messages import SampleDecoder, Topics, new_message
 
-from boom_twin import Scene, Settings, Stream, load_scene
-from boom_twin.errors import UsageError
-from boom_twin.messages.mapping import load_mapping
-from boom_twin.messages.sample_decoder import SampleDecoder
-from boom_twin.messages.topic_table import Topics
-from boom_twin.messages.type_store import new_message
+from boom_twin import Scene, Settings, Stream, UsageError, load_scene
 
 SCENE = load_scene()
 BORE, ROD = (0.16, 0.16, 0.12, 0.10), (0.09, 0.09, 0.07, 0.06)

@@ -8,19 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from recordings import load_mapping, load_truth, read, scan
+from ros_messages import ReportEncoder, SampleDecoder, jazzy, load_topics, stamp_of
 
-from boom_twin import Settings, Stream, Twin, load_scene, replay
-from boom_twin.bag.reader import read, scan
+from boom_twin import BagError, Sample, Settings, Stream, Twin, load_scene, replay
 from boom_twin.bag.session_files import write_samples
-from boom_twin.cli.main import main
-from boom_twin.errors import BagError
-from boom_twin.messages.mapping import load_mapping
-from boom_twin.messages.report_encoder import ReportEncoder
-from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
-from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import jazzy
-from boom_twin.offline.ground_truth import load_truth
-from boom_twin.types import Sample, StrokeReading
+from boom_twin.types import StrokeReading
 
 BAGS = Path(__file__).parents[2] / "bags"
 MOST = {"arch_session": 2e-3, "pump_session": 3e-3}  # m

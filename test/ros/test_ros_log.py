@@ -13,7 +13,6 @@ from ros_rig import Rig
 
 from boom_twin.diagnostics.levels import Level, Status
 from boom_twin.ros.diagnostics_publisher import DiagnosticsPublisher
-from boom_twin.ros.node.diagnostics import ClockCheck
 
 HOSTILE = "/rig\x1b[2J\n[INFO] [boom_twin]: all is well\u202e\x9b31m"
 ESCAPED = r"/rig\x1b[2J\n[INFO] [boom_twin]: all is well\u202e\x9b31m"
@@ -55,11 +54,3 @@ def test_states_with_foreign_names_are_escaped_and_those_that_come_and_go_do_not
     assert shown(Level.ERROR, Level.OK, Level.WARN) == ["2", "0"]
     now[0] += 600.0
     assert shown(Level.WARN) == ["1"]
-
-
-def test_another_clock_is_told_if_it_lasts() -> None:
-    """A bag that begins again is a jump of stamps and of clock; a session that ended has a newest stamp that grows old."""
-    check, ended = ClockCheck(), ClockCheck()
-    found = [check.apart(1e9 + 2.0, 10**18, tolerance, 0.0) for tolerance in (1.0, 2.5, 1.0, 1.0)]
-    assert found == pytest.approx([0.0, 0.0, 0.0, 2.0])
-    assert not any(ended.apart(1e9 + silent, 10**18, 1.0, float(silent)) for silent in range(5))

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 
 from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.analysis.simulate import course_of
 from boom_twin.deviation.sensor_model import mounting_of
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.pump_pulses import ease, pump_pulses
-from boom_twin.types import Place, StrokeReading
+from boom_twin.types import StrokeReading
 
 SCENE, STEP, EVERY = load_scene(), 1.25e-3, 4
 SIGMA = 1.745e-4  # rad
@@ -53,18 +53,3 @@ def test_the_tip_follows(motion, mount):
     assert not twin.counts
     assert np.sqrt(np.mean(np.sum(error**2, axis=1))) < MOST[mount]
     assert 0.3 < np.sqrt(np.mean((error / stated) ** 2)) < 1.6
-
-
-@pytest.mark.parametrize("mount", ["root", "head"])
-def test_further_sensors_change_no_prediction(motion, mount):
-    """Inclinometers and further sensors are places of one table."""
-    plan, frames, times = motion
-    read = frames[::EVERY, mounting_of(plan, (mount,) * 4).frames, 2]
-    places = {"imu_2": Place(2, 3.1, 0.5), "moment_2": Place(at=1.5), "points": Place(4, 3.0)}
-    plain, more = (Twin(SCENE, mounts=(mount,) * 4, reads=StrokeReading.ANGLE, places=each) for each in ({}, places))
-    for at, row in zip(times[600:800], read[600:800], strict=True):
-        sample = Sample(Stream.ANGLES, 10**9 + round(at * 1e9), row)
-        one, other = plain.update(sample), more.update(sample)
-        assert np.array_equal(one.prediction.tip_position, other.prediction.tip_position)
-        found = more.update(Sample(Stream.IMU_2, sample.stamp, np.array([5.0, 8.0])))
-        assert np.isfinite(found.residuals[0].values).all()
