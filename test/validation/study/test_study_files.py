@@ -7,9 +7,7 @@ from pathlib import Path
 import pytest
 from command import main
 
-from boom_twin import BagError
 from boom_twin.cli.study import KINDS
-from boom_twin.system.result_folder import result_folder, study
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -21,14 +19,3 @@ def test_a_file_that_is_there_is_kept(kind: str, tmp_path: Path, capsys: pytest.
         assert main(["study", kind, "--quick", "--out", str(out)]) == 1
         assert f"{out}: holds {name}, and no manifest of a study {kind}" in capsys.readouterr().err
         assert [path.read_text() for path in out.iterdir()] == ["mine"]
-
-
-def test_of_two_kinds_each_has_its_own_folder(tmp_path: Path) -> None:
-    with result_folder(tmp_path / "out", study("error"), []) as building:
-        (building.folder / "error_methods.png").write_text("one")
-    with result_folder(tmp_path / "out", study("error"), []) as building:
-        (building.folder / "error_methods.png").write_text("two")
-    assert (tmp_path / "out" / "error_methods.png").read_text() == "two"
-    with pytest.raises(BagError, match="only an earlier study parts is"), result_folder(tmp_path / "out", study("parts"), []):
-        raise AssertionError("it is another study's")
-    assert (tmp_path / "out" / "error_methods.png").read_text() == "two"
