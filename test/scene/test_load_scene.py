@@ -10,7 +10,7 @@ import pytest
 from default_boom import default_text
 from scene.editing import put
 
-from boom_twin import SceneError, SceneWarning, load_scene
+from boom_twin import SceneError, load_scene
 from boom_twin.config.yaml_text import plain
 
 
@@ -107,13 +107,6 @@ def test_six_bars_come_in_any_order_and_aliases_are_read(bench: Any) -> None:
     text = default_text().replace("kind: B1, range_deg: [-165, 10]", "kind: B1, range_deg: &range [-165, 10]")
     text = text.replace("kind: B2, range_deg: [-165, 10]", "kind: B2, range_deg: *range")
     assert load_scene(bench.text(text)) == load_scene()
-
-
-def test_oddities_are_issued_as_warnings_of_their_own_category(bench: Any) -> None:
-    path = bench.edited(lambda v: v.update(gravity=[0.0, -1.62]))
-    with pytest.warns(SceneWarning, match=r"gravity = \[0.0, -1.62\].*9.81") as caught:
-        load_scene(path)
-    assert len(caught) == 1 and caught[0].filename == __file__
 
 
 # -- what is refused --------------------------------------------------------------------------------------------------

@@ -63,15 +63,3 @@ def test_no_sample_waits_for_the_model_of_another_load_and_a_replay_repeats_it(m
         if report.change is not None:
             other.requests.repeat(report.change)
         assert equal(report, other.update(sample))
-
-
-def test_what_is_asked_while_a_model_is_made_counts_too_and_all_takes_effect_at_once(makers: list[str]) -> None:
-    rows, twin = samples(130), drive_twin(load_scene())
-    preparation = ModelPreparation(twin)
-    preparation.tune({"payload": 40.0})
-    preparation.tune({"gap": 0.3})
-    preparation.tune({"payload": 20.0})
-    while twin.settings.payload != 20.0:
-        preparation.take_in()
-        twin.update(rows.pop(0)) if twin.requests.due else None
-    assert twin.settings.gap == 0.3 and makers[0] == "MainThread" and set(makers[1:]) == {"model"}

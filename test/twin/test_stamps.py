@@ -155,14 +155,6 @@ def test_the_stated_deviation_of_a_start_from_rest_is_true(samples, clean, scene
         assert np.all(found[-1][2] < found[0][2])
 
 
-def test_strokes_out_of_their_range_are_told(scene, samples):
-    twin, far = Twin(scene), samples[0].values.copy()
-    far[1] = scene.joints[1].cylinder.max_stroke + 0.001
-    twin.update(samples[0])
-    twin.update(Sample(Stream.STROKES, samples[1].stamp, far))
-    assert twin.counts["out of range"] == 1
-
-
 @pytest.mark.parametrize(
     ("sample", "words"),
     [
