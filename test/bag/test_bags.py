@@ -131,6 +131,15 @@ def test_an_empty_bag_is_whole_but_its_topic_is_refused(tmp_path: Path) -> None:
         read(session, {"cylinder_strokes": "sensor_msgs/msg/JointState"})
 
 
+def test_bare_file_and_directory_without_metadata(bag: Path, content: Content) -> None:
+    whole = content(scan(bag))
+    assert content(scan(bag / FILE_NAME)) == whole
+    (bag / "metadata.yaml").unlink()
+    session = scan(bag)
+    assert content(session) == whole
+    assert session.notes == {"origin": "synthetic, made for a test"}
+
+
 def test_split_files_are_merged_by_time(tmp_path: Path, arrays: dict[str, Any], bag: Path, content: Content) -> None:
     cuts = {"late": slice(25, None), "early": slice(None, 25)}
     (tmp_path / "split").mkdir()

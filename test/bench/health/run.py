@@ -100,17 +100,10 @@ def row_of(number: int, causes: bool = False) -> dict[str, Any]:
         for health in report.health.values() if isinstance(report, ReportBlock) else [each.health for each in report.all]:
             if health is not None:
                 alarms.take(health)
-    found = [
-        [
-            each.channel,
-            each.kind,
-            (each.since - first) * NANO,
-            each.until and (each.until - first) * NANO,
-            each.told,
-            each.cause,
-        ]
-        for each in alarms.all
-    ]
+    found = []
+    for each in alarms.all:
+        since, until = (stamp and (stamp - first) * NANO for stamp in (each.since, each.until))
+        found.append([each.channel, each.kind, since, until, each.told, each.cause])
     drawn = {"number": number, "kind": kind, "rig": rig, "rate": sensors.rate, "streams": streams}
     return drawn | {"fault": named, "words": words, "alarms": found}
 
