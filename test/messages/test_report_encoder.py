@@ -161,6 +161,16 @@ def test_an_alarm_is_told_in_words_and_numbers() -> None:
     }
 
 
+def test_levels_of_alarms_and_how_far_off_the_tip_may_be() -> None:
+    unknown, ended = replace(ALARM, cause=None), replace(ALARM, until=STAMP)
+    found = filled(judged(ALARM, unknown, ended))
+    assert [status.level for status in found[Output.HEALTH].status] == [2, 1, 0]
+    assert {pair.key: pair.value for pair in found[Output.HEALTH].status[2].values}["to_s"] == "1700000000.123"
+    assert xyz(found[Output.TIP_UNCERTAINTY].vector) == (0.001, 0.0, 0.004)
+    assert {stamp_of(found[key]) for key in (Output.HEALTH, Output.TIP_UNCERTAINTY)} == {STAMP - 100_000_000}
+    assert not filled(judged())[Output.HEALTH].status
+
+
 def test_alarms_come_back_from_their_message_to_the_millisecond() -> None:
     """Without the sizes of what may be wrong. A status that is no alarm is left out."""
     ended = Alarm("joint_3", "stuck", STAMP - 5, STAMP, "joint_3.sensor", "repeats one value")
