@@ -1,4 +1,4 @@
-"""Cylinder lengths, as transducers read them, in place of drives: the boom at rest and in motion."""
+"""Cylinder lengths, as transducers read them, in place of drives; the interpolant of their histories."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from default_boom import strokes_of_posture, with_rigid_cylinders
 from oracle import booms
+from scipy.interpolate import PchipInterpolator
 
 from boom_twin import SolverError, UsageError, load_scene, simulate, statics
+from boom_twin.analysis.drive import pchip
 from boom_twin.scene.oil_spring import stiffness
 from boom_twin.validation.rig import Move, Programme
 
@@ -83,3 +85,16 @@ def test_a_motion_follows_strokes_or_lengths():
     rows[1, 3] = 2.0
     with pytest.raises(UsageError, match=r"length_4 = 2 m in row 2 of the drive: cylinder 4 travels"):
         simulate(None, np.array([0.0, 0.1]), lengths=rows)
+
+
+@pytest.mark.parametrize("rows", [2, 3, 4, 50])
+@pytest.mark.parametrize("seed", range(5))
+def test_same_curve_as_scipy(rows: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x = np.cumsum(rng.uniform(1e-3, 1.0, rows))
+    y = np.round(rng.standard_normal((rows, 4)), rng.integers(0, 4))  # few digits: equal neighbours, slopes of zero
+    at = np.concatenate([x, rng.uniform(x[0], x[-1], 200)])
+    values, rates = pchip(x, y, at)
+    curve = PchipInterpolator(x, y, axis=0)
+    assert values == pytest.approx(curve(at), abs=1e-13)
+    assert rates == pytest.approx(curve.derivative()(at), abs=1e-13 / np.diff(x).min())
