@@ -63,7 +63,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Result of a calibration."""
+    """Result of a calibration.
 
     Attributes
     ----------
@@ -93,12 +93,12 @@ class Calibration:
     scene: Scene
     zeros: dict[str, float]
     estimates: tuple[Estimate, ...]
-    groups: tuple[InseparableUnknowns, ...]  # what the sessions do not tell
-    misfit: float  # rms of the normalised innovations of the worst channel; 1 where noise alone is left
+    groups: tuple[InseparableUnknowns, ...]
+    misfit: float
     passes: int
     sessions: tuple[MeasuredSession, ...]
-    held_out: str  # what was not used for the fit
-    before: HeldOutResult  # the twin's residuals there
+    held_out: str
+    before: HeldOutResult
     after: HeldOutResult
     mapped: Mapped
     remarks: tuple[str, ...]

@@ -204,12 +204,8 @@ def test_sine_sweep_through_simulate():
         ({"posture": "nowhere"}, "posture = 'nowhere'"),
         ({}, "give either strokes or a posture"),
         ({"posture": "arch", "drive": 5}, "cylinders 1 to 4"),
-        ({"posture": "arch", "drive": 0}, "cylinders 1 to 4"),
         ({"posture": "arch", "drive": 1, "tip_force": (0.0, 1.0)}, "give one of them"),
-        ({"posture": "arch", "tip_force": (1.0,)}, "two numbers"),
         ({"posture": "arch", "frequencies": [-1.0]}, "at least 0 Hz"),
-        ({"posture": "arch", "frequencies": [np.nan]}, "at least 0 Hz"),
-        ({"posture": "arch", "frequencies": [[1.0, 2.0]]}, "in one row"),
     ],
 )
 def test_refused(given, told):

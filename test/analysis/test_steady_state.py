@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from default_boom import strokes_of_posture
 from oracle import booms
 
 from boom_twin import UsageError, frequency_response, load_scene, simulate, statics
@@ -15,7 +16,6 @@ from boom_twin.analysis.steady_state import (
     pump_load,
     steady_state,
 )
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.pump_pulses import upward
 
 SCENE = load_scene()

@@ -6,17 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import parameter, strokes_of_posture, with_parameters
 from oracle import booms
 from studies.clearance.scenes import treated, with_play
 
-from boom_twin import frequency_response, load_scene, simulate, statics
+from boom_twin import UsageError, frequency_response, load_scene, simulate, statics
 from boom_twin.analysis.balances import energy_balance, momentum_balance
 from boom_twin.analysis.doubts import joint_doubts
 from boom_twin.analysis.simulate import course_of
-from boom_twin.cli.main import main
-from boom_twin.errors import UsageError
-from boom_twin.scene.edit import parameter, with_parameters
-from boom_twin.scene.kinematics import gravity_in_base, strokes_of_posture
+from boom_twin.scene.kinematics import gravity_in_base
 from boom_twin.scene.pump_pulses import ease
 
 SCENE = load_scene()

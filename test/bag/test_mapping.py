@@ -10,11 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from recordings import SessionSheet, load_mapping, mapping_of
 from ros_messages import load_topics
-from ruamel.yaml import YAML
 
 from boom_twin import BagError, Stream, UsageError
 from boom_twin.bag.metadata import dump
-from boom_twin.bag.session_model import DEFAULT_MAPPING, strokes_of
+from boom_twin.bag.session_model import strokes_of
 from boom_twin.bag.session_sheet import FILE_NAME, RIG_ORIGIN
 from boom_twin.messages.topic_table import DEFAULT_FILE
 from boom_twin.types import StrokeReading
@@ -152,19 +151,6 @@ def recorded(directory: Path, mapping: str) -> Path:
     directory.mkdir(exist_ok=True)
     SessionSheet("1", "scene", "parameters", mapping, {}).write(directory)
     return directory
-
-
-def test_a_session_is_read_as_it_was_recorded(tmp_path: Path, write: Any) -> None:
-    bag = recorded(tmp_path / "bag", EXAMPLE)
-    assert YAML(typ="safe").load((bag / FILE_NAME).read_text())["mapping"] == EXAMPLE
-    mapped = mapping_of(bag)
-    assert mapped.topics.mounts(2) == [None, "root"] and mapped.source == f"{bag / FILE_NAME}, mapping"
-    assert mapping_of(bag / "session_0.mcap").topics == mapped.topics
-    other = write("sensors: {joint_1: {absolute: head}}")
-    assert mapping_of(bag, other).topics.mounts(2) == ["head", None] and mapping_of(bag, other).source == str(other)
-    assert mapping_of(tmp_path / "elsewhere").source == DEFAULT_MAPPING
-    (bag / FILE_NAME).write_text("note: of an older version\n")
-    assert mapping_of(bag).source == DEFAULT_MAPPING
 
 
 RIG = f"origin: {RIG_ORIGIN}\n"

@@ -44,8 +44,8 @@ def test_one_that_hangs_is_ended_with_its_children(tmp_path: Path) -> None:
         "import subprocess, sys, time; child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)']); "
         "open(sys.argv[1], 'w').write(str(child.pid)); time.sleep(600)"
     )
-    found = run(code, (3.0, PLENTY[1]), str(tmp_path / "pid"))
-    assert found.reason == "takes longer than 3 s. Raise --timeout."
+    found = run(code, (8.0, PLENTY[1]), str(tmp_path / "pid"))  # s; on a busy machine a process takes long to start
+    assert found.reason == "takes longer than 8 s. Raise --timeout."
     assert is_gone(int((tmp_path / "pid").read_text()))
 
 

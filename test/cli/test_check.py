@@ -53,17 +53,6 @@ def test_a_scene_without_end_mark_is_noted_and_strict_lets_it_pass(
     assert capsys.readouterr().err.startswith(f"{'warning' if code else 'note'}: {path}: line ")
 
 
-def test_the_z_fold_example_is_printed_and_checks_without_a_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["scene", "--example", "five_section_z_fold"]) == 0
-    path = tmp_path / "z.yaml"
-    path.write_text(capsys.readouterr().out, encoding="utf-8")
-    assert main(["check", str(path)]) == 0
-    out, err = capsys.readouterr()
-    assert err == "" and "Warnings: none" in out
-    assert "joint 3  B2, right" in out and "by the oil over the stroke, d = 1100 kN s/m" in out
-    assert "cylinder 1          829.8  166.4  114.3  117.7  271.9" in out
-
-
 def test_check_warns_in_words_and_in_one_flat_object(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = _scene(tmp_path, "k: 40.0e+6", "k: 40.0")
     assert main(["check", path]) == 0
@@ -89,14 +78,6 @@ def test_check_of_a_bad_scene_exits_with_1_and_says_why(tmp_path: Path, capsys: 
     assert "sections[0].root.mass = -36.0: it must not be less than 0. Give the mass in kg." in err
     assert main(["check", str(tmp_path / "nowhere.yaml")]) == 1
     assert "No such file" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("argv", [[], ["nonsense"], ["check", "--nonsense"], ["check", "a", "b"], ["scene", "extra"]])
-def test_wrong_usage_exits_with_2(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(argv)
-    assert stop.value.code == 2
-    assert "usage: boom_twin" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

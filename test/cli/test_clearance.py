@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import main
-from default_boom import clearance_text, default_text, strokes_of_posture, with_end_mark
+from default_boom import strokes_of_posture
 
 from boom_twin import load_scene
 
@@ -27,14 +27,6 @@ def drive(tmp_path: Path) -> Path:
     path = tmp_path / "drive.csv"
     np.savetxt(path, rows, delimiter=",", header="t_s," + ",".join(f"stroke_{i + 1}_m" for i in range(4)), comments="")
     return path
-
-
-def test_the_printed_scene_is_whole(scene_file: Path) -> None:
-    scene = load_scene(scene_file)
-    assert scene.clearance is not None
-    assert [pin.at for pin in scene.clearance.pins] == [f"cylinder_{i}.rod" for i in range(1, 5)]
-    assert scene.model_copy(update={"clearance": None}) == load_scene()
-    assert scene_file.read_text() == with_end_mark(default_text() + "\n" + clearance_text())
 
 
 def test_simulate_tells_lost_contacts_and_draws_orbits(

@@ -47,18 +47,6 @@ def test_nothing_is_written_over(table: str, capsys: pytest.CaptureFixture[str])
     assert main(["init", "--out", "new.yaml"]) == 1 and "--example-table prints one" in capsys.readouterr().err
 
 
-def test_links_that_cannot_meet_end_with_exit_code_1_and_no_scene(
-    table: str, capsys: pytest.CaptureFixture[str], folder: Path
-) -> None:
-    assert "range_deg: [-165, 10], bore: 200 mm" in table
-    wider = table.replace("range_deg: [-165, 10], bore: 200", "range_deg: [-200, 10], bore: 200")
-    Path("table.yaml").write_text(wider, encoding="utf-8")
-    assert main(MADE) == 1
-    out, err = capsys.readouterr()
-    assert out == "" and "joints[1].range_deg = [-200.0, 10.0]" in err and "Narrow range_deg to [" in err
-    assert [file.name for file in folder.iterdir()] == ["table.yaml"]
-
-
 def test_a_warned_table_is_mended_and_written_anew(table: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path("table.yaml").write_text(table.replace("7100 mm]", "6550 mm]"), encoding="utf-8")
     assert main(MADE) == 0

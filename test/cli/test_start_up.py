@@ -51,7 +51,7 @@ sys.exit(main(["record", "--out", sys.argv[1]]))
 
 def test_an_interruption_while_modules_are_imported_is_one_line(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", INTERRUPTED, str(tmp_path / "bag")], capture_output=True, text=True, check=False, timeout=100
+        [sys.executable, "-c", INTERRUPTED, str(tmp_path / "bag")], capture_output=True, text=True, check=False, timeout=300
     )
     assert done.returncode == 1 and done.stderr == "boom_twin: stopped\n"
     assert not (tmp_path / "bag").exists()

@@ -15,7 +15,6 @@ from default_boom import default_text
 from boom_twin import __version__
 from boom_twin.cli.main import COMMANDS, EXAMPLES
 from boom_twin.cli.replay import flat
-from boom_twin.offline.progress import TenthLines
 
 STROKES = "0.63,0.165,0.235,0.187"
 
@@ -116,31 +115,6 @@ def test_the_shell_is_told_what_may_follow(tmp_path: Path) -> None:
     environment = {**os.environ, **asked, "_ARGCOMPLETE_STDOUT_FILENAME": str(answer)}
     subprocess.run(command, env=environment, capture_output=True, timeout=300)
     assert {word.strip() for word in answer.read_text().split("\n")} >= {"--no-pictures", "--no-health", "--no-changes"}
-
-
-def test_progress_without_a_terminal_is_a_line_for_every_tenth(capsys: pytest.CaptureFixture[str]) -> None:
-    lines = TenthLines(70, "messages", "replay")
-    for _ in range(70):
-        lines.update(1)
-    told = capsys.readouterr().err.splitlines()
-    assert len(told) == 10 and told[0] == "replay: 10 %, 7 of 70 messages" and told[-1] == "replay: 100 %, 70 of 70 messages"
-
-
-def drive(path: Path, *rows: str) -> str:
-    path.write_text("\n".join(["t_s,stroke_1_m,stroke_2_m,stroke_3_m,stroke_4_m", *rows]) + "\n")
-    return str(path)
-
-
-def test_simulate_starts_from_its_first_row(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rows = [f"{t},{0.6 + 0.02 * t},0.16,0.22,0.18" for t in (0.0, 0.5, 1.0)]
-    arguments = ["simulate", "--drive", drive(tmp_path / "in.csv", *rows), "--out", str(tmp_path / "out.csv")]
-    assert main([*arguments, "--no-error-estimate"]) == 0
-    assert "started at rest   strokes 0.6, 0.16, 0.22, 0.18 m" in capsys.readouterr().out
-    assert main([*arguments, "--no-error-estimate", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told["rows"] == 3 and told["stroke_m"] == [0.6, 0.16, 0.22, 0.18] and told["tip_travel_m"] > 0.01
-    assert main([*arguments, "--posture", "arch"]) == 1
-    assert "posture arch has" in capsys.readouterr().err
 
 
 def test_a_summary_as_json_is_flat_and_has_its_alarms() -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from oracle import booms
 
+from boom_twin import load_scene
 from boom_twin.compiler.compile import compile_scene
 from boom_twin.kernels import tables as program
-from boom_twin.scene import load_scene
 from boom_twin.scene.segmentation import flexible_parts
 
 

@@ -9,9 +9,10 @@ from scipy.linalg import cholesky, expm
 
 pytest.importorskip("exudyn")
 
+from default_boom import strokes_of_posture
+
 from boom_twin import Sample, Stream, Twin, load_scene
 from boom_twin.deviation.accuracy import accuracy_at
-from boom_twin.scene.kinematics import strokes_of_posture
 from boom_twin.scene.summary import weight_of
 from boom_twin.types import Array, Place
 from boom_twin.validation.rig import RigSession, record

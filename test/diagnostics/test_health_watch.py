@@ -36,17 +36,6 @@ def test_a_stream_noisier_than_stated_is_one_warning() -> None:
     assert not watch.has_news and watch.acknowledge() == "no alarm has ended"
 
 
-def test_the_worst_is_told_first() -> None:
-    watch = HealthWatch()
-    watch.took(health(17, OPEN, BIAS))
-    assert watch.has_news
-    found = status(watch)
-    assert found.level == Level.ERROR and found.message == f"{BIAS.told}; {OPEN.told}"
-    assert (found.values["alarms"], found.values["2 cause"], found.values["1 cause"]) == (2, "joint_3.sensor", "")
-    assert found.values["2 from_s"] == "15.000" and not watch.has_news
-    assert watch.of("joint_3") == (Level.ERROR, BIAS.told) and watch.of("joint_2") is None
-
-
 def test_an_alarm_that_ended_stays_until_it_is_acknowledged() -> None:
     watch = HealthWatch()
     watch.took(health(17, BIAS, OPEN))

@@ -1,4 +1,4 @@
-"""Figures of one sensor, what is made of them, and the rule that tells a stuck sensor from a live one."""
+"""Levels that must last, and what is told of one sensor."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from boom_twin.config.settings import Thresholds
-from boom_twin.diagnostics.levels import ComponentJudge, Evaluation, Level
+from boom_twin.diagnostics.levels import Bounds, ComponentJudge, Evaluation, Hysteresis, Level
 from boom_twin.diagnostics.sensor_status import SensorSpec, sensor_status
 from boom_twin.diagnostics.stream_stats import Channel, ChannelStats
-from boom_twin.health.sensor_check import readings_of_frozen
 from boom_twin.texts import alarm_text
 
 SECOND = 1_000_000_000
@@ -37,14 +36,6 @@ def test_figures_of_a_second() -> None:
     assert none.stamp == 0 and isnan(none.value) and isnan(none.rate) and isnan(none.missing)
     set_back = STAMPS - np.where(np.arange(200) >= 100, 3600 * SECOND, 0) + np.where(np.arange(200) >= 150, 7200 * SECOND, 0)
     assert look(set_back).gap == pytest.approx(0.005) and look(set_back).rate == pytest.approx(200.0)
-
-
-def test_a_reading_that_does_not_change_is_counted_over_looks() -> None:
-    channel, values = Channel(), NOISE.copy()
-    values[150:] = 1.0
-    counts = [channel.look(STAMPS + k * SECOND, values if k == 0 else np.ones(200), 0, 0.1).unchanged for k in range(3)]
-    assert counts == [49, 249, 449]
-    assert channel.look(STAMPS + 3 * SECOND, NOISE, 0, 0.1).unchanged == 0
 
 
 SENSOR = SensorSpec("joint_1", "rad", -4.0, 4.0, 1.0, 0.1)
@@ -79,16 +70,27 @@ def test_what_a_sensor_is_told_to_be(
     assert (status.level, status.message) == (level, words)
 
 
-@pytest.mark.parametrize(("sigma", "resolution"), [(1.0, 0.25), (1.0, 0.5), (0.5, 1.0), (0.3, 1.0)])
-def test_live_sensors_are_rarely_taken_for_stuck(sigma: float, resolution: float) -> None:
-    """False alarms of 4 million readings of a still sensor, in the middle of a step, where it repeats most."""
-    random, alarm, count = np.random.default_rng(1), 1e-4, 4_000_000
-    needed = int(readings_of_frozen(sigma, resolution, alarm))
-    readings = np.round(random.normal(0.0, sigma, count) / resolution)
-    repeats = (readings[1:] == readings[:-1]).astype(np.int64)
-    total = np.cumsum(repeats)
-    runs = total[needed - 2 :] - np.concatenate([[0], total[: 1 - needed]]) if needed > 2 else repeats
-    rate = np.count_nonzero(runs == needed - 1) / count
-    assert 0.0 <= rate < alarm
-    if sigma < resolution:  # one value is then by far the most frequent, and the bound is nearly reached
-        assert rate > 0.2 * alarm
+BOUNDS, SLOW = Bounds(warn=1.0, error=2.0), Thresholds(raise_after=2.0, clear_after=5.0, release=0.8)
+AT_ONCE = Thresholds(raise_after=0.0, clear_after=0.0, release=0.8)
+LOW = Bounds(warn=100.0, error=10.0, low=True)
+
+
+@pytest.mark.parametrize(
+    ("values", "expected", "bounds", "thresholds"),
+    [
+        ([0, 1.5, 0, 1.5, 0], "OOOOO", BOUNDS, SLOW),  # too short
+        ([0, 1.5, 1.5, 1.5, 1.5], "OOWWW", BOUNDS, SLOW),
+        ([0, 2.5, 2.5, 2.5, 1.7, 1.7], "OOEEEE", BOUNDS, SLOW),  # not below 0.8 of the limit
+        ([0, 2.5, 2.5, 1.5, 1.5, 1.5, 1.5, 1.5], "OOEEEEEW", BOUNDS, SLOW),
+        ([0, 1.5, 1.5, 0.9, 0.9, 0.9, 0.9, 0.9], "OOWWWWWW", BOUNDS, SLOW),
+        ([0, 1.5, 1.5, 0, 0, 1.5, 0, 0, 0, 0, 0], "OOWWWWWWWWO", BOUNDS, SLOW),
+        ([nan, nan, nan], "OOO", BOUNDS, SLOW),
+        ([0, 1.5, 2.5, 0], "OWEO", BOUNDS, AT_ONCE),
+        ([inf, 101.0, 99.0, 9.0, 11.0, 13.0, 120.0, 126.0], "OOWEEWWO", LOW, AT_ONCE),
+    ],
+)
+def test_a_level_must_last(values: list[float], expected: str, bounds: Bounds, thresholds: Thresholds) -> None:
+    """First letters of the levels at one value a second."""
+    judge = Hysteresis()
+    found = [judge.update(value, bounds, thresholds, float(now)) for now, value in enumerate(values)]
+    assert "".join(level.name[0] for level in found) == expected

@@ -12,8 +12,9 @@ from command import main
 from ruamel.yaml import YAML
 
 import boom_twin
+from boom_twin import Settings
 from boom_twin.cli.main import COMMANDS
-from boom_twin.config.settings import NODE_ONLY, Settings, Thresholds, read_parameters
+from boom_twin.config.settings import NODE_ONLY, Thresholds, read_parameters
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")]

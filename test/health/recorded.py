@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from recordings import read, scan, write_session
 
-from boom_twin import Sample, Stream, Twin, load_scene
-from boom_twin.config.settings import Settings
-from boom_twin.types import Alarm, Health, Report
+from boom_twin import Report, Sample, Settings, Stream, Twin, load_scene
+from boom_twin.types import Alarm, Health
 
 NANO = 1e-9
 ARCH, PUMP = (Path(__file__).parents[2] / "bags" / name for name in ("arch_session", "pump_session"))

@@ -52,13 +52,6 @@ def test_a_softer_part_is_named(tmp_path, capsys, cause):
     assert size == pytest.approx(100 * SOFTER, abs=10)
 
 
-def test_causes_need_health(tmp_path, capsys):
-    """Without health nothing can be named: the command says so."""
-    argv = ["replay", str(BAGS / "arch_session"), "--out", str(tmp_path / "out"), "--causes", "--no-health"]
-    assert main(argv) != 0
-    assert "causes" in capsys.readouterr().err
-
-
 def test_sample_by_sample_as_by_blocks():
     """A twin that takes samples one by one names the same causes, with the same reports of health, as one that takes blocks."""
     scene, samples = stiffer("cylinder_2.k"), session(16.0)

@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 
+from boom_twin import Stream
 from boom_twin.health.sensor_check import SensorCheck, SensorFindings
 from boom_twin.health.sensor_monitor import SETTLED, SensorMonitor
 from boom_twin.texts import alarm_text
-from boom_twin.types import SENSORS, Stream
+from boom_twin.types import SENSORS
 
 BLOCK, NAMES = 100_000_000, ("joint_1", "joint_2")
 
@@ -40,10 +41,6 @@ class Watched:
 
     def rest(self, time: int):
         return [alarm for _ in range(time // BLOCK) for alarm in self.take(findings())]
-
-
-def test_kinds_are_those_of_findings():
-    assert set(findings().by_kind()) == set(KINDS)
 
 
 def test_begins_once_lasts_and_ends():
@@ -130,13 +127,6 @@ def test_a_jump_ends_where_the_reading_is_right_again():
     watched.take(findings(0, "jump", -0.5, level=-0.501))
     watched.rest(SETTLED)
     assert watched.take(findings(0, "jump", 0.8, level=0.299)) == [], "elsewhere, but not right"
-
-
-def test_two_faults_of_one_sensor():
-    watched = Watched()
-    watched.take(findings(0, "range"))
-    watched.take(findings(0, "noise"))
-    assert {alarm.kind for alarm in watched.watch.alarms} == {"range", "noise"}
 
 
 def jumped_after_a_pause(seconds: float) -> float:

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from health.recorded import NANO, PUMP, Outcome, run, session, spoilt
 
-from boom_twin import Settings, Stream, Twin, load_scene
+from boom_twin import Settings, Stream
 
 DEGREE, ONSET = math.radians(1.0), 6.0
-JOINTS = range(4)
 
 
 @lru_cache
@@ -33,25 +32,13 @@ def faulty(stream: Stream, kind: str, channel: int, onset: float = ONSET) -> Out
     return run(spoilt(session(), stream, channel, change, onset))
 
 
-def with_others_slow(kinds):
-    """Each kind on one joint at once, on the others in the long run."""
-    return [
-        pytest.param(kind, channel, marks=[] if channel == k % 4 else pytest.mark.slow)
-        for k, kind in enumerate(kinds)
-        for channel in JOINTS
-    ]
-
-
 def first_after(outcome: Outcome, onset: float) -> float:
     told = outcome.told()
     assert told and told[0][0] >= onset, "nothing before the fault"
     return told[0][0] - onset
 
 
-ANGLE_KINDS = ["stuck", "dropout", "spikes", "noise"]
-
-
-@pytest.mark.parametrize("kind, channel", with_others_slow(ANGLE_KINDS))
+@pytest.mark.parametrize("kind, channel", [("stuck", 0), ("dropout", 1), ("spikes", 2), ("noise", 3)])
 def test_an_angle_sensor(kind, channel):
     """Found within a second, that sensor named and no other; what the twin predicts is the same, bit for bit."""
     outcome = faulty(Stream.ANGLES, kind, channel)
@@ -61,7 +48,7 @@ def test_an_angle_sensor(kind, channel):
     assert outcome.tips().tobytes() == healthy().tips().tobytes()
 
 
-@pytest.mark.parametrize("kind, channel", with_others_slow(["dropout", "spikes"]))
+@pytest.mark.parametrize("kind, channel", [("dropout", 0), ("spikes", 1)])
 def test_a_stroke_sensor(kind, channel):
     """Told within a second by its own readings, and no other cause is named."""
     outcome = faulty(Stream.STROKES, kind, channel)
@@ -77,9 +64,8 @@ def test_a_stroke_that_reads_zero_for_a_while_is_a_jump_until_it_is_back(lasts):
     assert alarm.kind == "jump" and alarm.until is not None
 
 
-@pytest.mark.parametrize("channel", [1, *(pytest.param(i, marks=pytest.mark.slow) for i in (0, 2, 3))])
-def test_spikes_of_a_stroke_do_not_move_the_tip(channel):
-    outcome = faulty(Stream.STROKES, "spikes", channel)
+def test_spikes_of_a_stroke_do_not_move_the_tip():
+    outcome = faulty(Stream.STROKES, "spikes", 1)
     moved = np.linalg.norm(outcome.tips() - healthy().tips(), axis=1)
     assert 0.0 < moved.max() < 5e-3  # the angle sensor replaces the transducer: its noise is 2 mm at the tip
     assert outcome.twin.counts["implausible"] > 10
@@ -89,15 +75,6 @@ def test_healthy_sessions_give_no_alarm():
     assert healthy().states() == []
     assert len(healthy().health) >= 10, "one a second"
     assert np.all(healthy().health[-1].tip_sigmas > 1e-5) and np.all(healthy().health[-1].tip_sigmas < 0.05)
-
-
-def told(outcome: Outcome):
-    return [(health.stamp, health.alarms, health.tip_sigmas.tobytes()) for health in outcome.health]
-
-
-def test_twice_is_the_same():
-    again = faulty.__wrapped__(Stream.ANGLES, "stuck", 0)
-    assert told(again) == told(faulty(Stream.ANGLES, "stuck", 0)) and again.told()
 
 
 def test_the_order_of_arrival_does_not_matter():
@@ -116,12 +93,6 @@ def test_pump_and_wind_are_no_fault():
     assert len(outcome.health) >= 28 and outcome.states() == []
 
 
-def test_twice_the_stated_noise_gives_no_spikes():
-    rng, sigma = np.random.default_rng(5), math.sqrt(3.0) * Settings().angle_sigma
-    noisy = [replace(s, values=s.values + rng.normal(0.0, sigma, 4)) if s.stream is Stream.ANGLES else s for s in session(18.0)]
-    assert run(noisy).states() == []
-
-
 def test_noise_of_all_sensors_at_once_is_told_as_noise():
     """Three times what is stated: angles that are as noisy as strokes are no sign that the boom is shaken."""
     rng, settings = np.random.default_rng(6), Settings()
@@ -131,13 +102,6 @@ def test_noise_of_all_sensors_at_once_is_told_as_noise():
     ]
     assert run(noisy).health[-1].noise["noise_over_stroke_sigma"] > 1.8
     assert healthy().health[-1].noise["noise_over_stroke_sigma"] < 1.1
-
-
-def test_a_twin_without_health_tells_nothing():
-    twin = Twin(load_scene())
-    outcome = run(session(3.0), twin=twin)
-    assert outcome.health == [] and twin.judge is None
-    assert outcome.tips().tobytes() == healthy().tips()[: len(outcome.tips())].tobytes()
 
 
 def test_after_a_gap_it_begins_anew():

@@ -37,14 +37,6 @@ def published(rho):
 
 
 @pytest.mark.parametrize("rho", RHOS)
-def test_gain_and_rate(rho):
-    am, af, gamma, beta = published(rho)
-    s = scheme_of(GENERALISED_ALPHA, rho, 0.01)
-    assert s.gain == pytest.approx((1 - am) / ((1 - af) * beta * 1e-4))
-    assert s.rate == pytest.approx(gamma / (beta * 0.01))
-
-
-@pytest.mark.parametrize("rho", RHOS)
 def test_a_step_satisfies_the_defining_equations(rho):
     h, rng = 0.02, np.random.default_rng(1)
     am, af, gamma, beta = published(rho)

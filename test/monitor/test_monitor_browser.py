@@ -24,7 +24,7 @@ from boom_twin.texts import FILE, LANGUAGES
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install .[test]")
 CHROMIUM = Path("/usr/bin/chromium")
 pytestmark = pytest.mark.skipif(not CHROMIUM.is_file(), reason="chromium is not there (Debian: apt-get install chromium)")
-PATIENCE = 60_000  # ms
+PATIENCE = 240_000  # ms
 FAULT = 25.0  # s, when encoder 3 is known to be wrong
 TABS = ("traces", "spectrum", "spectrogram", "shape", "state", "path", "response")
 

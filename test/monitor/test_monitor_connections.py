@@ -21,7 +21,7 @@ from boom_twin.monitor.access_control import POLICY
 
 BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 HALF_OPEN = 1000
-PATIENCE = 60.0
+PATIENCE = 240.0
 HALVES = (b"", b"G", b"GET / HTTP/1.1\r\nHost: localhost\r\nX", b"GET /socket HTTP/1.1\r\nUpgrade: websocket\r\n")
 SHAKE = "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: " + "A" * 22 + "=="
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drive_twin import ARCH_DRIVES
-from recordings import read, scan
-from ros_messages import ReportEncoder, SampleDecoder, jazzy, load_topics, stamp_of
+from offline.by_the_node import assert_same_bytes
+from ros_messages import load_topics
 
-from boom_twin import Settings, Stream, Twin, load_scene, replay
+from boom_twin import Stream, load_scene, replay
 from boom_twin.cli.replay import as_text
 from boom_twin.types import StrokeReading
 
@@ -69,23 +69,5 @@ def test_summary_is_on_disk_and_complete(first):
 
 
 def test_the_result_bag_holds_what_the_three_calls_give(session, first):
-    """Two seconds of it: neither blocks nor threads change anything."""
-    inputs, outputs = load_topics().inputs, load_topics().outputs
-    roles = {inputs[stream].name: stream for stream in (Stream.STROKES, Stream.ANGLES, Stream.IMU)}
-    wanted = {name: inputs[stream].type for name, stream in roles.items()}
-    scene, store = load_scene(), jazzy()
-    reads = StrokeReading(first[0].summary["strokes"])
-    live, decoder = Twin(scene, health=True, reads=reads), SampleDecoder(4)
-    encoder = ReportEncoder(scene, Settings())
-    expected = []
-    for name, log_time, message in read(scan(session), wanted):
-        sample = decoder.put(roles[name], stamp_of(message), message)
-        for key, data in encoder.fill(live.update(sample)):
-            expected.append((outputs[key].absolute, log_time, data))
-        if len(expected) > 2400:
-            break
-    types = {topic.absolute: topic.type for key, topic in outputs.items() if key != "diagnostics"}
-    got = read(scan(first[1] / "bag"), types)
-    for topic, _, data in expected:
-        name, _, message = next(got)
-        assert (name, bytes(store.serialize_cdr(message, types[name]))) == (topic, data)
+    """Two seconds of it."""
+    assert_same_bytes(session, first[1], load_topics(), StrokeReading(first[0].summary["strokes"]), 2400)

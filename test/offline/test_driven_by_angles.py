@@ -8,19 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from offline.by_the_node import assert_same_bytes
+from recordings import load_mapping, load_truth, read, scan
+from ros_messages import SampleDecoder, load_topics, stamp_of
 
-from boom_twin import Settings, Stream, Twin, load_scene, replay
-from boom_twin.bag.reader import read, scan
+from boom_twin import BagError, Sample, Stream, Twin, replay
 from boom_twin.bag.session_files import write_samples
-from boom_twin.cli.main import main
-from boom_twin.errors import BagError
-from boom_twin.messages.mapping import load_mapping
-from boom_twin.messages.report_encoder import ReportEncoder
-from boom_twin.messages.sample_decoder import SampleDecoder, stamp_of
-from boom_twin.messages.topic_table import load_topics
-from boom_twin.messages.type_store import jazzy
-from boom_twin.offline.ground_truth import load_truth
-from boom_twin.types import Sample, StrokeReading
+from boom_twin.types import StrokeReading
 
 BAGS = Path(__file__).parents[2] / "bags"
 MOST = {"arch_session": 2e-3, "pump_session": 3e-3}  # m
@@ -67,26 +62,9 @@ def test_the_tip_follows_the_truth(without_strokes, mapping, tmp_path):
 
 
 def test_a_replay_gives_what_the_node_does(without_strokes, mapping, tmp_path):
-    """A second of it, sample by sample as the node takes them, as the same bytes."""
+    """A second of it."""
     replay(without_strokes, None, tmp_path / "out", mapping=mapping)
-    topics, store, scene = load_mapping(mapping, 4), jazzy(), load_scene()
-    live, decoder = Twin(scene, health=True, reads=topics.stroke_reading), SampleDecoder(4, topics)
-    encoder, expected = ReportEncoder(scene, Settings()), []
-    wires = {
-        topic.absolute: (streams, topic) for name, streams in topics.heard.items() for topic in [topics.inputs[streams[0]]]
-    }
-    types = {name: topic.type for name, (_, topic) in wires.items() if scan(without_strokes).find(name)}
-    for name, log_time, msg in read(scan(without_strokes), types):
-        for sample in decoder.samples(wires[name][0], stamp_of(msg), msg):
-            for key, data in encoder.fill(live.update(sample)):
-                expected.append((topics.outputs[key].absolute, log_time, data))
-        if len(expected) > 2000:
-            break
-    kinds = {topic.absolute: topic.type for key, topic in topics.outputs.items() if key != "diagnostics"}
-    got = read(scan(tmp_path / "out" / "bag"), kinds)
-    for topic, _, data in expected:
-        name, _, msg = next(got)
-        assert (name, bytes(store.serialize_cdr(msg, kinds[name]))) == (topic, data)
+    assert_same_bytes(without_strokes, tmp_path / "out", load_mapping(mapping, 4), StrokeReading.ANGLE, 2000)
 
 
 def test_without_the_mapping_the_remedy_is_told(without_strokes, mapping, tmp_path, capsys):

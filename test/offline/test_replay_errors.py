@@ -24,11 +24,6 @@ def session(path, rows=200, hole=None, strokes=None, joints=True):
     return path
 
 
-def test_missing_folder(tmp_path):
-    with pytest.raises(BagError, match="no such file or directory"):
-        replay(tmp_path / "nothing", load_scene(), tmp_path / "out")
-
-
 def test_a_missing_folder_is_told_before_the_model_is_compiled(tmp_path, capsys):
     assert main(["replay", str(tmp_path / "nothing"), "--out", str(tmp_path / "out")]) == 1
     (told,) = capsys.readouterr().err.splitlines()

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
 from command import main
 from default_boom import default_text
 from drive_twin import note_drives
-from offline.booms_apart import as_document, scene_text, session
+from offline.booms_apart import scene_text, session
 from recordings import MessageWriter, SessionSheet, scan, scene_of
 from ros_messages import fill_header, load_topics, new_message
 
@@ -23,7 +22,6 @@ from boom_twin.monitor.data.bag_feed import bag_feed
 from boom_twin.scene.load import DEFAULT_NAME
 from boom_twin.types import Alarm, Health
 
-BUNDLED = Path(__file__).parents[2] / "bags" / "arch_session"
 FAULTY = "sections: []\n"
 
 
@@ -159,12 +157,6 @@ def test_what_is_no_sheet_is_one_line_with_the_remedy(document, tmp_path):
         scene_of(tmp_path)
 
 
-def test_a_sheet_that_could_not_be_read_again_is_not_written(tmp_path):
-    with pytest.raises(BagError, match="bytes, of which"):
-        SessionSheet("0", "#" * 5_000_000).write(tmp_path)
-    assert not (tmp_path / FILE_NAME).exists()
-
-
 def test_a_scene_that_was_changed_is_told(five, tmp_path, capsys):
     bag = without_scene(five, tmp_path / "bag")
     sheet = (five / FILE_NAME).read_text()
@@ -180,11 +172,6 @@ def test_what_never_reached_the_recorder_is_told(four, tmp_path, capsys):
     SessionSheet("0").write(session, counts)
     warn_incomplete(scan(session))
     assert "never reached the recorder: 3 of /cylinder_strokes." in capsys.readouterr().err
-
-
-def test_the_bundled_session_keeps_the_default_scene():
-    assert scene_of(BUNDLED).text == default_text()
-    assert "synthetic" in str(as_document(BUNDLED)["origin"])
 
 
 def test_angles_of_another_boom_are_told_unless_their_wiring_explains_them():

@@ -1,4 +1,4 @@
-"""Pictures of a boom, its envelope, alarms and journals: what is drawn, and the geometry it is drawn from."""
+"""Pictures: pins and outlines where the geometry has them, the same bytes again, densities of SciPy, extreme rows kept."""
 
 from __future__ import annotations
 
@@ -6,13 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
 from default_boom import posture_angles, skeleton, strokes_of_posture
+from scipy.signal import welch
 
 from boom_twin import load_scene
 from boom_twin.analysis.undeflected import UndeflectedBoom
 from boom_twin.compiler.compile import compile_scene
+from boom_twin.plots.extreme_rows import ExtremeRows
 from boom_twin.plots.history import Orbits
+from boom_twin.plots.joint_ranges import joint_ranges_picture
 from boom_twin.plots.posture import orbits_picture
+from boom_twin.plots.session_distributions import SEGMENT, density
 
 SCENE, ROWS = load_scene(), 40
 
@@ -52,3 +57,78 @@ def test_journals_of_every_pin_are_drawn_and_the_same_bytes_again(tmp_path: Path
         orbits_picture(tmp_path / name, "journals", orbits)
     first, second = ((tmp_path / name).read_bytes() for name in ("a.png", "b.png"))
     assert first == second and first[:4] == b"\x89PNG"
+
+
+@pytest.mark.parametrize("count", [20, 101, 3000, 7001])
+def test_density_is_that_of_scipy(count: int) -> None:
+    times = np.arange(count) * 0.005
+    values = np.random.default_rng(count).normal(3.0, 1.0, count)
+    even = np.arange(times[0], times[-1], 0.005)
+    frequencies, power = welch(np.interp(even, times, values), 200.0, nperseg=min(len(even), round(SEGMENT / 0.005)))
+    found = density(times, values, 0.005)
+    np.testing.assert_allclose(found.frequencies, frequencies[1:])
+    np.testing.assert_allclose(found.power, power[1:], rtol=1e-12)
+
+
+def table(rows: int, part: int, most: int) -> tuple[ExtremeRows, np.ndarray]:
+    """A table that came in parts, and all that came."""
+    values = np.random.default_rng(5).standard_t(2.0, (rows, 3))
+    values[rows // 3 : rows // 2, 1] = np.nan
+    whole = np.column_stack([np.arange(float(rows)), values])
+    found = ExtremeRows(most, ("keys",))
+    for first in range(0, rows, part):
+        rows = whole[first : first + part]
+        found.add({"number": rows[:, 0], "keys": rows[:, 1:3], "other": rows[:, 3]})
+        if found.is_full:
+            found.thin(found.columns["number"] == 777.0)
+    return found, whole
+
+
+def test_few_rows_stay_as_they_are() -> None:
+    found, whole = table(1000, 100, 1000)
+    assert not found.is_thin
+    assert np.array_equal(np.column_stack([*found.columns.values()]), whole, equal_nan=True)
+
+
+@pytest.mark.parametrize("rows", [5_000, 50_000])
+def test_of_many_the_extremes_stay(rows: int) -> None:
+    found, whole = table(rows, 700, 2000)
+    numbers = found.columns["number"].astype(int)
+    assert found.is_thin and 400 < len(numbers) <= 2700
+    assert np.array_equal(np.column_stack([*found.columns.values()]), whole[numbers], equal_nan=True)
+    assert np.all(np.diff(numbers) > 0) and 777 in numbers
+    width = 2 ** int(np.ceil(np.log2(rows / 250)))  # that of a picture's column of pixels, or several
+    for first in range(0, rows - rows % width, width):
+        here = numbers[(numbers >= first) & (numbers < first + width)]
+        for column in (1, 2):
+            wanted, left = whole[first : first + width, column], whole[here, column]
+            if np.isfinite(wanted).any():
+                assert np.nanmin(left) == np.nanmin(wanted) and np.nanmax(left) == np.nanmax(wanted)
+
+
+def pixels(path: Path) -> np.ndarray:
+    from matplotlib.image import imread
+
+    return np.asarray(imread(path)[:, :, :3], dtype=float)
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_it_is_drawn_for_any_number_of_joints(tmp_path: Path, count: int) -> None:
+    scene = load_scene()
+    postures = {"arch": scene.postures["arch"][:count]}
+    update = {"sections": scene.sections[:count], "joints": scene.joints[:count], "postures": postures}
+    image = pixels(joint_ranges_picture(tmp_path / "pins.png", scene.model_copy(update=update), "boom"))
+    assert image.shape == (800 * (1 + count // 3), 900 * min(count + 1, 2) if count < 2 else 1800, 3)
+    assert ((image.max(axis=2) - image.min(axis=2)) > 0.3).mean() > 0.005, "nothing coloured was drawn"
+
+
+def test_the_command_writes_it_and_nothing_over_the_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, scene = tmp_path / "pins.png", tmp_path / "boom.yaml"
+    main(["scene"])
+    scene.write_text(capsys.readouterr().out, encoding="utf-8")
+    assert main(["check", str(scene), "--picture", str(path)]) == 0
+    assert f"Written: {path}" in capsys.readouterr().out and path.read_bytes().startswith(b"\x89PNG")
+    assert main(["check", str(scene), "--picture", str(path)]) == 0
+    assert main(["check", "--picture", str(scene)]) == 1
+    assert "is no earlier result" in capsys.readouterr().err
+    assert main(["check", str(scene), "--picture", str(scene)]) == 1

@@ -201,11 +201,8 @@ NO_CPP = {"state_publisher": "false"}
     ("name", "arguments", "words"),
     [
         ("twin", {}, "package robot_state_publisher is not in AMENT_PREFIX_PATH: install it, or say state_publisher:=false"),
-        ("twin", NO_CPP | {"rviz": "true"}, "package rviz2 is not in AMENT_PREFIX_PATH"),
         ("twin", NO_CPP | {"scene": "/no/such/boom.yaml"}, "/no/such/boom.yaml"),
-        ("twin", NO_CPP | {"mapping": "/no/such/mapping.yaml"}, "/no/such/mapping.yaml"),
         ("twin", NO_CPP | {"params_file": "/no/such/twin.yaml"}, "/no/such/twin.yaml"),
-        ("twin", {"state_publisher": "perhaps"}, "perhaps"),
         ("replay", NO_CPP | {"rviz": "false", "bag": "/no/such/bag"}, "/no/such/bag"),
     ],
 )

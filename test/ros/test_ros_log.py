@@ -1,19 +1,26 @@
-"""What files and other nodes put into names and texts is shown in the log and on /diagnostics, and obeyed by no terminal."""
+"""Words of others in the log and on /diagnostics, and the turns in which callbacks run."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import pytest
 
 pytest.importorskip("rclpy")
 
+import rclpy
+import rclpy.experimental
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from ros_messages import Output, load_topics
 from ros_rig import Rig
+from std_msgs.msg import String, UInt8
+from std_srvs.srv import Trigger
 
 from boom_twin.diagnostics.levels import Level, Status
+from boom_twin.ros import runtime
 from boom_twin.ros.diagnostics_publisher import DiagnosticsPublisher
-from boom_twin.ros.node.diagnostics import ClockCheck
 
 HOSTILE = "/rig\x1b[2J\n[INFO] [boom_twin]: all is well\u202e\x9b31m"
 ESCAPED = r"/rig\x1b[2J\n[INFO] [boom_twin]: all is well\u202e\x9b31m"
@@ -57,9 +64,50 @@ def test_states_with_foreign_names_are_escaped_and_those_that_come_and_go_do_not
     assert shown(Level.WARN) == ["1"]
 
 
-def test_another_clock_is_told_if_it_lasts() -> None:
-    """A bag that begins again is a jump of stamps and of clock; a session that ended has a newest stamp that grows old."""
-    check, ended = ClockCheck(), ClockCheck()
-    found = [check.apart(1e9 + 2.0, 10**18, tolerance, 0.0) for tolerance in (1.0, 2.5, 1.0, 1.0)]
-    assert found == pytest.approx([0.0, 0.0, 0.0, 2.0])
-    assert not any(ended.apart(1e9 + silent, 10**18, 1.0, float(silent)) for silent in range(5))
+@pytest.mark.parametrize("is_missing", [False, True])
+def test_messages_come_with_their_information_and_turns_end_when_due(
+    domain: None, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], is_missing: bool
+) -> None:
+    if is_missing:
+        monkeypatch.delattr(rclpy.experimental, "EventsExecutor")
+    node, came = rclpy.create_node("turns"), list[Mapping[str, Any]]()
+    node.create_subscription(String, "text", runtime.with_information(lambda data, info: came.append(info)), 10, raw=True)
+    publisher, end, due, sent = node.create_publisher(String, "text", 10), time.monotonic() + 60.0, 0.0, 0
+    with runtime.CallbackTurns(node, lambda: time.monotonic() >= due) as running:
+        while len(came) < 3 and time.monotonic() < end:
+            if publisher.get_subscription_count() and sent < 3:
+                publisher.publish(String(data="x" * 100))
+                sent += 1
+            due = time.monotonic() + 0.3
+            running.run()  # it ends though nothing more comes
+    assert [info["publication_sequence_number"] for info in came] == [1, 2, 3]
+    assert capfd.readouterr().err.count("events executor: ") == is_missing and not list(node.timers)
+    node.destroy_node()
+
+
+def test_nothing_is_lost_with_a_row_that_is_dropped(domain: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every turn drops the row of the one before; messages and requests stood in it."""
+    monkeypatch.setattr(runtime, "LATE", -1.0)
+    node, peer, came, end = rclpy.create_node("turns"), rclpy.create_node("peer"), list[int](), time.monotonic() + 60.0
+    qos = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+    node.create_subscription(UInt8, "number", lambda message: came.append(message.data), qos)
+    node.create_service(Trigger, "ask", lambda request, response: Trigger.Response(success=True))
+    publisher, client = peer.create_publisher(UInt8, "number", qos), peer.create_client(Trigger, "ask")
+    while not (client.service_is_ready() and publisher.get_subscription_count()):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    answers = []
+    with runtime.CallbackTurns(node, lambda: False) as running:
+        running.poll()
+        for number in range(60):
+            publisher.publish(UInt8(data=number))
+            if number % 20 == 0:
+                answers.append(client.call_async(Trigger.Request()))
+                running.poll()
+        while not (len(came) == 60 and all(answer.done() for answer in answers)):
+            assert time.monotonic() < end, (came, answers)
+            running.poll()
+            rclpy.spin_once(peer, timeout_sec=0.01)
+    assert came == list(range(60))
+    node.destroy_node()
+    peer.destroy_node()

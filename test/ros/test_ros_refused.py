@@ -45,13 +45,7 @@ def quiet_signals() -> Iterator[None]:
 
 CASES = [
     (["-p", "payload:=40.0"], "-p payload:=40.0: unknown. Parameters and remappings follow --ros-args"),
-    (["--ros-args", "--badly"], "--badly"),
-    (["--ros-args", "-p", "imu_sigma:=-1.0"], "imu_sigma"),
-    (
-        ["--ros-args", "-p", "look_step:=0.03"],
-        "look_step: without effect since 0.2.0",
-    ),
-    (["--ros-args", "-p", "gap:=1"], "1.0, not 1"),
+    (["--ros-args", "-p", "look_step:=0.03"], "look_step: without effect since 0.2.0"),
     (["--ros-args", "--params-file", "/nowhere.yaml"], "/nowhere.yaml"),
     (["--ros-args", "-p", "strok_rate:=0.4"], "strok_rate: unknown. The nearest is `stroke_rate`"),
     (["--ros-args", "-p", "frame_prefix:=/front/"], "names of frames have no leading slash (tf2). Give 'front/'"),
@@ -97,8 +91,6 @@ def test_a_bad_argument_is_told_by_its_name(
             {"RMW_IMPLEMENTATION": "rmw_none"},
             "=rmw_none: rclpy cannot load this middleware. Install its package,",
         ),
-        ({"HOME": None}, "Failed to get logging directory. Set HOME, or ROS_LOG_DIR, to a folder that can be written."),
-        ({"ROS_LOG_DIR": "/proc/none"}, "'/proc/none': 2. Set HOME, or ROS_LOG_DIR, to a folder that can be written."),
         ({"ROS_DOMAIN_ID": "one"}, "ROS_DOMAIN_ID is not an integral number. Check the environment variables ROS_*."),
     ],
 )

@@ -180,11 +180,3 @@ def test_faults_come_with_their_line_in_the_order_of_the_file(bench: Any) -> Non
     assert [fault.path for fault in faults] == ["material.nu", "sections[1].root.mass"]
     assert "nu: 0.9" in rows[faults[0].line - 1] and "mass: -12.0" in rows[faults[1].line - 1]
     assert str(faults[0]).startswith(f"line {faults[0].line}: material.nu = 0.9: ")
-
-
-def test_every_key_that_is_there_twice_is_reported(bench: Any) -> None:
-    root = "beta: 1.0e-3,\n     root: {mass: 36.0"
-    text = default_text().replace(root, f"beta: 2.0e-3, {root}") + "\nmodes: 1\nmodes: 2\ngravity: [0, 0]\n"
-    faults = bench.faults_of(bench.text(text))
-    assert {(fault.path, fault.value) for fault in faults} >= {("sections[0].beta", 2e-3), ("modes", 1.0)} and len(faults) == 3
-    assert all("there twice" in fault.bound and "Keep one" in fault.remedy for fault in faults)

@@ -6,14 +6,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from default_boom import strokes_of_posture
 from drive_twin import drive_twin
 from ros_messages import Output, ReportEncoder
 
 from boom_twin import Report, Sample, Settings, Stream, load_scene, statics
-from boom_twin.deviation.predictor import BoomPredictor
-from boom_twin.health.sensor_check import MISSTATED
 from boom_twin.twin.driver import drive
 from boom_twin.types import Change
 
@@ -91,28 +88,3 @@ def test_health_judged_after_a_sample_was_told_is_the_same() -> None:
             apart.setdefault(key, []).append(data)
     assert told == {"joint_3.sensor"} and len(whole[Output.HEALTH]) >= 5
     assert apart == whole
-
-
-def test_what_health_finds_changes_the_estimate_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Predictions, residuals and alarms are the same to the bit where no sensor is left out and no noise is allowed for.
-
-    So whoever judges health never holds up what is predicted.
-    """
-    kept, estimates = [], []
-    for is_heard in (True, False):
-        if not is_heard:
-            monkeypatch.setattr(BoomPredictor, "leave_out", lambda *_: None)
-        reports = [step.report for step in drive(drive_twin(load_scene(), health=True), spoilt_samples(5.0, 3.0))]
-        judged = [each.health for each in reports if each.health is not None]
-        assert {alarm.cause for alarm in judged[-1].alarms} == {"joint_3.sensor"}
-        assert judged[-1].noise["noise_over_angle_sigma"] > MISSTATED
-        numbers = [
-            *(each.prediction.tip_acceleration for each in reports if each.prediction is not None),
-            *(each.prediction.cylinder_forces for each in reports if each.prediction is not None),
-            *(part for each in reports for row in each.residuals for part in (row.values, row.sigmas)),
-            *(each.tip_sigmas for each in judged),
-        ]
-        kept.append((b"".join(map(np.ndarray.tobytes, numbers)), [each.alarms for each in judged]))
-        estimates.append(np.array([each.estimate.tip for each in reports if each.estimate is not None]))
-    assert kept[0] == kept[1]
-    assert np.abs(estimates[0] - estimates[1]).max() > 1e-4

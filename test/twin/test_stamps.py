@@ -130,13 +130,6 @@ def test_a_caller_may_use_its_array_again(samples, scene):
     assert all(np.array_equal(a, b) for a, b in zip(residuals[::2], residuals[1::2], strict=True))
 
 
-def test_a_masked_value_is_missing(samples, scene):
-    twin = Twin(scene)
-    twin.update(samples[0])
-    masked = np.ma.masked_array(samples[1].values, mask=[True, False, False, False])
-    assert twin.update(Sample(Stream.STROKES, samples[1].stamp, masked)).events == ("partial",)
-
-
 def test_equal_stamps_with_other_values_are_a_second_source(samples, clean):
     twin = copy.deepcopy(clean[1][700])
     for s in samples[700:720]:
@@ -162,14 +155,6 @@ def test_the_stated_deviation_of_a_start_from_rest_is_true(samples, clean, scene
         assert np.all(found[-1][2] < found[0][2])
 
 
-def test_strokes_out_of_their_range_are_told(scene, samples):
-    twin, far = Twin(scene), samples[0].values.copy()
-    far[1] = scene.joints[1].cylinder.max_stroke + 0.001
-    twin.update(samples[0])
-    twin.update(Sample(Stream.STROKES, samples[1].stamp, far))
-    assert twin.counts["out of range"] == 1
-
-
 @pytest.mark.parametrize(
     ("sample", "words"),
     [
@@ -190,14 +175,6 @@ def test_strokes_out_of_their_range_are_told(scene, samples):
 def test_samples_made_wrongly_are_refused_with_the_remedy(scene, sample, words):
     with pytest.raises(UsageError, match=words):
         Twin(scene).update(Sample(*sample))
-
-
-def test_lists_and_integers_of_numpy_are_taken(scene, samples):
-    one, other = Twin(scene), Twin(scene)
-    for s in samples[:5]:
-        a = one.update(s).prediction
-        b = other.update(Sample(s.stream, np.int64(s.stamp), s.values.tolist())).prediction
-        assert a.tip_position.tobytes() == b.tip_position.tobytes() and type(b.stamp) is int
 
 
 @pytest.mark.parametrize("unit", [1, 10**3, 10**6], ids=["s", "ms", "us"])

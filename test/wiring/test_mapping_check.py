@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 import yaml
+from command import main
+from recordings import read, scan, write_session
 
 from boom_twin import Stream
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_files import write_session
-from boom_twin.cli.main import main
 
 BAGS = Path(__file__).parents[2] / "bags"
 G = 9.80665

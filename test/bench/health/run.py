@@ -29,11 +29,11 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 from bench.record import keep
+from default_boom import with_parameters
 
 from boom_twin import Twin, load_scene
 from boom_twin.bag.session_files import samples_of
 from boom_twin.health.alarms import Alarms
-from boom_twin.scene.edit import with_parameters
 from boom_twin.twin.blocks import ReportBlock, block_of
 from boom_twin.types import NANO, Stream
 from boom_twin.validation.rig import Scheme, Sensors, at_rest, move, observe, random_programme
@@ -101,27 +101,12 @@ def row_of(number: int, causes: bool = False) -> dict[str, Any]:
         for health in report.health.values() if isinstance(report, ReportBlock) else [each.health for each in report.all]:
             if health is not None:
                 alarms.take(health)
-    found = [
-        [
-            each.channel,
-            each.kind,
-            (each.since - first) * NANO,
-            each.until and (each.until - first) * NANO,
-            each.told,
-            each.cause,
-        ]
-        for each in alarms.all
-    ]
-    drawn = {
-        "number": number,
-        "kind": kind,
-        "rig": rig,
-        "rate": sensors.rate,
-        "streams": streams,
-        "fault": named,
-        "words": words,
-    }
-    return drawn | {"alarms": found}
+    found = []
+    for each in alarms.all:
+        since, until = (stamp and (stamp - first) * NANO for stamp in (each.since, each.until))
+        found.append([each.channel, each.kind, since, until, each.told, each.cause])
+    drawn = {"number": number, "kind": kind, "rig": rig, "rate": sensors.rate, "streams": streams}
+    return drawn | {"fault": named, "words": words, "alarms": found}
 
 
 def onsets(row: dict[str, Any]) -> list[float]:

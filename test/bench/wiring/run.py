@@ -21,11 +21,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from bench.record import keep
+from recordings import read, scan, scene_of
 
-from boom_twin import load_scene, simulate
-from boom_twin.bag.reader import read, scan
-from boom_twin.bag.session_model import scene_of
-from boom_twin.scene.schema import Scene
+from boom_twin import Scene, load_scene, simulate
 from boom_twin.sensor_kinds import G
 from boom_twin.types import SENSORS, Stream, StrokeReading
 from boom_twin.validation.rig.faulty_boom import wrong_by

@@ -64,11 +64,6 @@ def test_another_boom_makes_moves_within_its_own_ranges(sections):
         bundled(scene.model_copy(update={"postures": {}}))
 
 
-def test_random_programme_depends_on_its_seed():
-    assert random_programme(SCENE, "low", 30.0, 1) == random_programme(SCENE, "low", 30.0, 1)
-    assert random_programme(SCENE, "low", 30.0, 1) != random_programme(SCENE, "low", 30.0, 2)
-
-
 def test_moves_through_postures_rest_in_each_and_keep_the_acceleration_of_the_tip():
     programme = through_postures(SCENE, ["arch", "low", "arch"], 60.0, 0.4)
     times = np.linspace(0.0, 60.0, 6001)

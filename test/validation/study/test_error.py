@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 import re
 from contextlib import redirect_stderr
 from pathlib import Path
@@ -12,17 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import main
-from default_boom import motion_of
 from oracle import booms
 
-from boom_twin import load_scene
-from boom_twin.analysis.methods import Method
 from boom_twin.validation.study.error import problem as error_problem
 from boom_twin.validation.study.error import report as error
 from boom_twin.validation.study.error import runner as error_run
-from boom_twin.validation.study.error.cases import Own, Peer
-from boom_twin.validation.study.error.problem import Problem, pose
-from boom_twin.validation.study.error.runner import Runner
 
 
 @pytest.fixture(scope="module")
@@ -40,15 +33,6 @@ def report(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def content(report):
     return json.loads((report / "error.json").read_text())
-
-
-@pytest.fixture(scope="module")
-def problem() -> Problem:
-    """Half a second without Exudyn."""
-    scene = load_scene()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(error_problem, "load_rig", lambda: (None, "left out"))
-        return pose(scene, motion_of(scene, duration=0.48), True)
 
 
 def rows_of(content, **wanted):
@@ -79,13 +63,3 @@ def test_without_exudyn_the_report_goes_on(tmp_path, monkeypatch):
     assert {row["program"] for row in content["rows"]} == {"boom_twin"}
     assert all(row["tip_mm"] == row["own_mm"] for row in content["rows"])
     assert reason in (tmp_path / "error.md").read_text()
-
-
-def test_failures_are_rows(problem, monkeypatch):
-    runner = Runner(problem)
-    lost = runner.row(Own(2.5e-4, Method(product="plain")))
-    assert not lost.good and "lost its digits" in lost.status and math.isnan(lost.tip_mm)
-    refused = runner.row(Own(3e-3))
-    assert refused.status.startswith("UsageError: duration") and not refused.good
-    monkeypatch.setattr(error_run, "load_rig", lambda: (None, "no exudyn"))
-    assert runner.row(Peer(1e-3, 4, 1, 1e-3)).status == "RuntimeError: no exudyn"

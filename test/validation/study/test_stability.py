@@ -17,12 +17,6 @@ COARSE = {"dt 2e-2 s", "dt 5e-2 s", "dt 5e-2 s, fast"}
 QUICK = [case for case in cases(load_scene()) if case.quick]
 
 
-# -- motions ----------------------------------------------------------------------------------------------------------
-
-
-# -- cases ------------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("case", QUICK, ids=lambda case: f"{case.group}: {case.name}")
 def test_default_method_holds(case):
     """Or, where there is no solution, says so; the coarsest steps may cost accuracy."""
@@ -37,9 +31,6 @@ def test_failures_of_other_methods_are_seen():
     case = next(case for case in QUICK if case.name == "10 min, undamped")
     found = one(case, {"Newmark 0.5": METHODS["Newmark 0.5"]}).cells["Newmark 0.5"]
     assert found.verdict.word == "fails"
-
-
-# -- files ------------------------------------------------------------------------------------------------------------
 
 
 def test_files_hold_the_verdicts_and_their_symptoms(tmp_path, two_sections):

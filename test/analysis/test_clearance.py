@@ -1,4 +1,4 @@
-"""A boom at rest on pins with clearance: levers and the oracle's pin forces give the tip's shift, rest is the oracle's."""
+"""A boom at rest on pins with clearance, and its small vibrations: levers, the oracle's pins, limits on ideal pins."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from oracle.clearance.scenes import PINS, RADII, RODS, with_pins
 from reference.worn_pin import geometry
 from reference.worn_pin.motion import freed
 
+from boom_twin import statics
 from boom_twin.kernels.elements.pin_contact import LEAST_GAP, SMOOTH
-from boom_twin.scene.schema import IDEAL_BELOW
 from boom_twin.validation.contact_law import Contact, stiffness
 
 POSTURES = ["horizontal", "arch", "high", "low"]
@@ -81,22 +81,6 @@ def test_rigid_boom_rests_as_the_oracle_has_it(posture, index):
         assert abs(estimate - shift) < 0.02 * abs(shift)
 
 
-@pytest.mark.parametrize("index", range(4))
-def test_the_shift_falls_linearly_down_to_the_switch_to_the_ideal_pin(index):
-    """And jumps there by lever x (1 um + penetration): the penetration stays, for the stiffness is capped."""
-    pin, posture, ideal = RODS[index], "horizontal", resting(IDEAL, "horizontal")
-    axis, force, _ = held(DOCUMENT, np.cumsum(ideal.joints), index, ideal.tension[index])
-    lever, clearances = loaded_lever(posture, index), (2e-4, 1e-4, 5e-5, 3e-5, 1e-5, 3e-6, IDEAL_BELOW)
-    for clearance in clearances:
-        shift = resting(with_pins(DOCUMENT, [pin], clearance), posture).tip - ideal.tip
-        play = lengthening(bush(pin, clearance), force, axis)
-        assert abs(lever * play - shift) < 0.02 * abs(shift), clearance
-    beyond = resting(with_pins(DOCUMENT, [pin], 0.99 * IDEAL_BELOW), posture)
-    assert beyond.tip == ideal.tip and not len(beyond.forces)
-    depth = (abs(force) / bush(pin, IDEAL_BELOW).stiffness) ** (2.0 / 3.0)
-    assert abs(shift) == pytest.approx(abs(lever) * (IDEAL_BELOW + depth), rel=0.02)
-
-
 @pytest.mark.parametrize("posture", POSTURES[:2])
 @pytest.mark.parametrize("pin", PINS)
 def test_the_tip_sinks_by_the_work_of_a_unit_load(pin, posture):
@@ -106,3 +90,58 @@ def test_the_tip_sinks_by_the_work_of_a_unit_load(pin, posture):
     work = (lever * found.offsets[0].conjugate()).real
     assert (found.tip - resting(IDEAL, posture).tip).imag == pytest.approx(-work, rel=0.01, abs=2e-6)
     assert abs(found.offsets[0]) > 1e-4 - 2e-6
+
+
+CLEARANCE, STEP = 1e-4, 1e-9
+
+
+def undamped(index):
+    """A rigid boom with the oil spring of cylinder `index` alone, without its damper."""
+    document = rigid.document(4, index)
+    del document["joints"][index]["cylinder"]["d"]
+    return document
+
+
+def linearised(document, headings, index):
+    """Natural frequencies (Hz, ascending) of the oracle's three coordinates, from differences of its accelerations."""
+    contact = Contact(stiffness(RADII[RODS[index]], CLEARANCE, 2.06e11, 0.3), 0.0, CLEARANCE, smoothing=SMOOTH)
+    boom, drive = freed(document, headings, index, contact), geometry.cylinder_length(document, headings, index)
+    rest = boom.rest(drive, headings[index])
+    at = np.array([rest.phi, rest.length, rest.psi, 0.0, 0.0, 0.0])
+    sides = [[boom.rates((drive, 0.0), at + side * one, 0.0)[3:] for one in np.eye(6)[:3]] for side in (STEP, -STEP)]
+    return np.sort(np.sqrt(-np.linalg.eigvals(np.subtract(*sides) / (2.0 * STEP)).real)) / (2.0 * np.pi)
+
+
+@pytest.mark.parametrize("posture", ["horizontal", "arch"])
+@pytest.mark.parametrize("index", range(4))
+def test_frequencies_on_a_pin_in_contact_are_the_oracles(posture, index):
+    """All three of a rigid boom; linearised, the pin is as stiff along its force, so the lowest is the same."""
+    document = undamped(index)
+    expected = linearised(document, np.radians(document["postures"][posture]), index)
+    found = statics(with_pins(document, [RODS[index]], CLEARANCE), posture=posture).frequencies
+    assert found == pytest.approx(expected, rel=1e-4)
+    linear = statics(with_pins(document, [RODS[index]], CLEARANCE, "spring-damper"), posture=posture)
+    assert linear.frequencies[0] == pytest.approx(expected[0], rel=5e-4)
+
+
+@pytest.mark.parametrize("pins", [RODS, PINS], ids=["rods", "all"])
+def test_frequencies_go_to_those_of_ideal_pins_as_contact_gets_stiff(pins):
+    """Clearance of 1 um, rigid sections, and a steel that is stiffer in the pins alone: off by its power -2/3, then -1.
+
+    The tangent of a Hertzian contact goes with K^(2/3) F^(1/3); once it is smaller than the smoothing the penetration makes
+    it linear.
+    """
+    off = []
+    for factor in (1.0, 1e2, 1e4, 1e6):
+        document = booms.document()
+        document["sections"] = [section | {"modes": 0} for section in document["sections"]]
+        document["material"]["E"] *= factor
+        found, ideal = (
+            statics(scene, posture="arch", modes=4).frequencies
+            for scene in (with_pins(document, pins, 1e-6), booms.scene_of(document))
+        )
+        off.append(1.0 - found / ideal)
+    assert np.all(np.array(off) > 0.0)
+    ratios = np.array(off[1:]) / off[:-1]
+    assert np.all(ratios[0] < 0.1) and np.all(ratios[1:] < 0.05)
+    assert np.all(off[-1] < 1e-6)

@@ -1,4 +1,4 @@
-"""The study of a scene's parts: complete, sorted, and the same as editing the file by hand."""
+"""Studies of a scene's parts, their motions and their folders."""
 
 from __future__ import annotations
 
@@ -7,8 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import main
+from default_boom import joint_angles_of_strokes, motion_of, strokes_of_posture
+from oracle import booms
+from oracle.conftest import random_scene
 
-from boom_twin import Scene, statics
+from boom_twin import Scene, load_scene, statics
+from boom_twin.analysis.motions import TURN
+from boom_twin.cli.study import KINDS
 from boom_twin.reduction import deviation
 from boom_twin.reduction.variants import variants
 from boom_twin.validation.study import parts
@@ -55,3 +61,43 @@ def test_the_files(found: parts.PartsStudy, two_sections: Scene, tmp_path: Path,
         text.count("\n| ") == len(found.shown) + 1 and "Leave out parts whose error you accept" in text and "surrogate" in text
     )
     assert (out / "parts.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_default_boom_moves_as_in_the_documentation():
+    scene = load_scene()
+    motion = motion_of(scene)
+    strokes, rates = motion(np.array([0.0, 0.75, 1.5, 4.0]))
+    assert motion.duration == 4.0 and "arch" in motion.label
+    assert strokes[0] == pytest.approx(strokes_of_posture(scene, "arch"), abs=1e-12)
+    assert strokes[1] - strokes[0] == pytest.approx([0.025, 0.0, 0.015, 0.0])
+    assert strokes[3] - strokes[0] == pytest.approx([0.05, 0.0, 0.03, 0.0])
+    assert not rates[[0, 2, 3]].any()
+
+
+SCENES = [*(booms.random_boom(seed) for seed in range(10)), *(random_scene(seed) for seed in range(10))]
+
+
+@pytest.mark.parametrize("scene", SCENES, ids=[f"booms{i}" for i in range(10)] + [f"scene{i}" for i in range(10)])
+def test_motion_stays_inside(scene):
+    motion = motion_of(scene)
+    moved = np.flatnonzero(motion.travel)
+    assert len(moved) and not np.any(moved % 2)
+    strokes, _ = motion(np.linspace(0.0, motion.duration, 50))
+    for i, joint in enumerate(scene.joints):
+        assert strokes[0, i] == motion.first[i]
+        assert strokes[:, i].min() >= -1e-9 and strokes[:, i].max() <= joint.cylinder.max_stroke + 1e-9
+    turned = joint_angles_of_strokes(scene, strokes[-1], near=motion.angles) - motion.angles
+    assert np.all(np.abs(turned[motion.travel == 0.0]) < 1e-7)
+    halvings = np.log2(TURN / np.abs(turned[moved]))
+    assert halvings == pytest.approx(np.round(halvings), abs=1e-4) and np.all(halvings < 3.5)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_file_that_is_there_is_kept(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Which is found before the work begins: it may take minutes."""
+    for name in (f"{kind}.md", f"{kind}.png", "notes.txt"):
+        (out := tmp_path / name).mkdir()
+        (out / name).write_text("mine")
+        assert main(["study", kind, "--quick", "--out", str(out)]) == 1
+        assert f"{out}: holds {name}, and no manifest of a study {kind}" in capsys.readouterr().err
+        assert [path.read_text() for path in out.iterdir()] == ["mine"]

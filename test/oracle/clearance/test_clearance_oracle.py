@@ -1,0 +1,161 @@
+"""The oracle of worn pins: dropped balls, geometry, rest, and a boom on one pin against Lagrange's equations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oracle import booms, lagrange, segments
+from oracle.clearance import rigid
+from oracle.clearance.drop import rebound, restitution
+from reference.worn_pin import geometry
+from reference.worn_pin.motion import freed
+
+from boom_twin.validation.contact_law import HYSTERESIS, Contact, stiffness
+
+STEEL = stiffness(0.030, 1e-4, 2.06e11, 0.3)
+PUBLISHED = [
+    *zip(["lankarani-nikravesh"] * 5, (0.95, 0.9, 0.8, 0.5, 0.3), (0.954, 0.913, 0.847, 0.725, 0.684), strict=True),
+    *zip(["flores"] * 3, (0.9, 0.8, 0.5), (0.894, 0.789, 0.470), strict=True),
+]
+
+
+@pytest.mark.parametrize("law, e, expected", PUBLISHED)
+def test_published(law, e, expected):
+    hysteresis = HYSTERESIS[law](e)
+    assert restitution(hysteresis) == pytest.approx(expected, abs=6e-4)
+    assert rebound(Contact(STEEL, hysteresis, 0.0), 20.0, 0.1) == pytest.approx(expected, abs=6e-4)
+
+
+@pytest.mark.parametrize("law", HYSTERESIS)
+@pytest.mark.parametrize("e", [0.95, 0.6, 0.3])
+@pytest.mark.parametrize("exponent, mass, speed", [(1.5, 20.0, 0.1), (1.0, 0.5, 3.0), (2.2, 300.0, 0.02)])
+def test_integration_meets_the_closed_form(law, e, exponent, mass, speed):
+    hysteresis = HYSTERESIS[law](e)
+    contact = Contact(STEEL, hysteresis, 0.0, exponent)
+    assert rebound(contact, mass, speed) == pytest.approx(restitution(hysteresis), abs=1e-7)
+
+
+POSTURES = ["horizontal", "arch", "high", "low"]
+
+
+@pytest.mark.parametrize("posture", POSTURES)
+def test_lengths_meet_the_finite_segments(posture):
+    document = booms.document()
+    headings = np.radians(document["postures"][posture])
+    expected = segments.Segments(booms.scene_of(document), 0).lengths(np.diff(headings, prepend=0.0))
+    found = [geometry.cylinder_length(document, headings, i) for i in range(4)]
+    assert found == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("index", range(4))
+def test_derivatives_of_a_part(index):
+    document, step = booms.document(), 1e-5
+    headings = np.radians(document["postures"]["arch"])
+    part = freed(document, headings, index, None).part
+    phi = headings[index]
+    before, here, after = (part.at(phi + side) for side in (-step, 0.0, step))
+    assert (after.inertia - before.inertia) / (2 * step) == pytest.approx(here.slope, rel=1e-6, abs=1e-4)
+    assert (after.height - before.height) / (2 * step) == pytest.approx(here.moments, rel=1e-7)
+    assert (after.pin.value - before.pin.value) / (2 * step) == pytest.approx(here.pin.first, rel=1e-7)
+    assert (after.pin.first - before.pin.first) / (2 * step) == pytest.approx(here.pin.second, rel=1e-6)
+    tips = [part.tip_at(phi + side) for side in (-step, step)]
+    lengths = [abs(p.pin.value - geometry.pins(document, headings, index)[0]) for p in (before, after)]
+    lever = (tips[1] - tips[0]) / (lengths[1] - lengths[0])
+    assert geometry.levers(document, headings)[index] == pytest.approx(lever, rel=1e-6)
+
+
+RADII = (0.030, 0.025, 0.025, 0.020)
+
+
+def pin(index, clearance, smoothing=0.0):
+    k = stiffness(RADII[index], clearance, 2.06e11, 0.3)
+    return Contact(k, HYSTERESIS["lankarani-nikravesh"](0.9), clearance, smoothing=smoothing)
+
+
+@pytest.mark.parametrize("posture", POSTURES)
+@pytest.mark.parametrize("index", range(4))
+def test_ideal_pin_meets_the_finite_segments(posture, index):
+    """Masses, gravity, levers, oil: all of the rigid boom's equilibrium by another method."""
+    document = rigid.document(4, index) | {"tip": {"payload": 30.0}, "line_fill": 8.0}
+    document["base"] |= {"inclination": 0.1}
+    headings = np.radians(document["postures"][posture])
+    scene = booms.scene_of(document)
+    drive = segments.Segments(scene, 0).lengths(np.diff(headings, prepend=0.0))
+    tip, _, forces = np.split(segments.statics(scene, 0, drive, np.diff(headings, prepend=0.0))[:10], [2, 6])
+    found = freed(document, headings, index, None).rest(drive[index], headings[index])
+    assert [found.tip.real, found.tip.imag] == pytest.approx(tip, abs=1e-9)
+    assert found.tension == pytest.approx(forces[index], rel=1e-7, abs=1e-3)
+
+
+@pytest.mark.parametrize("posture", POSTURES)
+@pytest.mark.parametrize("index", range(4))
+@pytest.mark.parametrize("smoothing", [0.0, 5e-6])
+def test_nothing_accelerates_at_rest(posture, index, smoothing):
+    """The force law backwards, by which the equilibrium was found, against the law forwards in the equations of motion."""
+    document = booms.document()
+    headings = np.radians(document["postures"][posture])
+    drive = geometry.cylinder_length(document, headings, index)
+    boom = freed(document, headings, index, pin(index, 1e-4, smoothing))
+    rest = boom.rest(drive, headings[index])
+    state = np.array([rest.phi, rest.length, rest.psi, 0.0, 0.0, 0.0])
+    accelerations = np.array(boom.rates((drive, 0.0), state, 0.0)[3:])
+    assert boom.part.at(rest.phi).inertia * accelerations[0] == pytest.approx(0.0, abs=0.05)
+    assert boom.cylinder.rod_mass * accelerations[1:] == pytest.approx([0.0, 0.0], abs=0.5)
+
+
+HEADINGS = np.array([0.5, -0.3])
+
+
+def bush_of(law="lankarani-nikravesh", restitution=0.9, smoothing=0.0):
+    return Contact(STEEL, HYSTERESIS[law](restitution), 1e-4, smoothing=smoothing)
+
+
+# the six-bar has the same contact as the slider-crank; its geometry is in test_geometry, its flights against the model in
+# test_clearance_motion
+@pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_a_stiff_pin_without_play_moves_as_lagrange_has_it(count):
+    """Linear contact of 2e10 N/m, no clearance: what differs from an ideal pin falls with its compliance."""
+    index, headings = count - 1, HEADINGS[:count]
+    document = rigid.document(count, index)
+    lengths = np.array([geometry.cylinder_length(document, headings, i) for i in range(count)])
+    times, own = np.linspace(0.0, 0.1, 11), rigid.move(lengths[index], 0.01, 0.08)
+    chosen = np.arange(count) == index
+
+    def drives(time):
+        length, rate, bend = own(time)
+        return np.where(chosen, length, lengths), np.where(chosen, rate, 0.0), np.where(chosen, bend, 0.0)
+
+    rows = lagrange.Lagrange(booms.scene_of(document), drives).solve(times, np.diff(headings, prepend=0.0), 1e-9)
+    differences = []
+    for k in (1e10, 2e10):
+        boom = freed(document, headings, index, Contact(k, 0.0, 0.0, exponent=1.0))
+        rest = boom.rest(lengths[index], headings[index])
+        found = boom.follow(own_pair(own), rest, times, [0.08])
+        differences.append(found.tip - rows[:, 2 * count : 2 * count + 2])
+    assert np.abs(differences[1]).max() < 1e-3 * np.ptp(rows[:, 2 * count + 1])
+    assert np.abs(2.0 * differences[1] - differences[0]).max() < 0.02 * np.abs(differences[0]).max()
+
+
+@pytest.mark.parametrize("law, loses", [("hertz", False), ("lankarani-nikravesh", True), ("flores", True)])
+def test_energy(law, loses):
+    """Thrown up out of rest, undamped oil, sharp contact: Hertz keeps the energy, the others never gain any."""
+    document = rigid.document(1, 0)
+    del document["joints"][0]["cylinder"]["d"]
+    boom = freed(document, HEADINGS[:1], 0, bush_of(law, 0.8))
+    drive = geometry.cylinder_length(document, HEADINGS[:1], 0)
+    found = boom.follow(lambda time: (drive, 0.0), boom.rest(drive, 0.5), np.linspace(0.0, 0.06, 2001), rate=0.3)
+    distance = np.hypot(*found.offset.T)
+    depth, n = np.maximum(distance - boom.contact.clearance, 0.0), boom.contact.exponent
+    total = found.energy + boom.contact.stiffness * depth ** (n + 1.0) / (n + 1.0)
+    moving = 0.5 * boom.part.at(0.5).inertia * 0.3**2
+    assert len(found.episodes) >= 2
+    if loses:
+        assert np.diff(total).max() < 1e-5 * moving
+        assert total[0] - total[-1] > 1e-3 * moving
+    else:
+        assert np.ptp(total) < 1e-4 * moving
+
+
+def own_pair(move):
+    """Length and rate alone."""
+    return lambda time: move(time)[:2]

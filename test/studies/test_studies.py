@@ -1,0 +1,60 @@
+"""The studies of the documentation: low speed, digits lost to round-off, and the reports of all three."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from default_boom import motion_of, posture_angles
+from studies.__main__ import main
+from studies.papers import low_speed
+from studies.roundoff.exact_step import digits, one_step
+from studies.roundoff.report import TARGET, TURN_UP_STEPS, turn_up
+
+from boom_twin import load_scene
+from boom_twin.validation.study.long_booms import long_boom
+
+SCENE = load_scene()
+
+
+def test_leaving_velocity_terms_out_errs_with_the_square_of_the_speed() -> None:
+    speeds = low_speed.error_by_speed(SCENE, motion_of(SCENE), (6.0, 3.0), 5e-3)
+    slopes = np.log(speeds[1, 1:] / speeds[0, 1:]) / np.log(speeds[1, 0] / speeds[0, 0])
+    assert slopes == pytest.approx([2.0, 2.0], abs=0.15)
+    assert 5e-4 < speeds[1, 1] < 2e-3  # m
+
+
+def test_plain_product_loses_digits_with_the_length_and_riccati_does_not():
+    steps = [one_step(boom, posture_angles(boom, "test"), 1e-3, 0.8) for boom in map(long_boom, (2, 3, 5, 20))]
+    plain, riccati = ([digits(getattr(step, name)) for step in steps] for name in ("plain", "riccati"))
+    assert np.all(np.diff(plain) > 0.5) and plain[-1] > 15.0
+    assert max(riccati) < 2.5
+    assert max(step.exact for step in steps) < 1e-15
+
+
+def test_error_of_the_tip_falls_with_the_square_of_the_step():
+    found = turn_up(load_scene(), tuple(step for step in TURN_UP_STEPS if step >= 1e-5))
+    assert found.order == pytest.approx(2.0, abs=0.05)
+    assert not found.turned_up_above_target
+    assert found.floor[1] < 0.1 * TARGET
+
+
+DOCS = Path(__file__).parents[2] / "docs" / "study"
+FILES = {
+    "papers": ("papers_low_speed.png",),
+    "clearance": ("clearance.png", "clearance_static.png"),
+    "roundoff": ("roundoff.png",),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", FILES)
+def test_a_report_has_the_chapters_of_the_page_in_the_docs(kind: str, tmp_path: Path) -> None:
+    pytest.importorskip("exudyn")
+    main([kind, "--quick", "--out", str(tmp_path / "out")])
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {f"{kind}.md", *FILES[kind]}
+    made, kept = (path.read_text(encoding="utf-8") for path in (tmp_path / "out" / f"{kind}.md", DOCS / f"{kind}.md"))
+    assert re.findall(r"^#.*", made, re.MULTILINE) == re.findall(r"^#.*", kept, re.MULTILINE)
+    assert "nan" not in made and "surrogates" in made
