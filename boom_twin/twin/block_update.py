@@ -25,11 +25,8 @@ from .blocks import CODES, STREAMS, EstimateBlock, PredictionBlock, ReportBlock,
 from .load_shedding import LoadShedding
 from .regular import NOISE_REACH
 from .run import Run
-from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
+from .state import BEGINS_SLOT, IS_DEFLECTED, ROOM, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .update import DONE, LOOK, ODD, measure, update
-
-CAPACITY = 4096  # samples that one call of the compiled update takes at most
-
 
 SWAY = 0.5  # rad, by which an inclinometer that drives the model may be off its estimate at once while its section shakes
 
@@ -98,6 +95,8 @@ class BlockUpdate:
         Of events; ``deflected`` and ``unmatched`` are counted here.
     shedding : LoadShedding
         Asked what is left out.
+    capacity : int
+        Samples that one call takes at most.
     before : BlockUpdate, optional
         Of the same scene under another load, whose arrays are taken over.
     """
@@ -111,6 +110,7 @@ class BlockUpdate:
         judge: HealthMonitor | None,
         counts: Counter[str],
         shedding: LoadShedding,
+        capacity: int = ROOM.samples,
         before: BlockUpdate | None = None,
     ) -> None:
         self._shedding, self._boom, self.limits, self._state, self._channels = shedding, boom, limits, state, channels
@@ -118,7 +118,7 @@ class BlockUpdate:
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
         drives = CODES[Stream.STROKES], limits.drive
         self._measured = [(code, int(width)) for code, width in enumerate(limits.channels) if code not in drives]
-        sizes = 2 * CAPACITY, self._joints, boom.width, boom.stations, limits.channels
+        self._capacity, sizes = capacity, (2 * capacity, self._joints, boom.width, boom.stations, limits.channels)
         self._found: UpdateOutput = new_output(*sizes) if before is None else before._found
         self._found.counts[:] = 0
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
@@ -150,7 +150,7 @@ class BlockUpdate:
         run : Run or None
             The present one.
         block : SampleBlock
-            At most `CAPACITY` samples; int64, int64 and float64 arrays without gaps.
+            At most `capacity` samples; int64, int64 and float64 arrays without gaps.
         trusted : bool
             Whether its only sample was looked at before.
 
@@ -218,7 +218,7 @@ class BlockUpdate:
     def make_room(self) -> None:
         """Prepare the next call of the compiled update; pass pending rows to the health monitor when the buffer is full."""
         self._begin, self._news = tuple(self._found.counts.tolist()), NO_EXTRAS
-        if max(self._begin) > CAPACITY:
+        if max(self._begin) > self._capacity:
             self._tell_health()
             self._found.counts[:] = 0
             self._begin = self._told = 0, 0
