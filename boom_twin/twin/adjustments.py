@@ -12,7 +12,7 @@ from ..errors import UsageError
 from ..types import SECOND, SENSORS, Array, Change, Stream
 from .blocks import CODES
 from .loaded_model import LoadedModel
-from .state import COUNT, FIRST, NONE, RECENT, ZEROS, Ring, TwinState, zeros_at
+from .state import COUNT, FIRST, NONE, ZEROS, Ring, TwinState, zeros_at
 
 
 class SensorZeros:
@@ -87,7 +87,7 @@ class ResidualBuffer:
     def _mean(self, channel: str, now: int) -> float:
         own, place = self._places[channel]
         recent, count = self._recent, self._recent.bounds[COUNT]
-        rows = (self._recent.bounds[FIRST] + np.arange(count)) % RECENT
+        rows = (self._recent.bounds[FIRST] + np.arange(count)) % len(recent.stamps)
         rows = rows[(recent.streams[rows] == own) & (recent.stamps[rows] > now - SECOND)]
         values = [value for value in recent.values[rows, place].tolist() if math.isfinite(value)]
         if len(values) < FEWEST_RESIDUALS:

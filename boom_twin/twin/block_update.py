@@ -21,10 +21,8 @@ from ..types import Health, Report, Residuals, Stream
 from .blocks import CODES, STREAMS, EstimateBlock, PredictionBlock, ReportBlock, ResidualBlock, SampleBlock, estimate_of
 from .load_shedding import LoadShedding
 from .run import Run
-from .state import BEGINS_SLOT, IS_DEFLECTED, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
+from .state import BEGINS_SLOT, IS_DEFLECTED, ROOM, SLOT, UNMATCHED, Limits, TwinState, UpdateOutput, new_output
 from .update import DONE, LOOK, update
-
-CAPACITY = 4096  # samples that one call of the compiled update takes at most
 
 
 @dataclass
@@ -45,7 +43,8 @@ class BlockUpdate:
     """Driver of the compiled update, for regular samples.
 
     `channels`: see `boom_twin.types.channels_of`. ``deflected`` and ``unmatched`` are added to `counts`. `shedding` is asked
-    what is left out. `before`, of the same scene under another load, gives its arrays.
+    what is left out. One call takes at most `capacity` samples. `before`, of the same scene under another load, gives its
+    arrays.
     """
 
     def __init__(
@@ -57,6 +56,7 @@ class BlockUpdate:
         judge: HealthMonitor | None,
         counts: Counter[str],
         shedding: LoadShedding,
+        capacity: int = ROOM.samples,
         before: BlockUpdate | None = None,
     ) -> None:
         self._shedding, self._boom, self.limits, self._state, self._channels = shedding, boom, limits, state, channels
@@ -64,7 +64,7 @@ class BlockUpdate:
         self._joints, self._pins = boom.plan.joints, len(boom.plan.pins)
         drives = CODES[Stream.STROKES], limits.drive
         self._measured = [(code, int(width)) for code, width in enumerate(limits.channels) if code not in drives]
-        sizes = 2 * CAPACITY, self._joints, boom.width, boom.stations, limits.channels
+        self._capacity, sizes = capacity, (2 * capacity, self._joints, boom.width, boom.stations, limits.channels)
         self._found: UpdateOutput = new_output(*sizes) if before is None else before._found
         self._found.counts[:] = 0
         self._begin, self._told, self._news = (0, 0), (0, 0), NO_EXTRAS
@@ -89,7 +89,7 @@ class BlockUpdate:
         self._told, self._due, self._begins_health = tuple(self._found.counts.tolist()), None, True
 
     def advance(self, run: Run | None, block: SampleBlock, trusted: bool = False) -> tuple[int, int]:
-        """Take regular samples of a block of at most `CAPACITY`; return why that ended, see `DONE`, and how many were taken.
+        """Take regular samples of a block of at most `capacity`; return why that ended, see `DONE`, and how many were taken.
 
         `run` is the present one. `trusted`: the only sample was looked at before. `reports` or `report` return the results.
         """
@@ -128,7 +128,7 @@ class BlockUpdate:
     def make_room(self) -> None:
         """Prepare the next call of the compiled update; pass pending rows to the health monitor when the buffer is full."""
         self._begin, self._news = tuple(self._found.counts.tolist()), NO_EXTRAS
-        if max(self._begin) > CAPACITY:
+        if max(self._begin) > self._capacity:
             self._tell_health()
             self._found.counts[:] = 0
             self._begin = self._told = 0, 0

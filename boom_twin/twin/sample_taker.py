@@ -41,7 +41,7 @@ from .regular import SHORTEST_STEP, near
 from .run import Run
 from .sample_check import SampleCheck
 from .stamp_check import Action, StampCheck, TimeStep, verdict_on
-from .state import NEWEST, NONE, STATUS, UNMATCHED, drop_waiting, new_state
+from .state import FOLLOWER_ROOM, NEWEST, NONE, ROOM, STATUS, UNMATCHED, Room, drop_waiting, new_state
 from .update import DONE, FAILED
 
 
@@ -60,6 +60,7 @@ class SampleTaker:
         causes: bool = False,
         is_live: bool = False,
         places: Mapping[str, Place] = NO_PLACES,
+        room: Room = ROOM,
     ) -> None:
         self.reads, self._drive, self.absent, scene = reads, reads.stream, frozenset(absent), as_scene(scene)
         self.scene, self.settings, self._health = scene, settings or Settings(), health
@@ -73,7 +74,7 @@ class SampleTaker:
         self._widths = [len(names) for names in self._channels.values()]
         self._edge = SampleCheck(self._channels, self._drive)
         self.requests = Requests(self.settings)
-        self._doubted = frozenset(doubted)
+        self._doubted, self._room = frozenset(doubted), room
         self._judged = True  # health, with the present sample
         self._fault_twins: FaultTwins | None = None
         if causes and health:
@@ -82,7 +83,7 @@ class SampleTaker:
 
     def _begin(self) -> None:
         """Reset state, model, estimate, health and zeros to those before the first sample."""
-        self._state = new_state(len(self.scene.joints), np.array(self._widths))
+        self._state = new_state(len(self.scene.joints), np.array(self._widths), self._room)
         self._state.clock[NEWEST] = NONE
         self._adopt(self._model(self.settings))
         self._run: Run | None = None
@@ -98,7 +99,8 @@ class SampleTaker:
 
         def make(each: Hypothesis) -> Follower:
             boom = each.scene, settings.tuned(each.load(*settings.load)), self.mounts
-            twin: Follower = kind(*boom, reads=self.reads, absent=self.absent, doubted=each.doubted, places=self.places)
+            sensors = {"reads": self.reads, "absent": self.absent, "doubted": each.doubted, "places": self.places}
+            twin: Follower = kind(*boom, **sensors, room=FOLLOWER_ROOM)
             return twin
 
         return make
@@ -133,7 +135,7 @@ class SampleTaker:
         self.plan = self._boom.plan
         parts = self._boom, model.limits, self._state, self._channels, self.judge
         self._former = before  # let go of when the next model is made, which may be in a thread of its own
-        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, before)
+        self._compiled = BlockUpdate(*parts, self.counts, self.shedding, self._room.samples, before)
         self._one = SampleBlock(np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros((1, max(self._widths))))
 
     def _take_over(self, stamp: int) -> list[str]:

@@ -15,14 +15,27 @@ Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 NONE = -(2**62)  # no stamp yet, ns
-KEPT = 16_384  # most expected readings, of the last `SPAN`: 8 kHz
 WAITING = 4096  # most samples that wait for a stroke
-RECENT = 16_384  # differences that the zero of a sensor may be found from
 ZEROS = 16  # sets of zeros that late samples may still need
 SLOT = 100_000_000  # ns; the first prediction in each has an outline, and health is judged with it
 
 EPOCH, NEWEST, CHECKED, TRUSTED, OTHERS, IN_SLOT, UNMATCHED, STATUS, BEGINS_SLOT, IS_DEFLECTED = range(10)  # of `clock`
 FIRST, COUNT = range(2)  # of a ring
+
+
+class Room(NamedTuple):
+    """Rows of a twin's buffers.
+
+    expected : expected readings of the last `SPAN`. recent : residuals that the zero of a sensor may be found from. samples :
+    samples that one call of the compiled update takes at most.
+    """
+
+    expected: int = 16_384
+    recent: int = 16_384
+    samples: int = 4096
+
+
+ROOM, FOLLOWER_ROOM = Room(), Room(1024, 1, 1024)  # for 8 kHz of strokes; for samples at 50 Hz, without requests of a zero
 
 
 @by_reference
@@ -115,14 +128,15 @@ def new_ring(size: int, values: int, sigmas: int = 0, strokes: int = 0) -> Ring:
     )  # fmt: skip
 
 
-def new_state(joints: int, channels: Integers) -> TwinState:
+def new_state(joints: int, channels: Integers, room: Room) -> TwinState:
     """Return the state of a new twin for so many joints, and so many channels in every stream."""
     streams, width, measured = len(channels), int(channels.max()), int(channels[1:].sum())
     return TwinState(
         clock=np.zeros(10, np.int64), interval=np.zeros(1),
         newest=np.full(streams, NONE), usual=np.zeros(streams), held=np.zeros(streams, np.int64),
         strokes=np.zeros(joints), taken=np.zeros(joints),
-        past=new_ring(KEPT, measured, measured, joints), waiting=new_ring(WAITING, width), recent=new_ring(RECENT, width),
+        past=new_ring(room.expected, measured, measured, joints), waiting=new_ring(WAITING, width),
+        recent=new_ring(room.recent, width),
         zeros_since=np.full(ZEROS, NONE), zeros=np.zeros((ZEROS, streams, width)), zero_sets=np.ones(1, np.int64),
     )  # fmt: skip
 
@@ -136,8 +150,7 @@ def new_output(samples: int, joints: int, row: int, moments: int, channels: Inte
         estimates=np.zeros((samples, WIDTH)), measured=np.zeros((samples, joints)),
         residual_at=np.zeros(residuals, np.int64), residual_streams=np.zeros(residuals, np.int64),
         residual_stamps=np.zeros(residuals, np.int64),
-        values=np.full((residuals, width), np.nan), sigmas=np.full((residuals, width), np.nan),
-        raw=np.full((residuals, width), np.nan),
+        values=np.zeros((residuals, width)), sigmas=np.zeros((residuals, width)), raw=np.zeros((residuals, width)),
     )  # fmt: skip
 
 

@@ -12,7 +12,6 @@ from ..errors import UsageError
 from ..health.monitor import warm_up
 from ..scene.kinematics import strokes_of_angles
 from ..types import SECOND, Array, Health, Report, Sample, Stream, StrokeReading
-from .block_update import CAPACITY
 from .blocks import STREAMS, ReportBlock, SampleBlock, block_of
 from .loaded_model import LoadedModel
 from .readings import check_units, merged, samples_of
@@ -47,6 +46,8 @@ class Twin(SampleTaker):
         True if no sample may wait for the name of a cause.
     places : mapping of str to Place, optional
         Of sensors that have one, such as ``imu_2``. The tip IMU is at the tip if it is not among them.
+    room : Room
+        Rows of its buffers, see `boom_twin.twin.state.Room`.
 
     Attributes
     ----------
@@ -216,7 +217,7 @@ class Twin(SampleTaker):
         row, size, channels, self._judged = 0, len(block.stamps), self._widths, True
         while row < size:
             if self._run is not None and self._edge.is_sure and not self.requests.due:
-                end = row + CAPACITY
+                end = row + self._room.samples
                 if self._fault_twins is not None:  # they take a second before its verdict may be asked for
                     self._fault_twins.reach(int(block.stamps[row]), self._failing)
                     is_later = block.stamps[row:end] // SECOND != block.stamps[row] // SECOND

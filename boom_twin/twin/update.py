@@ -26,7 +26,6 @@ from .state import (
     FIRST,
     IN_SLOT,
     IS_DEFLECTED,
-    KEPT,
     NEWEST,
     SLOT,
     STATUS,
@@ -155,7 +154,7 @@ def keep_strokes(state, stamp):
     """Store the newest strokes with those of the last `SPAN`; return their row, where the expected readings go."""
     past = state.past
     while past.bounds[COUNT] > 0 and past.stamps[past.bounds[FIRST]] < stamp - SPAN:
-        past.bounds[FIRST] = (past.bounds[FIRST] + 1) % KEPT
+        past.bounds[FIRST] = (past.bounds[FIRST] + 1) % past.stamps.shape[0]
         past.bounds[COUNT] -= 1
     at = new_row(past)
     past.stamps[at] = stamp
@@ -236,8 +235,8 @@ def write_residual(limits, state, stream, stamp, values, row, found):
     if after < 0:
         return False
     zeros = zeros_at(state, stamp)
-    before = (after + KEPT - 1) % KEPT
     past, at, k = state.past, limits.first[stream], new_residual(found, row, stream, stamp)
+    before = (after if after > 0 else past.stamps.shape[0]) - 1
     recent = new_row(state.recent)
     state.recent.stamps[recent], state.recent.streams[recent] = stamp, stream
     for i in range(limits.channels[stream]):
@@ -262,7 +261,7 @@ def matched(past, stamp):
     """
     at = -1
     for back in range(past.bounds[COUNT]):
-        row = (past.bounds[FIRST] + past.bounds[COUNT] - 1 - back) % KEPT
+        row = (past.bounds[FIRST] + past.bounds[COUNT] - 1 - back) % past.stamps.shape[0]
         if past.stamps[row] == stamp:
             return row, 1.0
         if past.stamps[row] < stamp:
