@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..scene.schema import Scene
-from ..types import NO_PLACES, SENSORS, Place, Stream, StrokeReading, channels_of
+from ..types import SENSORS, Stream, channels_of
 from .expected import Expected, RestModel
 from .hypotheses import (
     ANY_ZERO,
@@ -118,30 +117,18 @@ class _Explanation:
     cost: float
 
 
-def check(
-    scene: Scene,
-    reads: StrokeReading,
-    declared: Declared,
-    window: Window,
-    is_quick: bool = False,
-    places: Mapping[str, Place] = NO_PLACES,
-) -> Checked | None:
+def check(model: RestModel, declared: Declared, window: Window, is_quick: bool = False) -> Checked | None:
     """Check the declaration of a rig's sensors against readings.
 
     Parameters
     ----------
-    scene : Scene
-        Scene with load.
-    reads : StrokeReading
-        Quantity of the stroke readings.
+    model : RestModel
     declared : mapping of Stream to sequence of Channel
         Declaration of every channel, in the order of the channels.
     window : mapping of Stream to mapping of str to Series
         Readings by name (IMU: by axis). Strokes are required.
     is_quick : bool
         Flag channels not read as declared, without a correction.
-    places : mapping of str to Place
-        See `boom_twin.Twin`.
 
     Returns
     -------
@@ -150,11 +137,10 @@ def check(
     """
     tables = {stream: table for stream, table in tables_of(window).items() if len(table.names)}
     strokes = tables.get(Stream.STROKES)
-    if strokes is None or not len(strokes.values) or len(strokes.names) < len(scene.joints):
+    if strokes is None or not len(strokes.values) or len(strokes.names) < len(model.scene.joints):
         return None
     moved = bool((np.ptp(strokes.values, axis=0) > MOVED * np.abs(strokes.values).max()).any())
-    model, weight = RestModel(scene, reads, places), MOVED_WEIGHT if moved else STILL_WEIGHT
-    checker = _Checker(model, declared, tables, weight, is_quick)
+    checker = _Checker(model, declared, tables, MOVED_WEIGHT if moved else STILL_WEIGHT, is_quick)
     return Checked(checker.verdicts(), moved, checker.found[0].expected, tables) if checker.found else None
 
 
