@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..types import LIMIT, SECOND, SENSORS, Array, Sample, Stream
-from .cdr_decoder import Axes
+from .cdr_decoder import Axes, Vector
+from .message_block import Integers
 from .sample_assembler import Reading, SampleAssembler
 from .topic_table import Topics, factor, load_topics
 
@@ -153,6 +154,45 @@ class SampleDecoder:
         self.refused += not readings and self.oddities.total() > odd
         found = [each for reading in readings for each in self.assembler.take(reading)]
         self.refused += self.assembler.refused - contested
+        return found
+
+    def many(self, streams: Iterable[Stream], stamps: Integers, msg: Any) -> list[tuple[Stream, Integers, Array]] | None:
+        """Return streams, stamps (k,) in ns and values (k, channels) of the samples of many messages; None if any is irregular.
+
+        Parameters
+        ----------
+        streams : iterable of Stream
+            As for `samples`.
+        stamps : ndarray of int64, shape (k,)
+            At least two.
+        msg : message with arrays (k,) for numbers
+            From `boom_twin.messages.cdr_decoder.CdrDecoder.read_many`.
+        """
+        found, frame = list[tuple[Stream, Integers, Array]](), msg.frame if isinstance(msg, Axes) else ""
+        for stream in streams:
+            channels, kind, taken = self._channels[stream], SENSORS[stream], stamps - self.delays[stream]
+            columns, names = getattr(msg, kind.field), Vector._fields if isinstance(msg, Axes) else msg.name
+            if isinstance(msg, Axes):
+                places = [names.index(axis) if axis else -1 for axis in channels.names]
+                is_absent = getattr(msg, f"{kind.field}_covariance")[0] == NO_MEASUREMENT
+                if kind.beside and is_absent.all():
+                    continue
+                is_regular = not is_absent.any()
+            else:
+                places, *_, is_regular = channels.look(names)
+                is_regular &= len(columns) == len(names)
+            own = [i for i, place in enumerate(places) if place >= 0]
+            if not (is_regular and own and not kind.gives and ((stamps != 0) & (taken > 0) & (taken < LATEST)).all()):
+                return None
+            values = np.full((len(stamps), len(places)), np.nan)
+            for i in own:
+                zero, scale = channels.scales[i]
+                values[:, i] = (columns[places[i]] - zero) * scale
+            if not (np.abs(values[:, own]) <= LIMIT).all() or not self.assembler.is_regular(stream, taken, frame):
+                return None
+            found.append((stream, taken, in_range(values, *channels.range) if stream is Stream.ANGLES else values))
+        for each in found:
+            self.assembler.note(*each, frame)
         return found
 
     def put(self, stream: Stream, stamp_ns: int, msg: Any) -> Sample | None:

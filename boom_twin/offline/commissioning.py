@@ -26,6 +26,7 @@ from ..twin.driver import drive_blocks
 from ..twin.twin import Twin
 from ..types import SENSORS, Array, Change, Place, Stream, StrokeReading
 from ..wiring.check import Checked, Verdict, check
+from ..wiring.expected import RestModel
 from ..wiring.lag import Lag, lag_of
 from ..wiring.readings import Channel, Series, Window, is_checked
 from ..wiring.words import STROKES_ALONE, finding
@@ -121,7 +122,8 @@ def commission(
     settings = settings_of(session.path).settings
     series = readings_of(session, mapped.topics, joints, window)
     places = mapped.topics.places
-    found = check(loaded(own.scene, *settings.load), reads, declared(mapped.topics, joints), series, places=places)
+    model = RestModel(loaded(own.scene, *settings.load), reads, places)
+    found = check(model, declared(mapped.topics, joints), series)
     if found is None:
         names = [sensor.name for sensor in mapped.topics.sensors_of(Stream.STROKES, joints).values()]
         heard = series[Stream.STROKES]

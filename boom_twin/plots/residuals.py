@@ -74,8 +74,8 @@ def _distribution(axes: Axes, found: ResidualDistribution) -> None:
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)
     if found.mean is not None:
-        middles = 0.5 * (EDGES[:-1] + EDGES[1:])
-        axes.hist(middles, EDGES.tolist(), weights=found.counts, density=True, color=SKY, alpha=0.8, linewidth=0)
+        density = found.counts / (found.counts.sum() * np.diff(EDGES))
+        axes.stairs(density, EDGES, fill=True, color=SKY, alpha=0.8, linewidth=0)
         text = f"mean {found.mean:+.2f}\nsd {found.deviation:.2f}"
         axes.text(0.98, 0.97, text, transform=axes.transAxes, ha="right", va="top", fontsize=11, color=INK)
 

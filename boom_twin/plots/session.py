@@ -31,23 +31,19 @@ def replay_pictures(
     directory.mkdir(parents=True, exist_ok=True)
     import_plotting()
     tip, residuals, posture, spectrum = (directory / f"{name}.png" for name in ("tip", "residuals", "posture", "spectrum"))
-    written = [tip]
+    is_drawn = {tip: True, residuals: history.residual_names, posture: history.shapes, spectrum: has_spectrum(history)}
 
-    def draw_residuals() -> None:
-        if history.residual_names:
+    def draw_half() -> None:
+        if is_drawn[residuals]:
             residual_picture(residuals, session, history, note)
-
-    with beside(draw_residuals):  # it takes as long as the others together
-        tip_picture(tip, session, history, truth, note)
-        if history.residual_names:
-            written.append(residuals)
-        if history.shapes:
-            written.append(posture)
+        if is_drawn[posture]:
             posture_picture(posture, session, history, note)
-        if has_spectrum(history):
-            written.append(spectrum)
+
+    with beside(draw_half):
+        tip_picture(tip, session, history, truth, note)
+        if is_drawn[spectrum]:
             spectrum_picture(spectrum, session, history, note)
-    return written
+    return [path for path, is_there in is_drawn.items() if is_there]
 
 
 SHOWN = 30.0  # standard deviations at which a bar is cut off, with its number beside it

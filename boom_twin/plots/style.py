@@ -96,11 +96,11 @@ def picture(path: Path, title: str, note: str = "", size: tuple[float, float] = 
     write_atomic(path, content.getvalue())
 
 
-def _part_titles_and_legends(figure: Figure) -> None:
+def _part_titles_and_legends(figure: Any) -> None:
     """Raise every title that a legend would cover above that legend."""
     from matplotlib.text import Text
 
-    figure.draw_without_rendering()
+    figure.get_layout_engine().execute(figure)
     has_moved = False
     for axes in figure.axes:
         legend, text = axes.get_legend(), axes.get_title(loc="left")

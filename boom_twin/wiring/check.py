@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..scene.schema import Scene
-from ..types import NO_PLACES, SENSORS, Place, Stream, StrokeReading, channels_of
+from ..types import SENSORS, Stream, channels_of
 from .expected import Expected, RestModel
 from .hypotheses import (
     ANY_ZERO,
@@ -98,26 +97,18 @@ class _Explanation:
     cost: float
 
 
-def check(
-    scene: Scene,
-    reads: StrokeReading,
-    declared: Declared,
-    window: Window,
-    is_quick: bool = False,
-    places: Mapping[str, Place] = NO_PLACES,
-) -> Checked | None:
+def check(model: RestModel, declared: Declared, window: Window, is_quick: bool = False) -> Checked | None:
     """Check the declaration of a rig's sensors against readings; None if no block has all strokes, or nothing explains them.
 
     `declared` has every channel in their order. `window` has readings by name (IMU: by axis); strokes are required.
-    `is_quick` only flags channels that are not read as declared. For `places` see `boom_twin.Twin`.
+    `is_quick` only flags channels that are not read as declared.
     """
     tables = {stream: table for stream, table in tables_of(window).items() if len(table.names)}
     strokes = tables.get(Stream.STROKES)
-    if strokes is None or not len(strokes.values) or len(strokes.names) < len(scene.joints):
+    if strokes is None or not len(strokes.values) or len(strokes.names) < len(model.scene.joints):
         return None
     moved = bool((np.ptp(strokes.values, axis=0) > MOVED * np.abs(strokes.values).max()).any())
-    model, weight = RestModel(scene, reads, places), MOVED_WEIGHT if moved else STILL_WEIGHT
-    checker = _Checker(model, declared, tables, weight, is_quick)
+    checker = _Checker(model, declared, tables, MOVED_WEIGHT if moved else STILL_WEIGHT, is_quick)
     return Checked(checker.verdicts(), moved, checker.found[0].expected, tables) if checker.found else None
 
 
