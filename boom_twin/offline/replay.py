@@ -42,7 +42,7 @@ from .recording import Recording, Stretch
 from .refused_strokes import RefusedStrokes
 from .sample_table import RowsInMemory, SampleTable, columns_of
 from .session_samples import SessionSamples
-from .summary import alarm_as_text, summary_of
+from .summary import alarm_as_text, clocks_of, summary_of
 from .threads import quick_switches, read_ahead, result_bag
 
 SESSION = "session"
@@ -251,7 +251,7 @@ def replay_into(
     if options.with_bag:
         SessionSheet(__version__, given.kept.text, strokes=given.strokes.reading).write(out / "bag")
     file = out / "bag" / FILE_NAME if options.with_bag else None
-    summary = summary_of(recording, twin.counts, wall, file) | given.summary
+    summary = summary_of(recording, twin.counts, wall, file) | clocks_of(twin.clocks) | given.summary
     if errors is not None:
         summary |= errors.rms
     write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
