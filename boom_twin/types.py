@@ -228,6 +228,18 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True)
+class Clock:
+    """Clock of a stream against that of the strokes, as estimated."""
+
+    lag: float
+    lag_sigma: float
+    """By which its stamps are late, and the standard deviation, s."""
+    drift: float
+    drift_sigma: float
+    """Rate at which the lag grows, and the standard deviation; 1e-6 is 1 ppm."""
+
+
+@dataclass(frozen=True, slots=True)
 class Residuals:
     """Residuals at the stamp of one sample: measured minus predicted.
 

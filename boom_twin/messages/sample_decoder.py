@@ -108,6 +108,7 @@ ODDITIES = {
     "not finite": "a reading without a value (NaN or infinity); it is left out",
     "absurd magnitude": f"above {LIMIT:g} in a message; that value is left out",
     "no measurement": "an Imu says by linear_acceleration_covariance[0] = -1 that it has none (REP-145); it is left out",
+    "another frame": "header.frame_id is not that of the mapping: another sensor, or other axes; the message is left out",
     "no usable value": "nothing of a message could be used",
     "no stamp": "header.stamp is 0; the message is left out: let its driver set header.stamp to the time of the reading",
     "impossible stamp": "before 1970, or more seconds than a message can hold; the message is left out",
@@ -138,6 +139,7 @@ class SampleDecoder:
         pair = {Stream.STROKES: Stream.ANGLES, Stream.ANGLES: Stream.STROKES}
         self._sharing = pair if topics.is_shared else {}
         self.delays = {stream: topics.delay(stream) for stream in self._channels}
+        self._frames = {stream.value: topic.frame_id for stream, topic in topics.inputs.items()}
         self._areas = topics.areas
         self.refused = 0  # number of messages without a usable value; one without any names and values is not counted
         self._by_axis = {stream for stream, kind in SENSORS.items() if not kind.is_named}
@@ -207,6 +209,10 @@ class SampleDecoder:
         if not (stamp_ns and 0 < taken < LATEST):
             self.oddities["impossible stamp" if stamp_ns else "no stamp"] += 1
             return None
+        frame = "" if is_by_name else msg.frame if isinstance(msg, Axes) else msg.header.frame_id
+        if frame != (self._frames.get(SENSORS[stream].beside or stream.value) or frame):
+            self.oddities["another frame"] += not SENSORS[stream].beside
+            return None
         raw, is_whole = self._by_name(msg, stream) if is_by_name else (self._by_axes(msg, stream), True)
         if raw is None:
             return None
@@ -218,7 +224,6 @@ class SampleDecoder:
         if isnan(values[0]) and all(map(isnan, values)):
             self.oddities["no usable value"] += 1
             return None
-        frame = "" if is_by_name else msg.frame if isinstance(msg, Axes) else msg.header.frame_id
         array = in_range(np.array(values), *channels.range) if stream is Stream.ANGLES else np.array(values)
         return Reading(Sample(stream, taken, array), is_whole, frame)
 

@@ -94,7 +94,8 @@ class ReplayInputs:
         """Return a twin for the session, which names causes of faults if that is asked for."""
         topics, reads = self.topics, self.strokes.reading
         mounts, settings = topics.mounts(len(self.scene.joints)), topics.noise_of(self.settings)
-        return Twin(self.scene, settings, mounts, self.health, reads, topics.absent, causes=causes, places=topics.places)
+        given = self.scene, settings, mounts, self.health, reads, topics.absent
+        return Twin(*given, causes=causes, places=topics.places, lagging=topics.lagging)
 
     def refuse(self, reason: str) -> None:
         """Raise BagError if there is a `reason` for which the session is of another boom than the scene."""

@@ -42,7 +42,7 @@ from .progress import Progress
 from .recording import Recording, Stretch
 from .sample_table import SampleTable, columns_of
 from .session_samples import SessionSamples
-from .summary import alarm_as_text, summary_of
+from .summary import alarm_as_text, clocks_of, summary_of
 from .threads import quick_switches, read_ahead, result_bag
 
 SESSION = "session"  # folder in a replay of a table, with the session that was made of it
@@ -249,7 +249,7 @@ def replay_into(
     if options.with_bag:
         SessionSheet(__version__, given.kept.text, strokes=given.strokes.reading).write(out / "bag")
     file = out / "bag" / FILE_NAME if options.with_bag else None
-    summary = summary_of(recording, twin.counts, wall, file) | given.summary
+    summary = summary_of(recording, twin.counts, wall, file) | clocks_of(twin.clocks) | given.summary
     if errors is not None:
         summary |= errors.rms
     write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")

@@ -86,10 +86,11 @@ def loaded_model(
     reads: StrokeReading,
     absent: Collection[str],
     places: Mapping[str, Place],
+    lagging: Collection[Stream],
 ) -> LoadedModel:
     """Return the model of `scene` under the load of `settings`; for the parameters see `boom_twin.Twin`."""
     scene = loaded(scene, *settings.load)
-    boom = BoomPredictor(scene, settings, mounts, reads, places)
+    boom = BoomPredictor(scene, settings, mounts, reads, places, lagging)
     judge = HealthMonitor(scene, settings, tuple(mounts), absent, boom.channels, reads, places) if health else None
     _ = boom.held  # made here, where no sample waits for it
     return LoadedModel(scene, limits_of(scene, boom, settings, absent, reads), boom, judge)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config.settings import Settings
+from ..deviation.predictor import BoomPredictor
 from ..errors import BoomTwinError, SolverError
 from ..health.causes import Hypothesis
 from ..health.fault_twins import FaultTwins, Follower
@@ -48,6 +49,8 @@ from .update import DONE, FAILED
 class SampleTaker:
     """State and model of a twin, and what single samples do to them; `boom_twin.twin.twin.Twin` is the public side."""
 
+    _boom: BoomPredictor
+
     def __init__(
         self,
         scene: SceneSource = None,
@@ -60,6 +63,7 @@ class SampleTaker:
         causes: bool = False,
         is_live: bool = False,
         places: Mapping[str, Place] = NO_PLACES,
+        lagging: Collection[Stream] = (),
         room: Room = ROOM,
     ) -> None:
         self.reads, self._drive, self.absent, scene = reads, reads.stream, frozenset(absent), as_scene(scene)
@@ -67,7 +71,7 @@ class SampleTaker:
         self.counts: Counter[str] = Counter()
         self.shedding = LoadShedding()
         self.mounts = tuple(mounts) or (None,) * len(scene.joints)
-        self.places = dict(places)
+        self.places, self.lagging = dict(places), tuple(lagging)
         self._channels = channels_of(len(scene.joints), streams_of(self.places))
         self.absent |= {name for name in self._channels[Stream.MOMENTS] if name not in self.places}
         self._there = {s: np.array([name not in absent for name in names]) for s, names in self._channels.items()}
@@ -99,8 +103,8 @@ class SampleTaker:
 
         def make(each: Hypothesis) -> Follower:
             boom = each.scene, settings.tuned(each.load(*settings.load)), self.mounts
-            sensors = {"reads": self.reads, "absent": self.absent, "doubted": each.doubted, "places": self.places}
-            twin: Follower = kind(*boom, **sensors, room=FOLLOWER_ROOM)
+            sensors: Any = {"absent": self.absent, "doubted": each.doubted, "places": self.places, "lagging": self.lagging}
+            twin: Follower = kind(*boom, reads=self.reads, **sensors, room=FOLLOWER_ROOM)
             return twin
 
         return make
@@ -124,10 +128,13 @@ class SampleTaker:
 
     def _model(self, settings: Settings) -> LoadedModel:
         self._former: BlockUpdate | None = None
-        return loaded_model(self.scene, settings, self.mounts, self._health, self.reads, self.absent, self.places)
+        placed = self.absent, self.places, self.lagging
+        return loaded_model(self.scene, settings, self.mounts, self._health, self.reads, *placed)
 
     def _adopt(self, model: LoadedModel, before: BlockUpdate | None = None) -> None:
         """Use this model, which has the present load, in place of that of `before`."""
+        if before is not None:
+            model.boom.filters.lags[:] = self._boom.filters.lags
         self._boom, self.judge = model.boom, model.judge
         self._boom.doubt(self._doubted)
         if self.judge is not None:

@@ -11,7 +11,7 @@ from ..config.settings import Settings
 from ..errors import UsageError
 from ..health.monitor import warm_up
 from ..scene.kinematics import strokes_of_angles
-from ..types import SECOND, Array, Health, Report, Sample, Stream, StrokeReading
+from ..types import SECOND, Array, Clock, Health, Report, Sample, Stream, StrokeReading
 from .blocks import STREAMS, ReportBlock, SampleBlock, block_of
 from .loaded_model import LoadedModel
 from .readings import check_units, merged, samples_of
@@ -46,6 +46,8 @@ class Twin(SampleTaker):
         True if no sample may wait for the name of a cause.
     places : mapping of str to Place, optional
         Of sensors that have one, such as ``imu_2``. The tip IMU is at the tip if it is not among them.
+    lagging : collection of Stream
+        Streams whose stamps are late, or early, by a time that is not known. It is estimated, see `clocks`.
     room : Room
         Rows of its buffers, see `boom_twin.twin.state.Room`.
 
@@ -88,6 +90,11 @@ class Twin(SampleTaker):
     def evidence(self) -> float:
         """Log likelihood of all readings, up to a constant that depends on the samples alone."""
         return self._boom.evidence
+
+    @property
+    def clocks(self) -> dict[Stream, Clock]:
+        """Lag and drift of every lagging stream, as estimated by now."""
+        return self._boom.clocks
 
     def rezero(self, sensor: str) -> dict[str, float]:
         """Request the mean residual of the last second as the zero of a sensor; return its new zeros by channel.

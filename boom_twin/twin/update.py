@@ -55,7 +55,7 @@ def update(t, boom, live, work, p, f, bending, out, limits, state, streams, stam
     while row < stamps.shape[0]:
         stamp, before = stamps[row], found.counts[1]
         if streams[row] != limits.drive:
-            if not compare(limits, state, streams[row], stamp, values[row], row, trusted, found):
+            if not compare(limits, state, f.lags, streams[row], stamp, values[row], row, trusted, found):
                 return ODD, row
             take_residuals(limits, state, p, f, before, found)
             row += 1
@@ -167,19 +167,22 @@ def keep_strokes(state, stamp):
 
 
 @inner
-def compare(limits, state, stream, stamp, values, row, trusted, found):
+def compare(limits, state, lags, stream, stamp, values, row, trusted, found):
     """Write the residuals of a measured sample, or store it until its strokes come.
+
+    Its stamp is corrected by the estimated lag of its stream.
 
     Return False, with nothing done, if the sample is irregular.
     """
     if not trusted and not is_regular(limits, state, stream, stamp, values):
         return False
-    if stamp > state.clock[NEWEST]:
+    taken = stamp - np.int64(np.rint(lags[stream] / NANO))
+    if taken > state.clock[NEWEST]:
         if state.waiting.bounds[COUNT] == WAITING:
             forget_waiting(state.waiting, 1)
             state.clock[UNMATCHED] += 1
-        wait(limits, state, stream, stamp, values)
-    elif not write_residual(limits, state, stream, stamp, values, row, found):
+        wait(limits, state, stream, taken, values)
+    elif not write_residual(limits, state, stream, taken, values, row, found):
         return False
     if not trusted:
         note_stamp(state, stream, stamp)

@@ -72,6 +72,12 @@ class Checked(NamedTuple):
     expected: Expected
     tables: Mapping[Stream, Table]
 
+    def lacks(self, verdict: Verdict) -> bool:
+        """Return True if a channel is in no message, while others of its stream are read as declared."""
+        own = [each for each in self.verdicts if each.stream is verdict.stream]
+        names = self.tables[verdict.stream].names
+        return verdict.declared.name not in names and not any(each.is_wrong for each in own)
+
     @property
     def has_strokes_alone(self) -> bool:
         """Return True if no other sensor was read. Strokes swapped or shifted within the travels are then not found."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import cycle
 from typing import Any
@@ -26,6 +26,7 @@ from ...twin.events import EVENTS, TOLD_AT_ONCE
 from ...twin.load_shedding import LoadShedding
 from ...twin.twin import Twin
 from ...types import NANO, Stream
+from ...types import Clock as StreamClock
 from ..diagnostics_publisher import DiagnosticsPublisher
 from ..runtime import Log, node_name, qos_profile
 from .receive_queue import LARGEST, ReceiveQueue
@@ -130,6 +131,7 @@ class Diagnostics:
         self.watch = TwinWatch({}, {}, Thresholds())  # receives the twin's events. Every `configure` replaces it
         self._counts: dict[str, Mapping[str, int]] = {}
         self._shedding: LoadShedding | None = None
+        self._lags: Callable[[], Mapping[Stream, StreamClock]] = dict
         self._decoder: SampleDecoder | None = None
         self._scene, self._joints = "", 0
         self._told: set[str] = set()
@@ -142,6 +144,7 @@ class Diagnostics:
     def configure(self, twin: Twin, decoder: SampleDecoder, scene: str) -> None:
         """Watch a newly configured twin."""
         sensors = sensors_of(twin.scene, twin.settings, self._required, twin.mounts, twin.absent)
+        self._lags = lambda: twin.clocks
         stress = stress_model(twin.scene, twin.reads)
         self.watch = TwinWatch(sensors, self._inputs, self.watch.thresholds, stress=stress)
         self._queue.oddities.clear()
@@ -188,6 +191,9 @@ class Diagnostics:
         clock = self._node.get_clock().now().nanoseconds * NANO
         told: dict[str, Value] = {"scene": self._scene}
         told |= {f"{kind}: {name}": count for kind, found in self._counts.items() for name, count in sorted(found.items())}
+        for stream, each in self._lags().items():
+            told |= {f"{stream.value} lag_s": each.lag, f"{stream.value} lag_sigma_s": each.lag_sigma}
+            told[f"{stream.value} clock_drift_ppm"] = 1e6 * each.drift
         peers = self._peers
         wrong, received = self._wrong_names(), self._queue.look()
         ends = peers.publishers, peers.subscribers.values()
