@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from ..batch.results import BatchFolder
     from ..batch.session_task import Row, SessionTask
 
-MEGABYTE = 1_000_000
-
 
 def add_arguments(parser: ArgumentParser) -> None:
     sources = "sessions, globs (quote them), or files *.txt that list these, one a line"
@@ -113,7 +111,7 @@ def _tasks(args: Namespace, sessions: Sequence[Path], folder: BatchFolder) -> li
             report=args.report,
             keep_bag=args.keep_bags,
             time=args.timeout,
-            memory=round(args.memory * MEGABYTE),
+            memory=round(1e6 * args.memory),
             retries=args.retries,
         )
         for session in sessions

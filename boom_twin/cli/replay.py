@@ -142,7 +142,7 @@ def as_text(summary: dict[str, Any]) -> list[str]:
         ratio = hypot(summary["joint_residual_normalised_mean"][i], summary["joint_residual_normalised_std"][i])
         lines.append(f"joint {i + 1} residual   {1e3 * value:.3f} mrad rms, {ratio:.1f} times the expected noise")
     for name, count in summary["events"].items():
-        lines.append(f"{name:18s} {count_as_text(name, count)}")
+        lines.append(f"{name:18s} {count_as_text(name, count, StrokeReading(summary['strokes']))}")
     if "tip_error_rms_m" in summary:
         lines += _errors(summary)
     if "tip_load" in summary:
@@ -154,12 +154,12 @@ def as_text(summary: dict[str, Any]) -> list[str]:
     return [*lines, f"alarms             {len(alarms) or 'none'}", *(f"  {alarm_as_text(alarm)}" for alarm in alarms)]
 
 
-def count_as_text(name: str, count: int) -> str:
+def count_as_text(name: str, count: int, reads: StrokeReading) -> str:
     """Return in words how often an irregularity was met."""
     from ..messages.sample_decoder import ODDITIES
-    from ..twin.events import EVENTS
+    from ..twin.events import event_meaning
 
-    meaning = (EVENTS | ODDITIES).get(name, "").partition(";")[0]
+    meaning = (event_meaning(name, reads) or ODDITIES.get(name, "")).partition(";")[0]
     return f"{count} time{'' if count == 1 else 's'}" + (f": {meaning}" if meaning else "")
 
 

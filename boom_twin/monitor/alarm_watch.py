@@ -11,7 +11,6 @@ from .data.feed import Feed
 from .data.status import ListedAlarm
 
 BEGIN, CAUSE, END = "begin", "cause", "end"  # kinds of changes
-MICRO = 1000  # ns
 
 
 class AlarmWatch:
@@ -65,5 +64,5 @@ class AlarmWatch:
 
     def _date(self, time: float) -> str:
         stamp = self._feed.store.epoch + round(time * SECOND)
-        date = datetime.fromtimestamp(stamp // SECOND, UTC) + timedelta(microseconds=stamp % SECOND // MICRO)
+        date = datetime.fromtimestamp(stamp // SECOND, UTC) + timedelta(microseconds=stamp % SECOND // 1000)
         return date.isoformat(timespec="microseconds").replace("+00:00", "Z")

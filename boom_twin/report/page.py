@@ -18,7 +18,7 @@ from ..plots.health import frequency_picture, moment_picture, timeline_picture
 from ..scene.schema import DEPTH_BY_GYRATION
 from ..system.atomic_files import write_atomic
 from ..texts import alarm_sentence
-from ..twin.events import EVENTS
+from ..twin.events import event_meaning
 from ..types import SECOND, SENSORS, Stream
 from .evaluation import Evaluation
 from .fatigue import LIVES, NOISE_RANGE, hours_as_text, hours_to_end, yearly_as_text
@@ -278,11 +278,11 @@ def _fatigue(found: Evaluation) -> list[str]:
 
 def _events(found: Evaluation) -> list[str]:
     gaps = [(f"{start:.3f} to {stop:.3f} s", stop - start) for start, stop in found.history.gaps]
-    driven = found.result.recording.reads.named
-    events = [(name, count, EVENTS.get(name, "seen in a message")) for name, count in found.result.summary["events"].items()]
+    reads, counted = found.result.recording.reads, found.result.summary["events"]
+    events = [(name, count, event_meaning(name, reads) or "seen in a message") for name, count in counted.items()]
     return [
         heading("Gaps and events"),
-        table((f"gap of the {driven}", "s"), gaps) if gaps else paragraph(f"No gap in the {driven}."),
+        table((f"gap of the {reads.named}", "s"), gaps) if gaps else paragraph(f"No gap in the {reads.named}."),
         table(("event", "times", "what it is"), events) if events else paragraph("Nothing out of the ordinary."),
     ]
 

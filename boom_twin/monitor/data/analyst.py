@@ -40,7 +40,6 @@ SIGNALS = (
 )
 """The best first: the prediction knows nothing of what shakes the boom."""
 RESPONSE_FREQUENCIES = np.geomspace(0.25, 30.0, 400)  # frequencies of the responses, Hz
-MILLIMETRE = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +64,7 @@ class ResponseList(PresentPosture[TipResponses]):
         try:
             boom = linearised_boom(self._scene, strokes)
             drives = range(boom.plan.joints)
-            loads = [boom.load(UPWARD), *(MILLIMETRE * boom.load(drive=i) for i in drives)]
+            loads = [boom.load(UPWARD), *(1e-3 * boom.load(drive=i) for i in drives)]
             columns = [np.linalg.norm(boom.respond(RESPONSE_FREQUENCIES, load).tip_acceleration, axis=1) for load in loads]
         except BoomTwinError as error:
             return TipResponses(trouble=str(error))
