@@ -142,8 +142,8 @@ def commission(
     if with_lags and all(v.is_sure or not v.is_wrong for v in found.verdicts if v.stream is Stream.STROKES):
         topics = mapping_from(document, mapped.source, joints).of_scene(own.scene.joints)
         mounts = topics.mounts(joints)
-        given = topics.noise_of(settings), mounts, False, told or reads, topics.absent
-        twin = Twin(own.scene, *given, places=topics.places, lagging=topics.lagging)
+        sensing = topics.noise_of(settings), mounts, False, told or reads, topics.absent
+        twin = Twin(own.scene, *sensing, places=topics.places, lagging=topics.lagging)
         lags = _lags(twin, session, topics, window, found)
         for stream, lag in lags.items():
             if is_late(lag) and stream not in topics.lagging:
@@ -152,7 +152,7 @@ def commission(
                 entry["delay"] = "auto" if abs(delay) < MOST_LAG else delay
         topics = mapping_from(document, mapped.source, joints).of_scene(own.scene.joints)
         if any(stream in lags for stream in topics.lagging):
-            twin = Twin(own.scene, *given, places=topics.places, lagging=topics.lagging)
+            twin = Twin(own.scene, *sensing, places=topics.places, lagging=topics.lagging)
             for _ in drive_blocks(twin, _samples(session, topics, window, joints)):
                 pass
             lags |= {stream: Lag(clock.lag, clock.lag_sigma) for stream, clock in twin.clocks.items()}
