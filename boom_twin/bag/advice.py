@@ -156,10 +156,7 @@ class Publishable:
 def publishable(session: Session, names: Sequence[str] | None = None) -> list[Publishable]:
     """Return the topics with these names; without names, strokes and all inputs with messages.
 
-    Raises
-    ------
-    BagError
-        A topic is missing, is empty, or is an input of another type.
+    Raise BagError if a topic is missing, is empty, or is an input of another type.
     """
     topics = mapping_of(session.path).topics
     if names is None:

@@ -141,10 +141,7 @@ class Storage:
     def check(self) -> None:
         """Report a disk that does not answer, or that answers again.
 
-        Raises
-        ------
-        BagError
-            The disk is full or fails, or too much waits for it.
+        Raise BagError if the disk is full or fails, or too much waits for it.
         """
         if self._error is not None:
             raise self._error
@@ -172,10 +169,7 @@ class Storage:
     def close(self) -> list[int]:
         """Complete the bag and return the number of written messages by key.
 
-        Raises
-        ------
-        BagError
-            The disk is full or fails, or does not answer.
+        Raise BagError if the disk is full or fails, or does not answer.
         """
         self._queue.put(None)
         self._thread.join(PATIENCE)

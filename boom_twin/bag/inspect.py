@@ -149,12 +149,7 @@ class BagInfo:
 def inspect(path: Path, window: TimeWindow = WHOLE) -> BagInfo:
     """Read a session once and return the statistics of its messages in the window.
 
-    The window counts from the first message of the session.
-
-    Raises
-    ------
-    BagError
-        There is no session, or it is damaged.
+    The window counts from the first message of the session. Raise BagError if there is no session, or it is damaged.
     """
     session = scan(path)
     tallies = {topic.name: Tally(topic.name, topic.type, False, _NAMED in topic.type) for topic in session.topics}

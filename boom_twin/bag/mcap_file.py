@@ -251,10 +251,7 @@ def _notes(found: Iterable[Metadata]) -> dict[str, str]:
 def _content(file: BinaryIO, piece: ChunkIndex) -> bytes:
     """Return the bytes of the records in a piece of a file: a chunk with verified checksum, or messages outside chunks.
 
-    Raises
-    ------
-    BagError
-        The piece is larger than `MOST_HELD`.
+    Raise BagError if the piece is larger than `MOST_HELD`.
     """
     if (size := max(piece.chunk_length, piece.uncompressed_size)) > MOST_HELD:
         remedy = "Write smaller chunks: `mcap compress --chunk-size 1048576 IN.mcap -o OUT.mcap`."

@@ -56,10 +56,7 @@ _UNPACK: dict[str, Callable[[bytes, int], bytes]] = {"": lambda data, limit: dat
 def unpack(chunk: Chunk) -> bytes:
     """Return the content of a chunk after verifying its size and, if it has one, its checksum.
 
-    Raises
-    ------
-    McapError
-        The compression is unknown, the content exceeds `MOST_HELD`, or size or checksum do not fit.
+    Raise McapError if the compression is unknown, the content exceeds `MOST_HELD`, or size or checksum do not fit.
     """
     span = f"chunk with log times {chunk.message_start_time} to {chunk.message_end_time} ns"
     try:
@@ -86,10 +83,7 @@ def unpack_start(chunk: Chunk) -> bytes:
 def bounds(content: bytes) -> Iterator[tuple[int, int, int]]:
     """Yield opcode, start and end of the body of every record in the content of a chunk.
 
-    Raises
-    ------
-    McapError
-        A record is not whole, or there are more than `MOST_TOGETHER`.
+    Raise McapError if a record is not whole, or there are more than `MOST_TOGETHER`.
     """
     place, size, left = 0, len(content), MOST_TOGETHER
     while place < size:

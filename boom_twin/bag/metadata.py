@@ -118,10 +118,7 @@ def refuse_packed(path: Path) -> None:
 def read_metadata(path: Path) -> BagMetadata:
     """Return the content of a ``metadata.yaml``.
 
-    Raises
-    ------
-    BagError
-        It is no ``metadata.yaml`` of rosbag2, or its bag has a storage or a compression that is not read.
+    Raise BagError if it is no ``metadata.yaml`` of rosbag2, or its bag has a storage or a compression that is not read.
     """
     remedy = "Move it away: the files of the session can be read without it."
     document = read_plain(path, BagError, remedy, received=True)

@@ -87,10 +87,7 @@ def _by_number(path: Path) -> list[tuple[int, str]]:
 def readable(file: SessionFile, asked: Mapping[str, str]) -> set[int]:
     """Return the channels that hold CDR of the types `asked` for by topic; others of such a topic are passed over.
 
-    Raises
-    ------
-    BagError
-        A topic is in another encoding alone, or a message is defined otherwise than in Jazzy.
+    Raise BagError if a topic is in another encoding alone, or a message is defined otherwise than in Jazzy.
     """
     found: set[int] = set()
     for topic, kind in asked.items():
@@ -183,10 +180,7 @@ def files_sha256(session: Session) -> str:
 def scan(path: Path) -> Session:
     """Return the content of the session at `path`. Messages of a file with a summary are not read.
 
-    Raises
-    ------
-    BagError
-        There is no session, a file is damaged or cut off, or its counts differ from ``metadata.yaml``.
+    Raise BagError if there is no session, a file is damaged or cut off, or its counts differ from ``metadata.yaml``.
     """
     told = incompleteness(path)
     try:

@@ -116,10 +116,7 @@ def kept(session: Path, key: str, option: str) -> KeptText | None:
 def kept_parameters(session: Path) -> tuple[dict[str, Any], str]:
     """Return the parameters of the twin that ran beside a recording, and a description of their place; empty without a twin.
 
-    Raises
-    ------
-    BagError
-        ``session.yaml`` cannot be read, or holds something else there.
+    Raise BagError if ``session.yaml`` cannot be read, or holds something else there.
     """
     path, remedy = sheet_path(session), "Move it away, or give the parameters by --params."
     values = _value(path, "twin", remedy)

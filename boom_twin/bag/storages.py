@@ -21,10 +21,7 @@ SUMMARISE: dict[str, Callable[[Path], SessionFile]] = {
 def summarise(path: Path) -> SessionFile:
     """Return the content of one file. A file with an unknown suffix is read as .mcap.
 
-    Raises
-    ------
-    BagError
-        The file is missing, of another kind, cut off or damaged.
+    Raise BagError if the file is missing, of another kind, cut off or damaged.
     """
     refuse_packed(path)
     return SUMMARISE.get(path.suffix.lower(), SUMMARISE[".mcap"])(path)

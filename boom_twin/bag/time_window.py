@@ -38,10 +38,7 @@ class TimeWindow:
     def cut(self, blocks: Iterable[MessageBlock], path: Path) -> Iterator[MessageBlock]:
         """Yield the messages inside the window. Blocks after its end are not read.
 
-        Raises
-        ------
-        BagError
-            No message is in the window.
+        Raise BagError if no message is in the window.
         """
         first: int | None = None
         is_empty, newest = True, 0.0

@@ -31,10 +31,7 @@ from .metadata import Recorded, file_information, metadata_of
 def claim_directory(directory: Path) -> None:
     """Make the directory. Refuse one that holds anything except the mark of a result that is being built.
 
-    Raises
-    ------
-    BagError
-        The directory is not empty, or cannot be made.
+    Raise BagError if the directory is not empty, or cannot be made.
     """
     try:
         directory.mkdir(parents=True, exist_ok=True)

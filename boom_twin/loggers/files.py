@@ -20,12 +20,7 @@ EXTRA = 'Run `pip install "boom_twin[import]"`.'
 def tables_of(path: Path) -> list[LogTable]:
     """Return the tables of a file: one for each group of channels in TDMS and MDF, else one.
 
-    Raises
-    ------
-    BagError
-        The file cannot be read.
-    UsageError
-        The library that reads it is not installed.
+    Raise BagError if the file cannot be read. Raise UsageError if the library that reads it is not installed.
     """
     try:
         open_received(path.resolve()).close()

@@ -118,10 +118,7 @@ class CsvLogTable(LogTable):
 class ArrayTable(LogTable):
     """Table of arrays in memory, one for each column. A `datetime64` array holds times.
 
-    Raises
-    ------
-    UsageError
-        A column is no array of numbers or times, or has another length than the others.
+    Raise UsageError if a column is no array of numbers or times, or has another length than the others.
     """
 
     def __init__(self, source: str, columns: Mapping[str, Any], units: Mapping[str, str], layout: str = "") -> None:

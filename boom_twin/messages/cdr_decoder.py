@@ -43,10 +43,7 @@ def stamp_in(data: bytes) -> int | None:
 def names_in(data: bytes) -> tuple[tuple[str, ...], int]:
     """Return ``name`` of a sensor_msgs/JointState, and the offset of its end in `data`.
 
-    Raises
-    ------
-    ValueError, struct.error, KeyError
-        The message is not whole.
+    Raise ValueError, struct.error or KeyError if the message is not whole.
     """
     length = _LENGTHS[_ORDERS[data[:2]]]
     place = _string(data, _ORIGIN + 8, length)[1]  # after frame_id
@@ -125,10 +122,7 @@ class CdrDecoder:
     def read(self, data: bytes) -> tuple[int, Any]:
         """Return stamp (ns) and message with the fields that `boom_twin.messages.sample_decoder.SampleDecoder` reads.
 
-        Raises
-        ------
-        ValueError, or what `decode` raises
-            The message is not whole.
+        Raise ValueError, or what `decode` raises, if the message is not whole.
         """
         is_imu = self._type == TYPES[Stream.IMU]
         is_little = data[:2] == _LITTLE and (is_imu or self._type == TYPES[Stream.STROKES])

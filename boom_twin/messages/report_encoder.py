@@ -71,13 +71,7 @@ def encode_changes(change: Change, frame: str = FRAME) -> bytes:
 
 
 def decode_changes(msg: Any) -> Change:
-    """Return the change in a decoded message.
-
-    Raises
-    ------
-    BagError
-        The message has names or values that a change cannot have.
-    """
+    """Return the change in a decoded message. Raise BagError if the message has names or values that a change cannot have."""
     values = dict(zip(msg.name, map(float, msg.position), strict=False))
     from_rest = values.pop(FROM_REST, 0.0)
     settings = {name: values.pop(name) for name in Settings.live_names() if name in values}

@@ -231,10 +231,7 @@ class Topics(_Entry):
     def of_scene(self, joints: Sequence[Joint]) -> Topics:
         """Return these topics of a scene: ranges of its joints, and areas of its cylinders, which turn pressures to forces.
 
-        Raises
-        ------
-        UsageError
-            The mapping says that there are pressures, but areas are not known.
+        Raise UsageError if the mapping says that there are pressures, but areas are not known.
         """
         topics = self.of_joints(joint.range_deg for joint in joints)
         topic, oils = self.inputs[Stream.PRESSURES], [joint.cylinder.oil for joint in joints]

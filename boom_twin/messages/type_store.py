@@ -55,12 +55,7 @@ def text_in(data: bytes) -> str:
 def decode(data: bytes, type_name: str) -> Any:
     """Return the message in `data`, which may have up to `PADDING` bytes after its end, as Fast DDS leaves there.
 
-    The `Typestore`'s own decoder takes 3 bytes.
-
-    Raises
-    ------
-    SerdeError
-        The message is not whole, or more stands behind it.
+    The `Typestore`'s own decoder takes 3 bytes. Raise SerdeError if the message is not whole, or more stands behind it.
     """
     if data[:2] not in _ORDERS:
         raise SerdeError(f"{type_name} begins with the bytes {data[:2].hex()!r}: only 0000 and 0001, plain CDR, can be read.")

@@ -116,10 +116,7 @@ def check_kind(kind: str | None) -> None:
 def table_file(path: Path, columns: Sequence[str]) -> CsvFile | ParquetFile:
     """Return the file of a table with these columns, by the end of its name ``.csv`` or ``.parquet``.
 
-    Raises
-    ------
-    UsageError
-        A package that is needed is not there.
+    Raise UsageError if a package that is needed is not there.
     """
     return CsvFile(path, columns) if path.suffix == ".csv" else ParquetFile(path, columns)
 

@@ -64,10 +64,7 @@ class Changes:
 def recorded_changes(session: Session, topics: Topics) -> Changes:
     """Return the changes that were made while the session was recorded; `topics` names its topics.
 
-    Raises
-    ------
-    BagError
-        The session cannot be read, or holds what is no change.
+    Raise BagError if the session cannot be read, or holds what is no change.
     """
     topic = topics.outputs[Output.CHANGES]
     info = session.find(topic.absolute)
@@ -102,12 +99,8 @@ class SessionSamples:
     def __iter__(self) -> Iterator[SampleBlock | Change | None]:
         """Yield samples in the order of log times, each change before its sample.
 
-        After a block comes one None for each of its messages that could not be used.
-
-        Raises
-        ------
-        BagError
-            The session cannot be read.
+        After a block comes one None for each of its messages that could not be used. Raise BagError if the session cannot be
+        read.
         """
         heard, session = self._topics.heard, self._session
         changes = recorded_changes(session, self._topics)

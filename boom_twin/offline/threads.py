@@ -58,12 +58,8 @@ def result_bag(
 ) -> Iterator[Callable[[list[ReportBlock | Report]], None]]:
     """Yield a function that queues reports for a thread, which writes them to a bag.
 
-    The bag is complete if the block ends without an exception.
-
-    Raises
-    ------
-    BagError
-        The bag cannot be written. The function raises it, too.
+    The bag is complete if the block ends without an exception. Raise BagError if the bag cannot be written. The function
+    raises it, too.
     """
     encoder = ReportEncoder(scene, settings, topics.frame)
     outputs: dict[str, Topic] = {key: topic for key, topic in topics.outputs.items() if key is not Output.DIAGNOSTICS}

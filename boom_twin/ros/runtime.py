@@ -42,14 +42,10 @@ OTHER_REMEDY = "Check the environment variables ROS_*."
 def ros(arguments: Sequence[str] | None = None) -> Iterator[None]:
     """Provide rclpy within a context, started with the process's or the given ROS arguments.
 
-    rclpy's own signal handlers are left out: they close the context at once, and then a node can no longer say that it
-    is going. What a signal does is up to Python, see `boom_twin.ros.startup`. Fast DDS takes its profiles from the file that
-    ``FASTRTPS_DEFAULT_PROFILES_FILE`` names, and none from the working directory, which may be a received session's.
-
-    Raises
-    ------
-    UsageError
-        The arguments after ``--ros-args``, or what the environment says of ROS, cannot be used.
+    rclpy's own signal handlers are left out: they close the context at once, and then a node can no longer say that it is
+    going. What a signal does is up to Python, see `boom_twin.ros.startup`. Fast DDS takes its profiles from the file that
+    ``FASTRTPS_DEFAULT_PROFILES_FILE`` names, and none from the working directory, which may be a received session's. Raise
+    UsageError if the arguments after ``--ros-args``, or what the environment says of ROS, cannot be used.
     """
     os.environ.setdefault(NO_PROFILES, "1")
     try:

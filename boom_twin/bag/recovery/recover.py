@@ -63,12 +63,8 @@ def definitions_of(path: Path, unverified: bool = False) -> FileDefinitions:
     """Return the definitions, notes and counts of a file from one walk through it.
 
     A definition is used if the checksum of its chunk or of the summary fits or is missing. With `unverified`, definitions at
-    the start of a truncated or corrupt chunk are used too.
-
-    Raises
-    ------
-    BagError
-        The profile is ros1 or px4, or definitions exceed `LARGEST_SUMMARY`.
+    the start of a truncated or corrupt chunk are used too. Raise BagError if the profile is ros1 or px4, or definitions exceed
+    `LARGEST_SUMMARY`.
     """
     found, sure = FileDefinitions(), set[tuple[int, int]]()
     statistics: Statistics | None = None

@@ -157,13 +157,8 @@ class Recorder:
         """Record until `stopped`, which is asked every `boom_twin.ros.runtime.WAKE` s; return the counts by topic.
 
         `on_twin` is told what the twin says of itself, if there is one: its ``parameters``, and the text of its ``scene``.
-
-        Raises
-        ------
-        BagError
-            The bag cannot be written, or not all that was received was written.
-        UsageError
-            The type of a topic is not installed.
+        Raise BagError if the bag cannot be written, or not all that was received was written. Raise UsageError if the type of
+        a topic is not installed.
         """
         try:
             try:

@@ -28,10 +28,7 @@ _RULE = "=" * 80
 def installed_class(type_name: str) -> Any:
     """Return the class of ``package/msg/Name`` or ``package/Name``.
 
-    Raises
-    ------
-    UsageError
-        The type is not installed or not a message type.
+    Raise UsageError if the type is not installed or not a message type.
     """
     parts = type_name.split("/")
     full = f"{parts[0]}/msg/{parts[1]}" if len(parts) == 2 else type_name
@@ -118,10 +115,7 @@ class RequestedTopic:
 def requested_topics(names: Sequence[str], known: Mapping[str, Topic]) -> list[RequestedTopic]:
     """Return the topics named on a command line: ``NAME`` or ``NAME:package/msg/Name``.
 
-    Raises
-    ------
-    UsageError
-        A type is not installed, or a topic is named twice.
+    Raise UsageError if a type is not installed, or a topic is named twice.
     """
     found: dict[str, RequestedTopic] = {}
     for text in names:
@@ -177,10 +171,7 @@ def with_mapped(text: str, place: tuple[str, ...], value: str) -> str:
 def subscription_of(node: Any, wanted: RequestedTopic) -> tuple[Any, QoSProfile, Recorded] | None:
     """Return message class, QoS and entry in the bag of a topic, or None while its type is unknown.
 
-    Raises
-    ------
-    UsageError
-        The type is not installed, or publishers differ in type.
+    Raise UsageError if the type is not installed, or publishers differ in type.
     """
     if wanted.topic is not None:
         topic = wanted.topic

@@ -45,12 +45,7 @@ class TwinNode(LifecycleNode):  # type: ignore[misc] # rclpy.lifecycle is not ty
     It listens only while it is active and its model is ready, so a publisher that has matched its subscriptions is heard. The
     model advances by the stamps of the samples. No timer and no clock affects what is published, except on ``/diagnostics``.
     Compiling the model may take a minute. A thread does it after the transition to configure; the node may be activated
-    meanwhile.
-
-    Raises
-    ------
-    UsageError
-        A parameter given at start cannot be used.
+    meanwhile. Raise UsageError if a parameter given at start cannot be used.
     """
 
     def __init__(self) -> None:

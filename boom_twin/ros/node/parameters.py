@@ -58,10 +58,8 @@ TABLE = (
 def declare(node: Node) -> None:
     """Declare every row of the table.
 
-    Raises
-    ------
-    UsageError
-        A value given at start has the wrong type or is out of range, or is of a parameter that there is not, or no more.
+    Raise UsageError if a value given at start has the wrong type or is out of range, or is of a parameter that there is not,
+    or no more.
     """
     given = node._parameter_overrides  # rclpy has no public way to see those that were not declared
     for name in sorted(given.keys() & RETIRED.keys()):
