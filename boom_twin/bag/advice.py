@@ -52,10 +52,7 @@ def names_extra(info: BagInfo, topics: Topics, joints: int) -> list[str]:
 def missing(info: BagInfo, topics: Topics, joints: int, scene: str = "") -> list[str]:
     """Return a sentence for each input of a replay that the session lacks, the worst first.
 
-    Parameters
-    ----------
-    scene : str
-        Source of the scene, named in the sentences.
+    `scene` is the source of the scene, named in the sentences.
     """
     names = {stream: [name for names in tally.names for name in names] for stream, tally in _joint_states(info, topics)}
     found = [*missing_drive(info.session, topics), *other_names(topics, names, joints, scene)]

@@ -103,14 +103,9 @@ class FileSplit:
 class Storage:
     """Queue of messages in front of a bag; a thread writes them, so that a slow disk does not block the caller.
 
-    Messages survive this process after `FLUSH` seconds. They survive a loss of power as soon as the disk has them.
-
-    Parameters
-    ----------
-    bag : BagWriter
-        Used by this object only from now on.
-    tell : callable
-        Receives a sentence when the disk does not answer, when it answers again, and when no further file begins.
+    Messages survive this process after `FLUSH` seconds. They survive a loss of power as soon as the disk has them. `tell`
+    receives a sentence when the disk does not answer, when it answers again, and when no further file begins. Only this object
+    may use `bag` from now on.
     """
 
     def __init__(self, bag: BagWriter, split: FileSplit, tell: Callable[[str], None]) -> None:

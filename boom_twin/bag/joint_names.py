@@ -19,10 +19,7 @@ NAMES_TOLD = 12  # limit for the number of names in a sentence
 def refuse_other_names(session: Session, topics: Topics, joints: int, scene: str = "") -> None:
     """Raise BagError if a session names other cylinders or joints than a scene has.
 
-    Parameters
-    ----------
-    scene : str
-        Source of the scene; empty if unknown.
+    `scene` is the source of the scene; empty if unknown.
     """
     for sentence in other_names(topics, _names(session, topics, joints), joints, scene):
         raise BagError(f"{session.path}: {sentence}")

@@ -46,17 +46,8 @@ _HEADS = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")  # array type of `PREFIX` and `
 class McapWriter:
     """Writer of one .mcap file. `finish` writes its summary.
 
-    Parameters
-    ----------
-    stream : BinaryIO
-        Empty stream. Nothing else may write to it. It is not closed.
-    chunk_size : int
-        Size above which a chunk is complete, bytes of records.
-
-    Raises
-    ------
-    OSError
-        The stream raises it, in any method.
+    Nothing else may write to `stream`, which is empty and is not closed. A chunk is complete above `chunk_size` bytes of
+    records. Every method raises the OSErrors of the stream.
     """
 
     def __init__(self, stream: BinaryIO, profile: str, library: str, chunk_size: int, compression: CompressionType) -> None:

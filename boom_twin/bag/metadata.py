@@ -189,10 +189,7 @@ _LONGEST = 100_000  # characters of YAML in one entry
 def profiles(value: Any) -> list[Qos]:
     """Return the QoS profiles of one topic as in ``topics.yaml``. A profile that cannot be read is left out.
 
-    Parameters
-    ----------
-    value : object
-        ``offered_qos_profiles`` of ``metadata.yaml`` or of a channel: a list, or YAML of one.
+    `value` is ``offered_qos_profiles`` of ``metadata.yaml`` or of a channel: a list, or YAML of one.
     """
     if isinstance(value, str):
         try:

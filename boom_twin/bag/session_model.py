@@ -124,15 +124,8 @@ def settings_of(session: Path, given: Path | None = None, namespace: str = "") -
 def mapping_of(session: Path, given: Path | None = None, joints: int | None = None, namespace: str = "") -> Mapped:
     """Return the mapping of a session, from the same sources as the scene in `scene_of`.
 
-    Parameters
-    ----------
-    namespace : str
-        Namespace of the node, to which names without a leading slash are relative.
-
-    Raises
-    ------
-    UsageError
-        The mapping, given or the session's, has faults.
+    Names without a leading slash are relative to the `namespace` of the node. Raise UsageError if the mapping, given or the
+    session's, has faults.
     """
     own = kept(session, "mapping", "--mapping") if given is None else None
     if own is None:

@@ -46,15 +46,8 @@ class SessionSheet:
     def write(self, directory: Path, counts: Sequence[Mapping[str, str | int | None]] | None = None) -> None:
         """Write ``session.yaml`` beside the bag, all of it or nothing.
 
-        Parameters
-        ----------
-        counts : sequence of dict, optional
-            At the end: each topic with what became of its messages; None is unknown. A recording that was killed has none.
-
-        Raises
-        ------
-        BagError
-            The disk is full or fails, or the file would be larger than what is read again.
+        `counts` are given at the end: each topic with what became of its messages; None is unknown. A recording that was
+        killed has none. Raise BagError if the disk is full or fails, or the file would be larger than what is read again.
         """
         end = {} if counts is None else {"ended": _time(datetime.now(UTC)), "counts": [dict(each) for each in counts]}
         document = {
@@ -94,17 +87,8 @@ def sheet_path(session: Path) -> Path:
 def kept(session: Path, key: str, option: str) -> KeptText | None:
     """Return the text that a session keeps under `key`; None without one. The text is untrusted input.
 
-    Parameters
-    ----------
-    key : str
-        Key of ``session.yaml``: scene, parameters, mapping, ..
-    option : str
-        Option by which a user gives another text, for the error message.
-
-    Raises
-    ------
-    BagError
-        ``session.yaml`` cannot be read, or holds something else there.
+    `key` is one of ``session.yaml``: scene, parameters, mapping, .. The error names the `option` by which a user gives another
+    text. Raise BagError if ``session.yaml`` cannot be read, or holds something else there.
     """
     path, remedy = sheet_path(session), f"Move it away, or give the {key} by {option}."
     text = _value(path, key, remedy)
@@ -191,10 +175,7 @@ _BEGUN, _ENDED = (re.compile(rb"^%b:" % key, re.MULTILINE) for key in (b"started
 def incompleteness(path: Path) -> str:
     """Return the reason why a session or a result is incomplete; empty if its folder does not mark it as incomplete.
 
-    Parameters
-    ----------
-    path : Path
-        Folder or a file in it; also ``bag`` in the folder of a replay, and ``A/bag`` in that of a comparison.
+    `path` is a folder or a file in it; also ``bag`` in the folder of a replay, and ``A/bag`` in that of a comparison.
     """
     folder = path if path.is_dir() else path.parent
     for place in (folder, *folder.resolve().parents[:2]):

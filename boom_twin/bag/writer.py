@@ -57,19 +57,9 @@ METADATA_PAUSE = 10.0
 class BagWriter:
     """Writer of a bag; `close` completes it, `abandon` leaves it as it is.
 
-    Every method raises BagError if the disk is full or fails. After that, call only `abandon`.
-
-    Parameters
-    ----------
-    notes : dict of str to str, optional
-        Kept in every file and in ``custom_data``.
-    chunk_size : int, optional
-        Bytes of a chunk, before it is compressed.
-
-    Raises
-    ------
-    BagError
-        If `directory` holds anything, or cannot be made.
+    Every method raises BagError if the disk is full or fails. After that, call only `abandon`. `notes` are kept in every file
+    and in ``custom_data``. A chunk has `chunk_size` bytes before it is compressed. Raise BagError if `directory` holds
+    anything, or cannot be made.
     """
 
     def __init__(
@@ -247,14 +237,8 @@ class MessageWriter:
     """Context manager that writes a session of one file.
 
     Leaving the context completes the bag. After an exception the file keeps no end, so that it is not taken for whole;
-    `boom_twin.bag.recovery.recover` saves its messages.
-
-    Parameters
-    ----------
-    topics : dict of str to Topic
-        Topics by any key, which `write` takes. Names are made absolute.
-    notes : dict of str to str, optional
-        For instance that the session is synthetic, and its origin.
+    `boom_twin.bag.recovery.recover` saves its messages. `topics` have any keys, which `write` takes; their names are made
+    absolute. `notes` state, for instance, that the session is synthetic. Options are those of `BagWriter`.
     """
 
     def __init__(

@@ -29,12 +29,8 @@ def all_pieces(look: Generator[None, None, list[Status]]) -> list[Status]:
 class TwinWatch:
     """Judge of the twin and its inputs. It stores messages as they arrive; only `look` judges them.
 
-    Parameters
-    ----------
-    sensors : dict of Stream to sequence of SensorSpec
-        Sensors in the order of a sample's values. The first stream drives the model. Empty before the node is configured.
-    names : dict of Stream to str
-        Names of the input topics. Streams in the messages of another one have none.
+    `sensors` are in the order of a sample's values; the first stream drives the model. They are empty before the node is
+    configured. `names` are those of the input topics; streams in the messages of another one have none.
     """
 
     def __init__(

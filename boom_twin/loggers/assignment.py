@@ -80,17 +80,8 @@ class Assignment:
 def assign(tables: Sequence[LogTable], given: ColumnFile, joints: int | None) -> Assignment:
     """Assign the columns of tables to channels.
 
-    Parameters
-    ----------
-    given : ColumnFile
-        Columns that the user gives. The others are recognised by name.
-    joints : int or None
-        Number of joints of the boom, if it is known.
-
-    Raises
-    ------
-    BagError
-        A given column does not exist, or exists twice.
+    Columns that are not `given` are recognised by name. `joints` is the number of joints of the boom, if it is known. Raise
+    BagError if a given column does not exist, or exists twice.
     """
     for entry in given.time:
         named = [table for table in tables if entry.is_of(table)]

@@ -105,10 +105,7 @@ def is_time(name: str) -> bool:
 def guess(name: str, unit: str, joints: int | None) -> Guess:
     """Return the channel of a column if name and unit fit only one.
 
-    Parameters
-    ----------
-    joints : int or None
-        Number of joints of the boom, if it is known.
+    `joints` is the number of joints of the boom, if it is known.
     """
     if (stream := stream_of(name)) is not None and not unit:
         return Guess(name, SENSORS[stream].unit)

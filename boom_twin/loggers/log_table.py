@@ -35,13 +35,7 @@ class LogRows:
 
 
 class LogTable(ABC):
-    """Table whose rows share a clock.
-
-    Parameters
-    ----------
-    units : sequence of str
-        Units given outside the headers, empty strings if none.
-    """
+    """Table whose rows share a clock. `units` are given outside the headers, empty strings if there are none."""
 
     def __init__(self, source: str, headers: Sequence[str], units: Sequence[str], layout: str) -> None:
         self.source, self.headers, self.layout = source, list(headers), layout

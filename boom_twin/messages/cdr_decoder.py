@@ -105,14 +105,8 @@ MOST_HEADS = 8  # number of heads kept for one topic: a bus may send every joint
 class CdrDecoder:
     """Decoder of the messages of one topic. The frame and the names of a message are decoded when they are new.
 
-    Parameters
-    ----------
-    type_name : str
-        Those of ``sensor_msgs/msg/JointState`` and ``sensor_msgs/msg/Imu`` are read in place, others are decoded.
-    decode : callable, optional
-        Decodes a message with a new head, or one that is not whole.
-    field : str
-        Array of a JointState to read, ``position`` or ``effort``.
+    A ``sensor_msgs/msg/JointState`` or ``sensor_msgs/msg/Imu`` is read in place. `decode` takes other types, messages with a
+    new head, and those that are not whole. `field` is the array of a JointState to read, ``position`` or ``effort``.
     """
 
     def __init__(self, type_name: str, decode: Callable[[bytes, str], Any] = decode, field: str = _ARRAYS[0]) -> None:

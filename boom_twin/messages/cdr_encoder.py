@@ -44,15 +44,8 @@ class NumberFields:
 class Template:
     """One or more encoded messages with places for stamps and numbers, filled together.
 
-    Parameters
-    ----------
-    messages : sequence of (str, message of rosbags)
-        Type and message. Its numbers are constants or from `fields`, and its stamps are `STAMP` s.
-
-    Attributes
-    ----------
-    double_places : ndarray of int64
-        Index of every field among the doubles after the first encapsulation.
+    Each message comes with its type. Its numbers are constants or from `fields`, and its stamps are `STAMP` s. `double_places`
+    are the indices of the fields among the doubles after the first encapsulation.
     """
 
     def __init__(self, messages: Sequence[tuple[str, Any]], fields: NumberFields) -> None:

@@ -55,20 +55,9 @@ _SEE = "See the comments in msg_config/topics.yaml."
 def load_mapping(path: Path | None = None, joints: int | None = None) -> Topics:
     """Return the topics and sensors of a YAML file, or those of the package if no path is given.
 
-    Parameters
-    ----------
-    joints : int, optional
-        Number of joints of the scene, if known. Channels beyond it are then faults, too.
-
-    Returns
-    -------
-    Topics
-        All topics and sensors; those that the file does not name are from the package.
-
-    Raises
-    ------
-    UsageError
-        The file cannot be read, or has faults: the message lists each with path, value, bound and remedy.
+    What the file does not name is from the package. If the number of `joints` of the scene is given, channels beyond it are
+    faults, too. Raise UsageError if the file cannot be read, or has faults: the message lists each with path, value, bound and
+    remedy.
     """
     if path is None:
         return load_topics()

@@ -42,10 +42,7 @@ class ShapeMarkers:
     ``tip_trace``, 0              LINE_STRIP                 tip of the last 5 s, one point for every message
     ============================  =========================  ========================================================
 
-    Parameters
-    ----------
-    force_scale : float
-        Force that has the full colour, N.
+    `force_scale` is the force that has the full colour, N.
     """
 
     def __init__(self, exaggeration: float, force_scale: float, frame: str = FRAME) -> None:

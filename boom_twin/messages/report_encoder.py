@@ -90,10 +90,7 @@ Placer = Callable[[Any, NumberFields], None]
 class ReportEncoder:
     """Encoder of reports as messages in CDR, to publish or to record. Equal reports in equal order give equal bytes.
 
-    Parameters
-    ----------
-    frame : str
-        Frame in all headers, that of the base.
+    `frame` is that of all headers, of the base.
     """
 
     def __init__(self, scene: Scene, settings: Settings, frame: str = FRAME) -> None:

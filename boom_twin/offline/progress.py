@@ -23,12 +23,7 @@ Progress = Callable[[int], ProgressBar]
 class TenthLines:
     """Progress as one line per 10 %.
 
-    Parameters
-    ----------
-    total : int
-        Number of units in the whole run.
-    unit, name : str
-        Plural name of the units, and name of the command.
+    `total` is the number of units in the whole run, `unit` their plural name, `name` that of the command.
     """
 
     def __init__(self, total: int, unit: str, name: str, done: int = 0) -> None:

@@ -31,10 +31,7 @@ A looped session repeats stamps; a stray stamp is far from its stream.
 class Changes:
     """Changes of a session, each to be repeated before the stroke sample at which it took effect.
 
-    Parameters
-    ----------
-    logged : iterable of (int, Change)
-        With their log times (ns), in that order.
+    `logged` are changes with their log times (ns), in that order.
     """
 
     def __init__(self, logged: Iterable[tuple[int, Change]]) -> None:
@@ -77,13 +74,7 @@ BATCH = 400  # messages in one block, at least
 
 
 class SessionSamples:
-    """Samples of a session, many at a time; iterate once.
-
-    Parameters
-    ----------
-    window : TimeWindow, optional
-        The part of the session that is read.
-    """
+    """Samples of a session, many at a time; iterate once. Only the `window` of the session is read."""
 
     def __init__(self, session: Session, topics: Topics, wanted: list[str], joints: int, window: TimeWindow = WHOLE) -> None:
         self._session, self._topics, self._wanted, self._window = session, topics, wanted, window

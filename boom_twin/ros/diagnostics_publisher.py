@@ -20,13 +20,7 @@ MOST_LINES, LINES_SPAN = 4, 600.0
 
 
 class DiagnosticsPublisher:
-    """Publisher of the states of one node.
-
-    Parameters
-    ----------
-    hardware_id : str
-        What is diagnosed; empty: the node's name.
-    """
+    """Publisher of the states of one node. `hardware_id` names what is diagnosed; empty: the node's name."""
 
     def __init__(self, node: Node, topic: Topic, hardware_id: str = "") -> None:
         self._node, self._logger = node, Log(node)

@@ -173,12 +173,8 @@ def with_information(take: Callable[[bytes, Mapping[str, Any]], None]) -> Callab
     """Wrap `take` for ``create_subscription(.., raw=True)``, so that it gets a message's information too.
 
     rclpy tells by the signature that the information is wanted; its events executor (7.1) then gives the two as one argument.
-
-    Parameters
-    ----------
-    take : callable
-        Is given the encoded message and its information: ``received_timestamp``, ``source_timestamp`` (ns) and
-        ``publication_sequence_number``.
+    `take` is given the encoded message and its information: ``received_timestamp``, ``source_timestamp`` (ns) and
+    ``publication_sequence_number``.
     """
 
     def put(*received: Any) -> None:

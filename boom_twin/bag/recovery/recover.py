@@ -131,20 +131,8 @@ class Recovery:
 def recover(path: Path, out: Path, unverified: bool = False) -> Recovery:
     """Write all recoverable messages of the session at `path` into the new directory `out`, or nothing. `path` is only read.
 
-    Parameters
-    ----------
-    unverified : bool
-        Also save the whole messages at the start of chunks that are cut off or whose checksum does not fit.
-
-    Returns
-    -------
-    Recovery
-        Counts of the messages that were saved and lost.
-
-    Raises
-    ------
-    BagError
-        There is no session, nothing of it can be saved, or `out` cannot be written or lies in the source.
+    With `unverified`, the whole messages at the start of chunks that are cut off or whose checksum does not fit are saved,
+    too. Raise BagError if there is no session, nothing of it can be saved, or `out` cannot be written or lies in the source.
     """
     with result_folder(out, RECOVER, [path]) as building:
         return _recover(path, building, unverified)

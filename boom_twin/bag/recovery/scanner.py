@@ -60,12 +60,8 @@ def scan_damaged(
 ) -> Iterator[SoundRecords | DamagedBytes]:
     """Yield all bytes of a file in order as sound records and damaged bytes, with one chunk in memory at a time.
 
-    Parameters
-    ----------
-    unverified : bool
-        Also yield the whole records at the start of a chunk whose checksum does not fit or cannot be verified.
-    channels : container of int, optional
-        Known channels. After damage, messages outside chunks are searched for in these channels only.
+    With `unverified`, the whole records at the start of a chunk whose checksum does not fit or cannot be verified are sound,
+    too. After damage, messages outside chunks are searched for in the known `channels` only.
     """
     size = path.stat().st_size
     with open_received(path) as file:

@@ -139,10 +139,8 @@ def recorder_node() -> Iterator[Any]:
 class Recorder:
     """Recording of topics, with its state on ``/diagnostics``. Log times are those of the reception.
 
-    Parameters
-    ----------
-    tell : callable
-        Told in words when recording begins, once every required topic has a publisher (`COMPLETE`), and what is left out.
+    `tell` is told in words when recording begins, once every required topic has a publisher (`COMPLETE`), and what is left
+    out.
     """
 
     def __init__(

@@ -20,13 +20,7 @@ class BackgroundTask(Generic[Result]):
     """Work too long for a callback, done in a thread. A callback of `node` receives its result.
 
     The thread is a daemon, because a compiler in it cannot be interrupted, see `boom_twin.ros.startup.end_with_preparation`.
-
-    Parameters
-    ----------
-    use : callable
-        Receiver of the result of `work`, in the executor's thread.
-    give_up : callable
-        Receiver of an exception of `work`, in the executor's thread.
+    `use` receives the result of `work`, and `give_up` its exception, both in the executor's thread.
     """
 
     def __init__(

@@ -25,10 +25,7 @@ if TYPE_CHECKING:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped; returns the exit code.
 
-    Parameters
-    ----------
-    argv : sequence of str, optional
-        Arguments without the program's name; by default those of the process.
+    `argv` are the arguments without the program's name; by default those of the process.
     """
     open_closed_streams()
     arguments = list(sys.argv[1:] if argv is None else argv)

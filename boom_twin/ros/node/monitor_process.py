@@ -20,14 +20,8 @@ class MonitorProcess:
     """Child process of the monitor, from now until `close`. If it ends before, one line reports that and nothing else changes.
 
     It shares no socket, lock or queue with the node: it hears the node's topics as any subscriber does. Its standard input is
-    a pipe that the node holds, so it ends with the node however that ends.
-
-    Parameters
-    ----------
-    node : Node
-        Its names, namespace and remappings are those that the page listens to.
-    mapping, scene : str
-        Their paths; empty: the package's own.
+    a pipe that the node holds, so it ends with the node however that ends. The page listens to the names, namespace and
+    remappings of `node`. `mapping` and `scene` are paths; empty: the package's own.
     """
 
     def __init__(self, node: Node, topics: Topics, mapping: str, scene: str) -> None:
