@@ -37,7 +37,7 @@ class Tally:
 
     name: str
     type: str
-    stamped: bool  # stamped, named: true for messages with a header; True for joint states
+    stamped: bool  # stamped, named: messages have a header; they are joint states
     named: bool
     count: int = 0
     first: int = 0  # first, last: log times, ns
@@ -48,9 +48,7 @@ class Tally:
     unset: int = 0  # number of messages with a stamp of 0 or too short for a stamp
     names: Counter[tuple[str, ...]] = field(default_factory=Counter)  # number of messages by their joint names
     _skewed: int = 0  # messages whose log time is compared with their stamp
-    _skew_least: int = 0
-    _skew_most: int = 0
-    _skew_sum: int = 0
+    _skews: tuple[int, int, int] = (2**64, 0, -(2**64))  # least, sum and largest of log time minus stamp, ns
     _before: int | None = None
     _known: tuple[bytes, tuple[str, ...]] | None = None
 
@@ -63,12 +61,11 @@ class Tally:
         stamp: int | None = log_time
         if self.stamped:
             stamp = stamp_in(data)
-            if not stamp:
-                self.unset += 1
-                stamp = None
-            else:
+            if stamp:
                 self._compare(log_time - stamp)
-        if stamp is not None:
+            else:
+                self.unset += 1
+        if stamp:
             self._step(stamp, before_this)
         if self.named:
             self._read_names(data)
@@ -81,9 +78,8 @@ class Tally:
     @property
     def skew(self) -> Skew | None:
         """Log time minus stamp of its messages; None for messages without stamps."""
-        if not self._skewed:
-            return None
-        return Skew(self._skew_least * NANO, self._skew_sum * NANO / self._skewed, self._skew_most * NANO)
+        least, total, most = self._skews
+        return Skew(least * NANO, total * NANO / self._skewed, most * NANO) if self._skewed else None
 
     def _step(self, stamp: int, log_before: int) -> None:
         if self._before is not None:
@@ -94,9 +90,8 @@ class Tally:
         self._before = stamp
 
     def _compare(self, skew: int) -> None:
-        self._skew_least = min(self._skew_least, skew) if self._skewed else skew
-        self._skew_most = max(self._skew_most, skew) if self._skewed else skew
-        self._skew_sum += skew
+        least, total, most = self._skews
+        self._skews = min(least, skew), total + skew, max(most, skew)
         self._skewed += 1
 
     def _read_names(self, data: bytes) -> None:

@@ -196,8 +196,16 @@ def replay_into(
     session, joints = given.session, len(given.scene.joints)
     truth = truth_in(options.window, session, given.topics, given.wanted)
     errors = None if truth is None else TipErrors(truth)
-    taking = None if take is None else _Timed(take)
-    recording = Recording(joints, taking, errors, given.strokes.reading, given.streams)
+    spent = 0.0  # s, of `take`, which is no part of the replay
+
+    def timed(stretch: Stretch) -> None:
+        nonlocal spent
+        if take is not None:
+            began = time.perf_counter()
+            take(stretch)
+            spent += time.perf_counter() - began
+
+    recording = Recording(joints, None if take is None else timed, errors, given.strokes.reading, given.streams)
     other_boom = OtherBoom()
     samples = SessionSamples(session, given.topics, given.wanted, joints, options.window)
     with ExitStack() as stack:
@@ -229,7 +237,7 @@ def replay_into(
         given.refuse(other_boom.judge())
     if bar is not None:
         bar.close()
-    wall = time.perf_counter() - began - (taking.spent if taking else 0.0)
+    wall = time.perf_counter() - began - spent
     twin.counts.update(samples.oddities)
     one, names, bounds = "stroke", "cylinder", "the cylinders' travel"
     if given.strokes.reading is StrokeReading.ANGLE:
@@ -254,19 +262,6 @@ def replay_into(
         summary |= errors.rms
     write_atomic(out / "summary.json", json.dumps(summary, indent=2) + "\n")
     return Replay(summary, recording, session, truth)
-
-
-class _Timed:
-    """Wrapper of `take` that adds up its time, s, which is no part of the replay."""
-
-    def __init__(self, take: Callable[[Stretch], None]) -> None:
-        self._take = take
-        self.spent = 0.0
-
-    def __call__(self, stretch: Stretch) -> None:
-        began = time.perf_counter()
-        self._take(stretch)
-        self.spent += time.perf_counter() - began
 
 
 def _angles(block: SampleBlock, found: list[ReportBlock | Report], joints: int) -> tuple[Array, list[Array]]:
