@@ -147,22 +147,14 @@ class CdrDecoder:
             return None
         arrays = [] if is_imu else _arrays(first, end)[0]
         rows = gather(block.content, block.starts, size)
-        alike = slice(_ORIGIN), slice(_HEAD, end), *(slice(each.length, each.length + 4) for each in arrays)
+        alike = slice(_ORIGIN), slice(_HEAD, end), *(slice(length, length + 4) for length, _, _ in arrays)
         if any((rows[:, each] != rows[0, each]).any() for each in alike):
             return None
         times = rows[:, _ORIGIN:_HEAD].copy()
         stamps = times.view("<i4")[:, 0] * np.int64(SECOND) + times.view("<u4")[:, 1]
-        _, place, count = _Place(0, _aligned(end), _IMU_NUMBERS) if is_imu else arrays[_ARRAYS.index(self._field)]
+        _, place, count = (0, _aligned(end), _IMU_NUMBERS) if is_imu else arrays[_ARRAYS.index(self._field)]
         numbers = tuple(rows[:, place : place + 8 * count].copy().view("<f8").T)
         return stamps, _axes_of(text, numbers) if is_imu else Joints(text)._replace(**{self._field: numbers})
-
-
-class _Place(NamedTuple):
-    """Array in a message: offsets of its length and of its first number, and how many numbers it has."""
-
-    length: int
-    first: int
-    numbers: int
 
 
 def _aligned(place: int) -> int:
@@ -170,15 +162,18 @@ def _aligned(place: int) -> int:
     return place + -(place - _ORIGIN) % 8
 
 
-def _arrays(data: bytes, place: int) -> tuple[list[_Place], int]:
-    """Return the arrays of a JointState whose names end at `place`, and the end of the last one."""
+def _arrays(data: bytes, place: int) -> tuple[list[tuple[int, int, int]], int]:
+    """Return the arrays of a JointState whose names end at `place`, and the end of the last one.
+
+    Of each array these are the offsets of its length and of its first number, and its length.
+    """
     found = []
     for _ in _ARRAYS:
         length = place + -place % 4
         place = length + 4
         if count := int.from_bytes(data[length:place], "little"):
             place = _aligned(place)
-        found.append(_Place(length, place, count))
+        found.append((length, place, count))
         place += 8 * count
     return found, place
 

@@ -183,6 +183,7 @@ class SampleDecoder:
             else:
                 places, *_, is_regular = channels.look(names)
                 is_regular &= len(columns) == len(names)
+            is_regular &= frame == (self._frames.get(kind.beside or stream.value) or frame)
             own = [i for i, place in enumerate(places) if place >= 0]
             if not (is_regular and own and not kind.gives and ((stamps != 0) & (taken > 0) & (taken < LATEST)).all()):
                 return None

@@ -23,9 +23,6 @@ from ..config.settings import Settings
 from ..diagnostics.boom_mismatch import OtherBoom
 from ..errors import BagError
 from ..health.sensor_check import sensor_ranges
-from ..loggers.column_file import ColumnFile
-from ..loggers.import_session import import_session
-from ..loggers.log_table import table_of_frame
 from ..messages.sample_decoder import ODDITIES
 from ..scene.load import SceneSource
 from ..system.atomic_files import write_atomic
@@ -172,6 +169,10 @@ def replay(
         options = ReplayOptions(progress, mapping, changes, health, window, namespace, with_bag, causes)
         if is_path:
             return replay_into(building, bag, scene, settings, options)
+        from ..loggers.column_file import ColumnFile
+        from ..loggers.import_session import import_session
+        from ..loggers.log_table import table_of_frame
+
         kept, place = scene_from(scene), building / SESSION
         place.mkdir()
         sheet, own = SessionSheet(__version__, kept.text), None if mapping is None else Path(mapping)

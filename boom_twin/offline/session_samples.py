@@ -118,7 +118,7 @@ class SessionSamples:
     def _take(self, blocks: SessionBlocks, part: MessageBlock, wires: list[CdrDecoder], streams: list[list[Stream]]) -> None:
         """Decode messages: those of a source at once if all are regular, others one by one in their order."""
         irregular, regular = list[Integers](), list[tuple[Integers, Stream, Integers, Array]]()
-        for source in np.unique(part.sources).tolist():
+        for source in sorted(set(part.sources.tolist())):
             rows, found = np.flatnonzero(part.sources == source), None
             if len(rows) > 1 and (read := wires[source].read_many(part.chosen(rows))) is not None:
                 found = self._decoder.many(streams[source], *read)

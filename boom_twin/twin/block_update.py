@@ -192,9 +192,10 @@ class BlockUpdate:
             variances = found.rows[own, self._boom.places.variances].copy()
             self._judge.predicted(PredictionRows(found.stamps[own].copy(), found.measured[own].copy(), variances))
         streams = found.residual_streams[compared : counts[1]]
+        present = set(streams.tolist())
         for code, width in self._measured:
-            rows = compared + np.flatnonzero(streams == code)
-            if len(rows):
+            if code in present:
+                rows = compared + np.flatnonzero(streams == code)
                 values = (each[rows, :width] for each in (found.raw, found.values, found.sigmas))
                 self._judge.measured(STREAMS[code], MeasuredRows(found.residual_stamps[rows], *values))
 
