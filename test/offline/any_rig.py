@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from recordings import SessionSheet, SessionWriter, load_mapping, sensor_message
+from recordings import SessionSheet, SessionWriter, sensor_message
 
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.bag.session_writer import named_message
@@ -58,6 +58,3 @@ def write(folder: Path, session: RigSession, mapping: str, lag: float = LAG, dri
     session.save_truth(folder / FILE_NAME)
     SessionSheet("test", default_text(), mapping=mapping).write(folder)
     return folder
-
-
-__all__ = ["DRIFT", "KNOWN", "LAG", "SCENE", "TURNED", "load_mapping", "motion", "write"]
