@@ -42,6 +42,7 @@ WIDTH = 1e-6  # relative accuracy of natural frequencies
 USUAL_LOAD, LEAST_LOAD, FIRST_LOAD, BURST_LOAD = 2.5e-3, 1e-4, 2e-3, 2e-2  # shares of the boom's weight, see `SensorNoise`
 DOUBTED_DRIFT = 1000.0  # times the usual variance of the drift of a zero, of a sensor in doubt
 FAILED_WAY, FAILED_RATE = 0.05, 0.02  # m, m/s: how far a drive is, and how fast, when its transducer is found to fail
+LAG_FLOOR = 2e-3  # s, error of an estimated lag by errors of the model: measured on sessions of the virtual rig
 SWING, SPEED = 0.3, 0.05  # how far a boom at work swings, as a share of the tip's deflection; m/s of its cylinders
 
 
@@ -317,7 +318,12 @@ class BoomPredictor:
         for row in self.posture.channels[self.posture.channels.lag >= 0]:
             lag, is_there = zero + int(row.lag), self.posture.behind[0] > row.lag and f.status[FED] == 1
             sigmas = np.sqrt(f.spread[ESTIMATE].diagonal()[lag : lag + 2]) if is_there else (LAG_FIRST, DRIFT_FIRST)
-            numbers = f.lags[row.stream] + f.mean[ESTIMATE, lag], sigmas[0], f.mean[ESTIMATE, lag + 1], sigmas[1]
+            numbers = (
+                f.lags[row.stream] + f.mean[ESTIMATE, lag],
+                math.hypot(sigmas[0], LAG_FLOOR),
+                f.mean[ESTIMATE, lag + 1],
+                sigmas[1],
+            )
             found.setdefault(streams[row.stream], Clock(*map(float, numbers)))
         return {stream: clock for stream, clock in found.items() if not SENSORS[stream].beside}
 

@@ -34,7 +34,7 @@ from .session_samples import SessionSamples
 
 LOOK = 60.0  # s of a session that `wiring_of` reads
 LATE = 0.01  # s, smallest lag that is proposed as `delay`
-MOST_LAG = 0.08  # s, below which the estimator itself finds a lag
+MOST_LAG = 0.08  # s, below which the filter finds a lag; it knows how far the expected readings lag themselves
 SIGMAS = 4.0  # standard deviations by which a lag, or a reading as drive or length, has to be told
 ZERO = math.radians(0.15)  # zeros of encoders
 AXES = "x", "y", "z"
@@ -145,17 +145,18 @@ def commission(
         sensing = topics.noise_of(settings), mounts, False, told or reads, topics.absent
         twin = Twin(own.scene, *sensing, places=topics.places, lagging=topics.lagging)
         lags = _lags(twin, session, topics, window, found)
+        near = [stream for stream, lag in lags.items() if abs(lag.lag) < MOST_LAG and lag.sigma < math.inf]
+        for _ in range(2):  # the second time those that are not late tell the time
+            twin = Twin(own.scene, *sensing, places=topics.places, lagging=dict.fromkeys([*topics.lagging, *near]))
+            for _step in drive_blocks(twin, _samples(session, topics, window, joints)):
+                pass
+            lags |= {stream: Lag(clock.lag, clock.lag_sigma) for stream, clock in twin.clocks.items() if stream in lags}
+            near = [stream for stream in near if is_late(lags[stream])]
         for stream, lag in lags.items():
             if is_late(lag) and stream not in topics.lagging:
                 delay = round(topics.inputs[stream].delay + lag.lag, 3)
                 entry = document.setdefault("inputs", {}).setdefault(stream.value, {})
                 entry["delay"] = "auto" if abs(delay) < MOST_LAG else delay
-        topics = mapping_from(document, mapped.source, joints).of_scene(own.scene.joints)
-        if any(stream in lags for stream in topics.lagging):
-            twin = Twin(own.scene, *sensing, places=topics.places, lagging=topics.lagging)
-            for _ in drive_blocks(twin, _samples(session, topics, window, joints)):
-                pass
-            lags |= {stream: Lag(clock.lag, clock.lag_sigma) for stream, clock in twin.clocks.items()}
     return Commissioning(found, document, lags, absent, reads, told)
 
 

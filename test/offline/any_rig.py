@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from recordings import SessionSheet, SessionWriter, load_mapping, sensor_message
+from recordings import MessageWriter, SessionSheet, sensor_message
 
 from boom_twin import Sample, Stream, load_scene
 from boom_twin.bag.session_writer import named_message
@@ -45,7 +45,7 @@ def write(folder: Path, session: RigSession, mapping: str, lag: float = LAG, dri
     values = session.placed | {Stream.STROKES: session.strokes, Stream.ANGLES: session.joints, Stream.IMU: session.imu}
     names = ("joint_1", "joint_2", "", "")
     topics = {stream.value: every_input()[stream] for stream in STREAMS}
-    with SessionWriter(folder, topics, {"origin": "synthetic, a test"}) as bag:
+    with MessageWriter(folder, topics, {"origin": "synthetic, a test"}) as bag:
         for k, stamp in enumerate(session.stamps.tolist()):
             for stream, every in STREAMS.items():
                 if k % every == 0:
@@ -58,6 +58,3 @@ def write(folder: Path, session: RigSession, mapping: str, lag: float = LAG, dri
     session.save_truth(folder / FILE_NAME)
     SessionSheet("test", default_text(), mapping=mapping).write(folder)
     return folder
-
-
-__all__ = ["DRIFT", "KNOWN", "LAG", "SCENE", "TURNED", "load_mapping", "motion", "write"]
