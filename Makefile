@@ -11,9 +11,9 @@ export MPLBACKEND := Agg
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # With PYTHONDONTWRITEBYTECODE every process that a test starts would compile all modules again.
 unexport PYTHONPATH PYTHONHOME PYTHONDONTWRITEBYTECODE _ROS_WHEELS_BOOTSTRAP_COMPLETE
-# Processes that share the tests; those that wait for a ROS node leave the core to the others.
+# Processes that share the tests; those that wait for a ROS node leave the core to the others. A crash of one ends the run.
 WORKERS ?= 3
-PARALLEL = -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+PARALLEL = -n $(WORKERS) --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
 .PHONY: help setup warm demo demo-live test lint test-system test-extra ament client study gate soak fuzz session figures measured docs clean
 

@@ -17,6 +17,9 @@ from ..system.child_process import python_command
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Signals that end a process. A closed terminal sends SIGHUP; ``nohup`` ignores it."""
 
+PREPARATION = "preparation"
+"""Name of the thread that prepares a node's model."""
+
 
 def stop_signals() -> tuple[signal.Signals, ...]:
     """Return the signals of `STOPS` that this process handles; SIGHUP is left out if it is ignored."""
@@ -80,12 +83,12 @@ class StopSignal:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
-def end_with_threads(code: int) -> int:
-    """Return the exit code; if a daemon thread still works, end the process with it here.
+def end_with_preparation(code: int) -> int:
+    """Return the exit code; if the thread `PREPARATION` still works, end the process with it here.
 
-    Python does not wait for daemon threads. A compiler in one of them would crash while its library is unloaded.
+    Python does not wait for this daemon thread. The compiler in it would crash while its library is unloaded.
     """
-    if any(each.daemon for each in threading.enumerate()):
+    if any(each.name == PREPARATION for each in threading.enumerate()):
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -54,8 +55,17 @@ CASES = [
 ]
 
 
+@pytest.fixture
+def callers_thread() -> Iterator[None]:
+    """A daemon thread of the caller, for which the process must not be ended."""
+    over = threading.Event()
+    threading.Thread(target=over.wait, daemon=True).start()
+    yield
+    over.set()
+
+
 @HAS_ROS
-@pytest.mark.usefixtures("isolation", "quiet_signals")
+@pytest.mark.usefixtures("isolation", "quiet_signals", "callers_thread")
 @pytest.mark.parametrize(("arguments", "words"), CASES, ids=[words[:20] for _, words in CASES])
 def test_a_bad_argument_is_told_by_its_name(
     arguments: list[str], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]

@@ -9,6 +9,8 @@ from typing import Generic, TypeVar
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from ..startup import PREPARATION
+
 Result = TypeVar("Result")
 
 LOOK = 0.05  # period of the checks for the end of the work, s
@@ -17,7 +19,7 @@ LOOK = 0.05  # period of the checks for the end of the work, s
 class BackgroundTask(Generic[Result]):
     """Work too long for a callback, done in a thread. A callback of `node` receives its result.
 
-    The thread is a daemon, because a compiler in it cannot be interrupted, see `boom_twin.ros.startup.end_with_threads`.
+    The thread is a daemon, because a compiler in it cannot be interrupted, see `boom_twin.ros.startup.end_with_preparation`.
 
     Parameters
     ----------
@@ -40,7 +42,7 @@ class BackgroundTask(Generic[Result]):
         self._node, self._work, self._use, self._give_up = node, work, use, give_up
         self._ended: Callable[[], None] | None = None
         self._timer = node.create_timer(LOOK, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        Thread(target=self._run, name="preparation", daemon=True).start()
+        Thread(target=self._run, name=PREPARATION, daemon=True).start()
 
     def abandon(self) -> None:
         """Discard the result; the thread ends by itself."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from ...errors import BoomTwinError
 from ...system.cores import use_one_blas_thread
 from ...system.terminal_text import open_closed_streams
-from ..startup import StopSignal, end_with_threads, require_rclpy
+from ..startup import StopSignal, end_with_preparation, require_rclpy
 
 use_one_blas_thread()
 
@@ -34,7 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
         require_rclpy()
-        return end_with_threads(_run(arguments, StopSignal()))
+        return end_with_preparation(_run(arguments, StopSignal()))
     except BoomTwinError as error:
         print(f"twin_node: {error}", file=sys.stderr)
         return 1
